@@ -1,4 +1,4 @@
-"""No test, and no process of one, reads the configuration of whoever runs the tests."""
+"""Tests and their processes do not read the configuration of the user who runs them."""
 
 import os
 import signal
@@ -12,10 +12,10 @@ for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
     del os.environ[name]
 os.environ["MAV_TASKS_CONFIG"] = ""
 
-# pymavlink settles on a version of MAVLink when it is first imported, whichever test that is in.
+# pymavlink fixes its MAVLink version on its first import, whichever test that is in.
 os.environ["MAVLINK20"] = "1"
 
-# A shell lets what it runs in the background ignore Ctrl-C, and so would all that tests begin.
+# A shell ignores Ctrl-C in background jobs, and the tests' processes would inherit that.
 if (
     threading.current_thread() is threading.main_thread()
     and signal.getsignal(signal.SIGINT) is signal.SIG_IGN
@@ -24,5 +24,5 @@ if (
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Run again what failed while the machine stood still."""
+    """Rerun tests that failed while the machine stalled."""
     config.pluginmanager.register(RunAgain())

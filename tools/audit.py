@@ -1,10 +1,10 @@
-"""Ask pip-audit for known vulnerabilities of what tools/lock pins.
+"""Ask pip-audit for known vulnerabilities of the packages in tools/lock.
 
-Exit 0: none; 1: there are some, or nobody can tell why not; 75: not asked, because the network is
-not there: the first line says so, and tools/check repeats it. The lock is asked about, not the
-machine's environment, and all of it: also what other systems and other Pythons install.
+Exit 0: none; 1: some, or the audit failed; 75: skipped without a network: the first line says so,
+and tools/check repeats it. The audit covers the whole lock, not the installed environment, also
+packages for other systems and Python versions.
 
-Those in tools/lock/accepted.toml are known and lived with. Each has its reason there.
+tools/lock/accepted.toml lists accepted vulnerabilities, each with its reason.
 """
 
 import json
@@ -23,12 +23,12 @@ LOCK = Path(__file__).resolve().parent / "lock"
 FILES = ("requirements.txt", "without_dependencies.txt")
 ACCEPTED = "accepted.toml"
 
-LIMIT = 60.0  # s, for everything: a network that hangs must not hang the gate
-ANSWER = 10  # s, for one answer
+LIMIT = 60.0  # s, for everything: a hanging network must not block the gate
+ANSWER = 10  # s, per request
 FAILED, SKIPPED = 1, 75
 
 PIN = re.compile(r"([A-Za-z0-9._-]+)==([^\s;\\]+)")
-#: what pip-audit, or requests under it, says when nobody answers; 403 and 407 are a proxy's
+#: messages of pip-audit, or requests under it, without a network; 403 and 407 come from a proxy
 NO_NETWORK = re.compile(
     r"ConnectionError|ConnectTimeout|ReadTimeout|ProxyError|SSLError|Could not connect"
     r"|Failed to resolve|Name or service not known|Temporary failure in name resolution"
@@ -37,22 +37,22 @@ NO_NETWORK = re.compile(
 
 
 class AuditError(Exception):
-    """The audit could not be made; the message says why."""
+    """The audit failed; the message has the reason."""
 
 
 class NoNetwork(Exception):
-    """Nobody answers; the message says what was tried."""
+    """The network is unreachable; the message says what was tried."""
 
 
 class Accepted(NamedTuple):
-    """A vulnerability that is lived with."""
+    """An accepted vulnerability."""
 
     number: str
     reason: str
 
 
 class Found(NamedTuple):
-    """A vulnerability of a pin, under each of its names."""
+    """A vulnerability of a pinned package, with all its names."""
 
     package: str
     version: str
@@ -65,9 +65,9 @@ class Found(NamedTuple):
 
 
 def rounds(texts: list[str]) -> list[list[str]]:
-    """Return the pins of lock files, in lists in which no package stands twice.
+    """Return the pins of lock files, in lists in which each package occurs once.
 
-    A lock has two versions of a package where one Python wants another than the next.
+    A lock has two versions of a package if Python versions need different ones.
     """
     found: list[dict[str, str]] = []
     for text in texts:
@@ -87,7 +87,7 @@ def rounds(texts: list[str]) -> list[list[str]]:
 
 
 def accepted(text: str) -> list[Accepted]:
-    """Read the list of those that are lived with. AuditError: one has no reason."""
+    """Read the accepted vulnerabilities. Raise AuditError if one has no reason."""
     try:
         entries = tomllib.loads(text).get("accepted", [])
         known = [Accepted(entry["id"].strip(), entry["reason"].strip()) for entry in entries]
@@ -100,7 +100,7 @@ def accepted(text: str) -> list[Accepted]:
 
 
 def audit(pins: list[str], *, within: float) -> list[Found]:
-    """Ask about pins. NoNetwork: nobody answers; AuditError: something else is wrong."""
+    """Run pip-audit on pins. Raise NoNetwork without an answer, AuditError on any other error."""
     command = shutil.which("pip-audit")
     if command is None:
         raise AuditError("pip-audit is not installed: run tools/setup")
@@ -146,7 +146,7 @@ def _found(answer: Any, *, asked: int) -> list[Found]:
 
 
 def main(folder: Path) -> int:
-    """Audit the lock files of a folder; gives the exit code."""
+    """Audit the lock files of a folder; return the exit code."""
     end = monotonic() + LIMIT
     try:
         lived_with = accepted((folder / ACCEPTED).read_text(encoding="utf-8"))

@@ -1,8 +1,8 @@
 """Build `mav_tasks/mavlink/_dialect.py` from `dialects/` with pymavlink's mavgen.
 
-The base is the definition set that the installed pymavlink ships. `dialects/base_additions.xml` is
-merged into a temporary copy of it, and only what the base lacks, because mavgen refuses a message
-that is defined twice. The output depends on the definitions and the pymavlink version alone: no
+The base is the definition set of the installed pymavlink. `dialects/base_additions.xml` is merged
+into a temporary copy of it, without definitions that the base has, because mavgen refuses a message
+that is defined twice. The output depends only on the definitions and the pymavlink version: no
 date, no path. The build hook and the gate both call this file.
 """
 
@@ -25,8 +25,8 @@ DIALECT = Path("dialects/mav_tasks.xml")
 ADDITIONS = Path("dialects/base_additions.xml")
 OUTPUT = Path("mav_tasks/mavlink/_dialect.py")
 BASE = "common.xml"
-MESSAGES = 200  # there are more in the base
-#: what the constructor of each kind of message begins with
+MESSAGES = 200  # fewer than the base has
+#: the beginning of each message constructor
 _COMMON = re.compile(
     r"        MAVLink_message\.__init__\(self, (\w+)\.id, \1\.msgname\)\n"
     r"        self\._fieldnames = \1\.fieldnames\n"
@@ -50,7 +50,7 @@ class DialectError(Exception):
 
 
 def build_dialect(root: Path = ROOT) -> bool:
-    """Make the generated module current. True if it had to be written."""
+    """Update the generated module. Return True if it was written."""
     header = _header(root, _base_files())
     output = root / OUTPUT
     if output.is_file() and _first_line(output) == header:
@@ -60,7 +60,7 @@ def build_dialect(root: Path = ROOT) -> bool:
 
 
 def check_dialect(root: Path = ROOT) -> str | None:
-    """What is wrong with the generated module, or None. Finds edits by hand, too."""
+    """Return what is wrong with the generated module, or None. It also detects manual edits."""
     output = root / OUTPUT
     if not output.is_file():
         return f"{OUTPUT} is missing; run tools/build_dialect.py"
@@ -70,7 +70,7 @@ def check_dialect(root: Path = ROOT) -> str | None:
 
 
 def _base_files() -> list[Path]:
-    """The base definitions that pymavlink ships, and all that they include."""
+    """Return the base definitions of pymavlink, with all included files."""
     spec = importlib.util.find_spec("pymavlink")
     if spec is None or not spec.submodule_search_locations:
         raise DialectError("pymavlink is not installed: pip install pymavlink")
@@ -116,7 +116,7 @@ def _write_definitions(root: Path, folder: Path) -> None:
 
 
 def _merge(base: list[ElementTree.Element], additions: ElementTree.Element) -> None:
-    """Add to the first file of the base what no file of the base has."""
+    """Add definitions that no file of the base has to the first file of the base."""
     for enum in additions.iter("enum"):
         known = _named(base, "enum", enum.attrib["name"])
         if not known:
@@ -138,7 +138,7 @@ def _merge(base: list[ElementTree.Element], additions: ElementTree.Element) -> N
 
 
 def _extend(known: ElementTree.Element, message: ElementTree.Element) -> None:
-    """Append the extension fields that are lacking; base fields make up CRC_EXTRA and stay."""
+    """Append missing extension fields; base fields determine CRC_EXTRA and stay."""
     children = list(message)
     start = next(
         (i for i, child in enumerate(children) if child.tag == "extensions"), len(children)
@@ -169,7 +169,7 @@ def _run_mavgen(source: Path, output: Path) -> None:
     options = mavgen.Opts(
         str(output), mavparse.PROTOCOL_2_0, language="Python3", validate=True, strict_units=False
     )
-    said = io.StringIO()  # mavgen narrates each file; worth reading only when it fails
+    said = io.StringIO()  # mavgen reports each file; useful only if it fails
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             done = mavgen.mavgen(options, [str(source)])
@@ -180,10 +180,10 @@ def _run_mavgen(source: Path, output: Path) -> None:
 
 
 def _made_light(module: str) -> str:
-    """Have a message's constructor set its fields and nothing else.
+    """Reduce each message constructor to setting its fields.
 
-    What mavgen has it set beside them is the same for each message of a kind, and took two thirds
-    of the time of making one: it is said once for the kind.
+    mavgen's constructors also set values that are the same for each message type, which took two
+    thirds of the time of creating one. They are set once per type instead.
     """
     light, count = _COMMON.subn("", module)
     if count < MESSAGES:

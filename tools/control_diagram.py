@@ -1,6 +1,6 @@
-"""Draw what pauses a rover's queue, from the table of joint control, into mav_tasks/README.md.
+"""Draw the states of a rover's queue, from the table of joint control, into mav_tasks/README.md.
 
-`--check` tells if it is old.
+`--check` reports whether the drawing is old.
 """
 
 import sys
@@ -50,7 +50,7 @@ WORDS = {
 
 
 def edges() -> dict[tuple[Queue, Queue], list[Event]]:
-    """Return which events lead from each state of the queue to another."""
+    """Return the events that lead from each state of the queue to another."""
     found: dict[tuple[Queue, Queue], list[Event]] = {}
     for make, queue, grip, work in product(MAKES, Queue, Grip, Work):
         make_of: dict[str, Any] = {**MAKES[make]}

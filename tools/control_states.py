@@ -1,9 +1,9 @@
-"""Tries everything from every state of control that a rover can come into, and judges what it does.
+"""Tries every event in every reachable state of control, and judges the server's reaction.
 
     tools/control_states.py --persona px4 --most 1000      about a state a second
     tools/control_states.py --start "task, pause"          from there
 
-Exit code 0: nothing was wrong; 1: something was, and what led to it is printed. Linux only.
+Exit code 0: nothing was wrong; 1: something was, and its sequence of events is printed. Linux only.
 """
 
 import argparse
@@ -24,7 +24,7 @@ PERSONAS = {"ardupilot": PROMPT, "px4": PROMPT_PX4}
 
 
 def main() -> int:
-    """Do what the command line says; gives the exit code."""
+    """Run the search; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="tools/control_states.py",
         description=__doc__,
@@ -37,7 +37,7 @@ def main() -> int:
     start = [name.strip() for name in arguments.start.split(",") if name.strip()]
     if unknown := [name for name in start if name not in BY_NAME]:
         parser.error(f"{unknown[0]}: no deed; there are {', '.join(BY_NAME)}")
-    logging.disable(logging.CRITICAL)  # what servers say of thousands of refusals
+    logging.disable(logging.CRITICAL)  # thousands of logged refusals
     make = partial(_world, arguments.persona)
     found = search(make, most=arguments.most, start=start)
     for path, what in found.wrong:

@@ -1,4 +1,4 @@
-"""Parts of documents that are made by a tool, between two lines that say so."""
+"""Generated parts of documents, between two marker lines."""
 
 import sys
 from pathlib import Path
@@ -7,9 +7,10 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def keep_current(document: str, what: str, tool: str, made: str) -> int:
-    """Put what was made into a document of ours; gives the exit code.
+    """Put the generated text into a document; return the exit code.
 
-    With ``--check`` on the command line it only tells if what is there is old, which is 1.
+    With ``--check`` on the command line, only report whether the document is old, and return 1 if
+    so.
     """
     path = ROOT / document
     begin, end = f"<!-- {what}: made by tools/{tool} -->\n", f"<!-- end of {what} -->\n"

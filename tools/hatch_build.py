@@ -1,6 +1,6 @@
 """Hatchling's build hook: a wheel, editable or not, has the dialect generated from `dialects/`.
 
-The work is `build_dialect`'s, so that the set-up, the gate and a build cannot differ.
+`build_dialect` does the work, so that set-up, gate and build have the same result.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Prints the policy table into dialects/README.md; `--check` tells if what is there is old."""
+"""Prints the policy table into dialects/README.md; `--check` reports whether it is old."""
 
 import sys
 from collections.abc import Iterable, Iterator
@@ -19,7 +19,7 @@ Group = tuple[Row, list[str]]
 
 
 def table() -> str:
-    """Return kinds, commands and messages in words, each group of equal rows in one line."""
+    """Return kinds, commands and messages in words, with equal rows joined in one line."""
     kinds = [f"| {kind.name.lower()} | {kind.value} |" for kind in KINDS]
     commands = _lines(of_commands.COMMANDS.items(), (*of_commands.BY_WORDS, NAMELESS))
     messages = _lines(of_messages.MESSAGES.items(), (*of_messages.BY_WORDS, NAMELESS))
@@ -51,7 +51,7 @@ def _line(row: Row, names: list[str]) -> str:
 
 
 def _way(row: Row) -> str:
-    """Say what becomes of it."""
+    """Return a row's treatment in words."""
     if row.is_claimed and row.elsewhere is None:
         return "the server's; else as what is not named"
     if row.is_claimed:

@@ -1,8 +1,8 @@
-"""Create or update `.venv`, so that a run that was interrupted anywhere is repaired by the next.
+"""Create or update `.venv`; the next run repairs an interrupted one.
 
-Called by `tools/setup` with the interpreter that a new environment shall have. Standard library
-only: nothing is installed yet. Two runs at once take turns. An environment that was not made here
-is used as it is and never removed.
+`tools/setup` calls it with the interpreter for a new environment. Standard library only: nothing is
+installed yet. Concurrent runs wait for each other. An environment that was not made here is used
+unchanged and never removed.
 """
 
 import argparse
@@ -22,15 +22,15 @@ ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 VENV_PYTHON = VENV / "bin" / "python"
 LOCKS = ROOT / "tools" / "lock"
-#: What can be installed, and its lock. DEVELOPMENT has all that DEMO has, at the same versions.
+#: Installable sets, and their locks. DEVELOPMENT includes DEMO, at the same versions.
 DEMO, DEVELOPMENT = "demo", "development"
 LOCK_OF = {DEMO: LOCKS / "demo.txt", DEVELOPMENT: LOCKS / "requirements.txt"}
 LOCK_WITHOUT_DEPENDENCIES = ROOT / "tools" / "lock" / "without_dependencies.txt"
 DIALECT = ROOT / "mav_tasks" / "mavlink" / "_dialect.py"
-#: What the environment was made from. Written last; "unfinished" while a new one is being made.
+#: Inputs of the environment. Written last; "unfinished" while a new one is being made.
 STAMP = VENV / ".mav-tasks-setup"
 UNFINISHED = "unfinished\n"
-#: A change of any of these means there is something to do.
+#: A change of any of these requires an update.
 INPUTS = (
     "pyproject.toml",
     "tools/lock/demo.txt",
@@ -46,11 +46,11 @@ INPUTS = (
 
 
 class SetupError(Exception):
-    """The environment could not be made; the message says why."""
+    """The environment could not be made; the message has the reason."""
 
 
 def is_current(wanted: str) -> bool:
-    """Asked with the environment's own interpreter: is there nothing to do?"""
+    """Return whether the environment is current. Run with the environment's own interpreter."""
     return DIALECT.is_file() and _serves(wanted, platform.python_version())
 
 
@@ -58,9 +58,9 @@ def set_up(wanted: str) -> None:
     with _one_at_a_time():
         version = _usable_version()
         if version and _serves(wanted, version) and DIALECT.is_file():
-            return  # another run has just done it
+            return  # a concurrent run has done it
         if wanted == DEMO and version and _was_for(DEVELOPMENT):
-            wanted = DEVELOPMENT  # it stays what it is
+            wanted = DEVELOPMENT  # keep the larger set
         if version is None:
             _create()
         elif _read_stamp():
@@ -78,7 +78,7 @@ def set_up(wanted: str) -> None:
             "4/4 installing mav-tasks itself, editable, with its MAVLink dialect",
             _pip_install("--no-deps", "--no-build-isolation", "--editable", str(ROOT)),
         )
-        # pip does not compile what is editable; the dialect is large enough to notice.
+        # pip does not compile editable packages; the dialect is large enough to notice.
         _call([str(VENV_PYTHON), "-m", "compileall", "-q", str(DIALECT)])
         version = _version_of(VENV_PYTHON) or ""
         STAMP.write_text(_stamp(version, wanted), encoding="utf-8")
@@ -86,7 +86,7 @@ def set_up(wanted: str) -> None:
 
 
 def _usable_version() -> str | None:
-    """The Python version of an environment that can be used or updated; None: make a new one."""
+    """Return the Python version of a usable or updatable environment; None: make a new one."""
     stamp = _read_stamp()
     if stamp == UNFINISHED or not VENV.exists() or not any(VENV.iterdir()):
         return None
@@ -111,7 +111,7 @@ def _create() -> None:
 
 
 def _remove_old() -> None:
-    # Renamed first: an interrupted removal must not leave half an environment under this name.
+    # Rename first: an interrupted removal must not leave a partial environment under this name.
     if VENV.exists():
         VENV.rename(ROOT / f".venv.old-{os.getpid()}")
     for old in ROOT.glob(".venv.old-*"):
@@ -119,7 +119,7 @@ def _remove_old() -> None:
 
 
 def _serves(wanted: str, version: str) -> bool:
-    """Return whether all that is wanted is installed, of these very versions."""
+    """Return whether the wanted set is installed, in exactly these versions."""
     return _read_stamp() in (_stamp(version, wanted), _stamp(version, DEVELOPMENT))
 
 
@@ -160,7 +160,7 @@ def _pip_install(*arguments: str) -> list[str]:
 
 
 def _run(step: str, command: list[str]) -> None:
-    """Run pip with its talk reduced to a counter on a terminal, and shown only if it fails."""
+    """Run pip; show a counter of packages on a terminal, and its output only if it fails."""
     begin = time.monotonic()
     _say(step)
     said: list[str] = []
@@ -203,7 +203,7 @@ def _note_on_pybullet() -> str:
 
 @contextmanager
 def _one_at_a_time() -> Iterator[None]:
-    # A lock on a file that is always there leaves nothing behind, and ends with the process.
+    # A lock on an existing file leaves nothing behind, and ends with the process.
     with LOCK_OF[DEVELOPMENT].open(encoding="utf-8") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,13 +1,13 @@
-"""Soaks the server: lives in virtual time, packets that are not as they should be, any text at all.
+"""Soaks the server: random lives in virtual time, mutated packets, fuzzed parsers.
 
     tools/soak.py --seeds 100 --minutes 5 --jobs 2     random worlds, rules judged at each step
-    tools/soak.py --seed 17 --minutes 5                the one that failed, again
+    tools/soak.py --seed 17 --minutes 5                repeat the one that failed
     tools/soak.py --packets 1000000                    mutated packets
-    tools/soak.py --fuzz 10                            so many minutes of fuzzing
+    tools/soak.py --fuzz 10                            minutes of fuzzing
     tools/soak.py --hour                               memory over an hour of 5 rovers, 10 clients
 
 Exit code 0: nothing was wrong; 1: something was, and its seed is printed; 2: wrong arguments; 3: a
-rover that somebody had halted moved before somebody said go.
+halted rover moved before it was released.
 """
 
 import argparse
@@ -32,7 +32,7 @@ BATCH = 10_000  # packets between two lines of progress
 
 
 def main() -> int:
-    """Do what the command line says; gives the exit code."""
+    """Run the command line; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="tools/soak.py",
         description=__doc__,
@@ -49,7 +49,7 @@ def main() -> int:
     parser.add_argument("--first-seed", type=int, default=0, metavar="N")
     parser.add_argument("--figures", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    logging.disable(logging.CRITICAL)  # what servers say of thousands of refusals
+    logging.disable(logging.CRITICAL)  # thousands of logged refusals
     if arguments.seeds is not None:
         return _many(arguments)
     if arguments.seed is not None:
@@ -72,7 +72,7 @@ def _one(seed: int, seconds: float, *, only_figures: bool) -> int:
     print(f"seed {seed}", flush=True)
     try:
         figures = live(seed, seconds=seconds, then=_say_digest)
-    except Exception:  # noqa: BLE001 - whatever it is, it is what is looked for
+    except Exception:  # noqa: BLE001 - any exception is a finding
         traceback.print_exc()
         print(f"seed {seed} FAILED; again: tools/soak.py --seed {seed} --minutes {seconds / 60:g}")
         return 1
@@ -81,7 +81,7 @@ def _one(seed: int, seconds: float, *, only_figures: bool) -> int:
 
 
 def _say_digest(life: Life) -> None:
-    """Say what all packets of a life add up to: another one of the seed has the same."""
+    """Print the digest of all packets of a life, which is the same for the same seed."""
     for broken in life.world.broken:
         print(f"RULE BROKEN {broken}")
     print(f"digest {life.world.digest:08x}")
@@ -112,7 +112,7 @@ def _many(arguments: argparse.Namespace) -> int:
 def _packets(seed: int, count: int) -> int:
     print(f"seed {seed}, {count} packets", flush=True)
     began = time.process_time()
-    # every fifth of them to a server that looks at signatures
+    # every fifth packet goes to a server that checks signatures
     both = battered, signed = Battered(seed), signed_only(seed)
     quarter = 0
     try:
@@ -123,7 +123,7 @@ def _packets(seed: int, count: int) -> int:
             kept = sum(each.entries() for each in both)
             quarter = quarter or (kept if done + batch >= count / 4 else 0)
             print(f"{done + batch}: {kept} entries kept", flush=True)
-    except Exception:  # noqa: BLE001 - whatever it is, it is what is looked for
+    except Exception:  # noqa: BLE001 - any exception is a finding
         traceback.print_exc()
         print(f"seed {seed} FAILED; again: tools/soak.py --packets {count} --first-seed {seed}")
         return 1

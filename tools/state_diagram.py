@@ -1,4 +1,4 @@
-"""Draw the lifecycle table into mav_tasks/README.md; `--check` tells if the drawing is old."""
+"""Draw the lifecycle table into mav_tasks/README.md; `--check` reports whether it is old."""
 
 import sys
 
@@ -7,7 +7,7 @@ from mav_tasks.tasks.lifecycle import INITIAL, TERMINAL, TRANSITIONS, TaskState
 
 
 def diagram() -> str:
-    """Return the table as a Mermaid state diagram. KILLED is left to one line: all lead to it."""
+    """Return the table as a Mermaid state diagram, with one line for the transitions to KILLED."""
     lines = ["```mermaid", "stateDiagram-v2"]
     lines += [f"    [*] --> {_name(state)}" for state in sorted(INITIAL)]
     for old, edges in TRANSITIONS.items():

@@ -1,6 +1,6 @@
 """``python -m rover_sim``: simulated rovers on one UDP socket, in real time or faster.
 
-The command line, the socket and the signals; the loop is in ``real_time``.
+This file has the command line, the socket and the signals; the loop is in ``real_time``.
 """
 
 import argparse
@@ -41,11 +41,11 @@ from rover_sim.vehicle import Peers, make_vehicle
 
 DEFAULT_PORT = 14580
 SPACING = 3.0  # m between rovers, side by side
-KINEMATIC_SLIP = 0.3  # as the pybullet rover's
+KINEMATIC_SLIP = 0.3  # as for the pybullet rover
 TRUTH_HEADER = "time,system_id,north,east,yaw,forward_speed,yaw_rate\n"
 USAGE_ERROR = 2  # exit status, as argparse's own
-MAX_FRICTION = 5.0  # rubber on anything stays below
-ABORTED = 134  # as a shell reports SIGABRT, which is how a SITL goes
+MAX_FRICTION = 5.0  # above that of rubber on any surface
+ABORTED = 134  # a shell's status for SIGABRT, with which a crashing SITL ends
 
 
 class StartError(Exception):
@@ -54,7 +54,7 @@ class StartError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """The command line, read."""
+    """The parsed command line."""
 
     host: str
     port: int
@@ -76,11 +76,11 @@ class Options:
     home: Place
     sticks: StickPulses | None  # None: no transmitter
     faults: tuple[PlannedFault, ...]
-    shown_frame: str  # "", or what was asked for
+    shown_frame: str  # the --frame argument for the start-up line, "" if not given
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run until SIGINT or SIGTERM; give the exit status."""
+    """Run until SIGINT or SIGTERM; return the exit status."""
     options = read_options(arguments)
     try:
         with ExitStack() as stack:
@@ -95,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def read_options(arguments: Sequence[str] | None) -> Options:
-    """Read the command line; ends the process with status 2 on a bad one."""
+    """Parse the command line; exit with status 2 on a usage error."""
     parser = argparse.ArgumentParser(
         prog="rover_sim", description="Simulated rovers that speak MAVLink over UDP."
     )
@@ -193,7 +193,7 @@ def _persona(name: str, *, honours_yaw_rate: bool) -> Persona:
 
 
 def run(options: Options, stack: ExitStack) -> None:
-    """Set everything up, then drive the rovers until a signal."""
+    """Set everything up, then run the rovers until SIGINT or SIGTERM."""
     options = _with_body(options)
     key = _key(options)
     stop = _stop_signals(stack)
@@ -201,7 +201,7 @@ def run(options: Options, stack: ExitStack) -> None:
     truth = _open_truth(options, stack)
     clock = Clock(options.speed)
     bodies = [_make_body(options, index, stack) for index in range(options.count)]
-    now = clock.now()  # one for all: they then wake up together
+    now = clock.now()  # one start time for all rovers, so that they wake up together
     vehicles = [
         make_vehicle(
             body,
@@ -232,7 +232,7 @@ def run(options: Options, stack: ExitStack) -> None:
 
 
 def _with_body(options: Options) -> Options:
-    """Return the options with a body that there is; pybullet's own window needs pybullet."""
+    """Replace body "auto": bullet if pybullet is installed or ``gui`` needs it, else kinematic."""
     if options.body != "auto":
         return options
     if options.gui or has_pybullet():
@@ -252,7 +252,7 @@ def _key(options: Options) -> Key | None:
 
 
 def _stop_signals(stack: ExitStack) -> socket.socket:
-    """Return a socket that turns readable on SIGINT and SIGTERM."""
+    """Return a socket that becomes readable on SIGINT and SIGTERM."""
     stop, wake = socket.socketpair()
     stack.enter_context(stop)
     stack.enter_context(wake)
@@ -261,7 +261,7 @@ def _stop_signals(stack: ExitStack) -> socket.socket:
     def wake_up(_number: int, _frame: object) -> None:
         try:
             wake.send(b"\0")
-        except BlockingIOError:  # already woken, many times over
+        except BlockingIOError:  # buffer full: the reader is already woken
             return
 
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -1,6 +1,6 @@
 """A body with two steered front wheels, without a physics engine; implements ``Body``.
 
-It cannot turn on the spot: a turn rate at no speed turns its wheels, if that, and moves nothing.
+It cannot turn on the spot: at zero speed a yaw rate turns its front wheels at most.
 """
 
 import math
@@ -11,26 +11,26 @@ from rover_sim.frames import SERVO_RATE, TURN_RADIUS, WHEEL_BASE
 from rover_sim.planar import LAG_SPREAD, PlanarBody
 
 MAX_STEERING = math.atan(WHEEL_BASE / TURN_RADIUS)  # rad, 24 degrees
-LAG = 0.02  # s, from the wheels to the body: what is slow is in the drive train
-ROLLING = 0.005  # m/s of demanded speed, below which nothing says where to steer
+LAG = 0.02  # s, body behind wheels; the drive train has the larger lags
+ROLLING = 0.005  # m/s; below this demanded speed the steering angle is undefined
 
 
 class AckermannBody(PlanarBody):
-    """Moves along the arc that its front wheels point to, a little late.
+    """A body that follows the arc of its front wheels with a small lag.
 
-    ``seed`` varies the lag and how far the steering is off centre between rovers; None: neither.
+    ``seed`` varies the lag and the steering offset between rovers; None varies neither.
     """
 
     def __init__(self, *, start: Pose, seed: int | None) -> None:
         variation = Random(seed) if seed is not None else None
         lag = LAG * variation.uniform(*LAG_SPREAD) if variation else LAG
         super().__init__(start=start, lag=lag)
-        # rad; a linkage that is off by half a degree bends 10 m of way by 1 m
+        # rad; a linkage that is off by half a degree bends a path of 10 m by 1 m
         self._off_centre = math.radians(variation.uniform(-0.3, 0.3)) if variation else 0.0
         self._steering = self._demanded_steering = 0.0
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
-        """Demand a motion; kept until the next call. At no speed the wheels stay as they are."""
+        """Demand a motion, kept until the next call. At zero speed the steering angle is kept."""
         self._demanded_speed = forward_speed
         self._demanded_steering = steering_for(forward_speed, yaw_rate, self._demanded_steering)
 
@@ -41,9 +41,9 @@ class AckermannBody(PlanarBody):
 
 
 def steering_for(forward_speed: float, yaw_rate: float, present: float) -> float:
-    """Return the front wheels' angle (rad, right is positive) that makes this motion, or nearest.
+    """Return the front wheels' angle for this motion, clipped to full lock (rad, right positive).
 
-    ``present``: the angle that is kept where there is no speed to tell one by.
+    ``present``: the angle to return if the speed is too low to define one.
     """
     if abs(forward_speed) < ROLLING:
         return present

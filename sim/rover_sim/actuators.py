@@ -1,4 +1,4 @@
-"""The single outputs and wheels of a rover, for faults that take one of them."""
+"""The single outputs and wheels of a rover, for faults that affect one of them."""
 
 from collections.abc import Collection, Mapping
 from enum import Enum
@@ -6,13 +6,13 @@ from enum import Enum
 from rover_sim.frames import Frame
 
 HALF_TRACK = 0.23  # m, middle to wheel, as in the URDFs
-DRAG = 0.5  # of its speed is left to a rover that drags one wheel and drives with the other
+DRAG = 0.5  # of its speed remains when one wheel drags and the other drives
 
-PULL = 0.2  # 1/m, how much such a rover bends towards the wheel that stands
+PULL = 0.2  # 1/m, curvature of its path towards the blocked wheel
 
 
 class Actuator(Enum):
-    """What can stick."""
+    """An output that can freeze."""
 
     LEFT = "left"
     RIGHT = "right"
@@ -22,29 +22,29 @@ class Actuator(Enum):
 
 SIDES = frozenset({Actuator.LEFT, Actuator.RIGHT})
 
-#: the motor outputs of a frame
+#: the motor outputs of each frame
 OUTPUTS: Mapping[Frame, tuple[Actuator, ...]] = {
     Frame.SKID: (Actuator.LEFT, Actuator.RIGHT),
     Frame.DIFFERENTIAL: (Actuator.LEFT, Actuator.RIGHT),
     Frame.ACKERMANN: (Actuator.THROTTLE, Actuator.STEERING),
 }
 
-Motion = tuple[float, float]  # m/s, rad/s clockwise, as ``Body.drive`` takes them
+Motion = tuple[float, float]  # m/s and rad/s clockwise, the arguments of ``Body.drive``
 
 
 def sides_of(motion: Motion) -> tuple[float, float]:
     """Return the speeds of the left and the right wheels, m/s."""
     speed, rate = motion
-    return speed + rate * HALF_TRACK, speed - rate * HALF_TRACK  # clockwise: left runs ahead
+    return speed + rate * HALF_TRACK, speed - rate * HALF_TRACK  # clockwise: left is faster
 
 
 def motion_of(left: float, right: float) -> Motion:
-    """Return the motion that two sides make."""
+    """Return the motion for these speeds of the left and the right wheels, m/s."""
     return (left + right) / 2.0, (left - right) / (2.0 * HALF_TRACK)
 
 
 def with_frozen(motion: Motion, last: Motion, frozen: Collection[Actuator]) -> Motion:
-    """Return the motion with some outputs as they were at ``last``."""
+    """Return the motion with the ``frozen`` outputs kept at their values in ``last``."""
     if not frozen:
         return motion
     if SIDES & set(frozen):
@@ -60,7 +60,7 @@ def with_frozen(motion: Motion, last: Motion, frozen: Collection[Actuator]) -> M
 
 
 def with_blocked(motion: Motion, blocked: Collection[Actuator], frame: Frame) -> Motion:
-    """Return the motion of a rover of which the wheels of a side stand, or of both."""
+    """Return the motion of a rover whose wheels are blocked on one side or on both."""
     if set(blocked) >= SIDES:
         return 0.0, 0.0
     if not blocked:
@@ -76,7 +76,7 @@ def with_blocked(motion: Motion, blocked: Collection[Actuator], frame: Frame) ->
 
 
 def wheels_of(side: str) -> frozenset[Actuator]:
-    """Return the sides whose wheels ``side`` names: left, right or all. ValueError otherwise."""
+    """Return the sides that ``side`` names: left, right or all. Raise ValueError otherwise."""
     sides = {"left": {Actuator.LEFT}, "right": {Actuator.RIGHT}, "all": SIDES}
     if side not in sides:
         raise ValueError(f"wheels are left, right or all, not {side!r}")
@@ -84,7 +84,7 @@ def wheels_of(side: str) -> frozenset[Actuator]:
 
 
 def output_of(name: str, frame: Frame) -> Actuator:
-    """Return the output of that name. ValueError where this frame has none."""
+    """Return the output with that name. Raise ValueError if this frame lacks it."""
     for each in OUTPUTS[frame]:
         if each.value == name:
             return each

@@ -1,4 +1,4 @@
-"""What ArduPilot Rover does on commands, as observed on 4.6.3."""
+"""How ArduPilot Rover executes commands, as observed on 4.6.3."""
 
 from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.enums import MavCmd, MavModeFlag, MavResult
@@ -48,7 +48,7 @@ def ardupilot_commands(parts: CommandParts) -> CommandTable:
 
 
 class ArduPilotCommands:
-    """The actions; each takes a command and now, and gives its result."""
+    """The actions; each takes a command and ``now`` and returns the command's result."""
 
     def __init__(self, parts: CommandParts) -> None:
         self._parts = parts
@@ -58,7 +58,7 @@ class ArduPilotCommands:
         return f"ArduPilotCommands({self._flight!r})"
 
     def arm_disarm(self, command: Command, now: float) -> MavResult:
-        """Arm or disarm."""
+        """Arm or disarm; both magic numbers force arming."""
         arm, force = command.params[:2]
         if arm == 1.0:
             forced = force in (FORCE_ARM, FORCE_ARM_OR_DISARM)
@@ -69,14 +69,14 @@ class ArduPilotCommands:
         return MavResult.UNSUPPORTED
 
     def do_set_mode(self, command: Command, now: float) -> MavResult:
-        """Change the mode; param2 is the number that HEARTBEAT has."""
+        """Change the mode; param2 is HEARTBEAT.custom_mode."""
         base_mode, custom_mode = command.params[:2]
-        if not (0 <= base_mode <= 255 and 0 <= custom_mode <= 0xFFFFFFFF):  # NaN is not, either
+        if not (0 <= base_mode <= 255 and 0 <= custom_mode <= 0xFFFFFFFF):  # NaN fails, too
             return MavResult.DENIED
         return self.set_mode(int(base_mode), int(custom_mode), now)
 
     def set_mode(self, base_mode: int, custom_mode: int, now: float) -> MavResult:
-        """Change the mode."""
+        """Change the mode from SET_MODE's fields."""
         if not base_mode & MavModeFlag.CUSTOM_MODE_ENABLED:
             return MavResult.DENIED
         return _done(self._flight.request_custom_mode(custom_mode, now=now))
@@ -86,13 +86,13 @@ class ArduPilotCommands:
         return _done(self._flight.request_mode(Mode.RTL, now=now))
 
     def start_mission(self, command: Command, now: float) -> MavResult:
-        """Enter AUTO, from the first item only."""
+        """Enter AUTO; deny any first and last item but 0."""
         if command.params[:2] != (0.0, 0.0):
             return MavResult.DENIED
         return _done(self._flight.request_mode(Mode.AUTO, now=now))
 
     def reposition(self, command: Command, now: float) -> MavResult:
-        """Drive to a place in GUIDED; takes COMMAND_INT only."""
+        """Drive to a place in GUIDED; accept COMMAND_INT only."""
         if command.place is None:
             return MavResult.UNSUPPORTED
         destination = read_place(*command.place, self._parts.origin)
@@ -103,11 +103,11 @@ class ArduPilotCommands:
         return _done(self._flight.reposition(destination, now=now))
 
     def change_speed(self, command: Command, _now: float) -> MavResult:
-        """Change the speed towards a place in GUIDED."""
+        """Change the speed at which GUIDED drives to a place."""
         return _done(self._flight.change_speed(command.params[1]))
 
     def set_mission_current(self, command: Command, _now: float) -> MavResult:
-        """Go on with another mission item."""
+        """Continue with another mission item."""
         seq = command.params[0]
         if not 0 <= seq <= 65535:
             return MavResult.DENIED
@@ -115,7 +115,7 @@ class ArduPilotCommands:
         return MavResult.ACCEPTED
 
     def reboot_shutdown(self, command: Command, now: float) -> MavResult:
-        """Restart, disarmed."""
+        """Restart; refuse while armed."""
         if command.params[0] not in (REBOOT, REBOOT_TO_BOOTLOADER):
             return MavResult.UNSUPPORTED
         if self._flight.armed:

@@ -1,9 +1,9 @@
-"""ArduPilot Rover's speed and steering controllers on the vehicles of its own simulator.
+"""ArduPilot Rover's speed and steering controllers, driving the vehicles of its SITL.
 
-A PI loop on the *estimated* speed drives a throttle in steps of 1 us, the throttle drives a
-vehicle that follows it slowly: that is where overshoot, swinging and free rolling come from, and
-why an error of the estimate becomes one of the true speed. Fitted to recordings of Rover 4.6.3
-(steps of 0.5, 1 and 2 m/s, HOLD and disarming at 1 m/s, 0.5 m/s with 20 deg/s).
+A PI loop on the *estimated* speed sets a throttle in steps of 1 us, and the vehicle follows the
+throttle slowly. This causes overshoot, oscillation and rolling on, and it turns an error of the
+estimate into an error of the true speed. Fitted to recordings of Rover 4.6.3 (steps of 0.5, 1 and 2
+m/s, HOLD and disarming at 1 m/s, 0.5 m/s with 20 deg/s).
 """
 
 import math
@@ -16,27 +16,27 @@ from rover_sim.frames import TURN_RADIUS
 from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
 from rover_sim.steering import MAX_YAW_RATE, Demand, Output
 
-ACCELERATION = 1.0  # m/s², ATC_ACCEL_MAX, and for braking, too
-STOPPED = 0.1  # m/s, ATC_STOP_SPEED: once zero is asked, slower than this, the throttle is cut
-SLEW = 1.0  # of full throttle in a second, MOT_SLEWRATE: HOLD cuts the throttle only so fast
+ACCELERATION = 1.0  # m/s², ATC_ACCEL_MAX; for braking, too
+STOPPED = 0.1  # m/s, ATC_STOP_SPEED: below this, a demand of zero cuts the throttle
+SLEW = 1.0  # of full throttle per second, MOT_SLEWRATE; it also limits how fast HOLD cuts
 PWM_STEPS = 500  # us from neutral to full
 ERROR_FILTER = 0.016  # s, ATC_SPEED_FLTE: 10 Hz
 YAW_LIMITS = YawLimits(MAX_YAW_RATE, acceleration=2.1, deceleration=3.5)  # ATC_STR_ACC_MAX
-ROLLED_OUT = 1e-3  # m/s; slower than this the vehicle stands
+ROLLED_OUT = 1e-3  # m/s; a slower vehicle stands
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedGains:
-    """The loop's gains and the vehicle's answer to the throttle."""
+    """The gains of the speed loop and the vehicle's response to the throttle."""
 
-    base: float  # throttle for each m/s asked, 0..1: CRUISE_THROTTLE by CRUISE_SPEED
-    p: float  # throttle for each m/s of error: ATC_SPEED_P
-    i: float  # the same, for each second that it lasts: ATC_SPEED_I
+    base: float  # throttle (0..1) per m/s demanded: CRUISE_THROTTLE by CRUISE_SPEED
+    p: float  # throttle per m/s of error: ATC_SPEED_P
+    i: float  # throttle per m/s of error and second: ATC_SPEED_I
     top: float  # m/s at full throttle
-    lag: float  # s, of the vehicle's speed behind its throttle; that of free rolling, too
+    lag: float  # s, time constant of the vehicle's speed, also while it rolls freely
 
 
-# The parameters of SITL's frames, and their vehicles: speed and acceleration at full throttle.
+# The parameters of SITL's frames; speed and acceleration of their vehicles at full throttle.
 # "rover": 30 % for 5 m/s; 20 m/s and 10 m/s², so it rolls on with a time constant of 2 s
 ACKERMANN_GAINS = SpeedGains(base=0.06, p=0.1, i=0.2, top=20.0, lag=2.0)
 # "rover-skid": 75 % for 3 m/s; 4 m/s and 14 m/s², so 0.286 s
@@ -44,20 +44,20 @@ SKID_GAINS = SpeedGains(base=0.25, p=0.2, i=0.2, top=4.0, lag=0.286)
 
 
 class Steering(Protocol):
-    """What makes a turn rate of a demand."""
+    """Turns a demand into a yaw rate of the wheels."""
 
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
-        """Return the turn rate for wheels that drive at ``speed``, rad/s."""
+        """Return the yaw rate (rad/s) for wheels that drive at ``speed``."""
         ...
 
 
 class ArduPilotDrive:
-    """Implements ``DriveTrain``."""
+    """ArduPilot Rover's controllers; implements ``DriveTrain``."""
 
     def __init__(self, gains: SpeedGains, steering: Steering) -> None:
         self._gains = gains
         self._steering = steering
-        self._asked = 0.0  # m/s, what is asked, within the acceleration limit
+        self._asked = 0.0  # m/s, the demand after the acceleration limit
         self._error = 0.0  # m/s, filtered
         self._integral = 0.0  # throttle
         self._throttle = 0.0  # of the motors: -1..1, slewed
@@ -77,14 +77,14 @@ class ArduPilotDrive:
             self._throttle = 0.0
         else:
             self._throttle = toward(self._throttle, wanted, SLEW * CONTROL_PERIOD)
-        pulse = round(self._throttle * PWM_STEPS) / PWM_STEPS  # as a whole number of us makes it
+        pulse = round(self._throttle * PWM_STEPS) / PWM_STEPS  # in whole us
         self._speed += (self._gains.top * pulse - self._speed) * _part(self._gains.lag)
         if pulse == 0.0 and abs(self._speed) < ROLLED_OUT:
             self._speed = 0.0
         return self._speed, self._steering.step(demand, truth, estimate, self._speed)
 
     def _controlled(self, asked: float, speed: float) -> float:
-        """Return the throttle that the loop wants, -1..1."""
+        """Return the throttle that the speed loop demands, -1..1."""
         self._asked = toward(self._asked, asked, ACCELERATION * CONTROL_PERIOD)
         if self._asked == asked == 0.0 and abs(speed) <= STOPPED:
             self._error = self._integral = 0.0
@@ -99,30 +99,30 @@ class ArduPilotDrive:
 
 
 class SkidSteering:
-    """The rate loop turns the wheels against each other; implements ``Steering``."""
+    """Skid steering by a yaw rate loop; implements ``Steering``."""
 
     def __init__(self) -> None:
         self._yaw = YawControl(YAW_LIMITS)
 
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
-        """Return the turn rate for the wheels; free wheels still resist a turn."""
+        """Return the yaw rate for the wheels; wheels without throttle still resist a turn."""
         del truth
         wanted = demand.yaw_rate if demand.output is Output.CONTROLLED else 0.0
         return self._yaw.step(wanted, estimate.yaw_rate, rolls=speed != 0.0)
 
 
 class WheelSteering:
-    """The rate loop's output is an angle of the front wheels; implements ``Steering``.
+    """Steering by a yaw rate loop that sets the angle of the front wheels; implements ``Steering``.
 
-    Default gains: it asks for too small an angle, 10 deg/s come of 20 at 0.5 m/s. While the
-    estimate says that it rolls backwards the angle is the other way round, as it should be.
+    With the default gains the angle is too small: 20 deg/s at 0.5 m/s gives 10 deg/s. The angle is
+    reversed while the estimate says that the rover rolls backwards, as it should be.
     """
 
-    FEED_FORWARD = 0.78  # of the lock for each rad/s asked
-    P = 0.25  # of the lock for each rad/s of error
+    FEED_FORWARD = 0.78  # of the lock per rad/s demanded
+    P = 0.25  # of the lock per rad/s of error
 
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate, speed: float) -> float:
-        """Return the turn rate that the front wheels' angle makes at this speed."""
+        """Return the yaw rate that the front wheels' angle gives at this speed."""
         del truth
         if demand.output is not Output.CONTROLLED:
             return 0.0
@@ -133,5 +133,5 @@ class WheelSteering:
 
 
 def _part(time: float) -> float:
-    """How much of an error a first-order lag makes up for in one control period."""
+    """Return the fraction of an error that a first-order lag removes in one control period."""
     return 1.0 - math.exp(-CONTROL_PERIOD / time)

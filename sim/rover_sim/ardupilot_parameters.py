@@ -1,4 +1,4 @@
-"""The parameters of ArduPilot Rover, as far as clients or this simulator need them."""
+"""The parameters of ArduPilot Rover that clients or this simulator need."""
 
 import math
 from collections.abc import Iterable
@@ -14,17 +14,17 @@ class Cast:
     answers_untaken = True
 
     def to_wire(self, value: float, type_: int) -> float:
-        """Return the value."""
+        """Return the value unchanged."""
         del type_
         return value
 
     def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
-        """Return the value, whatever type the client says it has; no number is not taken."""
+        """Return the value, whatever type the client names; None if it is not finite."""
         del type_, own_type
         return value if math.isfinite(value) else None
 
     def digest(self, parameters: Iterable[tuple[Parameter, float]]) -> int | None:
-        """There is none."""
+        """Return None: ArduPilot has no hash of its parameters."""
         del parameters
         return None
 
@@ -39,7 +39,7 @@ def _rc_channels() -> Iterable[Parameter]:
 def _setup_pages() -> Iterable[Parameter]:
     for number in range(1, 7):
         yield Parameter(f"MODE{number}", 0, INT8)
-    # No rover has these; QGroundControl 4 asks for them all the same, by the copter's names.
+    # No rover has these; QGroundControl 4 asks for them by the copter's names anyway.
     for number in range(1, 7):
         yield Parameter(f"FLTMODE{number}", 0, INT8)
     for compass in ("", "2", "3"):
@@ -48,9 +48,9 @@ def _setup_pages() -> Iterable[Parameter]:
             yield Parameter(f"COMPASS_OFS{compass}_{axis}", 0.0)
 
 
-# The first 24 keep QGroundControl from complaining at connect, the setup pages' when those are
-# opened; the others steer this simulator. Rover 4.6 has no WPNAV_SPEED (a copter's) and no WP_SPD
-# (4.7's): QGroundControl therefore offers no "Change speed" for it, as for the real one.
+# QGroundControl complains at connect without the first 24, and on its setup pages without
+# _setup_pages(). The others control this simulator. Rover 4.6 has no WPNAV_SPEED (a copter's) and
+# no WP_SPD (4.7's), so QGroundControl offers no "Change speed" for it, as for the real one.
 COMMON: tuple[Parameter, ...] = (
     Parameter("SYSID_THISMAV", 1, INT16),
     Parameter("RCMAP_ROLL", 1, INT8),
@@ -82,7 +82,7 @@ COMMON: tuple[Parameter, ...] = (
 
 
 def ardupilot_parameters(frame: Frame) -> tuple[Parameter, ...]:
-    """Return the parameters of a rover; which outputs it has tells its frame."""
+    """Return the parameters of a rover; the output functions identify its frame."""
     outputs = ARDUPILOT_FRAMES[frame].items()
     first, *others = COMMON
     return (first, *(Parameter(name, value, INT16) for name, value in outputs), *others)

@@ -1,7 +1,7 @@
 """Modes, arming and failsafe of ArduPilot Rover, as observed on 4.6.3.
 
-Any mode may be entered disarmed, arming needs a settled estimate, and a mode that drives by itself
-starts to when armed.
+Any mode can be entered while disarmed. Arming needs a settled estimate. In a mode that drives by
+itself, the rover starts to drive as soon as it is armed.
 """
 
 from mav_tasks.mavlink.enums import MavSeverity, MavState
@@ -14,17 +14,17 @@ from rover_sim.route import Route, square_around
 from rover_sim.setpoints import Destination, Global, Local, Target
 from rover_sim.steering import HOLD, Demand, arc_to_point, steer_to_point
 
-REACHED_RADIUS = 0.3  # m, of a mission's items
+REACHED_RADIUS = 0.3  # m, around each mission item
 
 
 class ArduPilotRules:
-    """Implements ``FlightRules``."""
+    """ArduPilot Rover's rules; implements ``FlightRules``."""
 
     reposition_mode = Mode.GUIDED
     home_is_where_armed = False
     sticks_present = False
     no_position_text = "Arm: Need Position Estimate"
-    hold_destination: Destination | None = None  # HOLD stands
+    hold_destination: Destination | None = None  # HOLD stops the rover; it drives to no place
 
     def __init__(self, parts: FlightParts) -> None:
         self._parts = parts
@@ -43,16 +43,16 @@ class ArduPilotRules:
 
     @property
     def target(self) -> Target | None:
-        """What the setpoints ask for, in GUIDED."""
+        """The target of the setpoints, in GUIDED."""
         return self._guided.target
 
     @property
     def cruise_speed(self) -> float:
-        """How fast AUTO and RTL drive, m/s."""
+        """Speed of AUTO and RTL, m/s."""
         return self._parts.speed_limit()
 
     def system_status(self, mode: Mode, *, armed: bool) -> MavState:
-        """MAV_STATE as Rover derives it: from failsafe and mode, not from arming."""
+        """Return MAV_STATE as Rover derives it: from failsafe and mode, not from arming."""
         del armed
         if self._failsafe.tripped:
             return MavState.CRITICAL
@@ -61,97 +61,97 @@ class ArduPilotRules:
         return MavState.STANDBY if mode is Mode.HOLD else MavState.ACTIVE
 
     def arming_text(self, *, armed: bool) -> str:
-        """Return the text that tells of arming or disarming."""
+        """Return the text that reports arming or disarming."""
         return "Throttle armed" if armed else "Throttle disarmed"
 
     def unknown_mode(self, custom_mode: int) -> str:
-        """Return the text for a number that is no mode."""
+        """Return the text for a mode number that does not exist."""
         return f"No such mode {custom_mode}"
 
     def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
-        """Refuse only to enter or leave INITIALISING."""
+        """Return a refusal if INITIALISING would be entered or left, else None."""
         del now
         return "Flight mode change failed" if Mode.INITIALISING in (wanted, present) else None
 
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
-        """Refuse too early; forcing skips the check."""
+        """Return a refusal during the settling time, unless arming is forced, else None."""
         del mode
         if not forced and now - self._parts.started < self._parts.settling_time:
             return "Arm: AHRS: not using configured AHRS type"
         return None
 
     def intended(self, mode: Mode) -> Mode:
-        """Return the present mode: a failsafe here changes what is wanted."""
+        """Return the present mode: on ArduPilot a failsafe changes the intended mode, too."""
         return mode
 
     def choose(self, mode: Mode) -> None:
-        """Nothing hangs on who wanted a mode."""
+        """Do nothing: ArduPilot behaves alike, no matter who chose the mode."""
 
     def enter(self, mode: Mode) -> None:
-        """Entering GUIDED forgets the target."""
+        """Forget the target on entering GUIDED."""
         if mode is Mode.GUIDED:
             self._guided.clear()
 
     def intervene(
         self, mode: Mode, *, armed: bool, arrived: bool, now: float
     ) -> Intervention | None:
-        """HOLD when the operator is lost, if that failsafe is on."""
+        """Enter HOLD when the ground station's heartbeats stop, if that failsafe is enabled."""
         del mode, arrived
         if not self._failsafe.changed(now=now):
             return None
         if not self._failsafe.tripped:
             self._outbox.say(MavSeverity.INFO, "GCS Failsafe Cleared")
             return None
-        # The real one says Radio: the RC check shares the failsafe bits.
+        # Rover 4.6.3 says Radio, because the RC check shares the failsafe bits.
         self._outbox.say(MavSeverity.WARNING, "Radio Failsafe")
         return Intervention(Mode.HOLD) if armed else None
 
     def position_lost(self) -> Intervention:
-        """HOLD: FS_EKF_ACTION is 1."""
+        """Enter HOLD, as FS_EKF_ACTION = 1 does."""
         self._outbox.say(MavSeverity.CRITICAL, "EKF failsafe")
         return Intervention(Mode.HOLD)
 
     def fence_breached(self) -> Intervention:
-        """HOLD: FENCE_ACTION is 2 here, for 1 drives home. No text (4.6.3): SYS_STATUS tells."""
+        """Enter HOLD: FENCE_ACTION is 2 here, as 1 drives home. 4.6.3 tells SYS_STATUS only."""
         return Intervention(Mode.HOLD)
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
-        """Note a heartbeat of any system."""
+        """Note a heartbeat from any system."""
         self._failsafe.hear_heartbeat(system_id, now=now)
 
     def take_local(self, message: Local, estimate: Estimate, *, mode: Mode, now: float) -> None:
-        """Take a setpoint in GUIDED; dropped in silence elsewhere."""
+        """Take a setpoint in GUIDED; drop it silently in other modes."""
         if mode is Mode.GUIDED:
             self._guided.take_local(message, estimate, now=now)
 
     def take_global(self, message: Global, estimate: Estimate, *, mode: Mode, now: float) -> None:
-        """Take a setpoint in GUIDED; dropped in silence elsewhere."""
+        """Take a setpoint in GUIDED; drop it silently in other modes."""
         del estimate
         if mode is Mode.GUIDED:
             self._guided.take_global(message, now=now)
 
     def go_to(self, destination: Destination | None, *, now: float) -> None:
-        """Take a destination; there is none that means "here"."""
+        """Take a destination; ignore None ("here"), which ArduPilot does not know."""
         if destination is not None:
             self._guided.go_to(destination, now=now)
 
     def change_speed(self, speed: float, mode: Mode) -> bool:
-        """Set the speed towards a destination; NaN aborts in any mode."""
+        """Set the speed towards a destination; NaN aborts in any mode. Return False if refused."""
         return self._guided.change_speed(speed) and mode is Mode.GUIDED
 
     def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
-        """Say how to move in GUIDED."""
+        """Return the demand in GUIDED."""
         return self._guided.demand(estimate, now=now)
 
     def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
-        """Say how to move in AUTO and RTL; None once there."""
+        """Return the demand in AUTO and RTL, or None on arrival."""
         return self._steer(estimate, *place, speed_limit, radius=REACHED_RADIUS)
 
     def hold(self, estimate: Estimate) -> Demand:
-        """Stand."""
+        """Return the demand that stops the rover."""
         del estimate
         return HOLD
 
     def mission_route(self, home: Destination) -> Route | None:
-        """Return the stored mission, from its beginning, or the built-in track."""
+        """Return the stored mission from its beginning, or else the built-in square."""
         return self._parts.missions.route() or square_around(home)

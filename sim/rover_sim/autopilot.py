@@ -1,7 +1,7 @@
 """The simulated flight stack: messages in, messages and wheel demands out. Pure, no clock, no I/O.
 
-It behaves as the make that its persona names. This file joins the parts and directs each message
-to one of them; the rules are in the parts.
+It behaves like the autopilot of its persona. This file connects the parts and passes each message
+to one of them; the parts have the rules.
 """
 
 from collections.abc import Mapping
@@ -37,19 +37,19 @@ from rover_sim.streams import OFF, Streams, with_sticks
 from rover_sim.telemetry import Telemetry
 from rover_sim.timing import Departures
 
-MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # what it is driven by
-UNASKED_STICKS = 1.0  # s, RC_CHANNELS where nobody has asked for another interval
+MEASURED = (messages.Attitude.id, messages.LocalPositionNed.id)  # clients steer by these
+UNASKED_STICKS = 1.0  # s, interval of RC_CHANNELS until a client sets another
 RUNTIME_INTERVAL = 30.0  # s, AP_Stats' flush_interval_ms
 POSITIONS = (messages.LocalPositionNed.id, messages.GlobalPositionInt.id)
-FASTEST = 5.0  # m/s, of what no parameter limits
-REBOOT_TIME = 1.0  # s in which a restarting autopilot neither hears nor says anything
+FASTEST = 5.0  # m/s, the speed limit if the parameter sets none
+REBOOT_TIME = 1.0  # s; a restarting autopilot receives and sends nothing
 
 
 class Autopilot:
     """One rover's autopilot, address (system_id, 1).
 
-    ``handle`` a message when it comes, ``step`` once per control period, ``take_messages`` after
-    either. ``unix_offset`` is Unix time minus ``now``; 0 for none (SYSTEM_TIME then says unknown).
+    Call ``handle`` for each message, ``step`` once per control period, and ``take_messages`` after
+    either. ``unix_offset`` is Unix time minus ``now``; with 0, SYSTEM_TIME says unknown.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Autopilot:
         )
         self._departures = Departures(realism.timing, seed=seed)
         self._sticks = Sticks(realism.stick_speed)
-        self._asked = 0.0  # m/s
+        self._asked = 0.0  # m/s, the last demand
         self._outputs: Motion = (0.0, 0.0)  # of the motors
         self._origin = origin
         self._unix_offset = unix_offset
@@ -90,17 +90,17 @@ class Autopilot:
         )
         self._estimate: Estimate = estimate_from(self._seen(truth), NO_FAULTS, None)
         self._faults = NO_FAULTS
-        self._clock_stopped_at = now  # while that fault lasts; until then it goes
-        self.boots = 0  #: how often it has restarted
+        self._clock_stopped_at = now  # time of the last step with a running clock
+        self.boots = 0  #: number of restarts
         self._start(now)
 
     def __repr__(self) -> str:
         return f"Autopilot({self.address}, {self._flight!r})"
 
     def handle(self, message: Message, sender: Address, *, now: float) -> None:
-        """Take one message; those addressed to others are passed over.
+        """Take one message; ignore it if it is addressed to others.
 
-        Raises SimulatedCrash for what makes the real one abort.
+        Raise SimulatedCrash for a message that makes the real autopilot abort.
         """
         if self._faults.deaf or now < self._up_at or not self._is_for_us(message):
             return
@@ -109,7 +109,7 @@ class Autopilot:
             self._announce(now)
 
     def step(self, truth: BodyState, *, now: float) -> tuple[float, float]:
-        """Live through one control period; give forward speed and yaw rate for the wheels."""
+        """Advance by one control period; return forward speed and yaw rate for the wheels."""
         self._estimate = estimate_from(self._seen(truth), self._faults, self._estimate)
         if not self._faults.clock_frozen:
             self._clock_stopped_at = now
@@ -131,16 +131,16 @@ class Autopilot:
         return outputs
 
     def take_messages(self) -> list[Message]:
-        """Hand over what there is to say, to everybody on the link."""
+        """Return the messages to send, each to everybody on the link."""
         return self._outbox.take()
 
     @property
     def next_release(self) -> float:
-        """When something is to be sent that was held back; infinity: nothing is."""
+        """Time at which the next delayed message is due; infinity if there is none."""
         return self._outbox.next_release
 
     def release(self, *, now: float) -> None:
-        """Send what was held back until now."""
+        """Send the delayed messages that are due."""
         self._outbox.release(now=now)
 
     @property
@@ -155,28 +155,28 @@ class Autopilot:
 
     @property
     def missions(self) -> MissionStorage:
-        """The plans that are stored on board, to be looked at."""
+        """The plans stored on board, for inspection."""
         return self._missions
 
     @property
     def parameters(self) -> Parameters:
-        """The parameters, to read or to set beforehand."""
+        """The parameters, to read or to preset."""
         return self._parameters
 
     @property
     def faults(self) -> Faults:
-        """What is broken."""
+        """The present faults."""
         return self._faults
 
     def set_faults(self, faults: Faults) -> None:
-        """Break something, or with ``Faults()`` mend it all."""
+        """Replace the faults; ``Faults()`` clears them all."""
         was_inside = not self._faults.outside_fence
         self._faults = self._outbox.faults = self._flight.faults = faults
         if faults.outside_fence and was_inside:
             self._flight.leave_fence()
 
     def operator_mode(self, mode: Mode, *, now: float) -> None:
-        """Change the mode at the vehicle, as an RC switch would; not to one that it lacks."""
+        """Change the mode like an RC switch; ignore a mode that the persona lacks."""
         if mode in self._persona.modes.numbers:
             self._flight.enter(mode)
         self._announce(now)
@@ -187,17 +187,17 @@ class Autopilot:
         self._announce(now)
 
     def operator_sticks(self, forward_speed: float, yaw_rate: float) -> None:
-        """Hold the sticks so (m/s, rad/s); has an effect in MANUAL, until the mode changes."""
+        """Hold the sticks (m/s, rad/s) until the mode changes; for MANUAL and POSITION."""
         self._flight.set_sticks(forward_speed, yaw_rate)
         if self._realism.wire is Wire.REAL:
             self._sticks.hold(forward_speed, yaw_rate)
 
     def operator_pulses(self, throttle: int, steering: int) -> None:
-        """Hold the transmitter's sticks so, in microseconds."""
+        """Hold the transmitter's sticks at these pulses, in microseconds."""
         self._sticks.hold_pulses(throttle, steering)
 
     def reboot(self, *, now: float) -> None:
-        """Restart: time and state begin anew; parameters and missions are kept."""
+        """Restart with the initial state and clock; keep parameters and missions."""
         self.boots += 1
         self._start(now + REBOOT_TIME)
 
@@ -218,7 +218,7 @@ class Autopilot:
         self._up_at = up_at
         self._gps = GpsLoss()
         self._runtime_due = up_at + RUNTIME_INTERVAL
-        # a tidy one takes the request for RC_CHANNELS, too, and has nothing to say
+        # Wire.TIDY accepts a request for RC_CHANNELS, too, but has nothing to send.
         shows_sticks = realism.wire is Wire.REAL
         table = with_sticks(persona.streams, UNASKED_STICKS if shows_sticks else OFF)
         self._streams = Streams(table, now=up_at)
@@ -276,7 +276,7 @@ class Autopilot:
         self._handlers = self._make_handlers()
 
     def _speed_limit(self) -> float:
-        """Return the speed in m/s that it is limited to; 0 or less is PX4's "no limit"."""
+        """Return the speed limit in m/s; a parameter of 0 or less means "no limit" (PX4)."""
         limit = self._parameters[self._persona.speed_parameter]
         return limit if limit > 0.0 else FASTEST
 
@@ -313,7 +313,7 @@ class Autopilot:
         return True
 
     def _count_runtime(self, now: float) -> None:
-        """ArduPilot keeps its running time in a parameter, and sends that unasked."""
+        """Count the runtime parameter up; ArduPilot sends it unasked."""
         if self._runtime is not None and now >= self._runtime_due:
             self._runtime_due += RUNTIME_INTERVAL
             self._parameters.change(
@@ -325,7 +325,7 @@ class Autopilot:
         return flight.can_reposition and flight.reposition(place, now=now)
 
     def _announce(self, now: float) -> None:
-        """Send a heartbeat at once if something changed that this autopilot shows so."""
+        """Send a heartbeat at once if a change occurred that this autopilot announces."""
         timing = self._realism.timing
         if timing is not None:
             shown = timing.announces
@@ -367,7 +367,7 @@ class Autopilot:
         self._send(messages.MissionCurrent.id, now)
 
     def _handle_timesync(self, message: messages.Timesync, _sender: Address, now: float) -> None:
-        if message.tc1 == 0:  # a question; anything else is somebody's answer
+        if message.tc1 == 0:  # 0 marks a request; other values are responses
             boot_ns = int((now - self._up_at) * 1e9)
             self._outbox.send(messages.Timesync(boot_ns, message.ts1))
 

@@ -1,6 +1,6 @@
-"""The list of modes that a make offers, as AVAILABLE_MODES has it.
+"""The modes that a make offers, as AVAILABLE_MODES messages.
 
-MAVLink guide, "Standard Modes Protocol". The set never changes here, so that there is no
+MAVLink guide, "Standard Modes Protocol". The list never changes here, so there is no
 AVAILABLE_MODES_MONITOR: PX4 sends that only after a first change, and never on request.
 """
 
@@ -15,15 +15,15 @@ ADVANCED = 1  # MAV_MODE_PROPERTY
 
 
 class OfferedMode(NamedTuple):
-    """One mode as a client is to show it."""
+    """One mode as a client displays it."""
 
     mode: Mode
     standard: int  # MAV_STANDARD_MODE
-    name: str  # empty for a standard mode: the client has a name for it
+    name: str  # empty for a standard mode: the client names it
     properties: int  # MAV_MODE_PROPERTY
 
 
-#: in the order of PX4's navigation states; all but POSITION count as advanced there
+#: in the order of PX4's navigation states; PX4 marks all but POSITION as advanced
 PX4_OFFERED = (
     OfferedMode(Mode.MANUAL, NON_STANDARD, "Manual", ADVANCED),
     OfferedMode(Mode.POSITION, NON_STANDARD, "Position", 0),
@@ -37,7 +37,7 @@ PX4_OFFERED = (
 def available_modes(
     offered: Iterable[OfferedMode], modes: ModeNumbers
 ) -> tuple[m.AvailableModes, ...]:
-    """Return the messages, the one of index 1 first; none if nothing is offered."""
+    """Return the messages in the order of their index, from 1; none if nothing is offered."""
     listed = tuple(offered)
     return tuple(
         m.AvailableModes(
@@ -53,5 +53,5 @@ def available_modes(
 
 
 def standard_mode_of(mode: Mode, offered: Iterable[OfferedMode]) -> int:
-    """Return a mode's MAV_STANDARD_MODE; NON_STANDARD also for what is not offered."""
+    """Return a mode's MAV_STANDARD_MODE; NON_STANDARD also for a mode that is not offered."""
     return next((each.standard for each in offered if each.mode is mode), NON_STANDARD)

@@ -1,6 +1,6 @@
-"""What an autopilot drives: the seam between the flight stack and the physics.
+"""The vehicle body that an autopilot drives: the seam between flight stack and physics.
 
-A body knows wheels and ground, and nothing of MAVLink, modes or origins.
+A body knows wheels and ground, but no MAVLink, modes or origins.
 """
 
 import math
@@ -10,9 +10,9 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True)
 class BodyState:
-    """Where a body is and how it moves: the truth, not an estimate. SI units, NED axes.
+    """True position and motion of a body, not an estimate. SI units, NED axes.
 
-    Positions are from the ground frame's zero point, on the ground; ``down`` is 0 at rest on it.
+    Positions are relative to the ground frame's zero point, on the ground; ``down`` is 0 at rest.
     """
 
     time: float  # s of simulated time since the body was made
@@ -29,7 +29,7 @@ class BodyState:
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a body starts: on the ground, at rest."""
+    """Start pose of a body: on the ground, at rest."""
 
     north: float = 0.0
     east: float = 0.0
@@ -37,11 +37,11 @@ class Pose:
 
 
 class Body(Protocol):
-    """A rover on wheels. One process may hold many; each is stepped on its own."""
+    """A rover on wheels. One process may hold many; each is stepped separately."""
 
     @property
     def lag(self) -> float:
-        """How late the wheels do what ``drive`` demands, s."""
+        """Delay of the wheels behind ``drive``, s."""
         ...
 
     @property
@@ -52,7 +52,7 @@ class Body(Protocol):
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
         """Demand wheel speeds for this motion (m/s, rad/s clockwise), kept until the next call.
 
-        It is what the wheels would do without slip; closing the loop is the autopilot's part.
+        The wheels would make this motion without slip; the autopilot closes the loop.
         """
         ...
 
@@ -61,7 +61,7 @@ class Body(Protocol):
         ...
 
     def close(self) -> None:
-        """Release what the body holds; it cannot be used afterwards."""
+        """Release the body's resources; it cannot be used afterwards."""
         ...
 
 

@@ -1,6 +1,6 @@
-"""The first seconds of an autopilot: what it does not know yet, and why it cannot be armed.
+"""The first seconds of an autopilot: which estimates are still missing, and why it refuses to arm.
 
-The times are ``BootTimes``, the words each make's ``BootScript``; both were recorded.
+``BootTimes`` has the times, each make's ``BootScript`` the texts; both were recorded.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from rover_sim.realism import BootTimes
 
 
 class Event(Enum):
-    """What a boot text is said at; the value names the field of ``BootTimes``."""
+    """The event that triggers a boot text; the value names the field of ``BootTimes``."""
 
     READY = "mode_lost"
     ORIGIN = "origin"
@@ -20,15 +20,15 @@ class Event(Enum):
 
 @dataclass(frozen=True, slots=True)
 class BootScript:
-    """What one make says meanwhile."""
+    """Texts and mode behaviour of one make during its boot."""
 
-    refusals: tuple[tuple[float, tuple[str, ...]], ...]  # up to this part of ``armable``: texts
+    refusals: tuple[tuple[float, tuple[str, ...]], ...]  # (end as a part of ``armable``, texts)
     texts: tuple[tuple[Event, MavSeverity, str], ...]
-    keeps_to_its_first_mode: bool  # ArduPilot: a mode entered early is lost
+    keeps_to_its_first_mode: bool  # ArduPilot: a mode that is entered early is lost
 
 
 ARDUPILOT_SCRIPT = BootScript(
-    # recorded: at 1.1 s the first, from 4.1 to 13.1 s the second, from 16.1 to 22.2 s the third
+    # recorded: the first at 1.1 s, the second from 4.1 to 13.1 s, the third from 16.1 to 22.2 s
     refusals=(
         (0.095, ("Arm: System not initialised",)),
         (0.63, ("Arm: Accels inconsistent",)),
@@ -61,7 +61,7 @@ PX4_SCRIPT = BootScript(
 
 
 class Boot:
-    """One boot, from switching on at ``started``."""
+    """One boot, from power-on at ``started``."""
 
     def __init__(self, times: BootTimes, script: BootScript, *, started: float) -> None:
         self._times = times
@@ -74,49 +74,49 @@ class Boot:
         return f"Boot({len(self._unsaid)} texts to come)"
 
     def takes_modes(self, *, now: float) -> bool:
-        """Whether a mode can be entered already, though only to be lost again."""
+        """Return whether a mode can be entered already, although it will be lost."""
         return self._mode_to_lose and now - self._started >= self._times.initialised
 
     def is_initialised(self, *, now: float) -> bool:
-        """Whether INITIALISING is over."""
+        """Return whether INITIALISING is over."""
         return now - self._started >= max(self._times.initialised, self._times.mode_lost)
 
     def loses_mode(self, *, now: float) -> bool:
-        """Return True once: at the moment at which a mode that was entered before is lost."""
+        """Return True once, when a mode that was entered early is lost."""
         if not self._mode_to_lose or now - self._started < self._times.mode_lost:
             return False
         self._mode_to_lose = False
         return True
 
     def has_heading(self, *, now: float) -> bool:
-        """Whether the estimate has a heading."""
+        """Return whether the estimate has a heading."""
         return now - self._started >= self._times.heading
 
     def has_fix(self, *, now: float) -> bool:
-        """Whether the receiver has a position."""
+        """Return whether the receiver has a position."""
         return now - self._started >= self._times.fix
 
     def has_position(self, *, now: float) -> bool:
-        """Whether the estimate has a position."""
+        """Return whether the estimate has a position."""
         return now - self._started >= self._times.position
 
     def has_origin(self, *, now: float) -> bool:
-        """Whether the origin is known."""
+        """Return whether the origin is known."""
         return now - self._started >= self._times.origin
 
     def is_healthy(self, *, now: float) -> bool:
-        """Whether the pre-arm checks pass."""
+        """Return whether the pre-arm checks pass."""
         return now - self._started >= self._times.healthy
 
     def arming_refusal(self, *, now: float) -> tuple[str, ...]:
-        """Return the texts with which arming is refused; none: nothing speaks against it here."""
+        """Return the texts that refuse arming; empty if the boot does not prevent arming."""
         part = (now - self._started) / self._times.armable
         if self._times.is_none or part >= 1.0:
             return ()
         return next(texts for end, texts in self._script.refusals if part < end)
 
     def texts_due(self, *, now: float) -> list[tuple[MavSeverity, str]]:
-        """Return what is to be said since the last call."""
+        """Return the texts that became due since the last call."""
         if not self._unsaid:
             return []
         at = now - self._started

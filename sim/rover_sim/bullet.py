@@ -1,13 +1,14 @@
 """The rover in pybullet: wheels, motors, mass and friction. The only file that imports pybullet.
 
-Each body has a physics client (a world) of its own, so that rovers do not slow each other down and
-one can be closed alone. Nothing here runs in Python per physics step: motors are set once per
-control step, and one ``stepSimulation`` call does its physics steps inside the engine.
+Each body has its own physics client (world), so that rovers do not slow each other down and each
+can be closed separately. No Python runs per physics step: the motors are set once per control step,
+and one ``stepSimulation`` call does its physics steps inside the engine.
 
-Wheels are spheres for the collision. Measured on this rover, closed loop at 20 Hz, at friction 0.5,
-0.8 and 1.1: with either shape forward 2 m ends within 0.3 cm along, and 90 degrees on the spot
-within 0.2 degrees. But across, and from the spot, cylinders stray by up to 0.7 and 3.3 cm, spheres
-by 0.0 and 0.2 cm: a cylinder's contact jumps between its rims. Spheres are also 1.5 times as fast.
+The wheels collide as spheres. Measured on this rover, closed loop at 20 Hz, at friction 0.5, 0.8
+and 1.1: with spheres and with cylinders, 2 m forward ends within 0.3 cm along the path, and 90
+degrees on the spot within 0.2 degrees. But cylinders deviate by up to 0.7 cm across the path and
+3.3 cm from the spot, spheres by 0.0 and 0.2 cm: a cylinder's contact jumps between its rims.
+Spheres are also 1.5 times as fast.
 """
 
 import math
@@ -23,31 +24,32 @@ from rover_sim.bullet_wheels import SkidWheels, SteeredWheels, Wheels
 from rover_sim.errors import MissingExtra
 from rover_sim.frames import Frame
 
-#: what is said where the kinematic body takes its place
+#: the text for a kinematic body that replaces the pybullet one
 NO_PYBULLET = (
     "pybullet is not installed, so the rover is the kinematic one: no wheels, no friction"
     " (pip install pybullet numpy; its wheels are for Python 3.11 at most, on Linux x86-64)"
 )
 PHYSICS_RATE = 240  # Hz, pybullet's own default; stepping and sub-stepping alike
 GRAVITY = 9.81  # m/s²
-SOLVER_ITERATIONS = 20  # turns within 8 % of 150 iterations, at 1.5 times the speed of 50
+SOLVER_ITERATIONS = 20  # turns within 8 % of those with 150 iterations; 1.5 times as fast as 50
 ASSETS = Path(__file__).parent / "assets"
 RIDE_HEIGHT = 0.15  # m, ground to the base's origin, as in the URDFs
 SETTLING = 0.5  # s, from the drop onto the wheels to rest
-WHEEL_SPREAD = 0.05  # of the friction; how far one wheel may be off the ground's value
+WHEEL_SPREAD = 0.05  # of the friction; how far one wheel may deviate from the ground's value
 WHEELS = 4
 VIEW_DISTANCE = 4.0  # m, of the window's camera
 
 
 class BulletBody:
-    """A wheeled body in a world of its own; implements ``Body``.
+    """A wheeled body in its own world; implements ``Body``.
 
     ``friction`` is tyre against ground. ``variation`` (0.3 for ±30 %) with ``seed`` draws the
-    ground's friction around it, and lets each wheel differ a little more, as worn tyres do.
-    Raises MissingExtra where pybullet is not installed.
+    ground's friction around it, and a smaller deviation for each wheel, as of worn tyres.
+
+    Raise MissingExtra if pybullet is not installed.
     """
 
-    lag = 0.0  # s; its motors have torque enough for at once
+    lag = 0.0  # s; its motors have enough torque to follow at once
 
     def __init__(
         self,
@@ -101,13 +103,13 @@ class BulletBody:
         )
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
-        """Demand a motion; kept until the next call."""
+        """Demand a motion, kept until the next call."""
         if (forward_speed, yaw_rate) != self._demand:  # velocity motors keep their target
             self._demand = (forward_speed, yaw_rate)
             self._wheels.drive(*self._demand, steps=self._steps)
 
     def advance(self, duration: float) -> None:
-        """Step the physics; a multiple of 1/240 s, the same each time for best speed."""
+        """Step the physics by a multiple of 1/240 s; fastest if it is the same each time."""
         steps = round(duration * PHYSICS_RATE)
         if steps != self._steps:
             self._p.setPhysicsEngineParameter(
@@ -141,9 +143,9 @@ class BulletBody:
     def _build(self, start: Pose, urdf: Path) -> int:
         p, client = self._p, self._client
         p.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
-        # Bullet lays friction along the world's axes, so a steady demand turns the rover faster
-        # at some headings than at others: at 0.59 to 0.89 of the demanded rate; theory says 0.57.
-        # With the implicit friction cone on, as by default, it is 0.12 to 0.53.
+        # Bullet resolves friction along the world's axes, so a steady demand gives a yaw rate that
+        # depends on the heading: 0.59 to 0.89 of the demanded rate; theory says 0.57. With the
+        # default, the implicit friction cone, it is 0.12 to 0.53.
         p.setPhysicsEngineParameter(
             enableConeFriction=0, numSolverIterations=SOLVER_ITERATIONS, physicsClientId=client
         )
@@ -157,7 +159,7 @@ class BulletBody:
             flags=p.URDF_USE_INERTIA_FROM_FILE,
             physicsClientId=client,
         )
-        # Damping only on the base: given for a wheel, pybullet 3.2.7 drops the friction with it.
+        # Set damping only on the base: set for a wheel, pybullet 3.2.7 drops the wheel's friction.
         p.changeDynamics(rover, -1, linearDamping=0, angularDamping=0, physicsClientId=client)
         return rover
 
@@ -177,7 +179,7 @@ def _wheel_frictions(friction: float, variation: float, seed: int | None) -> lis
 
 
 def has_pybullet() -> bool:
-    """Return whether pybullet can be imported here."""
+    """Return whether pybullet can be imported."""
     try:
         _pybullet()
     except MissingExtra:
@@ -186,7 +188,7 @@ def has_pybullet() -> bool:
 
 
 def _pybullet() -> Any:
-    """Import pybullet late, so that everything else of the simulator works without it."""
+    """Import pybullet late, so that the rest of the simulator works without it."""
     try:
         with _silent_stderr():
             import pybullet  # noqa: PLC0415

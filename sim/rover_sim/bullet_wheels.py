@@ -1,6 +1,6 @@
-"""Motors and servos of the pybullet rovers: what a demanded motion is for each joint.
+"""Motors and servos of the pybullet rovers: a demanded motion becomes a target for each joint.
 
-Only ``bullet`` imports pybullet; here it is a value.
+Only ``bullet`` imports pybullet; this file gets the module as an argument.
 """
 
 import math
@@ -10,15 +10,15 @@ from typing import Any, Protocol
 from rover_sim.ackermann import steering_for
 from rover_sim.frames import SERVO_RATE, WHEEL_BASE
 
-WHEEL_RADIUS = 0.1  # m, as in the URDFs, like the next
+WHEEL_RADIUS = 0.1  # m, as in the URDFs; the next one, too
 HALF_TRACK = 0.23  # m, middle to wheel
-MAX_TORQUE = 20.0  # N·m a wheel; a turn on the spot takes 9 at friction 1.1, and 6 stall there
-SERVO_TORQUE = 20.0  # N·m; the wheels turn on their own contact points
+MAX_TORQUE = 20.0  # N·m per wheel; a turn on the spot takes 9 at friction 1.1, and stalls with 6
+SERVO_TORQUE = 20.0  # N·m; the wheels turn on their contact points
 SIDES = ("front_left", "front_right", "rear_left", "rear_right")
 
 
 class Wheels(Protocol):
-    """What a body's ``drive`` sets."""
+    """The joints that a body's ``drive`` sets."""
 
     @property
     def joints(self) -> tuple[int, ...]:
@@ -26,12 +26,12 @@ class Wheels(Protocol):
         ...
 
     def drive(self, forward_speed: float, yaw_rate: float, *, steps: int) -> None:
-        """Set every motor for this motion; ``steps`` of physics go to one call of the engine."""
+        """Set every motor for this motion; one call of the engine does ``steps`` physics steps."""
         ...
 
 
 class SkidWheels:
-    """Four driven wheels, the two of a side alike; implements ``Wheels``."""
+    """Four driven wheels, both of a side at the same speed; implements ``Wheels``."""
 
     def __init__(self, p: Any, client: int, rover: int) -> None:
         self._p, self._client, self._rover = p, client, rover
@@ -43,10 +43,11 @@ class SkidWheels:
 
     def drive(self, forward_speed: float, yaw_rate: float, *, steps: int) -> None:
         """Set the four motors."""
-        left = (forward_speed + yaw_rate * HALF_TRACK) / WHEEL_RADIUS  # clockwise: left runs ahead
+        left = (forward_speed + yaw_rate * HALF_TRACK) / WHEEL_RADIUS  # clockwise: left is faster
         right = (forward_speed - yaw_rate * HALF_TRACK) / WHEEL_RADIUS
-        # Bullet turns a torque limit into an impulse limit with the length of the whole step, and
-        # applies it in every sub-step: without the division the motors are that much stronger.
+        # Bullet computes an impulse limit from the torque limit and the length of the whole step,
+        # and applies it in every sub-step: without the division the motors are ``steps`` times as
+        # strong.
         self._p.setJointMotorControlArray(
             self._rover,
             self.joints,
@@ -58,14 +59,14 @@ class SkidWheels:
 
 
 class SteeredWheels:
-    """Two driven wheels at the rear, as over a differential, two steered; implements ``Wheels``."""
+    """Two rear wheels driven through a differential, two steered; implements ``Wheels``."""
 
     def __init__(self, p: Any, client: int, rover: int) -> None:
         self._p, self._client, self._rover = p, client, rover
         joints = joints_of(p, client, rover)
         self.joints = tuple(joints[f"{side}_axle"] for side in SIDES)
         self._knuckles = (joints["front_left_steering"], joints["front_right_steering"])
-        self._steering = 0.0  # rad, of a wheel in the middle, right is positive
+        self._steering = 0.0  # rad, of a virtual wheel in the middle, right is positive
 
     def __repr__(self) -> str:
         return f"SteeredWheels({math.degrees(self._steering):.0f} deg)"
@@ -87,7 +88,7 @@ class SteeredWheels:
         )
 
     def _steer(self, steps: int) -> None:
-        """Turn each front wheel across its own circle about the same point."""
+        """Turn each front wheel to the tangent of its own circle; all circles share one centre."""
         curvature = math.tan(self._steering) / WHEEL_BASE  # 1/m
         for joint, side in zip(self._knuckles, (HALF_TRACK, -HALF_TRACK), strict=True):
             angle = math.atan(WHEEL_BASE * curvature / (1.0 + side * curvature))

@@ -1,8 +1,8 @@
-"""The command protocol, vehicle side: COMMAND_LONG and COMMAND_INT to an answer.
+"""The command protocol, vehicle side: answers COMMAND_LONG and COMMAND_INT.
 
 MAVLink guide, "Command Protocol": exactly one COMMAND_ACK each, progress and result_param2 always
-0, targeted at the sender; no de-duplication, a repeat is carried out again. What a command does is
-in the persona's table.
+0, addressed to the sender. There is no de-duplication: a repeat is executed again. The persona's
+table has the effect of each command.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ DO_SET_MISSION_CURRENT = 224  # MAV_CMD
 
 
 class Command(NamedTuple):
-    """Either form of a command, as far as the answers need it."""
+    """The fields of COMMAND_LONG or COMMAND_INT that the actions need."""
 
     params: tuple[float, float, float, float]
     place: tuple[int, int] | None  # x, y of COMMAND_INT; None from COMMAND_LONG
@@ -38,7 +38,7 @@ Action = Callable[[Command, float], MavResult]
 
 @dataclass(frozen=True, slots=True)
 class CommandParts:
-    """What commands act on."""
+    """The parts of an autopilot that commands act on."""
 
     origin: Origin
     flight: FlightControl
@@ -47,19 +47,19 @@ class CommandParts:
     outbox: Outbox
     send_now: Callable[[int, float], bool]  # a message by id; False if unknown
     reboot: Callable[[float], None]
-    modes: tuple[messages.AvailableModes, ...]  # those on offer; none: it knows no such list
+    modes: tuple[messages.AvailableModes, ...]  # the modes on offer; empty: this make sends no list
 
 
 class CommandTable(NamedTuple):
-    """What one make does on commands, by MAV_CMD, and how it answers SET_MODE."""
+    """One make's actions by MAV_CMD, and its answer to SET_MODE."""
 
     actions: Mapping[int, Action]
     set_mode: Callable[[int, int, float], MavResult]  # base_mode, custom_mode, now
-    set_mode_acked_as: int  # the command id in the answer to the message SET_MODE
+    set_mode_acked_as: int  # the command id in the COMMAND_ACK of the message SET_MODE
 
 
 class CommandReceiver:
-    """Answers commands by a table."""
+    """Answers commands from a table."""
 
     def __init__(self, table: CommandTable, outbox: Outbox, departures: Departures) -> None:
         self._table = table
@@ -87,7 +87,7 @@ class CommandReceiver:
         self._answer(message.command, command, sender, now)
 
     def _handle_set_mode(self, message: messages.SetMode, sender: Address, now: float) -> None:
-        """The old message, which autopilots answer as if it were a command."""
+        """Answer the deprecated message SET_MODE with a COMMAND_ACK, as autopilots do."""
         result = self._table.set_mode(message.base_mode, message.custom_mode, now)
         self._ack(self._table.set_mode_acked_as, result, sender, now)
 
@@ -108,5 +108,5 @@ def _first_four(
 
 
 def as_id(value: float) -> int:
-    """A message id from a float parameter; -1 for what cannot be one (NaN among them)."""
+    """Return the message id in a float parameter; -1 if it cannot be one (NaN, for example)."""
     return int(value) if 0 <= value <= 0xFFFFFF else -1

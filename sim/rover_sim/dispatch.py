@@ -1,4 +1,4 @@
-"""How a message finds the part of the autopilot that takes it: a table by message id."""
+"""Handlers by message id: the part of the autopilot that takes each message."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""From demand to wheels: the seam, and which drive train a rover has."""
+"""From demand to wheels: the drive train protocol, and the choice of a drive train."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -21,7 +21,7 @@ from rover_sim.steering import Demand
 
 
 class DriveTrain(Protocol):
-    """Speed and turn-rate controllers with the motors that they drive."""
+    """Speed and yaw rate controllers with the motors that they drive."""
 
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
         """Return forward speed and yaw rate for the wheels, for one control period."""
@@ -34,19 +34,19 @@ def drive_train_of(
     frame: Frame,
     parameters: Parameters,
 ) -> DriveTrain:
-    """Return the drive train: the exact one, or its make's ``real`` one."""
+    """Return the exact drive train, or the make's ``real`` one."""
     return MotionControl() if drive is Drive.EXACT else real(frame, parameters)
 
 
 def ardupilot_drive(frame: Frame, _parameters: Parameters) -> DriveTrain:
-    """Return ArduPilot Rover's, on SITL's vehicle."""
+    """Return ArduPilot Rover's drive train, on SITL's vehicle."""
     if frame is Frame.ACKERMANN:
         return ArduPilotDrive(ACKERMANN_GAINS, WheelSteering())
     return ArduPilotDrive(SKID_GAINS, SkidSteering())
 
 
 def px4_drive(frame: Frame, parameters: Parameters) -> DriveTrain:
-    """Return PX4's."""
+    """Return PX4's drive train."""
     if frame is Frame.ACKERMANN:
         return AckermannDrive(parameters)
     return DifferentialDrive(parameters)

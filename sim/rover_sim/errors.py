@@ -1,10 +1,10 @@
-"""What the simulator itself can raise; bytes from outside never do.
+"""Exceptions that the simulator itself raises; bytes from outside never cause one.
 
 Exception
 ├── MissingExtra       an optional dependency is not installed
 ├── SimulatedCrash     a message that makes the real autopilot abort
-├── NotInVirtualTime   something that needs real time, asked of a loop that has none
-└── Stalled            what a test waits for in virtual time does not come
+├── NotInVirtualTime   an operation that needs real time, on the virtual loop
+└── Stalled            a test waits in virtual time for something that never happens
 """
 
 
@@ -17,8 +17,8 @@ class SimulatedCrash(Exception):
 
 
 class NotInVirtualTime(Exception):
-    """Sockets, processes and the like do not wait for virtual time, nor it for them."""
+    """Sockets, processes and the like run in real time, which a virtual loop cannot wait for."""
 
 
 class Stalled(Exception):
-    """Waiting in virtual time has no end; the message says who waits, and where."""
+    """A wait in virtual time would never end; the message says who waits, and where."""

@@ -1,4 +1,4 @@
-"""Where the autopilot believes it is: the truth, seen through its faults."""
+"""The autopilot's estimate: the truth, changed by faults."""
 
 import math
 from dataclasses import dataclass, fields
@@ -29,14 +29,14 @@ class Estimate:
 
     @property
     def without_numbers(self) -> "Estimate":
-        """What an estimator says that has failed: nothing of it is a number."""
+        """A failed estimator's output: every field is NaN."""
         return Estimate(*[math.nan] * len(fields(self)))
 
 
 def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Estimate:
-    """Return the estimate of this moment.
+    """Return the present estimate.
 
-    A frozen position still has live attitude, rates and wheel speed: gyros and encoders go on.
+    With a frozen position, attitude, rates and wheel speed stay live: gyros and encoders work.
     """
     if faults.position_frozen and last is not None:
         north, east, down, vn, ve = last.north, last.east, last.down, last.vn, last.ve

@@ -1,7 +1,7 @@
-"""By how much the estimate is off: errors that wander over seconds, as real estimators' do.
+"""Estimation errors that wander over seconds, as those of real estimators do.
 
-The autopilot reports what it sees and steers by it, so that an error of its speed becomes an error
-of its true speed. Where there is no error, there is no estimator: what is seen is the truth.
+The autopilot reports the estimate and steers by it, so an error of the estimated speed becomes an
+error of the true speed. An exact rover has no estimator: it sees the truth.
 """
 
 import math
@@ -12,18 +12,18 @@ from rover_sim.body import BodyState, wrap_angle
 from rover_sim.motion import CONTROL_PERIOD, toward
 from rover_sim.realism import EstimatorError, PushingError, Wander
 
-PUSHES = 0.1  # m/s; asked for more than this while it stands, it pushes
+PUSHES = 0.1  # m/s; a standing rover whose demand exceeds this pushes
 STANDS = 0.02  # m/s
 PUSHED_AFTER = 1.0  # s of pushing
-UPSET_FOR = 100.0  # s; recorded of PX4's SIH: from its last pushing until it reports to stand
-GROWS_FOR = 3.0  # s from right to upset, and back: recorded, the heading strays by 7 deg in 5 s
+UPSET_FOR = 100.0  # s; recorded of PX4's SIH: from the end of pushing until it reports standstill
+GROWS_FOR = 3.0  # s from normal to upset, and back; recorded: the heading drifts by 7 deg in 5 s
 
 
 class WanderingValue:
     """One axis of an error: a Gauss-Markov process about a fixed value.
 
-    Of the second order, two equal lags one after the other: recorded errors wander smoothly, 0.85
-    alike after 1 s and 0.35 after 3 s, which no single lag gives.
+    It is of second order, two equal lags in series: recorded errors wander smoothly, with a
+    correlation of 0.85 after 1 s and 0.35 after 3 s, which a single lag cannot give.
     """
 
     def __init__(self, wander: Wander, chance: Random) -> None:
@@ -33,7 +33,7 @@ class WanderingValue:
         driving = wander.spread * math.sqrt(2.0)  # the second lag halves the variance
         self._fresh = driving * math.sqrt(1.0 - self._kept * self._kept)
         self._driving = chance.gauss(0.0, driving)
-        # as after a long time: half the driving value, and half the variance on its own
+        # steady state: half of the driving value, plus independently half of the variance
         self._wandering = 0.5 * self._driving + chance.gauss(0.0, wander.spread * math.sqrt(0.5))
 
     def __repr__(self) -> str:
@@ -41,18 +41,18 @@ class WanderingValue:
 
     @property
     def value(self) -> float:
-        """The error of this moment."""
+        """The present error."""
         return self._fixed + self._wandering
 
     def step(self) -> float:
-        """Live through one control period; return the error then."""
+        """Advance by one control period; return the new error."""
         self._driving = self._driving * self._kept + self._chance.gauss(0.0, self._fresh)
         self._wandering = self._driving + (self._wandering - self._driving) * self._kept
         return self._fixed + self._wandering
 
 
 class Estimator:
-    """Sees the truth with errors. The same seed makes the same errors, step for step."""
+    """Sees the truth with errors. The same seed gives the same errors, step for step."""
 
     def __init__(self, error: EstimatorError, *, seed: int) -> None:
         chance = Random(seed)
@@ -69,10 +69,10 @@ class Estimator:
         return f"Estimator({self._forward!r}, {self._right!r})"
 
     def see(self, truth: BodyState, *, asked: float) -> BodyState:
-        """Return what the rover takes for the truth, one control period later than before.
+        """Advance by one control period; return the state that the rover believes.
 
-        ``asked`` is the speed for which the wheels push, m/s. The velocity is measured in the
-        ground's frame: an error of the heading does not turn it.
+        ``asked`` is the demanded speed, m/s. The velocity is measured in the ground's frame, so an
+        error of the heading does not rotate it.
         """
         upset = RIGHT if self._upset is None else self._upset.step(truth, asked=asked)
         error = self._yaw.step() + upset.yaw
@@ -98,7 +98,7 @@ NOWHERE = (0.0, 0.0)
 
 
 class Drift:
-    """How far a position has strayed over minutes, north and east."""
+    """Slow drift of a position over minutes, north and east."""
 
     def __init__(self, wander: Wander, chance: Random) -> None:
         self._north = WanderingValue(wander, chance)
@@ -108,12 +108,12 @@ class Drift:
         return f"Drift({self._north.value:.2f} N, {self._east.value:.2f} E)"
 
     def step(self) -> tuple[float, float]:
-        """Live through one control period; return the metres then."""
+        """Advance by one control period; return the drift north and east, m."""
         return self._north.step(), self._east.step()
 
 
 class MoreError(NamedTuple):
-    """What an upset estimate is off by, on top of the rest."""
+    """The additional error of an upset estimate."""
 
     forward: float  # m/s
     right: float  # m/s
@@ -124,21 +124,21 @@ RIGHT = MoreError(0.0, 0.0, 0.0)
 
 
 class Upset:
-    """The error of an estimator that has felt its rover push without moving, for minutes."""
+    """The error of an estimator, for minutes after its rover pushed without moving."""
 
     def __init__(self, error: PushingError, chance: Random) -> None:
         self._forward = WanderingValue(error.speed, chance)
         self._right = WanderingValue(error.speed, chance)
         self._yaw = WanderingValue(error.yaw, chance)
-        self._pushed = 0.0  # s without a break
+        self._pushed = 0.0  # s of uninterrupted pushing
         self._left = 0.0  # s until it recovers
-        self._share = 0.0  # 0 (right) to 1 (upset)
+        self._share = 0.0  # 0 (normal) to 1 (fully upset)
 
     def __repr__(self) -> str:
         return f"Upset({self._left:.1f} s)"
 
     def step(self, truth: BodyState, *, asked: float) -> MoreError:
-        """Live through one control period; return the error then."""
+        """Advance by one control period; return the additional error."""
         pushes = abs(asked) > PUSHES and abs(truth.forward_speed) < STANDS
         self._pushed = self._pushed + CONTROL_PERIOD if pushes else 0.0
         self._left = UPSET_FOR if self._pushed > PUSHED_AFTER else self._left - CONTROL_PERIOD

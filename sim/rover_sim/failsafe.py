@@ -1,13 +1,13 @@
-"""The operator-lost failsafe: heartbeats of the one ground station that counts (SYSID_MYGCS).
+"""The GCS failsafe: it watches the heartbeats of one ground station (SYSID_MYGCS).
 
-Off by default, as in the real one. Setpoints are no sign of life, only heartbeats are.
+Off by default, as on the real one. Only heartbeats count as a sign of life, setpoints do not.
 """
 
 from rover_sim.parameters import Parameters
 
 
 class OperatorFailsafe:
-    """Trips when heartbeats stop; a rover that never heard one does not miss them."""
+    """Trips when heartbeats stop; a rover that never received one does not miss them."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
@@ -18,12 +18,12 @@ class OperatorFailsafe:
         return f"OperatorFailsafe(tripped={self.tripped})"
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
-        """Note a heartbeat of any system."""
+        """Note a heartbeat from any system."""
         if system_id == self._parameters["SYSID_MYGCS"]:
             self._last_heard = now
 
     def changed(self, *, now: float) -> bool:
-        """Look at the clock; True once when it trips and once when it clears."""
+        """Check the time-out; return True once when it trips and once when it clears."""
         if self._parameters["FS_GCS_ENABLE"] == 0 or self._last_heard is None:
             lost = False
         else:

@@ -1,8 +1,8 @@
-"""Faults by the clock, as the command line says them: reading only, no rover is touched here.
+"""Timed faults, as ``--fault`` takes them: parsing only, no rover is touched here.
 
     [rover 2] at 10 s: block-wheel left for 5 s
 
-``ACTIONS`` lists what can happen. What lasts does so for the time given, or for good.
+``ACTIONS`` lists the faults. A lasting fault lasts for the given time, or for good.
 """
 
 import re
@@ -23,12 +23,12 @@ EXAMPLE = "at 10 s: block-wheel left for 5 s"
 
 
 class PlanError(Exception):
-    """What cannot be understood; the message is one line for the user."""
+    """A fault that cannot be parsed; the message is one line for the user."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lasting:
-    """Something that is broken, until it is mended."""
+    """A fault that lasts until its end."""
 
     faults: Faults = Faults()  # noqa: RUF009  # frozen
     blocked: frozenset[Actuator] = frozenset()
@@ -36,7 +36,7 @@ class Lasting:
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """A shove, as the rover sees it."""
+    """A displacement, in the rover's own axes."""
 
     forward: float = 0.0  # m
     right: float = 0.0  # m
@@ -45,12 +45,12 @@ class Push:
 
 @dataclass(frozen=True, slots=True)
 class Reboot:
-    """The autopilot is switched off and on."""
+    """A restart of the autopilot."""
 
 
 @dataclass(frozen=True, slots=True)
 class Disarm:
-    """Somebody disarms it at the rover."""
+    """Disarming at the rover, by a person."""
 
 
 Event = Lasting | Push | Reboot | Disarm
@@ -59,13 +59,13 @@ Words = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class PlannedFault:
-    """One thing that happens at a time."""
+    """One fault with its time."""
 
-    text: str  # as it was given
+    text: str  # as given
     rover: int | None  # system id; None: every rover
     at: float  # s since the simulator started
     event: Event
-    lasts: float | None  # s; None: for good, or it is over at once
+    lasts: float | None  # s; None: for good, or a momentary event
 
 
 def _block_wheel(words: Words, _frame: Frame) -> Event:
@@ -106,7 +106,7 @@ def _plain(event: Event) -> Callable[[Words, Frame], Event]:
     return read
 
 
-#: what can happen: how it is written, and how that is read
+#: action name: its syntax for the user, and its parser
 ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
     "block-wheel": ("block-wheel left|right|all", _block_wheel),
     "freeze-output": ("freeze-output left|right (ackermann: throttle|steering)", _freeze_output),
@@ -127,7 +127,7 @@ HELP = (
 
 
 def read_fault(text: str, frame: Frame) -> PlannedFault:
-    """Read one fault. Raise PlanError."""
+    """Parse one fault. Raise PlanError."""
     form = FORM.fullmatch(text.strip())
     if form is None:
         raise PlanError(f"not understood: {text!r}; for example: {EXAMPLE}")
@@ -171,7 +171,7 @@ def _amount(words: Words, *, unit: str, default: str) -> tuple[float, str]:
 
 
 def check_rovers(plan: Iterable[PlannedFault], numbers: Container[int]) -> None:
-    """Raise PlanError where a fault names a rover that there is not."""
+    """Raise PlanError if a fault names a rover that does not exist."""
     for fault in plan:
         if fault.rover is not None and fault.rover not in numbers:
             raise PlanError(f"{fault.text!r}: there is no rover {fault.rover}")

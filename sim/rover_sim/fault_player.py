@@ -1,4 +1,4 @@
-"""Faults by the clock: lets what was planned happen to rovers, when its time has come."""
+"""Plays timed faults on rovers when they are due."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
@@ -17,14 +17,14 @@ NOTHING: frozenset[Actuator] = frozenset()
 
 @dataclass(frozen=True, slots=True)
 class HandledRover:
-    """A rover and the hands about it."""
+    """A rover with the body on which faults act."""
 
     vehicle: Vehicle
     body: BodyByHand
 
 
 class FaultPlayer:
-    """Plays a plan once; the same plan at the same times does the same."""
+    """Plays a plan once; the same plan at the same times has the same effects."""
 
     def __init__(self, plan: Iterable[PlannedFault], rovers: Sequence[HandledRover]) -> None:
         self._begin = sorted(plan, key=lambda fault: fault.at)
@@ -35,7 +35,7 @@ class FaultPlayer:
         return f"FaultPlayer({len(self._begin)} to come, {len(self._end)} to end)"
 
     def play(self, elapsed: float, *, now: float) -> list[str]:
-        """Do what is due ``elapsed`` seconds after the start; return a line for each."""
+        """Start and end faults due ``elapsed`` seconds after the start; return log lines."""
         said = []
         while self._begin and self._begin[0].at <= elapsed:
             fault = self._begin.pop(0)
@@ -67,7 +67,7 @@ class FaultPlayer:
                     rover.vehicle.autopilot.operator_arm(False, now=now)
 
     def _break(self) -> None:
-        """Break in each rover what lasts at this moment, and mend the rest."""
+        """Apply the present lasting faults to each rover, and clear the others."""
         for rover in self._rovers:
             lasting = [
                 fault.event
@@ -86,7 +86,7 @@ class FaultPlayer:
 
 
 def joined(faults: Iterable[Faults]) -> Faults:
-    """Return all that is broken in any of them; of flags and sets only, as a plan has them."""
+    """Return the union of flags and sets, the only faults in plans; else the first value."""
     values = list(faults)
     if not values:
         return Faults()

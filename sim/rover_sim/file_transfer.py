@@ -1,4 +1,4 @@
-"""MAVLink FTP, as far as saying no: silence would cost a client seconds.
+"""MAVLink FTP, refusals only: without an answer a client would wait for seconds.
 
 MAVLink guide, "File Transfer Protocol".
 """
@@ -11,7 +11,7 @@ FILE_NOT_FOUND = 10
 
 
 def refusal_of(payload: Sequence[int]) -> list[int]:
-    """Return the NAK to a request: same session, next sequence number, its opcode named."""
+    """Return the NAK to a request: same session, next sequence number, the request's opcode."""
     seq = (payload[0] | payload[1] << 8) + 1 & 0xFFFF
     session, opcode = payload[2], payload[3]
     header = [seq & 0xFF, seq >> 8, session, NAK, 1, opcode, 0, 0, 0, 0, 0, 0, FILE_NOT_FOUND]

@@ -1,6 +1,6 @@
-"""Modes and arming: what decides, at each moment, who drives.
+"""Modes and arming: decides at each moment what drives the rover.
 
-What every make does; what they do differently is asked of the persona's ``FlightRules``.
+This file has what all makes share; the persona's ``FlightRules`` have what differs.
 """
 
 from mav_tasks.mavlink import messages
@@ -23,7 +23,7 @@ NEEDS_POSITION = (Mode.GUIDED, Mode.AUTO, Mode.RTL)
 
 
 class FlightControl:
-    """Mode, arming, and the demand that follows from them."""
+    """Mode, arming, and the resulting demand."""
 
     def __init__(
         self,
@@ -48,10 +48,10 @@ class FlightControl:
         self._outbox = outbox
         self._boot = boot
         self._radio = sticks
-        self._follower = follower  # None: home never moves by itself, but where it is armed
+        self._follower = follower  # None: home moves only at arming, if at all
         self._route: Route | None = None
         self._sticks = STOP
-        self._home_due = False  # home is to be where it is now
+        self._home_due = False  # set home to the present position in the next step
         self._announced = (self.mode, self.armed)
 
     def __repr__(self) -> str:
@@ -65,27 +65,27 @@ class FlightControl:
 
     @property
     def custom_mode(self) -> int:
-        """The mode's number, as HEARTBEAT has it."""
+        """The mode's number, as in HEARTBEAT."""
         return self._modes.numbers[self.mode]
 
     @property
     def intended_custom_mode(self) -> int:
-        """The number of the mode that somebody asked for, as CURRENT_MODE has it."""
+        """The number of the last requested mode, as in CURRENT_MODE."""
         return self._modes.numbers[self._rules.intended(self.mode)]
 
     @property
     def system_status(self) -> MavState:
-        """MAV_STATE, as HEARTBEAT has it."""
+        """MAV_STATE, as in HEARTBEAT."""
         return self._rules.system_status(self.mode, armed=self.armed)
 
     @property
     def target(self) -> Target | None:
-        """What the setpoints ask for, while they are followed."""
+        """The target of the setpoints while they are followed, else None."""
         return self._rules.target if self.mode is Mode.GUIDED else None
 
     @property
     def destination(self) -> Destination | None:
-        """Where it drives to, if it drives to a place."""
+        """The place that the rover drives to, or None."""
         if self.mode is Mode.GUIDED:
             return self.target if isinstance(self.target, Destination) else None
         if self.mode is Mode.HOLD:
@@ -96,21 +96,21 @@ class FlightControl:
 
     @property
     def current_item(self) -> int:
-        """The mission item that it is at, for MISSION_CURRENT."""
+        """The current mission item, for MISSION_CURRENT."""
         waypoint = self._route.next if self._route is not None else None
         if self.mode is Mode.AUTO and waypoint is not None and waypoint.seq is not None:
             return waypoint.seq
         return self._missions.current
 
     def take_changes(self) -> Change:
-        """Return what has changed since the last call."""
+        """Return the changes since the last call."""
         mode, armed = self._announced
         self._announced = (self.mode, self.armed)
         changed = Change.NOTHING if mode is self.mode else Change.MODE
         return changed if armed is self.armed else changed | Change.ARMING
 
     def request_mode(self, mode: Mode, *, now: float) -> bool:
-        """Change the mode at a client's wish."""
+        """Change the mode for a client; return False if refused."""
         refusal = None
         if self.mode is not Mode.INITIALISING or not self._boot.takes_modes(now=now):
             refusal = self._rules.mode_refusal(mode, self.mode, now=now)
@@ -123,7 +123,7 @@ class FlightControl:
         return True
 
     def request_custom_mode(self, custom_mode: int, *, now: float) -> bool:
-        """Change the mode at a client's wish, by its number."""
+        """Change the mode for a client, by its number; return False if refused."""
         mode = self._modes.mode_of(custom_mode)
         if mode is None:
             self._outbox.say(MavSeverity.INFO, self._rules.unknown_mode(custom_mode))
@@ -136,7 +136,7 @@ class FlightControl:
         self._switch(mode)
 
     def skip_to_item(self, seq: int) -> bool:
-        """Go on with another mission item, now or when AUTO is next entered; False: refused."""
+        """Continue with another mission item, now or on the next AUTO; return False if refused."""
         if not self._missions.move_to(seq):
             return False
         if self.mode is Mode.AUTO and self._route is not None and self._missions.item_count > 0:
@@ -146,9 +146,9 @@ class FlightControl:
     def reposition(
         self, destination: Destination | None, *, keeps_place: bool = False, now: float
     ) -> bool:
-        """Drive to a place (None: stay here) in the mode that is for it, if that may be entered.
+        """Drive to a place (None: stay) in the reposition mode; return False if refused.
 
-        ``keeps_place``: go on to the place of before, if there is one.
+        ``keeps_place``: drive on to the previous place, if there is one.
         """
         mode = self._rules.reposition_mode
         if self.mode is not mode and not self.request_mode(mode, now=now):
@@ -160,15 +160,15 @@ class FlightControl:
 
     @property
     def can_reposition(self) -> bool:
-        """Whether it is in the mode in which it drives to a place."""
+        """Whether the rover is in the mode in which it drives to a place."""
         return self.mode is self._rules.reposition_mode
 
     def change_speed(self, speed: float) -> bool:
-        """Change how fast it drives by itself; False: refused."""
+        """Change the speed of the modes that drive by themselves; return False if refused."""
         return self._rules.change_speed(speed, self.mode)
 
     def arm(self, *, forced: bool, now: float) -> bool:
-        """Arm at a client's wish; what forcing skips is the make's, but never a fault."""
+        """Arm for a client; return success. ``forced`` skips the make's checks, not faults."""
         if self.armed:
             return True
         if self.faults.refuse_arm:
@@ -192,7 +192,7 @@ class FlightControl:
         return True
 
     def set_armed(self, armed: bool, *, text: str | None = None) -> None:
-        """Arm or disarm, without checks. Disarming always works: the rover coasts."""
+        """Arm or disarm, without checks. A disarmed rover coasts."""
         if armed is not self.armed:
             self.armed = armed
             self._home_due = armed and self._home_follows_arming
@@ -200,7 +200,7 @@ class FlightControl:
             self._outbox.say(MavSeverity.INFO, text or self._rules.arming_text(armed=armed))
 
     def set_home(self, place: Destination | None) -> None:
-        """Put home at a place; None: where the rover is."""
+        """Set home to a place; None sets it to the rover's position."""
         self._home_due = place is None
         if self._follower is not None:
             self._follower.name(here=place is None)
@@ -208,21 +208,21 @@ class FlightControl:
             self.home = place
 
     def set_sticks(self, speed: float, yaw_rate: float) -> None:
-        """Drive by hand; has an effect only in MANUAL and POSITION."""
+        """Drive manually; has an effect only in MANUAL and POSITION."""
         self._sticks = Demand(speed, yaw_rate)
         self._rules.sticks_present = True
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
-        """Note a heartbeat of any system."""
+        """Note a heartbeat from any system."""
         self._rules.hear_heartbeat(system_id, now=now)
 
     def lose_position(self) -> None:
-        """Note that there is no position any more: what drives by one ends."""
+        """Note the loss of the position; the rules end a mode that needs one."""
         if self.armed and self.mode in NEEDS_POSITION:
             self._intervene(self._rules.position_lost())
 
     def leave_fence(self) -> None:
-        """Note that the rover is outside its own fence."""
+        """Note that the rover left its own fence."""
         if self.armed:
             self._intervene(self._rules.fence_breached())
 
@@ -235,7 +235,7 @@ class FlightControl:
         self._rules.take_global(message, estimate, mode=self.mode, now=now)
 
     def demand(self, estimate: Estimate, *, now: float) -> Demand:
-        """Say how to move now. Called once per control step: it also lets time pass."""
+        """Return the demand. Call once per control step: it also advances time-outs."""
         self._pass_time(now)
         if self._home_due:
             self.home = Destination(estimate.north, estimate.east)
@@ -249,7 +249,7 @@ class FlightControl:
                 demand = self._radio.demand(now=now) or self._sticks
             case Mode.HOLD | Mode.LAND:
                 demand = self._rules.hold(estimate)
-            case Mode.GUIDED:  # asked also while disarmed: its time-out goes on
+            case Mode.GUIDED:  # called also while disarmed, so that its time-out runs
                 demand = self._rules.follow_setpoints(estimate, now=now)
                 if isinstance(self.target, Heading | TurnRate):
                     demand = self._radio.nudged(demand, now=now)
@@ -258,7 +258,7 @@ class FlightControl:
         return demand if self.armed else COAST
 
     def _switch(self, mode: Mode) -> None:
-        """Entering the present mode again changes nothing, not even a target."""
+        """Switch the mode; re-entering the present mode changes nothing, not even a target."""
         if mode is self.mode:
             return
         self.mode = mode

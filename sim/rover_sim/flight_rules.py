@@ -1,6 +1,6 @@
-"""What one make's flight stack decides otherwise than another's: the seam behind ``flight``.
+"""The decisions that differ between flight stacks: the protocol behind ``flight``.
 
-``flight`` does what every make does; it asks the rules of its persona for the rest.
+``flight`` does what all makes share; it asks the rules of its persona for the rest.
 """
 
 from collections.abc import Callable
@@ -20,12 +20,12 @@ from rover_sim.route import Route
 from rover_sim.setpoints import Destination, Global, Local, Target
 from rover_sim.steering import Demand
 
-SETTLING_TIME = 0.5  # s after start until the position estimate is good for arming
+SETTLING_TIME = 0.5  # s after start until the position estimate permits arming
 
 
 @dataclass(frozen=True, slots=True)
 class FlightParts:
-    """What rules are made from."""
+    """The parts that rules are constructed from."""
 
     origin: Origin
     parameters: Parameters
@@ -36,33 +36,33 @@ class FlightParts:
     started: float  # s
     frame: Frame
     drive: Drive
-    settling_time: float = SETTLING_TIME  # s; 0 where a boot says when it can be armed
+    settling_time: float = SETTLING_TIME  # s; 0 if a simulated boot decides when it can be armed
 
 
 class Intervention(NamedTuple):
-    """What a flight stack does by itself, unasked."""
+    """An action that a flight stack takes by itself."""
 
     mode: Mode | None = None
     disarm: bool = False
-    disarm_text: str | None = None  # None: as on anybody's command
+    disarm_text: str | None = None  # None: the text for a command
 
 
 class FlightRules(Protocol):
     """Modes, arming, setpoints and failsafes of one make."""
 
-    reposition_mode: Mode  # in which it drives to the place of DO_REPOSITION
-    sticks_present: bool  # somebody holds the sticks of its remote control
-    no_position_text: str  # with which arming is refused then
-    home_is_where_armed: bool  # else where it was switched on
+    reposition_mode: Mode  # for the place of DO_REPOSITION
+    sticks_present: bool  # a person holds the sticks of the RC transmitter
+    no_position_text: str  # refuses arming without GPS
+    home_is_where_armed: bool  # else home is where the rover was switched on
 
     @property
     def target(self) -> Target | None:
-        """What the setpoints ask for, in GUIDED."""
+        """The target of the setpoints, in GUIDED."""
         ...
 
     @property
     def hold_destination(self) -> Destination | None:
-        """Where it drives to in HOLD, if anywhere."""
+        """The place that the rover drives to in HOLD, or None."""
         ...
 
     def system_status(self, mode: Mode, *, armed: bool) -> MavState:
@@ -70,60 +70,60 @@ class FlightRules(Protocol):
         ...
 
     def arming_text(self, *, armed: bool) -> str:
-        """Return the text that tells of arming or disarming."""
+        """Return the text that reports arming or disarming."""
         ...
 
     def unknown_mode(self, custom_mode: int) -> str:
-        """Return the text for a number that is no mode."""
+        """Return the text for a mode number that does not exist."""
         ...
 
     def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
-        """Return the text with which a client's mode change is refused; None: it may be."""
+        """Return the text that refuses a client's mode change; None allows it."""
         ...
 
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
-        """Return the text with which arming is refused; None: it may be."""
+        """Return the text that refuses arming; None allows it."""
         ...
 
     def intended(self, mode: Mode) -> Mode:
-        """Return what somebody asked for last, which a failsafe does not change."""
+        """Return the mode that was requested last, which a failsafe does not change."""
         ...
 
     def choose(self, mode: Mode) -> None:
-        """Note what somebody asked for, also when it is the present mode."""
+        """Note a requested mode, even if it is the present one."""
         ...
 
     def enter(self, mode: Mode) -> None:
-        """Begin a mode, whoever wanted it."""
+        """Begin a mode, no matter who requested it."""
         ...
 
     def intervene(
         self, mode: Mode, *, armed: bool, arrived: bool, now: float
     ) -> Intervention | None:
-        """Look at the clock, once per control step; give what follows from it.
+        """Check the time-outs, once per control step; return the resulting action, or None.
 
-        ``arrived``: the way that AUTO or RTL drives is at its end.
+        ``arrived``: AUTO or RTL has reached the end of its route.
         """
         ...
 
     def position_lost(self) -> Intervention:
-        """Say what it does, armed in a mode that needs a position, when that is gone."""
+        """Return the reaction to a lost position, while armed in a mode that needs one."""
         ...
 
     def fence_breached(self) -> Intervention:
-        """Say what it does, armed, when it has left its own fence."""
+        """Return the reaction to leaving the fence, while armed."""
         ...
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
-        """Note a heartbeat of any system."""
+        """Note a heartbeat from any system."""
         ...
 
     def take_local(self, message: Local, estimate: Estimate, *, mode: Mode, now: float) -> None:
-        """Take SET_POSITION_TARGET_LOCAL_NED, in whatever mode."""
+        """Take SET_POSITION_TARGET_LOCAL_NED, in any mode."""
         ...
 
     def take_global(self, message: Global, estimate: Estimate, *, mode: Mode, now: float) -> None:
-        """Take SET_POSITION_TARGET_GLOBAL_INT, in whatever mode."""
+        """Take SET_POSITION_TARGET_GLOBAL_INT, in any mode."""
         ...
 
     def go_to(self, destination: Destination | None, *, now: float) -> None:
@@ -131,26 +131,26 @@ class FlightRules(Protocol):
         ...
 
     def change_speed(self, speed: float, mode: Mode) -> bool:
-        """Take DO_CHANGE_SPEED, m/s; False: refused."""
+        """Take DO_CHANGE_SPEED, m/s; return False if refused."""
         ...
 
     def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
-        """Say how to move in GUIDED."""
+        """Return the demand in GUIDED."""
         ...
 
     def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
-        """Say how to move in AUTO and RTL; None once there."""
+        """Return the demand in AUTO and RTL; None on arrival."""
         ...
 
     def hold(self, estimate: Estimate) -> Demand:
-        """Say how to move in HOLD."""
+        """Return the demand in HOLD."""
         ...
 
     def mission_route(self, home: Destination) -> Route | None:
-        """Return what AUTO drives; None: nothing."""
+        """Return the route of AUTO, or None if there is none."""
         ...
 
     @property
     def cruise_speed(self) -> float:
-        """How fast AUTO and RTL drive, m/s."""
+        """Speed of AUTO and RTL, m/s."""
         ...

@@ -10,7 +10,7 @@ LONGITUDE_LIMIT_DEGE7 = 1_800_000_000
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where the local frame's zero point is. Degrees, and metres above mean sea level."""
+    """The zero point of the local frame. Degrees, and metres above mean sea level."""
 
     latitude: float
     longitude: float
@@ -18,12 +18,12 @@ class Origin:
 
     @property
     def latitude_degE7(self) -> int:
-        """The latitude as MAVLink has it."""
+        """The latitude in degE7."""
         return round(self.latitude * 1e7)
 
     @property
     def longitude_degE7(self) -> int:
-        """The longitude as MAVLink has it."""
+        """The longitude in degE7."""
         return round(self.longitude * 1e7)
 
     def to_global(self, north: float, east: float) -> tuple[int, int]:
@@ -33,9 +33,9 @@ class Origin:
         return round(latitude * 1e7), round(longitude * 1e7)
 
     def to_global_cut(self, north: float, east: float) -> tuple[int, int]:
-        """Return latitude and longitude in degE7 as ArduPilot reckons: its offsets are cut off.
+        """Return latitude and longitude in degE7, with truncated offsets like ArduPilot.
 
-        (Location::offset.) An origin that is worked out from a position is 1 degE7 off by chance.
+        (Location::offset.) An origin computed from such a position can be 1 degE7 off.
         """
         latitude = self.latitude + north / METRES_PER_DEGREE
         return (
@@ -52,7 +52,7 @@ class Origin:
         )
 
     def _metres_per_degree_east(self, latitude: float) -> float:
-        """Of longitude, between the origin and a place at this latitude: half-way between them."""
+        """Return metres per degree of longitude, at the mean of the origin's and this latitude."""
         return METRES_PER_DEGREE * math.cos(math.radians((self.latitude + latitude) / 2))
 
 

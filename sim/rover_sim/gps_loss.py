@@ -2,11 +2,11 @@
 
 from rover_sim.faults import Faults
 
-COASTS = 5.0  # s, PX4's EKF2_NOAID_TOUT; ArduPilot's EKF gives up after as many to ten
+COASTS = 5.0  # s, PX4's EKF2_NOAID_TOUT; ArduPilot's EKF gives up after 5 to 10 s
 
 
 class GpsLoss:
-    """Keeps the time since the satellites were lost."""
+    """Measures the time since the satellites were lost."""
 
     def __init__(self) -> None:
         self._lost_at: float | None = None
@@ -16,7 +16,7 @@ class GpsLoss:
         return f"GpsLoss({'no position' if self.is_position_gone else 'position'})"
 
     def watch(self, faults: Faults, *, now: float) -> bool:
-        """Look at the clock; True once, when the position is gone."""
+        """Check the time; return True once, when the position is lost."""
         if not faults.gps_lost:
             self._lost_at, self.is_position_gone = None, False
             return False

@@ -1,4 +1,4 @@
-"""GUIDED mode: the one target there is, its time-out, and what to do for it now."""
+"""GUIDED mode: one target, its time-out, and the demand for it."""
 
 import math
 from collections.abc import Callable
@@ -22,11 +22,11 @@ from rover_sim.setpoints import (
 from rover_sim.steering import STOP, Demand, SteerToPoint, steer_to_heading
 
 SETPOINT_TIMEOUT = 3.0  # s, a constant in ArduPilot's mode_guided.cpp
-ARRIVAL_RADIUS = 0.1  # m, before braking out
+ARRIVAL_RADIUS = 0.1  # m; nearer than this the rover only brakes
 
 
 class Guided:
-    """Keeps the last target, armed or not: armed within its time-out, the rover drives off."""
+    """Keeps the last target, armed or not: if armed within its time-out, the rover drives off."""
 
     def __init__(
         self,
@@ -49,11 +49,11 @@ class Guided:
 
     @property
     def target(self) -> Target | None:
-        """What it was last asked for, and has not forgotten."""
+        """The last target, until it is reached, times out or is cleared."""
         return self._target
 
     def clear(self) -> None:
-        """Forget the target: on entering the mode, and only then."""
+        """Forget the target; called only on entering the mode."""
         self._target = None
 
     def take_local(self, message: Local, estimate: Estimate, *, now: float) -> None:
@@ -69,7 +69,7 @@ class Guided:
         self._take(destination, now)
 
     def change_speed(self, speed: float) -> bool:
-        """Set the speed towards a destination; refused for any other target."""
+        """Set the speed towards a destination; return False without one, or for speed < 0."""
         if math.isnan(speed):
             raise SimulatedCrash("NaN in DO_CHANGE_SPEED: ArduPilot aborts")
         if speed < 0.0 or not isinstance(self._target, Destination):
@@ -78,7 +78,7 @@ class Guided:
         return True
 
     def demand(self, estimate: Estimate, *, now: float) -> Demand:
-        """Say how to move now; counts the time-out down also while disarmed."""
+        """Return the demand; the time-out also runs while disarmed."""
         match self._target:
             case None:
                 return STOP
@@ -109,6 +109,6 @@ class Guided:
         if demand is not None:
             return demand
         self._target = None
-        # The real one says so for a guided target too, though no mission runs.
+        # The real one sends this for a guided target, too, although no mission runs.
         self._outbox.send(messages.MissionItemReached(0))
         return STOP

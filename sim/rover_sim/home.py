@@ -1,8 +1,8 @@
-"""Home: where it is, and when it moves by itself, as the real ones' does.
+"""Home: its position, and when it moves by itself, as on the real autopilots.
 
-Read in the sources of ArduPilot Rover 4.6 (commands.cpp, update_home) and PX4 1.17
-(HomePosition.cpp): while disarmed, home follows the rover. A place that a person names is kept:
-on ArduPilot whatever DO_SET_HOME says, until a restart; on PX4 a place, but not "here".
+From the sources of ArduPilot Rover 4.6 (commands.cpp, update_home) and PX4 1.17 (HomePosition.cpp):
+while disarmed, home follows the rover. DO_SET_HOME fixes it: on ArduPilot in either form, until a
+restart; on PX4 only with a place, not with "here".
 """
 
 import math
@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from rover_sim.estimate import Estimate
 from rover_sim.setpoints import Destination
 
-LOOK = 1.0  # s; ArduPilot's one_second_loop. PX4 looks in every loop
+LOOK = 1.0  # s between checks; ArduPilot's one_second_loop. PX4 checks in every loop
 
 
 @dataclass(frozen=True, slots=True)
 class HomeRule:
-    """When one make moves home."""
+    """Conditions in which one make moves home."""
 
-    where_armed: bool  # at each arming
-    least_move: float  # m; disarmed, it follows a rover that is farther off than this
-    here_is_kept: bool  # DO_SET_HOME "here" is a person's word, too
+    where_armed: bool  # sets home at each arming
+    least_move: float  # m; while disarmed, home follows a rover that is at least this far away
+    here_is_kept: bool  # DO_SET_HOME with "here" also fixes home
 
 
 ARDUPILOT_HOME = HomeRule(where_armed=False, least_move=0.5, here_is_kept=True)
@@ -33,14 +33,14 @@ class Follower:
     def __init__(self, rule: HomeRule) -> None:
         self._rule = rule
         self._looked_at = float("-inf")
-        self.is_kept = False  # a person has named it
+        self.is_kept = False  # a person has set it
 
     def __repr__(self) -> str:
         return f"Follower(is_kept={self.is_kept})"
 
     @property
     def follows_arming(self) -> bool:
-        """Whether home is to be where it is armed now."""
+        """Whether arming sets home."""
         return self._rule.where_armed and not self.is_kept
 
     def name(self, *, here: bool) -> None:
@@ -48,7 +48,7 @@ class Follower:
         self.is_kept = self._rule.here_is_kept or not here
 
     def moved(self, home: Destination, estimate: Estimate, *, now: float) -> Destination:
-        """Return where home of a disarmed rover is now."""
+        """Return the new home of a disarmed rover."""
         if self.is_kept or now - self._looked_at < LOOK:
             return home
         self._looked_at = now

@@ -1,6 +1,6 @@
-"""DO_SET_HOME: the same on every make but for the refusing result. After the sources, not observed.
+"""DO_SET_HOME: alike on every make but for the result of a refusal. From the sources, not observed.
 
-The altitude that is named changes nothing here: the world is flat.
+The altitude is ignored: the world is flat.
 """
 
 import math
@@ -17,13 +17,13 @@ HERE = 1.0  # param1
 
 @dataclass(frozen=True, slots=True)
 class HomeCommand:
-    """Sets home to where the rover is, or to a place."""
+    """Sets home to the rover's position, or to a place."""
 
     parts: CommandParts
     refusal: MavResult
 
     def actions(self) -> Mapping[int, Action]:
-        """Return the part of a table that is this command."""
+        """Return the command table's entry for this command."""
         return {MavCmd.DO_SET_HOME: self._set_home}
 
     def _set_home(self, command: Command, now: float) -> MavResult:
@@ -40,7 +40,7 @@ class HomeCommand:
 
 
 def _as_degE7(degrees: tuple[float, float] | None) -> tuple[int, int]:
-    """Return the place of a COMMAND_LONG; 0/0, which is none, for what is no number."""
+    """Return the place of a COMMAND_LONG; 0/0, which is invalid, for values that are not finite."""
     if degrees is None or not all(math.isfinite(value) for value in degrees):
         return 0, 0
     return round(degrees[0] * 1e7), round(degrees[1] * 1e7)

@@ -1,6 +1,6 @@
 """A skid-steered body without a physics engine: lag, acceleration limits, slip.
 
-For fast tests, and for interpreters that pybullet has no wheel for.
+For fast tests, and for Python versions that have no pybullet wheel.
 """
 
 from random import Random
@@ -10,14 +10,14 @@ from rover_sim.planar import LAG_SPREAD, PlanarBody, approach
 
 LAG = 0.08  # s, first-order lag from wheel-speed demand to motion
 MAX_YAW_ACCELERATION = 12.0  # rad/s²
-SLIP_SPREAD = 0.3  # of the slip; how far a seed can move it either way
+SLIP_SPREAD = 0.3  # of the slip; a seed changes it by up to this, either way
 
 
 class KinematicBody(PlanarBody):
-    """Moves as demanded, a little late; implements ``Body``.
+    """Moves as demanded, with a small lag; implements ``Body``.
 
-    ``slip`` is the part of a demanded yaw rate that is lost in scrubbing tyres (0 none, 0.3 as
-    the pybullet rover). ``seed`` varies slip and lag between rovers; None does not.
+    ``slip`` is the fraction of a demanded yaw rate that scrubbing tyres lose (0 none, 0.3 as the
+    pybullet rover). ``seed`` varies slip and lag between rovers; None varies neither.
     """
 
     def __init__(self, *, start: Pose, slip: float, seed: int | None) -> None:
@@ -31,7 +31,7 @@ class KinematicBody(PlanarBody):
         self._demanded_yaw_rate = 0.0
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
-        """Demand a motion; kept until the next call."""
+        """Demand a motion, kept until the next call."""
         self._demanded_speed = forward_speed
         self._demanded_yaw_rate = yaw_rate * self._grip
 

@@ -1,4 +1,4 @@
-"""A body within reach of a tester's hands: carried, turned, its wheels held."""
+"""A body that a tester can carry and turn, and whose wheels can be blocked."""
 
 from dataclasses import replace
 from math import cos, sin
@@ -11,26 +11,26 @@ from rover_sim.frames import Frame
 class BodyByHand:
     """A body that can be moved from outside; implements ``Body``.
 
-    The ground is the same everywhere: to carry a rover is to move the ground's frame under it.
+    The ground is the same everywhere, so moving a rover means moving the ground's frame under it.
     """
 
     def __init__(self, body: Body, *, frame: Frame = Frame.SKID) -> None:
         self._body = body
-        self._offset: Pose | None = None  # of the body's own frame; None: not moved yet
+        self._offset: Pose | None = None  # of the body's frame; None: not moved yet
         self._frame = frame
-        self.blocked: frozenset[Actuator] = frozenset()  # sides whose wheels stand
+        self.blocked: frozenset[Actuator] = frozenset()  # sides with blocked wheels
 
     def __repr__(self) -> str:
         return f"BodyByHand({self._body!r})"
 
     @property
     def lag(self) -> float:
-        """How late the wheels do what ``drive`` demands, s."""
+        """Delay of the wheels behind ``drive``, s."""
         return self._body.lag
 
     @property
     def state(self) -> BodyState:
-        """The state after the last ``advance``, or after a hand has moved it."""
+        """The state after the last ``advance`` or ``place``."""
         state, offset = self._body.state, self._offset
         if offset is None:
             return state
@@ -43,7 +43,7 @@ class BodyByHand:
         )
 
     def place(self, pose: Pose) -> None:
-        """Put it down there. What moves, moves on from there, forward as it was."""
+        """Put the rover down at this pose. It keeps its motion relative to its heading."""
         state = self._body.state
         turn = wrap_angle(pose.yaw - state.yaw)
         north, east = turned(state.north, state.east, turn)
@@ -58,10 +58,10 @@ class BodyByHand:
         self._body.advance(duration)
 
     def close(self) -> None:
-        """Release what the body holds."""
+        """Release the body's resources."""
         self._body.close()
 
 
 def turned(north: float, east: float, angle: float) -> tuple[float, float]:
-    """Turn a vector clockwise."""
+    """Return the vector (north, east), turned clockwise by ``angle`` (rad)."""
     return north * cos(angle) - east * sin(angle), north * sin(angle) + east * cos(angle)

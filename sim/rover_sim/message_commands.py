@@ -1,4 +1,4 @@
-"""The commands that ask for messages: the same on every make but for the refusing result."""
+"""The commands that request messages: alike on every make but for the result of a refusal."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from rover_sim.commands import Action, Command, CommandParts, as_id
 
 @dataclass(frozen=True, slots=True)
 class MessageCommands:
-    """Sends messages now, or changes how often."""
+    """Sends messages once, or changes their intervals."""
 
     parts: CommandParts
-    unknown_message: MavResult  # to REQUEST_MESSAGE
-    bad_interval: MavResult  # to SET_MESSAGE_INTERVAL
-    bad_interval_text: str | None  # said beside it, with the message's id in it
-    by_index: Mapping[int, Action]  # REQUEST_MESSAGE of what needs more than an id, by id
+    unknown_message: MavResult  # answer to REQUEST_MESSAGE
+    bad_interval: MavResult  # answer to SET_MESSAGE_INTERVAL
+    bad_interval_text: str | None  # STATUSTEXT beside it; {} is the message id
+    by_index: Mapping[int, Action]  # REQUEST_MESSAGE that needs param2, by message id
 
     def actions(self) -> Mapping[int, Action]:
-        """Return the part of a table that is these commands."""
+        """Return the command table's entries for these commands."""
         return {
             MavCmd.SET_MESSAGE_INTERVAL: self._set_message_interval,
             MavCmd.GET_MESSAGE_INTERVAL: self._get_message_interval,

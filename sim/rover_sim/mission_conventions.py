@@ -1,4 +1,4 @@
-"""How one make speaks the mission protocol: numbers, and the choices that the guide leaves."""
+"""How one make speaks the mission protocol: numbers, and choices that the guide leaves open."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,35 +11,35 @@ MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255  # MAV_MISSION_TYPE
 
 @dataclass(frozen=True, slots=True)
 class MissionConventions:
-    """What one make does with missions, fences and rally points."""
+    """One make's handling of missions, fences and rally points."""
 
-    request: type[messages.MissionRequest | messages.MissionRequestInt]  # how it asks for items
+    request: type[messages.MissionRequest | messages.MissionRequestInt]  # requests items with this
     capacity: int  # items of one list
     request_interval: float  # s between repeats of an unanswered request
     upload_timeout: float  # s without an item
     timeout_text: str
-    timeout_result: MavMissionResult | None  # the ack of a given up upload; None: silence
+    timeout_result: MavMissionResult | None  # the ack that ends an upload; None: silence
     full_text: str | None
     busy: MavMissionResult  # to another client during an upload
     unknown_type: MavMissionResult
-    wrong_sequence: MavMissionResult | None  # to an item that was not asked for; None: silence
+    wrong_sequence: MavMissionResult | None  # to an unrequested item; None: silence
     storable: Mapping[int, frozenset[int]]  # MAV_CMDs, by mission type
-    stored_frames: Mapping[int, int]  # frames that come back as others
-    home_is_item_0: bool  # what is uploaded there is replaced, and not driven to
+    stored_frames: Mapping[int, int]  # frames that are stored as others
+    home_is_item_0: bool  # an uploaded item 0 is replaced by home, and not driven to
     has_ids: bool  # opaque ids in MISSION_ACK, MISSION_COUNT and MISSION_CURRENT
-    goes_on: bool  # AUTO goes on where it was left, rather than beginning anew
-    takes_guided_items: bool  # a lone item with current = 2 is a place to go to now, in GUIDED
+    goes_on: bool  # AUTO resumes the mission instead of restarting it
+    takes_guided_items: bool  # a lone item with current = 2 is a place to drive to now, in GUIDED
 
 
 NAVIGATION = frozenset({16, 17, 18, 19, 20, 42, 82, 83, 92, 93, 94, 112, 113, 114, 115})
 DO = frozenset(range(177, 220))
-AIRBORNE = frozenset({21, 22, 31, 84, 85})  # stored, and passed over by a rover
+AIRBORNE = frozenset({21, 22, 31, 84, 85})  # stored; a rover skips them
 PAYLOAD = frozenset({530, 531, 532, 1000, 1001, 2000, 2001, 2500, 2501})  # likewise
 FENCES = frozenset(range(5000, 5005))
 RALLIES = frozenset({5100})
 
-#: Rover 4.6.3: it asks with MISSION_REQUEST, never with the INT form, takes MISSION_ITEM_INT in
-#: answer, and knows no opaque ids
+#: Rover 4.6.3: it requests with MISSION_REQUEST, never with the INT form, accepts MISSION_ITEM_INT
+#: in answer, and has no opaque ids
 ARDUPILOT_MISSIONS = MissionConventions(
     request=messages.MissionRequest,
     capacity=655,
@@ -62,7 +62,7 @@ ARDUPILOT_MISSIONS = MissionConventions(
     takes_guided_items=True,
 )
 
-#: PX4 1.15: an opaque id for each list, silence to what it did not ask for
+#: PX4 1.15: an opaque id for each list; it ignores items that it did not request
 PX4_MISSIONS = MissionConventions(
     request=messages.MissionRequestInt,
     capacity=2000,

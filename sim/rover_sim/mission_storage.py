@@ -1,6 +1,6 @@
-"""The autopilot's own mission, fence and rally storage: the vehicle's end of the mission protocol.
+"""The autopilot's own mission, fence and rally storage: the vehicle side of the mission protocol.
 
-MAVLink guide, "Mission Protocol"; what it leaves open is in the persona's ``MissionConventions``.
+MAVLink guide, "Mission Protocol"; the persona's ``MissionConventions`` has what it leaves open.
 """
 
 from collections.abc import Callable, Mapping
@@ -44,9 +44,9 @@ class MissionStorage:
         self._outbox = outbox
         self._lists: dict[int, list[messages.MissionItemInt]] = {MISSION: [], FENCE: [], RALLY: []}
         self._upload: _Upload | None = None
-        self._stored: _Upload | None = None  # the last one that came to its end
-        self.current = 0  # where AUTO goes on, for makes that go on
-        self.complete = False  # AUTO came to its end
+        self._stored: _Upload | None = None  # the last complete upload
+        self.current = 0  # where AUTO resumes, on makes that resume
+        self.complete = False  # AUTO reached the end of the mission
         self.go_to: Callable[[Destination, float], bool] = lambda _place, _now: False
         self.handlers: Mapping[int, Handler] = {
             messages.MissionCount.id: self._handle_count,
@@ -63,12 +63,12 @@ class MissionStorage:
         return f"MissionStorage({[len(items) for items in self._lists.values()]})"
 
     def stored(self, mission_type: int) -> tuple[messages.MissionItemInt, ...]:
-        """Return the items of a plan, as they would be downloaded."""
+        """Return the items of a plan, as a download would return them."""
         return tuple(self._lists[mission_type])
 
     @property
     def item_count(self) -> int:
-        """How many items of a mission there are, home not counted."""
+        """Number of mission items, without home."""
         return max(0, len(self._lists[MISSION]) - self._first_item)
 
     def route(self) -> Route | None:
@@ -81,9 +81,9 @@ class MissionStorage:
         return Route(waypoints, loop=False) if waypoints else None
 
     def move_to(self, seq: int) -> bool:
-        """Remember the item at which AUTO goes on; False if there is no such item.
+        """Set the item at which AUTO continues; return False if it does not exist.
 
-        A make that begins anew each time takes any.
+        A make that restarts each mission accepts any number.
         """
         if not self._conventions.goes_on:
             return True
@@ -93,14 +93,14 @@ class MissionStorage:
         return True
 
     def plan_id(self, mission_type: int) -> int:
-        """Return the opaque id of a list: 0 if it is empty or this make has none, else never 0."""
+        """Return a list's opaque id: 0 if it is empty or the make has no ids, else not 0."""
         items = self._lists[mission_type]
         if not items or not self._conventions.has_ids:
             return 0
         return crc32(b"".join(_content(item) for item in items)) or 1
 
     def step(self, *, now: float) -> None:
-        """Repeat an unanswered request, and give up in the end."""
+        """Repeat an unanswered request; end the upload after its time-out."""
         upload = self._upload
         if upload is None:
             return
@@ -156,7 +156,7 @@ class MissionStorage:
                 self._ask(upload, now)
 
     def _go_to(self, item: Item, sender: Address, now: float) -> None:
-        """Older ground stations say "go to" so; no item of a plan has that mark."""
+        """Drive to an item with current = 2, which older stations send; plans have none."""
         refusal = self._refusal(item, MISSION)
         if refusal is None:
             latitude, longitude = _place_of(item)
@@ -165,7 +165,7 @@ class MissionStorage:
         self._ack(sender, MISSION, refusal or MavMissionResult.ACCEPTED)
 
     def _handle_stray_item(self, message: Item, sender: Address) -> None:
-        """The last item again: a make with ids takes the ack for lost, and repeats it."""
+        """Answer a repeated last item: a make with ids repeats its ack, others send an error."""
         last = self._stored
         repeated = last is not None and (last.partner, last.mission_type, last.count) == (
             sender,
@@ -208,7 +208,7 @@ class MissionStorage:
         self._ack(sender, message.mission_type, MavMissionResult.ACCEPTED)
 
     def _handle_ack(self, message: messages.MissionAck, sender: Address, _now: float) -> None:
-        """A client's ack ends a download, which needs nothing here, or cancels its upload."""
+        """End a cancelled upload; other acks end a download, which has no state here."""
         upload = self._upload
         if upload is None or upload.partner != sender:
             return
@@ -230,7 +230,7 @@ class MissionStorage:
             self.complete = False
 
     def _put_home_first(self, items: list[messages.MissionItemInt]) -> None:
-        """Item 0 is home: what was uploaded there is replaced."""
+        """Replace the uploaded item 0 by home."""
         origin = self._origin
         home = items[0]
         home.frame, home.command = MavFrame.GLOBAL, NAV_WAYPOINT
@@ -256,14 +256,14 @@ class MissionStorage:
         if item.command not in self._conventions.storable[mission_type]:
             return MavMissionResult.UNSUPPORTED
         latitude, longitude = _place_of(item)
-        if not abs(latitude) <= LATITUDE_LIMIT_DEGE7:  # NaN, from the float form, is not
+        if not abs(latitude) <= LATITUDE_LIMIT_DEGE7:  # NaN (float form) fails, too
             return MavMissionResult.INVALID_PARAM5_X
         if not abs(longitude) <= LONGITUDE_LIMIT_DEGE7:
             return MavMissionResult.INVALID_PARAM6_Y
         return None
 
     def _as_stored(self, item: Item) -> messages.MissionItemInt:
-        """Keep every item in the INT form, in the frame that this make gives back."""
+        """Return an item in the INT form, in the frame in which this make returns it."""
         latitude, longitude = _place_of(item)
         frame = self._conventions.stored_frames.get(item.frame, item.frame)
         return _item_for(Address(0, 0), item, frame, round(latitude), round(longitude))
@@ -296,6 +296,6 @@ def _item_for(partner: Address, item: Item, frame: int, x: int, y: int) -> messa
 
 
 def _content(item: messages.MissionItemInt) -> bytes:
-    """What makes an item the same item, wherever it comes from."""
+    """Return the bytes that identify an item, independent of its sender."""
     floats = (item.param1, item.param2, item.param3, item.param4, item.z)
     return pack("<5f2iHHB", *floats, item.x, item.y, item.seq, item.command, item.frame)

@@ -1,4 +1,4 @@
-"""What a flight stack can be doing; every make has its own numbers and names for it."""
+"""The modes of a flight stack; every make has its own numbers and names."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,11 +6,11 @@ from enum import Enum
 
 
 class Mode(Enum):
-    """A mode, named as on ArduPilot; PX4's name follows where it is another."""
+    """A mode, named as on ArduPilot; a comment gives PX4's name if it differs."""
 
     INITIALISING = "initialising"
     MANUAL = "manual"
-    POSITION = "position"  # sticks, as MANUAL; ArduPilot Rover has none, PX4: POSCTL
+    POSITION = "position"  # manual control, like MANUAL; ArduPilot Rover has none, PX4: POSCTL
     HOLD = "hold"  # PX4: AUTO.LOITER
     AUTO = "auto"  # PX4: AUTO.MISSION
     RTL = "rtl"
@@ -20,11 +20,11 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ModeNumbers:
-    """The modes of one make."""
+    """The mode numbers of one make."""
 
     numbers: Mapping[Mode, int]  # HEARTBEAT.custom_mode
-    first: Mode  # right after switching on
+    first: Mode  # after power-on
 
     def mode_of(self, custom_mode: int) -> Mode | None:
-        """Return the mode of a number, or None if there is no such mode."""
+        """Return the mode with this number, or None if there is no such mode."""
         return next((mode for mode, n in self.numbers.items() if n == custom_mode), None)

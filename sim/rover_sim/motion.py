@@ -1,6 +1,7 @@
-"""The speed and turn-rate controllers: demands into wheel speeds, within what a rover can do.
+"""The speed and yaw rate controllers: demands to wheel speeds, within a rover's limits.
 
-``MotionControl`` is the exact one, for arithmetic: it follows a ramp, and ends where it should.
+``MotionControl`` is the exact one, for tests with exact arithmetic: it follows a ramp, and stops
+where it should.
 """
 
 from dataclasses import dataclass
@@ -9,17 +10,17 @@ from rover_sim.body import BodyState
 from rover_sim.estimate import Estimate
 from rover_sim.steering import MAX_YAW_RATE, Demand
 
-CONTROL_RATE = 40  # Hz. Divides 240 Hz physics; 20 and 10 Hz telemetry comes evenly spaced
+CONTROL_RATE = 40  # Hz. Divides the 240 Hz physics; 20 and 10 Hz telemetry is evenly spaced
 CONTROL_PERIOD = 1.0 / CONTROL_RATE  # s
 ACCELERATION = 1.0  # m/s²; 2 m/s in about 2 s, as observed
 YAW_P = 0.8
-YAW_I = 8.0  # 1/s; friction differs with heading, a slow loop would show it
+YAW_I = 8.0  # 1/s; friction differs with heading, and a slow loop would show that
 YAW_I_LIMIT = 2.0  # rad/s; a skid-steered rover loses a third of its yaw rate to scrubbing
 
 
 @dataclass(frozen=True, slots=True)
 class YawLimits:
-    """What a rate loop asks of the wheels at most."""
+    """Limits of a yaw rate loop."""
 
     rate: float  # rad/s
     acceleration: float  # rad/s²
@@ -31,18 +32,18 @@ EXACT_LIMITS = YawLimits(MAX_YAW_RATE, 2.1, 2.1)  # ArduPilot's ATC_STR_ACC_MAX 
 
 
 class YawControl:
-    """Ramps a turn rate and closes the loop on it: wheels that scrub do not give it alone."""
+    """Ramps a yaw rate and closes the loop on it, because scrubbing wheels lose part of it."""
 
     def __init__(self, limits: YawLimits = EXACT_LIMITS) -> None:
         self._limits = limits
-        self.yaw_rate = 0.0  # rad/s, what is asked, ramped
+        self.yaw_rate = 0.0  # rad/s, the ramped demand
         self._correction = 0.0
 
     def __repr__(self) -> str:
         return f"YawControl({self.yaw_rate:.2f} rad/s)"
 
     def step(self, demanded: float, measured: float, *, rolls: bool) -> float:
-        """Return the turn rate for the wheels, for one control period."""
+        """Return the yaw rate for the wheels, for one control period."""
         limits = self._limits
         wanted = max(-limits.rate, min(limits.rate, demanded))
         slows = abs(wanted) < abs(self.yaw_rate)
@@ -50,7 +51,7 @@ class YawControl:
         rate = self.yaw_rate = toward(self.yaw_rate, wanted, change * CONTROL_PERIOD)
         if rate == 0.0 and (not rolls or abs(measured) < 1e-6):
             self._correction = 0.0
-            return 0.0  # locked wheels are the exact stop
+            return 0.0  # locked wheels stop exactly
         error = rate - measured
         integral = self._correction + limits.integral * error * CONTROL_PERIOD
         self._correction = max(-YAW_I_LIMIT, min(YAW_I_LIMIT, integral))
@@ -60,7 +61,7 @@ class YawControl:
 class MotionControl:
     """Ramps a demand and closes the loop on the true yaw rate; implements ``DriveTrain``.
 
-    Speed needs no loop: wheels that push straight ahead hardly slip.
+    Speed needs no loop: wheels hardly slip when they drive straight ahead.
     """
 
     def __init__(self) -> None:
@@ -78,7 +79,7 @@ class MotionControl:
 
 
 def toward(value: float, goal: float, step: float) -> float:
-    """Return the value, nearer to the goal by a step at most."""
+    """Return the value, moved towards the goal by at most ``step``."""
     change = goal - value
     if abs(change) <= step:
         return goal
@@ -86,7 +87,7 @@ def toward(value: float, goal: float, step: float) -> float:
 
 
 def _ramped_speed(speed: float, demand: Demand) -> float:
-    """Brake at the demand's rate, speed up at the rover's; a change of direction is both."""
+    """Brake at the demand's rate, accelerate at the rover's; stop before changing direction."""
     wanted = demand.speed
     if speed * wanted < 0.0 or abs(wanted) < abs(speed):
         goal = 0.0 if speed * wanted < 0.0 else wanted

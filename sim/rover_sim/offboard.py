@@ -1,20 +1,20 @@
-"""PX4's OFFBOARD: whether setpoints stream, and what to do for the last one."""
+"""PX4's OFFBOARD: whether setpoints stream, and the demand for the last one."""
 
 from rover_sim.estimate import Estimate
 from rover_sim.px4_setpoints import Setpoint
 from rover_sim.setpoints import Destination, Heading, Target, TurnRate
 from rover_sim.steering import STOP, Demand, steer_to_point, turn_then_drive
 
-STREAM_GAP = 0.5  # s, at most between two setpoints: PX4's guide asks for 2 Hz
+STREAM_GAP = 0.5  # s, longest gap between two setpoints: PX4's guide asks for 2 Hz
 ARRIVAL_RADIUS = 0.1  # m
 
 
 class Offboard:
-    """Counts setpoints in any mode; follows those that come in OFFBOARD, and keeps the last."""
+    """Counts setpoints in any mode; keeps and follows the last one that came in OFFBOARD."""
 
     def __init__(self) -> None:
         self.target: Target | None = None
-        self.speed: float | None = None  # m/s towards a place, where one came with it
+        self.speed: float | None = None  # m/s towards a place, if the setpoint has one
         self._last: float | None = None
         self._gap: float | None = None  # s between the last two
 
@@ -27,11 +27,11 @@ class Offboard:
         self._last = now
 
     def follow(self, setpoint: Setpoint) -> None:
-        """Take a setpoint's target."""
+        """Store the target of a setpoint."""
         self.target, self.speed = setpoint
 
     def is_streaming(self, *, now: float) -> bool:
-        """Whether setpoints come, two at least and the last one lately."""
+        """Return whether setpoints stream: at least two came, and the last one recently."""
         return (
             self._gap is not None
             and self._gap <= STREAM_GAP
@@ -39,11 +39,11 @@ class Offboard:
         )
 
     def silence(self, *, now: float) -> float:
-        """Seconds since the last setpoint."""
+        """Return the seconds since the last setpoint; infinity if there was none."""
         return float("inf") if self._last is None else now - self._last
 
     def demand(self, estimate: Estimate, speed_limit: float) -> Demand:
-        """Say how to move now."""
+        """Return the demand for the stored target."""
         match self.target:
             case None:
                 return STOP

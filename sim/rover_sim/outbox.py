@@ -1,4 +1,4 @@
-"""What the flight stack has to say, in order, until the vehicle takes it."""
+"""Messages of the flight stack, in order, until the vehicle takes them."""
 
 import math
 from operator import itemgetter
@@ -18,8 +18,8 @@ class Outbox:
     def __init__(self) -> None:
         self.faults: Faults = NO_FAULTS
         self._messages: list[Message] = []
-        self._long_texts = 0  # the id of the last text that took more than one STATUSTEXT
-        self._late: list[tuple[float, Message]] = []  # when to send it, the earliest first
+        self._long_texts = 0  # id of the last text that needed more than one STATUSTEXT
+        self._late: list[tuple[float, Message]] = []  # (time to send, message), earliest first
 
     def __repr__(self) -> str:
         return f"Outbox({len(self._messages)} waiting)"
@@ -31,7 +31,7 @@ class Outbox:
             self._messages.append(message)
 
     def say(self, severity: MavSeverity, text: str) -> None:
-        """Add a STATUSTEXT, or as many as the text takes, with one id and numbered."""
+        """Add a text as one STATUSTEXT, or as several with a common id and sequence numbers."""
         pieces = [text[at : at + TEXT_LENGTH] for at in range(0, len(text), TEXT_LENGTH)]
         if len(pieces) > 1:
             self._long_texts = self._long_texts % LAST_TEXT_ID + 1
@@ -44,7 +44,7 @@ class Outbox:
         self.say(MavSeverity.INFO, text)
 
     def send_at(self, message: Message, at: float, *, now: float) -> None:
-        """Add a message at that time; whoever keeps the time calls ``release``."""
+        """Add a message at time ``at``; the owner of the clock calls ``release``."""
         if at <= now:
             self.send(message)
             return
@@ -53,15 +53,15 @@ class Outbox:
 
     @property
     def next_release(self) -> float:
-        """When ``release`` is due."""
+        """Time at which ``release`` is due; infinity if nothing is delayed."""
         return self._late[0][0] if self._late else math.inf
 
     def release(self, *, now: float) -> None:
-        """Add what was to be sent by now."""
+        """Add the delayed messages that are due."""
         while self._late and self._late[0][0] <= now:
             self.send(self._late.pop(0)[1])
 
     def take(self) -> list[Message]:
-        """Hand over what was collected."""
+        """Return the collected messages and forget them."""
         taken, self._messages = self._messages, []
         return taken

@@ -1,7 +1,7 @@
 """The autopilot's parameters and the parameter protocol, vehicle side.
 
-MAVLink guide, "Parameter Protocol"; how values travel is the persona's ``ParameterProtocol``. An
-unknown name gets no answer at all, as from the real ones.
+MAVLink guide, "Parameter Protocol"; the persona's ``ParameterProtocol`` encodes the values.
+Requests for an unknown name get no answer, as from the real autopilots.
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,8 +16,8 @@ from rover_sim.realism import Wire
 
 INT8, INT16, UINT32, INT32, REAL32 = 2, 4, 5, 6, 9  # MAV_PARAM_TYPE
 BY_NAME = -1  # param_index in a request
-UNNUMBERED = 65535  # param_index of what has no place in the list, or is not told it
-HASH_CHECK = "_HASH_CHECK"  # PX4's name for a digest of all: a client with a cache asks for it
+UNNUMBERED = 65535  # param_index of a parameter outside the list, or if the make does not send it
+HASH_CHECK = "_HASH_CHECK"  # hash of all parameters; a client with a cache requests it (PX4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,30 +30,30 @@ class Parameter:
 
 
 class ParameterProtocol(Protocol):
-    """How one make reads and writes PARAM_VALUE and PARAM_SET."""
+    """How one make encodes PARAM_VALUE and decodes PARAM_SET."""
 
-    tells_index: bool  # also in an answer to a read by name, or to a set
+    tells_index: bool  # also in answers to PARAM_SET and to reads by name
 
     def to_wire(self, value: float, type_: int) -> float:
         """Return the value as PARAM_VALUE carries it."""
         ...
 
     def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
-        """Return what PARAM_SET carries under some type for a parameter of another, or the same.
+        """Return the value of a PARAM_SET, sent as ``type_`` for a parameter of ``own_type``.
 
-        None: nothing that could be taken.
+        None: the make rejects it.
         """
         ...
 
-    answers_untaken: bool  # a PARAM_SET that is not taken is answered with the old value
+    answers_untaken: bool  # a rejected PARAM_SET is answered with the old value
 
     def digest(self, parameters: Iterable[tuple[Parameter, float]]) -> int | None:
-        """Return _HASH_CHECK's value; None: there is no such thing here."""
+        """Return _HASH_CHECK's value, or None if this make has none."""
         ...
 
 
 class Parameters:
-    """The values, and what answers the parameter messages. They survive a reboot."""
+    """The values, and the handlers of the parameter messages. They survive a reboot."""
 
     def __init__(
         self,
@@ -90,14 +90,14 @@ class Parameters:
         self._values[name] = value
 
     def change(self, name: str, value: float) -> None:
-        """Set a value as the autopilot itself does, and tell everybody."""
+        """Set a value as the autopilot itself does, and send it to everybody."""
         self[name] = value
         self._send(self._indices[name], UNNUMBERED)
 
     def _handle_request_list(
         self, _message: messages.ParamRequestList, _sender: Address, _now: float
     ) -> None:
-        if self._wire is Wire.REAL:  # PX4 sends its digest first (mavlink_parameters.cpp)
+        if self._wire is Wire.REAL:  # PX4 sends its hash first (mavlink_parameters.cpp)
             self._send_digest()
         for index in range(len(self._listed)):
             self._send(index, index)
@@ -114,7 +114,7 @@ class Parameters:
             self._answer(self._indices[name])
 
     def _handle_set(self, message: messages.ParamSet, _sender: Address, _now: float) -> None:
-        """The answer carries what is kept, also if that is the old value."""
+        """Answer with the stored value, even if it is unchanged."""
         index = self._indices.get(_name_of(message.param_id))
         if index is None:
             return

@@ -1,8 +1,8 @@
-"""What tells one make of autopilot from another: its numbers and names, and its strategies.
+"""The differences between makes of autopilot: numbers, names and strategies.
 
-``ardupilot`` is Rover 4.6.3 as observed on the wire; ``px4`` is a rover on PX4 1.17, after its
-sources and as observed; ``generic`` speaks as PX4 does. Behaviour that differs by make is in
-objects that a persona names (rules of flight, commands, conventions); nothing asks for its name.
+``ardupilot`` is Rover 4.6.3 as observed on the wire; ``px4`` is a rover on PX4 1.17, from its
+sources and as observed; ``generic`` speaks as PX4 does. A persona names objects (flight rules,
+commands, conventions) for the behaviour that differs; no code tests its name.
 """
 
 from collections.abc import Callable, Mapping
@@ -44,7 +44,7 @@ from rover_sim.realism import (
 )
 from rover_sim.streams import ARDUPILOT_STREAMS, PX4_STREAMS, StreamTable
 
-GEOFENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot's is healthy unless it is breached
+GEOFENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE: ArduPilot reports it healthy unless it is breached
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +54,17 @@ class Persona:
     name: str
     autopilot: MavAutopilot
     modes: ModeNumbers
-    offered_modes: tuple[OfferedMode, ...]  # AVAILABLE_MODES; none: it does not know that list
-    mode_flags: Mapping[Mode, int]  # HEARTBEAT.base_mode, but for "armed"
+    offered_modes: tuple[OfferedMode, ...]  # AVAILABLE_MODES; empty: it sends no such list
+    mode_flags: Mapping[Mode, int]  # HEARTBEAT.base_mode, without SAFETY_ARMED
     capabilities: int  # AUTOPILOT_VERSION.capabilities
     flight_sw_version: int  # AUTOPILOT_VERSION: major, minor, patch, type, a byte each
     firmware_hash: bytes  # AUTOPILOT_VERSION.flight_custom_version, 8 bytes
-    announces_changes: bool  # a HEARTBEAT at once when mode or arming changes, or only each second
-    heeds_component: bool  # passes over what is for another component of its system
-    also_healthy: int  # SYS_STATUS: sensors that are said to be healthy, though they are not there
+    announces_changes: bool  # HEARTBEAT at once when mode or arming changes, else each second
+    heeds_component: bool  # ignores messages to another component of its system
+    also_healthy: int  # SYS_STATUS: sensors reported healthy although not present
     landed_state_armed: MavLandedState  # EXTENDED_SYS_STATE while armed
-    no_mission_total: int  # MISSION_CURRENT.total where no mission is stored
-    lacks: frozenset[int]  # ids of messages that others can send
+    no_mission_total: int  # MISSION_CURRENT.total if no mission is stored
+    lacks: frozenset[int]  # ids of messages that this make cannot send
     streams: StreamTable
     rules: Callable[[FlightParts], FlightRules]
     commands: Callable[[CommandParts], CommandTable]
@@ -72,25 +72,25 @@ class Persona:
     parameter_protocol: ParameterProtocol
     parameters: tuple[Parameter, ...]
     parameters_of: Callable[[Frame], tuple[Parameter, ...]]
-    system_id_parameter: str  # the name of the one that shows the system id
-    speed_parameter: str  # the name of the one that limits its speed, m/s
-    honours_yaw_rate: bool  # of a setpoint; PX4's rules look here, ArduPilot always does
-    realism: Realism  # how unkind it is, unless another is asked for
+    system_id_parameter: str  # name of the parameter with the system id
+    speed_parameter: str  # name of the parameter with the speed limit, m/s
+    honours_yaw_rate: bool  # of a setpoint; only PX4's rules use it, ArduPilot always honours it
+    realism: Realism  # the default realism
     estimators: Mapping[Gps, EstimatorError]
-    pushing: PushingError | None  # the estimate's further error, on an Ackermann rover
-    boot: BootTimes  # as long as it really takes
+    pushing: PushingError | None  # additional estimation error, on an Ackermann rover
+    boot: BootTimes  # in real time
     boot_script: BootScript
     home: HomeRule
-    tells_no_landed_state: bool  # EXTENDED_SYS_STATE: always undefined, where words are real
-    shows_prearm_in_health_only: bool  # SYS_STATUS, likewise
-    accepted_in_silence: frozenset[int]  # ids: REQUEST_MESSAGE is accepted, nothing comes; likewise
-    answers_first_peer: bool  # on a socket, and nobody else until it is started again
-    runtime_parameter: Parameter | None  # in which it counts the seconds that it runs, likewise
+    tells_no_landed_state: bool  # EXTENDED_SYS_STATE: always undefined, if the wire is real
+    shows_prearm_in_health_only: bool  # SYS_STATUS, if the wire is real
+    accepted_in_silence: frozenset[int]  # ids of REQUEST_MESSAGE: accepted, but not sent; wire real
+    answers_first_peer: bool  # on a socket, and no other peer until it restarts
+    runtime_parameter: Parameter | None  # counts its seconds of runtime; if the wire is real
     frame: Frame  # how it steers
-    drive: Callable[[Frame, Parameters], DriveTrain]  # where the drive is not exact
+    drive: Callable[[Frame, Parameters], DriveTrain]  # if the drive is not exact
 
     def on(self, frame: Frame) -> "Persona":
-        """Return the same make on another frame; its parameters tell which."""
+        """Return the same make on another frame; its parameters identify the frame."""
         pushing = self.pushing if frame is Frame.ACKERMANN else None
         realism, own = self.realism, self.realism.estimator
         adds_speed = realism.stick_speed is not None
@@ -190,7 +190,7 @@ PX4 = Persona(
             Mode.LAND: 4 << 16 | 6 << 24,
             Mode.GUIDED: 6 << 16,
         },
-        first=Mode.HOLD,  # as a SITL without sticks
+        first=Mode.HOLD,  # like a SITL without sticks
     ),
     offered_modes=PX4_OFFERED,
     mode_flags={
@@ -210,7 +210,7 @@ PX4 = Persona(
     announces_changes=False,  # 1 Hz
     heeds_component=True,
     also_healthy=0,
-    landed_state_armed=MavLandedState.IN_AIR,  # its rover land detector: armed is not landed
+    landed_state_armed=MavLandedState.IN_AIR,  # PX4's rover land detector: armed means not landed
     no_mission_total=65535,
     lacks=frozenset(),
     streams=PX4_STREAMS,
@@ -238,7 +238,7 @@ PX4 = Persona(
     drive=px4_drive,
 )
 
-#: speaks as PX4 does and says that it is none that anybody knows
+#: speaks like PX4, but reports an unknown autopilot
 GENERIC = replace(
     PX4,
     name="generic",

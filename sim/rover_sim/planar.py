@@ -1,22 +1,23 @@
-"""A body on level ground without a physics engine: what those of all frames have in common.
+"""A body on level ground without a physics engine: the common part of all frames.
 
-It has no mass, no tyres and always stands level: what depends on those is tested on ``bullet``.
+It has no mass and no tyres, and is always level; tests of effects that depend on those use
+``bullet``.
 """
 
 import math
 
 from rover_sim.body import BodyState, Pose, wrap_angle
 
-MAX_ACCELERATION = 6.0  # m/s², what tyres on dry ground can pass on
-SNAP = 1e-3  # m/s, rad/s; nearer than this it is there
-LAG_SPREAD = 0.8, 1.2  # times the lag; how far a seed can move it either way
+MAX_ACCELERATION = 6.0  # m/s², the limit of tyres on dry ground
+SNAP = 1e-3  # m/s, rad/s; a smaller difference counts as reached
+LAG_SPREAD = 0.8, 1.2  # factors on the lag; a seed draws between them
 LONGEST_STEP = 0.05  # s; a longer advance is cut into equal parts
 
 
 class PlanarBody:
-    """Where it is and how it moves; implements ``Body`` but for ``drive``.
+    """Position and motion of a body; implements ``Body`` without ``drive``.
 
-    ``lag`` in s, from what is demanded to motion.
+    ``lag`` in s, from demand to motion.
     """
 
     def __init__(self, *, start: Pose, lag: float) -> None:
@@ -47,22 +48,22 @@ class PlanarBody:
         )
 
     def advance(self, duration: float) -> None:
-        """Move on by ``duration`` seconds."""
+        """Move by ``duration`` seconds."""
         parts = max(1, math.ceil(duration / LONGEST_STEP - 1e-9))
         for _ in range(parts):
             self._step(duration / parts)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: the body holds no resources."""
 
     def _next_yaw_rate(self, speed: float, dt: float) -> float:
-        """Return the turn rate in ``dt`` seconds, at which it will drive at ``speed``."""
+        """Return the yaw rate after ``dt`` seconds, for a rover that then drives at ``speed``."""
         raise NotImplementedError
 
     def _step(self, dt: float) -> None:
         speed = approach(self._speed, self._demanded_speed, self.lag, MAX_ACCELERATION, dt)
         yaw_rate = self._next_yaw_rate(speed, dt)
-        # The mean of both ends, along the heading in the middle: second order on arcs.
+        # Mean speed of both ends, along the heading in the middle: second order on arcs.
         distance = 0.5 * (self._speed + speed) * dt
         turned = 0.5 * (self._yaw_rate + yaw_rate) * dt
         heading = self._yaw + 0.5 * turned
@@ -74,7 +75,7 @@ class PlanarBody:
 
 
 def approach(value: float, target: float, lag: float, limit: float, dt: float) -> float:
-    """One step of a rate-limited first-order lag; lands on the target, so that a stop is one."""
+    """Return the value after one step of a rate-limited lag; it reaches the target exactly."""
     error = target - value
     if abs(error) < SNAP:
         return target

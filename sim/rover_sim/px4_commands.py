@@ -1,4 +1,4 @@
-"""What a PX4 1.15 rover does on commands, after its commander and its MAVLink receiver."""
+"""How a PX4 1.15 rover executes commands, after its commander and its MAVLink receiver."""
 
 import math
 
@@ -19,10 +19,10 @@ from rover_sim.modes import Mode
 from rover_sim.setpoints import Destination
 
 DO_SET_STANDARD_MODE = 262  # MAV_CMD
-STANDARD_MODES = {SAFE_RECOVERY: Mode.RTL, MISSION: Mode.AUTO}  # the rest are for aircraft
+STANDARD_MODES = {SAFE_RECOVERY: Mode.RTL, MISSION: Mode.AUTO}  # the others are for aircraft
 CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS
-NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT, for NaN
-MISTAKEN_NAN = 0x7FF80000  # a float's NaN, sent as an integer
+NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT: INT32_MAX stands for NaN
+MISTAKEN_NAN = 0x7FF80000  # a float's NaN that was sent as an integer
 NOTHING, REBOOT, REBOOT_TO_BOOTLOADER = 0.0, 1.0, 3.0  # param1 of PREFLIGHT_REBOOT_SHUTDOWN
 
 
@@ -62,7 +62,7 @@ def px4_commands(parts: CommandParts) -> CommandTable:
 
 
 class Px4Commands:
-    """The actions; each takes a command and now, and gives its result."""
+    """The actions; each takes a command and ``now`` and returns the command's result."""
 
     def __init__(self, parts: CommandParts) -> None:
         self._parts = parts
@@ -72,7 +72,7 @@ class Px4Commands:
         return f"Px4Commands({self._flight!r})"
 
     def arm_disarm(self, command: Command, now: float) -> MavResult:
-        """Arm or disarm; a ground vehicle may be disarmed at any time."""
+        """Arm or disarm; a ground vehicle can be disarmed at any time."""
         arm = command.params[0]
         if arm == 1.0:
             return _done(self._flight.arm(forced=False, now=now))
@@ -85,25 +85,25 @@ class Px4Commands:
         """Change the mode; param2 is the main mode, param3 the sub mode."""
         base_mode, main, sub = command.params[:3]
         sub = 0.0 if math.isnan(sub) else sub
-        if not all(0 <= value <= 255 for value in (base_mode, main, sub)):  # NaN is not, either
+        if not all(0 <= value <= 255 for value in (base_mode, main, sub)):  # NaN fails, too
             return MavResult.DENIED
         return self.set_mode(int(base_mode), int(main) << 16 | int(sub) << 24, now)
 
     def set_mode(self, base_mode: int, custom_mode: int, now: float) -> MavResult:
-        """Change the mode."""
+        """Change the mode from SET_MODE's fields."""
         if not base_mode & MavModeFlag.CUSTOM_MODE_ENABLED:
             return MavResult.DENIED
         return _done(self._flight.request_custom_mode(custom_mode, now=now))
 
     def do_set_standard_mode(self, command: Command, now: float) -> MavResult:
-        """Change the mode to one that every make calls the same."""
+        """Change to a MAV_STANDARD_MODE."""
         mode = STANDARD_MODES.get(as_id(command.params[0]))
         if mode is None:
             return MavResult.FAILED
         return _done(self._flight.request_mode(mode, now=now))
 
     def send_modes(self, command: Command, _now: float) -> MavResult:
-        """Send AVAILABLE_MODES: that of an index from 1, or with 0 all of them."""
+        """Send AVAILABLE_MODES of the index in param2, from 1; 0 sends all of them."""
         modes, index = self._parts.modes, as_id(command.params[1])
         if not 0 <= index <= len(modes):
             return MavResult.DENIED
@@ -125,18 +125,18 @@ class Px4Commands:
         return _done(self._flight.request_mode(Mode.RTL, now=now))
 
     def refuse_to_fly(self, _command: Command, _now: float) -> MavResult:
-        """A rover has no mode for it."""
+        """Refuse takeoff and landing: a rover has no mode for them."""
         self._parts.outbox.say(MavSeverity.CRITICAL, "A rover neither takes off nor lands")
         return MavResult.TEMPORARILY_REJECTED
 
     def start_mission(self, command: Command, now: float) -> MavResult:
-        """Enter MISSION and arm, at an item or (-1) at the present one."""
+        """Enter MISSION at an item (-1: the present one), and arm."""
         first, missions = command.params[0], self._parts.missions
         if missions.route() is None:
             text = "Mission start denied! No valid mission"
             self._parts.outbox.say(MavSeverity.CRITICAL, text)
             return MavResult.DENIED
-        if not -1 <= first < missions.item_count:  # NaN is not, either
+        if not -1 <= first < missions.item_count:  # NaN fails, too
             return MavResult.DENIED
         if first >= 0:
             self._flight.skip_to_item(int(first))
@@ -144,12 +144,11 @@ class Px4Commands:
         return _done(started and self._flight.arm(forced=False, now=now))
 
     def reposition(self, command: Command, now: float) -> MavResult:
-        """Drive to a place in HOLD, from either form of the command; no place: stay here.
+        """Drive to a place in HOLD, from either form of the command; without a place stay here.
 
-        "Stay here" is only what has neither place nor heading nor altitude, each NaN: with a number
-        in one of these the navigator of 1.17 keeps the place that it is on its way to
-        (navigator_main.cpp, DO_REPOSITION). Without CHANGE_MODE the commander says that it knows no
-        such command, and the navigator obeys it all the same.
+        "Stay here" needs NaN in place, heading and altitude: with a number in heading or altitude,
+        the navigator of 1.17 keeps its present destination (navigator_main.cpp, DO_REPOSITION).
+        Without CHANGE_MODE the commander answers UNSUPPORTED, but the navigator obeys.
         """
         changes_mode = command.params[1] == CHANGE_MODE
         if not changes_mode and not (self._flight.can_reposition and self._flight.armed):
@@ -167,19 +166,19 @@ class Px4Commands:
         return _done(done) if changes_mode else MavResult.UNSUPPORTED
 
     def change_speed(self, command: Command, _now: float) -> MavResult:
-        """Change how fast it drives by itself."""
+        """Change the speed of the modes that drive by themselves."""
         changed = self._flight.change_speed(command.params[1])
         return MavResult.ACCEPTED if changed else MavResult.DENIED
 
     def set_mission_current(self, command: Command, _now: float) -> MavResult:
-        """Go on with another mission item."""
+        """Continue with another mission item."""
         seq = command.params[0]
         if not 0 <= seq <= 65535 or not self._flight.skip_to_item(int(seq)):
             return MavResult.DENIED
         return MavResult.ACCEPTED
 
     def reboot_shutdown(self, command: Command, now: float) -> MavResult:
-        """Restart, disarmed."""
+        """Restart; deny while armed."""
         if command.params[0] == NOTHING:
             return MavResult.ACCEPTED
         if command.params[0] not in (REBOOT, REBOOT_TO_BOOTLOADER) or self._flight.armed:
@@ -188,13 +187,13 @@ class Px4Commands:
         return MavResult.ACCEPTED
 
     def request_protocol_version(self, _command: Command, now: float) -> MavResult:
-        """Send PROTOCOL_VERSION; without it a QGroundControl falls back to MAVLink 1."""
+        """Send PROTOCOL_VERSION; without it QGroundControl falls back to MAVLink 1."""
         self._parts.send_now(messages.ProtocolVersion.id, now)
         return MavResult.ACCEPTED
 
 
 def _place(command: Command) -> tuple[float, float] | None:
-    """Latitude and longitude in degE7, not checked; None: none given. Beyond Earth: a mistake."""
+    """Return latitude and longitude in degE7, unchecked; None if not given."""
     if command.place is not None:
         return None if command.place == (NOT_GIVEN, NOT_GIVEN) else command.place
     if command.degrees is None or any(math.isnan(value) for value in command.degrees):

@@ -1,8 +1,8 @@
-"""PX4 1.17's rover controllers, and what they drive: a differential and an Ackermann rover.
+"""PX4 1.17's rover controllers and their vehicles: a differential and an Ackermann rover.
 
-Their figures are parameters (RO_*), read as they stand. Recorded on a differential rover whose
-wheels follow within 0.08 s, as this simulator's do, and on PX4's own Ackermann rover (SIH), whose
-friction holds it below a quarter of the throttle.
+Their gains and limits are parameters (RO_*). Recorded on a differential rover whose wheels follow
+within 0.08 s, as this simulator's do, and on PX4's own Ackermann rover (SIH), which friction holds
+below a quarter of the throttle.
 """
 
 import math
@@ -13,21 +13,21 @@ from rover_sim.motion import CONTROL_PERIOD, YawControl, YawLimits, toward
 from rover_sim.parameters import Parameters
 from rover_sim.steering import Demand, Output
 
-MANY = 1000.0  # m/s² or rad/s²: a limit parameter of 0 or less is none
-# SIH's vehicle, for each kg: 20 N at full throttle; what it takes to break away, and to roll on;
-# drag. The last two fitted: 1.37, 2.50 and 3.25 m/s for 1, 2 and 3 m/s asked.
+MANY = 1000.0  # m/s² or rad/s²: for a limit parameter of 0 or less, which means none
+# SIH's vehicle, per kg: 20 N at full throttle; the force to break away; rolling friction; drag.
+# Friction and drag are fitted: 1.37, 2.50 and 3.25 m/s for 1, 2 and 3 m/s demanded.
 THRUST, BREAKAWAY, FRICTION, DRAG = 20.0, 4.9, 3.57, 1.43  # m/s², m/s², m/s², 1/m
-YAW_INTEGRAL = 1.0  # 1/s; recorded, it does not swing after a turn at 195 deg/s: with more it does
+YAW_INTEGRAL = 1.0  # 1/s; recorded: no oscillation after a turn at 195 deg/s; more would cause it
 DEAD_TIME = 8  # control periods, from setpoint to thrust
 ROLLED_OUT = 0.03  # m/s
-FLT_EPSILON = 1.1920929e-7  # m/s asked, below which the speed loop is off and forgets its integral
-FREE_ROLLING = 2.0  # s, disarmed. SIH's rolls on for ever, which is its model's and no vehicle's
+FLT_EPSILON = 1.1920929e-7  # m/s demanded; below it the speed loop is off and resets its integral
+FREE_ROLLING = 2.0  # s, disarmed. SIH's rolls on for ever, which is an artefact of its model
 
 
 class DifferentialDrive:
-    """Feed-forward to wheels that do as they are told; implements ``DriveTrain``.
+    """Feed-forward to wheels that follow exactly; implements ``DriveTrain``.
 
-    Disarmed or in HOLD it brakes as the wheels do: geared motors without current.
+    Disarmed, it stops at once, as geared motors without current do; in HOLD it brakes at the limit.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -52,8 +52,8 @@ class DifferentialDrive:
 class AckermannDrive:
     """Throttle against friction and drag; implements ``DriveTrain``.
 
-    With the factory's gains (RO_SPEED_P and I nearly 0) it drives too fast, and at 0.5 m/s or
-    below not at all.
+    With the default gains (RO_SPEED_P and I nearly 0) it drives too fast, and does not move at 0.5
+    m/s or below.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -61,7 +61,7 @@ class AckermannDrive:
         self._asked = 0.0  # m/s, ramped
         self._integral = 0.0  # throttle
         self._speed = 0.0  # m/s, of the wheels
-        self._underway = [0.0] * DEAD_TIME  # throttles that have not reached the wheels
+        self._underway = [0.0] * DEAD_TIME  # throttles within the dead time
 
     def __repr__(self) -> str:
         return f"AckermannDrive({self._asked:.2f} m/s asked, {self._speed:.2f} m/s)"
@@ -96,7 +96,7 @@ class AckermannDrive:
 
 
 def pushed(speed: float, throttle: float) -> float:
-    """Return the speed one control period later, under this throttle."""
+    """Return the speed one control period later, at this throttle."""
     thrust = THRUST * throttle
     if abs(speed) < ROLLED_OUT:
         if abs(thrust) <= BREAKAWAY:
@@ -107,17 +107,17 @@ def pushed(speed: float, throttle: float) -> float:
     return after if after * speed > 0.0 else 0.0
 
 
-NO_LIMIT = 5.0  # m/s, about what the motors can do, where RO_SPEED_LIM is -1: none
+NO_LIMIT = 5.0  # m/s, about the motors' limit, for RO_SPEED_LIM = -1
 
 
 def speed_limit_of(parameters: Parameters) -> float:
-    """Return the speed in m/s that a PX4 rover does not exceed."""
+    """Return the speed limit of a PX4 rover, m/s."""
     limit = parameters["RO_SPEED_LIM"]
     return limit if limit > 0.0 else NO_LIMIT
 
 
 def ramped(speed: float, asked: float, parameters: Parameters) -> float:
-    """Return the speed that is asked for one control period later, within RO_*_LIM."""
+    """Return the demanded speed one control period later, ramped within RO_*_LIM."""
     limit = speed_limit_of(parameters)
     asked = max(-limit, min(limit, asked))
     name = "RO_DECEL_LIM" if abs(asked) < abs(speed) else "RO_ACCEL_LIM"

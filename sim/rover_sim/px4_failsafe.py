@@ -1,12 +1,12 @@
-"""What a PX4 rover does when its setpoints end: the whole decision, as a table.
+"""The offboard-loss failsafe of a PX4 rover, as a table.
 
 After the commander of PX4 1.15 to 1.17 (``failsafe.cpp``). COM_OBL_RC_ACT names an action. Its
-first three are modes that need a person's sticks; where no manual control is heard, NAV_RCL_ACT
-counts instead, at once: COM_FAIL_ACT_T delays it as little as COM_RCL_EXCEPT excepts it. With both
-at their defaults (0 and 2) and no sticks, that is a drive home. Only Hold stands.
+first three values are modes that need manual control; without it, NAV_RCL_ACT applies instead, at
+once: neither COM_FAIL_ACT_T delays it, nor does COM_RCL_EXCEPT disable it. With both at their
+defaults (0 and 2) and no sticks, the rover drives home. Only Hold makes it stand.
 
-A NAV_RCL_ACT outside of its list (0, or -1) is no action at all: the rover stays in OFFBOARD and
-drives on as the last setpoint said.
+A NAV_RCL_ACT outside its list (0, or -1) means no action: the rover stays in OFFBOARD and follows
+the last setpoint.
 """
 
 from collections.abc import Mapping
@@ -17,21 +17,21 @@ from rover_sim.modes import Mode
 
 
 class Action(Enum):
-    """What follows, by the commander's own names."""
+    """The failsafe action, with the commander's own names."""
 
-    NONE = "none"  # it drives on
-    POSITION = "position"  # the sticks steer
-    STABILIZED = "stabilized"  # the sticks steer; here MANUAL
+    NONE = "none"  # the rover drives on
+    POSITION = "position"  # manual control
+    STABILIZED = "stabilized"  # manual control; here MANUAL
     HOLD = "hold"
     RETURN = "return"
-    LAND = "land"  # it stands; a rover has landed at once, and is disarmed COM_DISARM_LAND later
-    TERMINATE = "terminate"  # the real one stays locked until it is started again
+    LAND = "land"  # stops; a rover counts as landed at once, and is disarmed COM_DISARM_LAND later
+    TERMINATE = "terminate"  # the real one stays locked until it restarts
     DISARM = "disarm"
 
 
-STICKS = (Action.POSITION, Action.STABILIZED)  # modes that a person drives in
+STICKS = (Action.POSITION, Action.STABILIZED)  # modes with manual control
 
-#: COM_OBL_RC_ACT. 1 is Altitude, which no rover has: it falls through to Stabilized.
+#: COM_OBL_RC_ACT. 1 is Altitude, which rovers lack: PX4 falls through to Stabilized.
 OFFBOARD_LOST: Mapping[int, Action] = {
     0: Action.POSITION,
     1: Action.STABILIZED,
@@ -64,9 +64,9 @@ INTERVENTIONS: Mapping[Action, Intervention | None] = {
 
 
 def action_on_loss(offboard_loss: int, stick_loss: int, *, sticks: bool) -> Action:
-    """Return what COM_OBL_RC_ACT and NAV_RCL_ACT make it do; ``sticks``: somebody holds some.
+    """Return the action of COM_OBL_RC_ACT and NAV_RCL_ACT; ``sticks``: manual control is present.
 
-    A COM_OBL_RC_ACT that there is not counts as 0.
+    An unknown COM_OBL_RC_ACT counts as 0.
     """
     action = OFFBOARD_LOST.get(offboard_loss, Action.POSITION)
     if action in STICKS and not sticks:

@@ -1,7 +1,7 @@
-"""How a PX4 1.17 rover makes a turn rate and a speed of a course or a place.
+"""How a PX4 1.17 rover computes yaw rate and speed from a course or a place.
 
 Towards a course it turns while it drives, whatever the angle. Towards a place a differential rover
-turns on the spot first, an Ackermann rover takes an arc at whatever speed is left to it.
+turns on the spot first; an Ackermann rover drives an arc at a reduced speed.
 """
 
 import math
@@ -15,7 +15,7 @@ from rover_sim.steering import Demand
 
 
 class Px4Guidance:
-    """Steers by RO_*, RD_*; remembers only whether it is turning on the spot."""
+    """Steers by RO_* and RD_*; its only state is whether it turns on the spot."""
 
     def __init__(self, frame: Frame, parameters: Parameters) -> None:
         self._frame = frame
@@ -26,7 +26,7 @@ class Px4Guidance:
         return f"Px4Guidance({self._frame.value})"
 
     def to_course(self, estimate: Estimate, yaw: float, speed: float) -> Demand:
-        """Drive at ``speed`` and turn to ``yaw`` meanwhile; no speed does not mean no turn."""
+        """Return the demand to drive at ``speed`` and turn to ``yaw``, even at zero speed."""
         limit = speed_limit_of(self._parameters)
         rate = self._yaw_rate(estimate, wrap_angle(yaw - estimate.yaw))
         return Demand(max(-limit, min(limit, speed)), rate)
@@ -34,7 +34,7 @@ class Px4Guidance:
     def to_place(
         self, estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
     ) -> Demand | None:
-        """Drive to a place and be slow there; None once within ``radius``."""
+        """Return the demand to drive to a place and slow down there; None within ``radius``."""
         dn, de = north - estimate.north, east - estimate.east
         distance = math.hypot(dn, de)
         if distance < radius:
@@ -59,7 +59,7 @@ class Px4Guidance:
         return self._turns
 
     def _least_speed(self) -> float:
-        """Return the speed at which full lock turns as fast as RO_YAW_RATE_LIM, m/s."""
+        """Return the speed at which full lock gives RO_YAW_RATE_LIM, m/s."""
         return TURN_RADIUS * math.radians(self._parameters["RO_YAW_RATE_LIM"])
 
     def _yaw_rate(self, estimate: Estimate, error: float) -> float:
@@ -70,10 +70,10 @@ class Px4Guidance:
 
 
 def speed_left(distance: float, deceleration: float, jerk: float) -> float:
-    """Return the speed from which it can still stop within so many metres.
+    """Return the speed from which the rover can stop within ``distance`` metres.
 
-    Braking that begins with limited jerk (m/s³) and then is constant (m/s²): the distance is
-    v² / 2a + 2 v a / j, solved for v.
+    Braking starts with limited jerk (m/s³) and is then constant (m/s²): the distance is v² / 2a + 2
+    v a / j, solved for v.
     """
     b = 4.0 * deceleration * deceleration / jerk
     return 0.5 * (math.sqrt(b * b + 8.0 * deceleration * distance) - b)

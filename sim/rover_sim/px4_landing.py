@@ -1,4 +1,4 @@
-"""How a PX4 rover lands: by being where it returned to. It then disarms itself."""
+"""How a PX4 rover lands: it counts as landed at the end of a return, then disarms itself."""
 
 from mav_tasks.mavlink.enums import MavSeverity
 from rover_sim.outbox import Outbox
@@ -7,7 +7,7 @@ LANDED_AFTER = 0.5  # s, of its land detector's hysteresis
 
 
 class Landing:
-    """Watches an armed rover that returns or lands."""
+    """Land detector of an armed rover that returns or lands."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
@@ -18,7 +18,7 @@ class Landing:
         return f"Landing({'landed' if self.has_landed else 'not landed'})"
 
     def watch(self, *, is_there: bool, disarm_after: float, now: float) -> bool:
-        """Return whether it is to be disarmed now. ``disarm_after`` s; 0 or less: never."""
+        """Return whether to disarm now. ``disarm_after`` in s; 0 or less means never."""
         if not is_there:
             self._there_since, self.has_landed = None, False
             return False

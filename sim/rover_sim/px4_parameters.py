@@ -1,4 +1,4 @@
-"""The parameters of a PX4 rover, as far as clients or this simulator need them."""
+"""The parameters of a PX4 rover that clients or this simulator need."""
 
 import math
 from collections.abc import Iterable
@@ -12,23 +12,23 @@ WIRE_FORMATS = {INT32: "<i", UINT32: "<I"}
 
 
 class Bytewise:
-    """PX4's protocol: an integer's four bytes stand in the float; implements ``ParameterProtocol``.
+    """PX4's protocol: the float carries an integer's four bytes; implements ``ParameterProtocol``.
 
-    A PARAM_SET of another type than the parameter's is not taken and not answered.
+    A PARAM_SET whose type is not the parameter's is ignored without an answer.
     """
 
     tells_index = True
     answers_untaken = False
 
     def to_wire(self, value: float, type_: int) -> float:
-        """Return the float that has the value's bytes."""
+        """Return the float with the value's bytes."""
         if type_ == REAL32:
             return value
         (as_float,) = unpack("<f", pack(WIRE_FORMATS[type_], int(value)))
         return float(as_float)
 
     def from_wire(self, value: float, type_: int, own_type: int) -> float | None:
-        """Return the value whose bytes these are."""
+        """Return the value with these bytes; None if the type is wrong or a float is not finite."""
         if type_ != own_type:
             return None
         if own_type == REAL32:
@@ -47,8 +47,8 @@ class Bytewise:
 
 
 # COM_OF_LOSS_T, COM_OBL_RC_ACT, NAV_RCL_ACT, COM_DISARM_LAND, NAV_ACC_RAD, MAV_SYS_ID and RO_*
-# steer this simulator; the others keep QGroundControl from complaining, at connect and in its setup
-# pages. MPC_XY_VEL_MAX, for which QGroundControl offers "Change speed", is a multicopter's: not
+# control this simulator; QGroundControl complains without the others, at connect or in its setup
+# pages. MPC_XY_VEL_MAX, for which QGroundControl offers "Change speed", is a multicopter's and not
 # here. Values are 1.17's defaults; each frame adds its own (below).
 COMMON: tuple[Parameter, ...] = (
     Parameter("BAT1_N_CELLS", 3, INT32),
@@ -64,7 +64,7 @@ COMMON: tuple[Parameter, ...] = (
     Parameter("COM_LOW_BAT_ACT", 0, INT32),
     Parameter("COM_OBL_RC_ACT", 0, INT32),
     Parameter("COM_OF_LOSS_T", 1.0),
-    Parameter("COM_RC_IN_MODE", 1, INT32),  # joystick, no RC: as PX4's start in a simulation
+    Parameter("COM_RC_IN_MODE", 1, INT32),  # joystick, no RC: as in PX4's simulation start script
     Parameter("COM_RC_LOSS_T", 0.5),
     Parameter("MAV_COMP_ID", 1, INT32),
     Parameter("MAV_SYS_ID", 1, INT32),
@@ -87,11 +87,11 @@ COMMON: tuple[Parameter, ...] = (
     Parameter("SYS_HAS_MAG", 0, INT32),
 )
 
-#: airframe 50000, and what the recorded rover had
+#: airframe 50000, and the values of the recorded rover
 DIFFERENTIAL: tuple[Parameter, ...] = (
     Parameter("CA_AIRFRAME", 6, INT32),  # rover (differential)
-    Parameter("RD_TRANS_DRV_TRN", 0.785398),  # rad: beyond it, it turns on the spot to a place
-    Parameter("RD_TRANS_TRN_DRV", 0.174533),  # rad: below it, it drives again
+    Parameter("RD_TRANS_DRV_TRN", 0.785398),  # rad: above it, turns on the spot towards a place
+    Parameter("RD_TRANS_TRN_DRV", 0.174533),  # rad: below it, the rover drives again
     Parameter("RD_WHEEL_TRACK", 0.6),
     Parameter("RO_ACCEL_LIM", 4.0),
     Parameter("RO_DECEL_LIM", 6.0),

@@ -1,14 +1,15 @@
-"""A PX4 1.17 rover as it really is: where zero velocity is a course and a lost stream a drive home.
+"""The rules of the real PX4 1.17 rover, including its surprises.
 
-Recorded and tried on 1.17.0. What is unlike its guide, and matters to who drives one:
+Recorded and tried on 1.17.0. It differs from PX4's guide, in ways that matter to a controller:
 
-- A velocity is a speed and a course, atan2(east, north); a velocity of zero is a course, too. That
-  of plain zeros is north, or south where a zero is negative (0.0 * cos of a southerly heading). A
-  differential rover turns to it on the spot, an Ackermann rover bends while it brakes.
-- There is no backwards: it turns round while it drives.
-- Setpoints that end are answered after COM_OF_LOSS_T by the table in ``px4_failsafe``.
-- HOLD is the place where it began: a rover that rolled on beyond NAV_ACC_RAD drives back to it.
-- Having returned it has landed, and disarms itself.
+- A velocity is a speed and a course, atan2(east, north). Zero velocity is a course, too: north for
+  plain zeros, or south if a zero is negative (0.0 * cos of a southerly heading). A differential
+  rover turns to it on the spot, an Ackermann rover bends while it brakes.
+- It never drives backwards: it turns round while it drives.
+- When setpoints end, the table in ``px4_failsafe`` applies after COM_OF_LOSS_T; by default the
+  rover drives home.
+- HOLD keeps the place where it began: a rover that rolled beyond NAV_ACC_RAD drives back to it.
+- After a return it counts as landed, and disarms itself.
 """
 
 from rover_sim.estimate import Estimate
@@ -22,31 +23,31 @@ from rover_sim.realism import Drive
 from rover_sim.setpoints import Destination, Heading, TurnRate
 from rover_sim.steering import HOLD, STOP, Demand
 
-RETURNS_OVER = 60.0  # m, RTL_RETURN_ALT: what the text says, though no rover rises
+RETURNS_OVER = 60.0  # m, RTL_RETURN_ALT: only for the text, as no rover rises
 DESTINATION_TEXT = "RTL: land at destination"
 
 
 def px4_rules(parts: FlightParts) -> FlightRules:
-    """Return the rules of a rover whose drive is exact, or real."""
+    """Return the rules for an exact or a real drive."""
     return Px4Rules(parts) if parts.drive is Drive.EXACT else RealPx4Rules(parts)
 
 
 class RealPx4Rules(Px4Rules):
-    """Implements ``FlightRules``: what differs from the kind ones."""
+    """The real PX4 rover where it differs from ``Px4Rules``; implements ``FlightRules``."""
 
     def __init__(self, parts: FlightParts) -> None:
         super().__init__(parts)
         self._guidance = Px4Guidance(parts.frame, parts.parameters)
         self._landing = Landing(parts.outbox)
-        self._held_at: Destination | None = None  # where HOLD began; None: not yet known
+        self._held_at: Destination | None = None  # where HOLD began; None: set at the next step
 
     def enter(self, mode: Mode) -> None:
-        """Begin a mode; HOLD is held where the rover is at its first step."""
+        """Begin a mode; HOLD keeps the rover's place at its first step."""
         super().enter(mode)
         self._held_at = None
 
     def go_to(self, destination: Destination | None, *, now: float) -> None:
-        """Drive to a place in HOLD; None: stay where it is at the next step."""
+        """Drive to a place in HOLD; None: stay at the place of the next step."""
         super().go_to(destination, now=now)
         if destination is None:
             self._held_at = None
@@ -54,7 +55,7 @@ class RealPx4Rules(Px4Rules):
     def intervene(
         self, mode: Mode, *, armed: bool, arrived: bool, now: float
     ) -> Intervention | None:
-        """Answer a lost stream, and a return that has arrived."""
+        """React to a lost stream, a finished mission, and a completed return."""
         if self._has_landed(mode, armed=armed, arrived=arrived, now=now):
             return Intervention(self._intended, disarm=True, disarm_text="Disarmed by landing")
         if armed and self._mission_is_over(mode):
@@ -69,7 +70,7 @@ class RealPx4Rules(Px4Rules):
         return Intervention(Mode.GUIDED) if mode is not Mode.GUIDED else None
 
     def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
-        """Say how to move in OFFBOARD."""
+        """Return the demand in OFFBOARD."""
         del now
         match self._offboard.target:
             case None:
@@ -84,7 +85,7 @@ class RealPx4Rules(Px4Rules):
                 return Demand(speed, yaw_rate)
 
     def hold(self, estimate: Estimate) -> Demand:
-        """Drive to the place of DO_REPOSITION, or back to where HOLD began."""
+        """Return the demand to the place of DO_REPOSITION, or back to where HOLD began."""
         if self._held_at is None:
             self._held_at = Destination(estimate.north, estimate.east)
         place = self._place or self._held_at
@@ -94,7 +95,7 @@ class RealPx4Rules(Px4Rules):
         return demand or HOLD
 
     def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
-        """Say how to move in AUTO and RTL; None once there."""
+        """Return the demand in AUTO and RTL; None on arrival."""
         return self._to(estimate, place, speed_limit, self._acceptance_radius)
 
     @property

@@ -1,15 +1,16 @@
-"""Modes, arming and the offboard-loss failsafe of a PX4 rover, kinder than the real one.
+"""Modes, arming and offboard-loss failsafe of a PX4 rover, idealised.
 
-For tests of exact arithmetic; what the real one does instead is in ``px4_real_rules``.
+For tests of exact arithmetic; ``px4_real_rules`` has the real behaviour.
 
-Modelled: what a mode needs to be entered or armed in (OFFBOARD a stream, MISSION a mission), the
-stream's loss (COM_OF_LOSS_T, COM_OBL_RC_ACT) and its return, places for HOLD (DO_REPOSITION).
-Stricter than the real one: that takes any mode while disarmed, and refuses to arm in it instead.
-Not modelled: failsafes of data link, battery, fence and estimator; the 5 s of Hold that precede
-RTL (COM_FAIL_ACT_T); AUTO.LAND; a mission that is replaced while it is driven (the real one drives
-the new one); loss of sticks, which nobody holds here until a test does.
-Texts fit into one STATUSTEXT and lack the tab that the real ones end with (it sends an EVENT beside
-each, and a ground station then drops the text).
+Modelled: the conditions for entering a mode and arming in it (OFFBOARD needs a stream, MISSION a
+mission), the loss of the stream (COM_OF_LOSS_T, COM_OBL_RC_ACT) and its return, places for HOLD
+(DO_REPOSITION). Stricter than the real one, which accepts any mode while disarmed, and refuses to
+arm in it instead. Not modelled: failsafes of data link, battery, fence and estimator; the 5 s of
+Hold before RTL (COM_FAIL_ACT_T); AUTO.LAND; replacing a mission while driving it (the real one
+drives the new one); loss of sticks, which are absent until a test holds them.
+
+Texts fit into one STATUSTEXT and lack the tab at the end of the real ones (PX4 sends an EVENT
+beside each, so that a ground station drops the text).
 """
 
 import math
@@ -38,17 +39,17 @@ NAMES: Mapping[Mode, str] = {
 }
 
 # COM_OBL_RC_ACT, 1.15. The modes of 0 to 2 (position, altitude, manual) need sticks; without them
-# the real one goes on to a mode that does not, here HOLD. Landing (4) is standing, for a rover.
+# the real one falls back to a mode that needs none, here HOLD. A landing rover (4) stands.
 LOST: Mapping[int, Intervention] = {
     3: Intervention(Mode.RTL),
-    6: Intervention(disarm=True),  # terminate: the real one also stays locked until a restart
+    6: Intervention(disarm=True),  # terminate: the real one also stays locked until it restarts
     7: Intervention(disarm=True),
 }
 LOST_OTHERWISE = Intervention(Mode.HOLD)
 
 
 class Px4Rules:
-    """Implements ``FlightRules``."""
+    """The idealised PX4 rules; implements ``FlightRules``."""
 
     reposition_mode = Mode.HOLD
     home_is_where_armed = True
@@ -58,7 +59,7 @@ class Px4Rules:
     def __init__(self, parts: FlightParts) -> None:
         self._parts = parts
         self._offboard = Offboard()
-        self._intended = Mode.HOLD  # what somebody asked for; a failsafe does not change it
+        self._intended = Mode.HOLD  # the last requested mode; a failsafe does not change it
         self._failing = False
         self._place: Destination | None = None
         self._cruise: float | None = None  # m/s, from DO_CHANGE_SPEED
@@ -68,44 +69,44 @@ class Px4Rules:
 
     @property
     def target(self) -> Target | None:
-        """What the setpoints ask for, in OFFBOARD."""
+        """The target of the setpoints, in OFFBOARD."""
         return self._offboard.target
 
     @property
     def hold_destination(self) -> Destination | None:
-        """Where DO_REPOSITION sent it."""
+        """The place of DO_REPOSITION, or None."""
         return self._place
 
     @property
     def cruise_speed(self) -> float:
-        """How fast it drives by itself, m/s."""
+        """Speed of the modes that drive by themselves, m/s."""
         limit = self._parts.speed_limit()
         return limit if self._cruise is None else min(self._cruise, limit)
 
     def system_status(self, mode: Mode, *, armed: bool) -> MavState:
-        """MAV_STATE: from failsafe and arming, not from the mode."""
+        """Return MAV_STATE, from failsafe and arming, not from the mode."""
         del mode
         if self._failing:
             return MavState.CRITICAL
         return MavState.ACTIVE if armed else MavState.STANDBY
 
     def arming_text(self, *, armed: bool) -> str:
-        """Return the text that tells of arming or disarming."""
+        """Return the text that reports arming or disarming."""
         return "Armed by external command" if armed else "Disarmed by external command"
 
     def unknown_mode(self, custom_mode: int) -> str:
-        """Return the text for a number that is no mode."""
+        """Return the text for a mode number that does not exist."""
         return f"Unsupported mode {custom_mode:#010x}"
 
     def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
-        """Refuse a mode that could not run now."""
+        """Return a refusal for a mode that cannot run now, else None."""
         del present
         if self._can_run(wanted, now):
             return None
         return f"Switching to {NAMES[wanted]} is currently not available"
 
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:
-        """Refuse too early, or in a mode that could not run; forcing skips nothing from outside."""
+        """Return a refusal while settling or in a mode that cannot run; ignore ``forced``."""
         del forced
         if now - self._parts.started < self._parts.settling_time:
             return "Arming denied: health checks not passed yet"
@@ -114,27 +115,27 @@ class Px4Rules:
         return None
 
     def intended(self, mode: Mode) -> Mode:
-        """Return what somebody asked for last."""
+        """Return the last requested mode."""
         del mode
         return self._intended
 
     def choose(self, mode: Mode) -> None:
-        """Note what somebody asked for: it ends a failsafe, also in the same mode."""
+        """Note a requested mode: this ends a failsafe, even in the same mode."""
         self._intended = mode
         self._failing = False
 
     def enter(self, mode: Mode) -> None:
-        """Begin a mode; what setpoints asked for last is kept, for when OFFBOARD returns."""
+        """Begin a mode; keep the last setpoint for a return to OFFBOARD."""
         del mode
         self._place = self._cruise = None
 
     def intervene(
         self, mode: Mode, *, armed: bool, arrived: bool, now: float
     ) -> Intervention | None:
-        """Leave OFFBOARD when the stream is lost, and MISSION when there is nothing left of it.
+        """Leave OFFBOARD when the stream is lost, and MISSION at its end.
 
-        When the stream returns, so does OFFBOARD, unasked and driving: the failsafe holds only
-        while its cause does.
+        When the stream returns, the rover re-enters OFFBOARD and drives on: the failsafe lasts only
+        as long as its cause.
         """
         del arrived
         if armed and self._mission_is_over(mode):
@@ -160,19 +161,19 @@ class Px4Rules:
         return mode is Mode.AUTO and (missions.complete or missions.item_count == 0)
 
     def position_lost(self) -> Intervention:
-        """Land, the first failsafe that needs no position: it stands, and is disarmed."""
+        """Land, the first action that needs no position: the rover stops and is disarmed."""
         self._say("Failsafe activated")
-        self._intended = Mode.LAND  # it does not go back to OFFBOARD by itself
+        self._intended = Mode.LAND  # so that it does not re-enter OFFBOARD by itself
         return Intervention(Mode.LAND)
 
     def fence_breached(self) -> Intervention:
-        """HOLD: GF_ACTION is 2."""
+        """Enter HOLD: GF_ACTION is 2."""
         self._say("Failsafe activated")
         self._intended = Mode.HOLD
         return Intervention(Mode.HOLD)
 
     def hear_heartbeat(self, system_id: int, *, now: float) -> None:
-        """Nothing hangs on a ground station (NAV_DLL_ACT is 0)."""
+        """Ignore heartbeats: NAV_DLL_ACT is 0."""
 
     def take_local(self, message: Local, estimate: Estimate, *, mode: Mode, now: float) -> None:
         """Count a setpoint; in OFFBOARD follow it."""
@@ -190,7 +191,7 @@ class Px4Rules:
         self._place = destination
 
     def change_speed(self, speed: float, mode: Mode) -> bool:
-        """Set how fast it drives by itself, until the mode changes; 0 or less: as before."""
+        """Set the speed until the mode changes; 0 or less resets it. Return False if not finite."""
         del mode
         if not math.isfinite(speed):
             return False
@@ -198,16 +199,16 @@ class Px4Rules:
         return True
 
     def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
-        """Say how to move in OFFBOARD."""
+        """Return the demand in OFFBOARD."""
         del now
         return self._offboard.demand(estimate, self._parts.speed_limit())
 
     def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
-        """Say how to move in AUTO and RTL; None once there."""
+        """Return the demand in AUTO and RTL; None on arrival."""
         return steer_to_point(estimate, *place, speed_limit, radius=ARRIVAL_RADIUS)
 
     def hold(self, estimate: Estimate) -> Demand:
-        """Drive to the place of DO_REPOSITION, if there is one; stand."""
+        """Return the demand to the place of DO_REPOSITION; without a place, stop."""
         if self._place is None:
             return HOLD
         speed, radius = self.cruise_speed, ARRIVAL_RADIUS
@@ -218,7 +219,7 @@ class Px4Rules:
         return demand
 
     def mission_route(self, home: Destination) -> Route | None:
-        """Return the stored mission, from the item that it has come to."""
+        """Return the stored mission from its current item, or None."""
         del home
         route = self._parts.missions.route()
         if route is not None:

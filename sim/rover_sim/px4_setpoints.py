@@ -1,8 +1,8 @@
-"""SET_POSITION_TARGET_*: what a PX4 rover makes of them. Pure reading; nothing is ever answered.
+"""SET_POSITION_TARGET_*: how a PX4 rover interprets them. Parsing only; they get no answers.
 
-After the receiver of PX4 1.15 to 1.17: a field counts as given if its own bit of the mask is clear
-and it is a number (NaN is "not given", and harmless). In BODY_NED there are velocities only, and
-only whole.
+After the receiver of PX4 1.15 to 1.17: a field is given if its own bit of the mask is clear and it
+is a number (NaN is "not given", and harmless). BODY_NED has velocities only, and needs all three
+axes.
 """
 
 import math
@@ -18,7 +18,7 @@ from rover_sim.setpoints import Destination, Global, Heading, Local, Target, Tur
 X, VX, AX = 1, 8, 64
 FORCE = 512
 YAW_RATE_IGNORED = 2048
-GLOBAL_INT_FRAMES = (5, 6, 11)  # the INT forms only
+GLOBAL_INT_FRAMES = (5, 6, 11)  # only the INT forms
 
 LOCAL = "SET_POSITION_TARGET_LOCAL_NED"
 
@@ -26,16 +26,16 @@ Vector = tuple[float | None, float | None, float | None]
 
 
 class Setpoint(NamedTuple):
-    """One that counts as a sign of life of the stream, whether or not a rover can drive it."""
+    """A setpoint that keeps the stream alive, even if a rover cannot drive it."""
 
-    target: Target | None  # None: it stands (an acceleration, or half of a place or velocity)
-    speed: float | None = None  # m/s towards a place, where one came with it
+    target: Target | None  # None: stop (an acceleration, or an incomplete place or velocity)
+    speed: float | None = None  # m/s towards a place, if the setpoint has one
 
 
 def read_px4_local(message: Local, estimate: Estimate, *, yaw_rate: bool) -> Setpoint | str:
-    """Read SET_POSITION_TARGET_LOCAL_NED; a text says why it does not count.
+    """Parse SET_POSITION_TARGET_LOCAL_NED; return a text if it does not count as a setpoint.
 
-    ``yaw_rate``: whether the rover turns at one in BODY_NED. Yaw is passed over.
+    ``yaw_rate``: whether the rover honours a yaw rate in BODY_NED. Yaw is ignored.
     """
     position = _given(message.type_mask, X, (message.x, message.y, message.z))
     velocity = _given(message.type_mask, VX, (message.vx, message.vy, message.vz))
@@ -56,7 +56,7 @@ def read_px4_local(message: Local, estimate: Estimate, *, yaw_rate: bool) -> Set
 
 
 def read_px4_global(message: Global, origin: Origin) -> Setpoint | str:
-    """Read SET_POSITION_TARGET_GLOBAL_INT; a text says why it does not count."""
+    """Parse SET_POSITION_TARGET_GLOBAL_INT; return a text if it does not count as a setpoint."""
     position: Vector = NOTHING
     if not message.type_mask & (X | X << 1 | X << 2):
         if message.coordinate_frame not in GLOBAL_INT_FRAMES:
@@ -95,7 +95,7 @@ def _setpoint(
         return Setpoint(Destination(north, east), speed or None)
     if speed is None or vn is None or ve is None:
         return Setpoint(None)
-    # There is no backwards: a rover drives to where the vector points, and turns round for it.
-    # Zero has a course, too, by the signs of its zeros: that is what the real one turns to.
+    # A rover never drives backwards: it turns round and drives where the vector points. Zero
+    # velocity has a course, too, by the signs of its zeros, to which the real one turns.
     yaw = math.atan2(ve, vn)
     return Setpoint(Heading(wrap_angle(yaw), speed))

@@ -10,27 +10,27 @@ from rover_sim.fault_player import FaultPlayer
 from rover_sim.vehicle import Vehicle
 
 MAX_DATAGRAM = 65535
-DATAGRAMS_PER_TURN = 64  # read at most so many before the rovers get their turn
+DATAGRAMS_PER_TURN = 64  # then the rovers get their turn
 TRUTH_INTERVAL = 0.1  # s
 
 
 class Clock:
-    """Simulated time: the monotonic clock, run faster or slower from the start on."""
+    """Simulated time: the monotonic clock, scaled from its start."""
 
     def __init__(self, speed: float) -> None:
         self._speed = speed
         self._start = time.monotonic()
 
     def now(self) -> float:
-        """Simulated seconds; at real speed equal to the monotonic clock."""
+        """Return simulated seconds; at real speed they equal the monotonic clock."""
         return self._start + (time.monotonic() - self._start) * self._speed
 
     def elapsed(self, now: float) -> float:
-        """Simulated seconds since the start."""
+        """Return simulated seconds since the start."""
         return now - self._start
 
     def real(self, duration: float) -> float:
-        """How long a simulated duration takes, s."""
+        """Return the real seconds that a simulated duration takes."""
         return duration / self._speed
 
 
@@ -73,7 +73,7 @@ def _read(server: socket.socket, vehicles: list[Vehicle], clock: Clock) -> None:
             data, peer = server.recvfrom(MAX_DATAGRAM)
         except BlockingIOError:
             return
-        except OSError:  # an earlier datagram met a closed port: its peer will fall silent
+        except OSError:  # an earlier datagram met a closed port: that peer will time out
             continue
         now = clock.now()
         for vehicle in vehicles:
@@ -83,7 +83,7 @@ def _read(server: socket.socket, vehicles: list[Vehicle], clock: Clock) -> None:
 def _send(server: socket.socket, vehicle: Vehicle) -> None:
     for peer, packet in vehicle.take_packets():
         try:
-            server.sendto(packet, cast(tuple[Any, ...], peer))  # as recvfrom gave it
+            server.sendto(packet, cast(tuple[Any, ...], peer))  # as recvfrom returned it
         except OSError:  # full buffer or unreachable peer: a datagram link may lose packets
             continue
 

@@ -1,8 +1,8 @@
-"""How unkind a simulated rover is: its estimator, its boot, its links and its drive train.
+"""How closely a simulated rover imitates a real one: estimator, boot, links, drive train.
 
-Values only; the parts that read them do the work. The figures are those of recordings of real
-autopilots (ArduPilot Rover 4.6.3, PX4 1.17.0, each on a simulated vehicle of its own). ``EXACT``
-is the opposite: a rover that knows where it is, is ready at once and does what it is told.
+Values only; the parts that read them do the work. The figures come from recordings of real
+autopilots (ArduPilot Rover 4.6.3, PX4 1.17.0, each on its own simulated vehicle). ``EXACT`` is the
+opposite: a rover that knows its position, is ready at once and follows demands exactly.
 """
 
 from dataclasses import dataclass, fields
@@ -13,28 +13,28 @@ from rover_sim.frames import Frame
 
 
 class Drive(Enum):
-    """How the rover follows what its flight stack demands."""
+    """How the rover follows the demands of its flight stack."""
 
-    EXACT = "exact"  # the speed asked for, ramped; zero and HOLD are a stop
-    REAL = "real"  # overshoot, least speed, free rolling, as the make's controllers do
+    EXACT = "exact"  # the demanded speed, ramped; zero and HOLD stop it
+    REAL = "real"  # overshoot, least speed, rolling on, like the make's controllers
 
 
 class Home(Enum):
     """When home moves by itself."""
 
-    AS_ARMED = "as armed"  # when it is armed, if its make does so; else never
-    FOLLOWS = "follows"  # also while it is disarmed, to where it is
+    AS_ARMED = "as armed"  # at arming, if the make does so; else never
+    FOLLOWS = "follows"  # also to the rover's position while it is disarmed
 
 
 class Wire(Enum):
-    """Whether messages say what is meant, or what the real ones say."""
+    """Whether messages are consistent, or have the quirks of the real autopilots."""
 
     TIDY = "tidy"
     REAL = "real"  # landed state undefined, pre-arm bit in health only, RC_CHANNELS, and the like
 
 
 class Change(Flag):
-    """What a HEARTBEAT can show before its second is over."""
+    """A change that triggers a HEARTBEAT before its second is over."""
 
     NOTHING = 0
     MODE = auto()
@@ -52,18 +52,19 @@ class Gps(Enum):
 class Wander:
     """An error that wanders over seconds about a fixed value: a Gauss-Markov process.
 
-    Not white noise: neighbouring samples are nearly equal, and a mean over a second is as wrong.
+    Not white noise: neighbouring samples are nearly equal, and averaging over a second hardly
+    helps.
     """
 
     spread: float  # standard deviation of one axis, about the fixed value
-    time: float  # s, of each of two lags: 0.74 alike after so long, 0.2 after three times that
-    least: float = 0.0  # the fixed value is drawn between these two
+    time: float  # s, of each of two lags: correlation 0.74 after this time, 0.2 after three times
+    least: float = 0.0  # the fixed value is drawn between ``least`` and ``most``
     most: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class PushingError:
-    """By how much more it is off after the rover has pushed against what holds it."""
+    """Additional estimation error after the rover pushed against an obstacle."""
 
     speed: Wander  # m/s, forward and to the right
     yaw: Wander  # rad
@@ -71,54 +72,54 @@ class PushingError:
 
 @dataclass(frozen=True, slots=True)
 class EstimatorError:
-    """By how much the estimate is off. Each axis wanders on its own; a seed decides how."""
+    """Errors of the estimate. Each axis wanders independently, drawn from the seed."""
 
-    forward_speed: Wander  # m/s; recorded, the fixed part turns with the rover
+    forward_speed: Wander  # m/s; recorded: the fixed part turns with the rover
     lateral_speed: Wander  # m/s to the right
     position: Wander  # m, north and east
     yaw: Wander  # rad
     yaw_rate: Wander  # rad/s
-    drift: Wander | None = None  # m, north and east, over minutes; None: position has all of it
-    pushing: PushingError | None = None  # None: pushing does not upset it
+    drift: Wander | None = None  # m, north and east, over minutes; None: included in position
+    pushing: PushingError | None = None  # None: pushing has no effect
 
 
 @dataclass(frozen=True, slots=True)
 class BootTimes:
-    """When what is there, s after switching on."""
+    """Times at which parts of the autopilot are ready, s after power-on."""
 
-    initialised: float  # ArduPilot: INITIALISING ends, in MANUAL; arming says what it waits for
-    mode_lost: float  # a mode entered before is lost, once: ArduPilot is in MANUAL again
-    heading: float  # the estimate has a heading; before it says north
+    initialised: float  # ArduPilot: INITIALISING ends, in MANUAL; arming then reports its reason
+    mode_lost: float  # a mode entered earlier is lost, once: ArduPilot is in MANUAL again
+    heading: float  # the estimate has a heading; before, it reports north
     fix: float  # the receiver has a position
-    position: float  # the estimate has a position; home is there, without its altitude
-    origin: float  # GPS_GLOBAL_ORIGIN, and home as it should be
+    position: float  # the estimate has a position; home has one, but no altitude
+    origin: float  # GPS_GLOBAL_ORIGIN, and a complete home
     healthy: float  # the pre-arm bit of SYS_STATUS
     armable: float
-    uses_gps: float  # the text that says so
+    uses_gps: float  # the text that reports it
 
     @property
     def is_none(self) -> bool:
-        """Whether there is no boot to speak of."""
+        """Whether the boot takes no time."""
         return self.healthy == 0.0
 
     def scaled(self, factor: float) -> "BootTimes":
-        """Return the same boot, all of it so much longer."""
+        """Return the same boot with all times multiplied by ``factor``."""
         return BootTimes(*(getattr(self, field.name) * factor for field in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
 class LinkTiming:
-    """What it sends, when."""
+    """Delays of a link."""
 
-    first_answer: float  # s, from a command to its COMMAND_ACK, at least
-    last_answer: float  # s, at most
-    in_pairs: bool  # positions that are due come late, two at a time
-    announces: Change  # what is shown by a HEARTBEAT at once
+    first_answer: float  # s from a command to its COMMAND_ACK, least
+    last_answer: float  # s, most
+    in_pairs: bool  # late positions are sent two at a time
+    announces: Change  # changes that trigger a HEARTBEAT at once
 
 
 @dataclass(frozen=True, slots=True)
 class Realism:
-    """How unkind the rover is."""
+    """How closely the rover imitates a real one."""
 
     estimator: EstimatorError | None  # None: the estimate is the truth
     boot: BootTimes
@@ -126,11 +127,11 @@ class Realism:
     drive: Drive
     home: Home
     wire: Wire
-    stick_speed: float | None = None  # m/s; full throttle counts so in GUIDED. None: not at all
+    stick_speed: float | None = None  # m/s at full throttle, in GUIDED. None: ignored
     tells_origin: bool = True  # GPS_GLOBAL_ORIGIN
 
 
-NO_BOOT = BootTimes(  # everything but arming is there at once, and that as fast as tests want it
+NO_BOOT = BootTimes(  # everything but arming is ready at once, and arming as fast as tests need it
     initialised=0.25,
     mode_lost=0.0,
     heading=0.0,
@@ -186,7 +187,7 @@ ARDUPILOT_ESTIMATOR = {
     Gps.METRE: EstimatorError(  # as with noisy sensors, standing 0.037 / 0.059 m/s
         forward_speed=Wander(0.015, 2.0, least=-0.026, most=-0.018),
         lateral_speed=Wander(0.015, 2.0, least=0.018, most=0.026),
-        position=Wander(0.032, 1.0),  # PX4's: the noise of that recording was of speed only
+        position=Wander(0.032, 1.0),  # PX4's: that recording had noisy speed only
         yaw=Wander(radians(0.1), 20.0, least=radians(0.9), most=radians(1.0)),
         yaw_rate=Wander(radians(0.015), 0.5, least=radians(0.035), most=radians(0.05)),
         drift=Wander(0.15, 35.0),
@@ -210,7 +211,7 @@ PX4_ESTIMATOR = {
         drift=Wander(0.15, 35.0),  # 0.18 / 0.43 m over a drive, 0.7 m at most
     ),
 }
-# standing after it 0.284 / 0.472 m/s; yaw -4.8 to +9.2 deg once, -5.5 to +1.9 another time
+# standing after pushing 0.284 / 0.472 m/s; yaw -4.8 to +9.2 deg once, -5.5 to +1.9 another time
 PUSHING = PushingError(speed=Wander(0.22, 1.2), yaw=Wander(radians(7.3), 12.0))
 
 # m/s at full throttle, CRUISE_SPEED / CRUISE_THROTTLE of SITL's frames: 3 / 0.75, 5 / 0.3.

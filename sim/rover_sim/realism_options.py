@@ -1,4 +1,4 @@
-"""The command line's words for where a rover is and how unkind it is."""
+"""Command line options for a rover's start, its realism and its transmitter."""
 
 import argparse
 from collections.abc import Sequence
@@ -13,25 +13,25 @@ from rover_sim.realism import EXACT, NO_BOOT, SHORT, Gps, Realism
 from rover_sim.vehicle import Peers
 
 HOME_FIELDS = 4
-PULSES = (800, 2200)  # µs, what a receiver can say
+PULSES = (800, 2200)  # µs, the range of a receiver
 
 
 class Place(NamedTuple):
-    """Where a rover starts, and the origin of its local frame."""
+    """Start of a rover, and the origin of its local frame."""
 
     origin: Origin
     yaw: float  # rad, clockwise from north
 
 
 class StickPulses(NamedTuple):
-    """What the transmitter sends, µs."""
+    """The transmitter's pulses, µs."""
 
     throttle: int
     steering: int
 
 
 def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of realism, of the place, and of a transmitter."""
+    """Add the options for start, realism and transmitter."""
     add = parser.add_argument
     add(
         "--home",
@@ -70,9 +70,9 @@ def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def with_home_joined(arguments: Sequence[str]) -> list[str]:
-    """Return the arguments with ``--home`` and its value as one.
+    """Return the arguments with ``--home`` and its value joined by "=".
 
-    argparse takes a value that begins with a minus, as southern latitudes do, for an option.
+    argparse takes a value with a leading minus, such as a southern latitude, for an option.
     """
     joined: list[str] = []
     for each in arguments:
@@ -84,7 +84,7 @@ def with_home_joined(arguments: Sequence[str]) -> list[str]:
 
 
 def realism_of(values: argparse.Namespace, persona: Persona) -> Realism:
-    """Return how unkind the rover is that the command line asks for."""
+    """Return the realism that the command line asks for."""
     noisy = values.noise == "on"
     realism = persona.realism if noisy else EXACT
     boots = {"short": persona.boot.scaled(SHORT), "real": persona.boot, "none": NO_BOOT}
@@ -99,7 +99,7 @@ def realism_of(values: argparse.Namespace, persona: Persona) -> Realism:
 
 
 def peers_of(values: argparse.Namespace, persona: Persona) -> Peers:
-    """Return whom the rovers answer."""
+    """Return which peers the rovers answer."""
     if values.peers is not None:
         return Peers(values.peers)
     first = persona.answers_first_peer and values.noise == "on"
@@ -107,7 +107,7 @@ def peers_of(values: argparse.Namespace, persona: Persona) -> Peers:
 
 
 def read_place(text: str) -> Place:
-    """Return where a rover starts. ArgumentTypeError."""
+    """Parse ``--home``. Raise ArgumentTypeError."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
@@ -115,13 +115,13 @@ def read_place(text: str) -> Place:
     if len(numbers) != HOME_FIELDS or not all(isfinite(number) for number in numbers):
         raise argparse.ArgumentTypeError(f"must be LAT,LON,ALT,HEADING in numbers, not {text!r}")
     latitude, longitude, altitude, heading = numbers
-    if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):  # at a pole east is nowhere
+    if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0):  # at a pole there is no east
         raise argparse.ArgumentTypeError("latitude is within 90 degrees, longitude within 180")
     return Place(Origin(latitude, longitude, altitude), wrap_angle(radians(heading)))
 
 
 def read_sticks(text: str) -> StickPulses:
-    """Return what a transmitter sends. ArgumentTypeError."""
+    """Parse ``--sticks``. Raise ArgumentTypeError."""
     least, most = PULSES
     parts = text.split(",")
     if not 1 <= len(parts) <= len(StickPulses._fields) or not all(

@@ -1,4 +1,4 @@
-"""Places to drive to, one after the other: AUTO's mission or built-in track, RTL's home."""
+"""Places to drive to, in order: AUTO's mission or built-in square, RTL's home."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,19 +10,19 @@ from rover_sim.steering import STOP, Demand
 TRACK_SIDE = 4.0  # m, of the square that AUTO drives when no mission is stored
 
 
-#: says how to drive to a place, at a speed at the most (m/s); None once there
+#: returns the demand to drive to a place with a speed limit (m/s); None on arrival
 Steer = Callable[[Estimate, Destination, float], Demand | None]
 
 
 class Waypoint(NamedTuple):
-    """A place, and the sequence number of the mission item that it comes from, if of one."""
+    """A place, with the sequence number of its mission item, if it has one."""
 
     seq: int | None
     place: Destination
 
 
 class Route:
-    """Progress along waypoints. ``loop`` begins again after the last one."""
+    """Progress along waypoints. ``loop`` starts again after the last one."""
 
     def __init__(self, waypoints: tuple[Waypoint, ...], *, loop: bool) -> None:
         self._waypoints = waypoints
@@ -34,18 +34,18 @@ class Route:
 
     @property
     def next(self) -> Waypoint | None:
-        """The waypoint it drives to; None when done."""
+        """The waypoint that the rover drives to; None at the end."""
         return self._waypoints[self._index] if self._index < len(self._waypoints) else None
 
     def skip_to(self, seq: int) -> None:
-        """Go on from the first waypoint at or after a mission item."""
+        """Continue at the first waypoint at or after a mission item."""
         numbers = [waypoint.seq or 0 for waypoint in self._waypoints]
         self._index = next((i for i, n in enumerate(numbers) if n >= seq), len(numbers))
 
     def demand(
         self, estimate: Estimate, speed_limit: float, steer: Steer
     ) -> tuple[Demand, Waypoint | None]:
-        """Say how to move now, and which waypoint has just been reached."""
+        """Return the demand, and the waypoint that was just reached, if any."""
         waypoint = self.next
         if waypoint is None:
             return STOP, None
@@ -59,7 +59,7 @@ class Route:
 
 
 def square_around(home: Destination) -> Route:
-    """Return the built-in track: a square with one corner at home, for ever."""
+    """Return the built-in track: an endless square with one corner at home."""
     north, east = home
     side = TRACK_SIDE
     corners = ((side, 0.0), (side, side), (0.0, side), (0.0, 0.0))

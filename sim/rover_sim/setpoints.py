@@ -1,7 +1,7 @@
-"""SET_POSITION_TARGET_*: which of them ArduPilot Rover acts on, and what it reads in them.
+"""SET_POSITION_TARGET_*: which of them ArduPilot Rover accepts, and how it interprets them.
 
-Pure reading, as observed on Rover 4.6.3; nothing is ever answered. The mask's bits count as
-groups: one bit of a pair or triple says "ignored" for the whole of it.
+Parsing only, as observed on Rover 4.6.3; they get no answers. The mask's bits act in groups: one
+set bit of a pair or triple ignores the whole group.
 """
 
 import math
@@ -16,7 +16,7 @@ from rover_sim.geo import LATITUDE_LIMIT_DEGE7, LONGITUDE_LIMIT_DEGE7, Origin
 
 # POSITION_TARGET_TYPEMASK
 POSITION_IGNORED = 0x0003  # x or y
-VELOCITY_IGNORED = 0x0018  # vx or vy; vz plays no part on the ground
+VELOCITY_IGNORED = 0x0018  # vx or vy; vz is unused on the ground
 ACCELERATION_IGNORED = 0x01C0  # any axis
 YAW_IGNORED = 0x0400
 YAW_RATE_IGNORED = 0x0800
@@ -53,7 +53,7 @@ Global = messages.SetPositionTargetGlobalInt
 
 
 def read_local(message: Local, estimate: Estimate, *, speed_limit: float) -> Target | None:
-    """Read SET_POSITION_TARGET_LOCAL_NED; None: dropped in silence."""
+    """Parse SET_POSITION_TARGET_LOCAL_NED; return None if Rover drops it silently."""
     frame = message.coordinate_frame
     if frame not in LOCAL_FRAMES:
         return None
@@ -73,7 +73,7 @@ def read_local(message: Local, estimate: Estimate, *, speed_limit: float) -> Tar
 
 
 def read_global(message: Global, origin: Origin, *, speed_limit: float) -> Target | None:
-    """Read SET_POSITION_TARGET_GLOBAL_INT; None: dropped in silence."""
+    """Parse SET_POSITION_TARGET_GLOBAL_INT; return None if Rover drops it silently."""
     if message.coordinate_frame not in GLOBAL_FRAMES:
         return None
     if not message.type_mask & POSITION_IGNORED:
@@ -82,7 +82,7 @@ def read_global(message: Global, origin: Origin, *, speed_limit: float) -> Targe
 
 
 def read_place(latitude_degE7: int, longitude_degE7: int, origin: Origin) -> Destination | None:
-    """Return the place in the local frame, or None if there is no such place on Earth.
+    """Return the place in the local frame, or None if the coordinates are out of range.
 
     0/0 means "not given", as in most of ArduPilot's commands.
     """
@@ -107,7 +107,7 @@ def _read_motion(message: Local | Global, base_yaw: float, speed_limit: float) -
         speed = min(math.hypot(message.vx, message.vy), speed_limit)
         yaw = base_yaw + math.atan2(message.vy, message.vx)
         if (yaw_given or rate_given) and message.vx < 0.0:
-            speed = -speed  # only with a yaw or yaw rate beside it; else it turns round
+            speed = -speed  # only with a yaw or yaw rate; else the rover turns round
     elif not (yaw_given or rate_given):
         return None
     if rate_given:
@@ -120,6 +120,9 @@ def _read_motion(message: Local | Global, base_yaw: float, speed_limit: float) -
 
 
 def _abort_on_nan(*values: float) -> None:
-    """The real one aborts with SIGFPE (SITL) or reports internal error 0x400 (hardware)."""
+    """Raise SimulatedCrash on NaN.
+
+    The real one aborts with SIGFPE (SITL) or reports internal error 0x400 (hardware).
+    """
     if any(math.isnan(value) for value in values):
         raise SimulatedCrash("NaN in a setpoint: ArduPilot aborts with a floating point exception")

@@ -1,6 +1,6 @@
-"""MAVLink 2 signing of a rover that was given a key: it signs all, and hears nothing unsigned.
+"""MAVLink 2 signing of a rover with a key: it signs every packet, and drops unsigned ones.
 
-It has no SETUP_SIGNING: the key is there from the beginning. Radios may speak unsigned.
+It has no SETUP_SIGNING: the key is there from the start. Radio status may be unsigned.
 """
 
 from mav_tasks.mavlink.packet import Packet
@@ -22,7 +22,7 @@ LINK_ID = 0
 
 
 class RoverSignatures:
-    """What one rover signs and believes; ``unix_offset`` is Unix time less ``now``."""
+    """Signs and verifies packets of one rover; ``unix_offset`` is Unix time minus ``now``."""
 
     def __init__(self, key: Key, *, unix_offset: float) -> None:
         self._key = key
@@ -35,11 +35,11 @@ class RoverSignatures:
         return f"RoverSignatures({self._key.name}, {self.refused} refused)"
 
     def sealed(self, raw: bytes, *, now: float) -> bytes:
-        """Return a packet as it is to leave."""
+        """Return a packet signed."""
         return self._signer.sign(raw, clock=self._clock(now))
 
     def believes(self, packet: Packet, *, now: float) -> bool:
-        """Whether a packet is to be looked at."""
+        """Return whether to accept a packet."""
         is_good = packet.message_id in FROM_RADIOS
         if packet.is_signed:
             is_good = is_signed_with(packet, self._key.secret) and self._is_news(packet, now)

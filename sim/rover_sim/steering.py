@@ -1,8 +1,8 @@
-"""From where to go to how to move: pure functions, no state.
+"""From a target to a demand: pure functions, no state.
 
-A skid-steered rover turns on the spot when it is asked for a turn rate; an Ackermann rover only
-turns while it rolls, and takes arcs. Towards a heading ArduPilot steers any rover as a car, as the
-real one was seen to (no speed, no turn).
+A skid-steered rover turns on the spot when a yaw rate is demanded; an Ackermann rover turns only
+while it rolls, and drives arcs. Towards a heading ArduPilot steers any rover like a car, as
+observed (no speed, no turn).
 """
 
 import math
@@ -16,29 +16,29 @@ from rover_sim.estimate import Estimate
 MAX_YAW_RATE = 1.6  # rad/s
 HEADING_GAIN = 1.2  # 1/s, yaw rate per heading error
 TURN_RADIUS = 1.5  # m, tightest arc while steering to a heading
-BRAKING = 0.9  # m/s²; 2 m/s to a stand in 2.2 s and 2.2 m
-HOLD_BRAKING = 0.75  # m/s²; in HOLD it takes 3 s from 2.1 m/s
+BRAKING = 0.9  # m/s²; from 2 m/s to standstill in 2.2 s and 2.2 m
+HOLD_BRAKING = 0.75  # m/s²; HOLD takes 3 s from 2.1 m/s
 COASTING = 0.5  # m/s², disarmed: rolling resistance and geared motors
-PIVOT_ERROR = math.radians(60)  # beyond it a rover turns on the spot towards a waypoint
-APPROACH_GAIN = 1.0  # 1/s, speed per metre left, over the last metre
+PIVOT_ERROR = math.radians(60)  # above it a rover turns on the spot towards a waypoint
+APPROACH_GAIN = 1.0  # 1/s, speed per remaining metre, over the last metre
 LEAST_ARC_SPEED = 0.3  # m/s
 
 
 class Output(Enum):
-    """What the motor outputs do."""
+    """State of the motor outputs."""
 
-    CONTROLLED = "controlled"  # the controllers see to speed and turn rate
-    NEUTRAL = "neutral"  # throttle and steering in the middle; ArduPilot's HOLD
+    CONTROLLED = "controlled"  # the controllers set speed and yaw rate
+    NEUTRAL = "neutral"  # throttle and steering neutral; ArduPilot's HOLD
     OFF = "off"  # disarmed
 
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What the rover shall do now, before acceleration limits."""
+    """The demanded motion, before acceleration limits."""
 
     speed: float  # m/s, negative is backwards
     yaw_rate: float  # rad/s, clockwise
-    braking: float = BRAKING  # m/s², how fast speed may fall, where the drive is exact
+    braking: float = BRAKING  # m/s², limit of the deceleration if the drive is exact
     output: Output = Output.CONTROLLED
 
 
@@ -53,19 +53,19 @@ class SteerToPoint(Protocol):
     def __call__(
         self, estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
     ) -> Demand | None:
-        """Say how to move now; None once within ``radius`` (m)."""
+        """Return the demand; None within ``radius`` (m)."""
         ...
 
 
 def steer_to_heading(estimate: Estimate, yaw: float, speed: float) -> Demand:
-    """Drive at ``speed`` while turning to ``yaw`` on an arc."""
+    """Return the demand to drive at ``speed`` while turning to ``yaw`` on an arc."""
     limit = min(MAX_YAW_RATE, abs(estimate.forward_speed) / TURN_RADIUS)
     wanted = HEADING_GAIN * wrap_angle(yaw - estimate.yaw)
     return Demand(speed, max(-limit, min(limit, wanted)))
 
 
 def turn_then_drive(estimate: Estimate, yaw: float, speed: float) -> Demand:
-    """Drive at ``speed`` towards ``yaw``; turn to it on the spot first, if it is far off."""
+    """Return the demand to drive towards ``yaw``; turn on the spot first if it is far off."""
     error = wrap_angle(yaw - estimate.yaw)
     if speed == 0.0:
         return STOP
@@ -76,7 +76,7 @@ def turn_then_drive(estimate: Estimate, yaw: float, speed: float) -> Demand:
 def steer_to_point(
     estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
 ) -> Demand | None:
-    """Drive to a point and be slow there; None once within ``radius``."""
+    """Return the demand to drive to a point and slow down there; None within ``radius``."""
     dn, de = north - estimate.north, east - estimate.east
     distance = math.hypot(dn, de)
     if distance < radius:
@@ -92,10 +92,10 @@ def steer_to_point(
 def arc_to_point(
     estimate: Estimate, north: float, east: float, speed_limit: float, *, radius: float
 ) -> Demand | None:
-    """Drive to a point on arcs, as a rover must that cannot turn on the spot; None once there.
+    """Return the demand to drive to a point on arcs, for a rover that cannot turn on the spot.
 
-    It never stands on the way: it would no longer be able to turn. Half its speed is left to a
-    point behind it.
+    None within ``radius``. The rover never stops on the way, because it could not turn then. It
+    drives at half speed if the point is behind it.
     """
     dn, de = north - estimate.north, east - estimate.east
     distance = math.hypot(dn, de)

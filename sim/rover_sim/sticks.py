@@ -1,7 +1,7 @@
-"""The remote control: what its transmitter sends, and what RC_CHANNELS_OVERRIDE puts over it.
+"""The remote control: the transmitter's channels, and RC_CHANNELS_OVERRIDE on top of them.
 
-ArduPilot Rover heeds the throttle in GUIDED, too: the rover drives as fast as stick or setpoint
-asks, whichever is more (its mode.cpp, calc_speed_nudge). Channels are in microseconds.
+ArduPilot Rover uses the throttle in GUIDED, too: the rover drives at the speed of the stick or of
+the setpoint, whichever is larger (its mode.cpp, calc_speed_nudge). Channels are in microseconds.
 """
 
 from dataclasses import replace
@@ -14,12 +14,12 @@ COUNT = 8  # channels
 NEUTRAL, REACH = 1500, 500  # µs
 DEAD_ZONE = 30  # µs, RCn_DZ
 NO_CHANGE, RELEASED = 65535, 0  # in RC_CHANNELS_OVERRIDE
-OVERRIDE_TIME = 3.0  # s, RC_OVERRIDE_TIME; then the transmitter counts again
+OVERRIDE_TIME = 3.0  # s, RC_OVERRIDE_TIME; then the transmitter applies again
 DEFAULT_TOP_SPEED = 4.0  # m/s at full throttle: SITL's rover-skid, 3 m/s at 75 %
 
 
 class Sticks:
-    """What the channels say now."""
+    """The present RC channels."""
 
     def __init__(self, top_speed: float | None) -> None:
         self._top_speed = DEFAULT_TOP_SPEED if top_speed is None else top_speed
@@ -33,17 +33,17 @@ class Sticks:
         return f"Sticks({self._held}, {self._override})"
 
     def hold(self, forward_speed: float, yaw_rate: float) -> None:
-        """Hold the transmitter's sticks so, m/s and rad/s."""
+        """Hold the transmitter's sticks at this demand, m/s and rad/s."""
         throttle, steering = forward_speed / self._top_speed, yaw_rate / MAX_YAW_RATE
         self.hold_pulses(_pulse(throttle), _pulse(steering))
 
     def hold_pulses(self, throttle: int, steering: int) -> None:
-        """Hold the transmitter's sticks so, µs."""
+        """Hold the transmitter's sticks at these pulses, µs."""
         self.is_there = True
         self._held[THROTTLE], self._held[STEERING] = throttle, steering
 
     def take_override(self, message: messages.RcChannelsOverride, *, now: float) -> None:
-        """Put values over the transmitter's, or take them off."""
+        """Override channels, or release them."""
         self._overridden_at = now
         for channel in range(COUNT):
             value = getattr(message, f"chan{channel + 1}_raw")
@@ -59,20 +59,20 @@ class Sticks:
         return tuple(self._override.get(n, held) for n, held in enumerate(self._held))
 
     def demand(self, *, now: float) -> Demand | None:
-        """Return what they ask for in MANUAL; None: they are neutral."""
+        """Return the sticks' demand in MANUAL; None if they are neutral."""
         channels = self.channels(now=now)
         speed = _part(channels[THROTTLE]) * self._top_speed
         yaw_rate = _part(channels[STEERING]) * MAX_YAW_RATE
         return None if speed == yaw_rate == 0.0 else Demand(speed, yaw_rate)
 
     def arming_refusal(self, *, now: float) -> str | None:
-        """Return why it cannot be armed; a real ArduPilot says so in these words (4.6.3)."""
+        """Return the text that refuses arming, in ArduPilot's words (4.6.3), or None."""
         if not self._adds_speed or _part(self.channels(now=now)[THROTTLE]) == 0.0:
             return None
         return "Arm: Throttle (RC3) is not neutral"
 
     def nudged(self, demand: Demand, *, now: float) -> Demand:
-        """Return what is driven in GUIDED for a velocity that is asked for."""
+        """Return the demand of a velocity setpoint in GUIDED, raised by the throttle stick."""
         if not self._adds_speed:
             return demand
         pilot = _part(self.channels(now=now)[THROTTLE]) * self._top_speed
@@ -82,7 +82,7 @@ class Sticks:
 
 
 def _part(pulse: int) -> float:
-    """How far a stick is out, -1..1; beyond its dead zone."""
+    """Return a stick's deflection beyond its dead zone, -1..1."""
     off = pulse - NEUTRAL
     if abs(off) <= DEAD_ZONE:
         return 0.0
@@ -91,7 +91,7 @@ def _part(pulse: int) -> float:
 
 
 def _pulse(part: float) -> int:
-    """The pulse for so much of a stick's reach."""
+    """Return the pulse for a stick's deflection, -1..1."""
     if part == 0.0:
         return NEUTRAL
     off = round(DEAD_ZONE + min(abs(part), 1.0) * (REACH - DEAD_ZONE))

@@ -1,4 +1,4 @@
-"""When each telemetry message is due: one interval a message, as SET_MESSAGE_INTERVAL has it.
+"""When each telemetry message is due: one interval per message, as in SET_MESSAGE_INTERVAL.
 
 MAVLink guide, "Message Interval"; REQUEST_DATA_STREAM sets the same intervals by group.
 """
@@ -10,18 +10,18 @@ from mav_tasks.mavlink import messages as m
 
 OFF = 0.0
 NEVER = float("inf")
-LONGEST_TOLD = 2**31 - 1  # µs, what MESSAGE_INTERVAL has room for
-JITTER = 1e-6  # s; clock readings are not exact multiples of anything
+LONGEST_TOLD = 2**31 - 1  # µs, the limit of MESSAGE_INTERVAL
+JITTER = 1e-6  # s; clock readings are not exact multiples of an interval
 ALL_STREAMS = 0  # MAV_DATA_STREAM
 RC_GROUP = 3
 
 
 @dataclass(frozen=True, slots=True)
 class StreamTable:
-    """What one make streams unasked."""
+    """One make's default streams."""
 
-    intervals: Mapping[int, float]  # s, by message id; OFF: only when asked for
-    shortest_interval: float  # s; below it is refused
+    intervals: Mapping[int, float]  # s, by message id; OFF: only on request
+    shortest_interval: float  # s; shorter ones are refused
     groups: Mapping[int, tuple[int, ...]]  # what REQUEST_DATA_STREAM sets, by MAV_DATA_STREAM
 
 
@@ -30,8 +30,8 @@ ARDUPILOT_STREAMS = StreamTable(
         (
             m.Heartbeat.id,
             m.SysStatus.id,
-            # The real one sends these two on request only; streaming both lets a MAVSDK or
-            # QGroundControl without the server see them.
+            # The real one sends these two on request only; with both streamed, MAVSDK and
+            # QGroundControl can connect to the simulator without the server.
             m.ExtendedSysState.id,
             m.HomePosition.id,
             m.Attitude.id,
@@ -44,10 +44,10 @@ ARDUPILOT_STREAMS = StreamTable(
             m.MissionCurrent.id,
             m.PositionTargetGlobalInt.id,
         ),
-        1.0,  # a SITL streams at 1 Hz unasked
+        1.0,  # a SITL streams at 1 Hz by default
     ),
     shortest_interval=0.02,  # the real one's main loop
-    groups={  # as Rover fills them
+    groups={  # as in Rover
         1: (),  # RAW_SENSORS
         2: (  # EXTENDED_STATUS
             m.SysStatus.id,
@@ -63,7 +63,7 @@ ARDUPILOT_STREAMS = StreamTable(
     },
 )
 
-#: near to what PX4 streams to an onboard computer, in whole control periods
+#: close to PX4's streams to an onboard computer, in whole control periods
 PX4_STREAMS = StreamTable(
     intervals={
         m.Heartbeat.id: 1.0,
@@ -85,12 +85,12 @@ PX4_STREAMS = StreamTable(
         m.ProtocolVersion.id: OFF,
     },
     shortest_interval=0.001,
-    groups={},  # it does not know REQUEST_DATA_STREAM
+    groups={},  # it ignores REQUEST_DATA_STREAM
 )
 
 
 def with_sticks(table: StreamTable, unasked: float) -> StreamTable:
-    """Return the table of a rover that also shows its remote control, every so many seconds."""
+    """Return the table with RC_CHANNELS every ``unasked`` seconds."""
     message_id = m.RcChannels.id
     groups = dict(table.groups)
     if RC_GROUP in groups:
@@ -99,7 +99,7 @@ def with_sticks(table: StreamTable, unasked: float) -> StreamTable:
 
 
 class Streams:
-    """The interval of each message and when it is due next. One set for the whole link."""
+    """The interval and next due time of each message. One set for the whole link."""
 
     def __init__(self, table: StreamTable, *, now: float) -> None:
         self._table = table
@@ -108,27 +108,27 @@ class Streams:
             message_id: NEVER if interval == OFF else now
             for message_id, interval in table.intervals.items()
         }
-        self._next = now  # least of _due: most control steps look at nothing else
+        self._next = now  # least of _due: most control steps check nothing else
 
     def __repr__(self) -> str:
         return f"Streams(next={self._next:.3f})"
 
     def interval_us(self, message_id: int) -> int:
-        """Return the interval as MESSAGE_INTERVAL has it: -1 off, 0 not available."""
+        """Return the interval for MESSAGE_INTERVAL: -1 off, 0 not available."""
         interval = self._intervals.get(message_id)
         if interval is None:
             return 0
         return -1 if interval == OFF else round(min(interval * 1e6, LONGEST_TOLD))
 
     def set_interval(self, message_id: int, interval_us: float, *, now: float) -> bool:
-        """Set microseconds between two messages; 0 is the default, -1 off. False: refused."""
+        """Set the interval in µs; 0 is the default, -1 off. Return False if refused."""
         if message_id not in self._intervals:
             return False
         if interval_us == 0:
             self._set(message_id, self._table.intervals[message_id], now)
         elif interval_us == -1:
             self._set(message_id, OFF, now)
-        elif not interval_us * 1e-6 >= self._table.shortest_interval:  # NaN is not, either
+        elif not interval_us * 1e-6 >= self._table.shortest_interval:  # NaN fails, too
             return False
         else:
             self._set(message_id, interval_us * 1e-6, now)
@@ -144,14 +144,14 @@ class Streams:
             self._set(message_id, interval, now)
 
     def take_due(self, *, now: float) -> list[int]:
-        """Return the ids that are due, and plan each one's next time."""
+        """Return the ids that are due, and set the next due time of each."""
         horizon = now + JITTER
         if horizon < self._next:
             return []
         due = [message_id for message_id, at in self._due.items() if at <= horizon]
         for message_id in due:
             following = self._due[message_id] + self._intervals[message_id]
-            # Late by more than an interval: go on from now rather than send a burst.
+            # Late by more than an interval: continue from now rather than send a burst.
             late = following <= now
             self._due[message_id] = now + self._intervals[message_id] if late else following
         self._next = min(self._due.values())

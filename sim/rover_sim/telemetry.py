@@ -1,4 +1,4 @@
-"""What each telemetry message says: from the flight stack's state to MAVLink fields and units."""
+"""The content of each telemetry message: the flight stack's state in MAVLink fields and units."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -20,15 +20,15 @@ from rover_sim.realism import Realism, Wire
 from rover_sim.sticks import Sticks
 
 MAVLINK_VERSION = 3
-OVERFLOW = 1 << 32  # ms; time_boot_ms begins anew after 49.7 days
+OVERFLOW = 1 << 32  # ms; time_boot_ms wraps after 49.7 days
 UNKNOWN_U16 = 65535
 # MAV_SYS_STATUS_SENSOR: gyro, accelerometer, compass, GPS, yaw and position control, motors, AHRS,
-# pre-arm check. MAVSDK takes "healthy" from these.
+# pre-arm check. MAVSDK derives "healthy" from these.
 SENSORS = 0x1 | 0x2 | 0x4 | 0x20 | 0x1000 | 0x4000 | 0x8000 | 0x200000 | 0x10000000
 PREARM = 0x10000000
-NO_ALTITUDE = 140  # mm, recorded of ArduPilot before it has an origin
+NO_ALTITUDE = 140  # mm, recorded from ArduPilot before it has an origin
 RSSI_UNKNOWN = 255
-CELL_VOLTAGES = (12600,) + (UNKNOWN_U16,) * 9  # mV; ArduPilot puts a pack's total into the first
+CELL_VOLTAGES = (12600,) + (UNKNOWN_U16,) * 9  # mV; ArduPilot puts the pack's total into the first
 GPS_FIX_3D = 3
 TARGET_POSITION_ONLY = 0x0DF8  # type_mask of POSITION_TARGET_*
 TARGET_VELOCITY_ONLY = 0x0DC7
@@ -37,7 +37,7 @@ MISSION_STATES = {"none": 1, "not started": 2, "active": 3, "paused": 4, "comple
 
 
 class Telemetry:
-    """Builds any message that the rover can send about itself, by message id."""
+    """Builds every message that the rover can send about itself, by message id."""
 
     def __init__(
         self,
@@ -90,18 +90,18 @@ class Telemetry:
         return f"Telemetry({self._persona.name}, system {self._system_id})"
 
     def knows(self, message_id: int) -> bool:
-        """Whether there is such a message here."""
+        """Return whether this rover can send the message."""
         return message_id in self._builders and message_id not in self._persona.lacks
 
     def build(self, message_id: int, estimate: Estimate, *, now: float) -> Message | None:
-        """Return the message of this moment; None if there is nothing to say."""
+        """Return the present message; None if there is nothing to send."""
         message = self._builders[message_id](estimate, self.boot_ms(now))
         if message is not None and hasattr(message, "time_boot_ms"):
             message.time_boot_ms %= OVERFLOW
         return message
 
     def boot_ms(self, now: float) -> int:
-        """Milliseconds since this autopilot started."""
+        """Return milliseconds since this autopilot started."""
         return int((now - self._started) * 1000.0 + 0.5)
 
     def _heartbeat(self, _estimate: Estimate, _boot_ms: int) -> Message:
@@ -250,7 +250,7 @@ class Telemetry:
             none,
             0,
             0,
-            self._system_id,  # uid: tells one simulated rover from another
+            self._system_id,  # uid: distinguishes simulated rovers
         )
 
     def _mission_current(self, _estimate: Estimate, _boot_ms: int) -> Message:
@@ -281,14 +281,14 @@ class Telemetry:
             return None
         latitude, longitude = self._origin.to_global(*destination)
         if abs(latitude) > LATITUDE_LIMIT_DEGE7 or abs(longitude) > LONGITUDE_LIMIT_DEGE7:
-            return None  # a local place that is so far off that Earth has none
+            return None  # a local place far beyond the Earth's coordinates
         nothing = (0.0,) * 8
         return m.PositionTargetGlobalInt(
             boot_ms, 5, TARGET_POSITION_ONLY, latitude, longitude, self._origin.altitude, *nothing
         )
 
     def _protocol_version(self, _estimate: Estimate, _boot_ms: int) -> Message:
-        return m.ProtocolVersion(200, 100, 200, (0,) * 8, (0,) * 8)  # MAVLink 2, 1 at least
+        return m.ProtocolVersion(200, 100, 200, (0,) * 8, (0,) * 8)  # MAVLink 2, minimum 1
 
     def _current_mode(self, _estimate: Estimate, _boot_ms: int) -> Message:
         flight = self._flight
@@ -305,5 +305,5 @@ def _cm(metres: float) -> int:
 
 
 def _centidegrees(angle: float) -> int:
-    """0 to 35999."""
+    """Return the angle as 0 to 35999."""
     return round(math.degrees(angle) * 100) % 36000

@@ -1,19 +1,20 @@
-"""When things leave: answers a little late, positions two at a time, as the real ones send them."""
+"""Send times: answers are slightly late, positions come two at a time, as recorded."""
 
 from random import Random
 
 from rover_sim.motion import CONTROL_PERIOD
 from rover_sim.realism import LinkTiming
 
-# Recorded at 40 Hz asked for: 20, 20, 20, 40 ms. With steps of 25 ms every eighth is late by one
+# Recorded at 40 Hz: intervals of 20, 20, 20, 40 ms. With steps of 25 ms, every eighth is late by
+# one
 HELD_BACK = 0.125
-HELD_LONGER = 0.01  # of all, by two: recorded were up to 88 ms
-# Most answers are as fast as they can be: recorded p50 / max 4 / 62 ms (PX4), 11 / 24 (ArduPilot)
+HELD_LONGER = 0.01  # of all positions, late by two steps: up to 88 ms were recorded
+# Most answers take the least delay: recorded p50 / max 4 / 62 ms (PX4), 11 / 24 (ArduPilot)
 PROMPTNESS = 8
 
 
 class Departures:
-    """Decides when a message leaves. None of it is by chance but the seed's."""
+    """Decides when a message leaves; deterministic for a given seed."""
 
     def __init__(self, timing: LinkTiming | None, *, seed: int) -> None:
         self._timing = timing
@@ -24,7 +25,7 @@ class Departures:
         return f"Departures({self._timing})"
 
     def answer_at(self, *, now: float) -> float:
-        """Return when the answer leaves to what has come now: never before an earlier answer."""
+        """Return when the answer to a present command leaves: never before an earlier answer."""
         if self._timing is None:
             return now
         least, most = self._timing.first_answer, self._timing.last_answer
@@ -33,11 +34,11 @@ class Departures:
         return self._last_answer
 
     def position_at(self, *, now: float) -> float:
-        """Return when a position leaves that is due now."""
+        """Return when a position that is due now leaves."""
         if self._timing is None or not self._timing.in_pairs:
             return now
         if now < self._held_until - CONTROL_PERIOD / 2:
-            return self._held_until  # not before the one that is held back
+            return self._held_until  # not before the delayed position
         drawn = self._chance.random()
         if drawn >= HELD_BACK:
             return now

@@ -1,7 +1,7 @@
 """A rover as its links see it: datagrams in, datagrams out; inside, an autopilot drives a body.
 
-It pushes nowhere by itself: it talks to the peers from which it has heard valid MAVLink lately,
-and, as the real one does on a link, tells every one of them everything.
+It never sends first: it talks to peers from which it has recently received valid MAVLink, and sends
+everything to each of them, as the real one does on a link.
 """
 
 from collections.abc import Hashable
@@ -19,19 +19,19 @@ from rover_sim.personas import ARDUPILOT, Persona
 from rover_sim.realism import Drive, Realism
 from rover_sim.signatures import RoverSignatures
 
-PEER_TIMEOUT = 10.0  # s of silence after which a peer is no longer talked to
-MAX_CATCH_UP = 0.5  # s; a vehicle held up for longer loses the time, as a stalled machine does
+PEER_TIMEOUT = 10.0  # s of silence until a peer is dropped
+MAX_CATCH_UP = 0.5  # s; a vehicle delayed for longer loses the time, as on a stalled machine
 
 
 class Peers(Enum):
-    """Whom a rover answers on its socket."""
+    """Which peers a rover answers on its socket."""
 
     ALL = "all"
-    FIRST = "first"  # PX4's own link: the first that it heard, until it is started again
+    FIRST = "first"  # PX4's own link: only the first peer, until a restart
 
 
 class Vehicle:
-    """One rover. Time is the caller's, in seconds, and starts with ``now`` of the constructor."""
+    """One rover. The caller passes the time, s, which starts with the constructor's ``now``."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class Vehicle:
         peers: Peers = Peers.ALL,
         motors: Motors | None = None,
     ) -> None:
-        """``motors``: what is between autopilot and body; None: nothing."""
+        """Create a vehicle; ``motors`` is the lag between autopilot and body, None for no lag."""
         self._motors = motors
         self._answers = peers
         self.body = body
@@ -61,11 +61,11 @@ class Vehicle:
 
     @property
     def truth(self) -> BodyState:
-        """Where the rover really is."""
+        """The rover's true state."""
         return self.body.state
 
     def receive(self, data: bytes, peer: Hashable, *, now: float) -> None:
-        """Take a datagram, any bytes. Raises only SimulatedCrash."""
+        """Take a datagram of any bytes. Raise only SimulatedCrash."""
         for packet in split_datagram(data):
             if self._signatures is not None and not self._signatures.believes(packet, now=now):
                 continue
@@ -76,11 +76,11 @@ class Vehicle:
         self._collect()
 
     def next_deadline(self) -> float:
-        """When the next control step is due, or something held back is to leave."""
+        """Return when the next control step or delayed message is due."""
         return min(self._next_step, self.autopilot.next_release)
 
     def handle_deadline(self, *, now: float) -> None:
-        """Live through every control step that is due by ``now``; early or twice does nothing."""
+        """Run every control step that is due by ``now``; an early or repeated call does nothing."""
         if now - self._next_step > MAX_CATCH_UP:
             self._next_step = now - MAX_CATCH_UP
         while self._next_step <= now:
@@ -95,7 +95,7 @@ class Vehicle:
         self._collect()
 
     def take_packets(self) -> list[tuple[Hashable, bytes]]:
-        """Hand over what is to be sent: one datagram each, in order."""
+        """Return the packets to send: one datagram each, in order."""
         taken, self._outgoing = self._outgoing, []
         return taken
 
@@ -105,7 +105,7 @@ class Vehicle:
 
     def _collect(self) -> None:
         messages = self.autopilot.take_messages()
-        if self._boots != self.autopilot.boots:  # its numbers begin anew, too
+        if self._boots != self.autopilot.boots:  # its sequence numbers restart, too
             self._boots = self.autopilot.boots
             self._encoder = Encoder(self.autopilot.address)
         if not messages:
@@ -139,12 +139,12 @@ def make_vehicle(
     seed: int = 0,
     peers: Peers = Peers.ALL,
 ) -> Vehicle:
-    """Put an autopilot that has just been switched on into a body.
+    """Put an autopilot that was just powered on into a body.
 
-    ``realism`` is how unkind it is, None as its make; ``seed`` draws what is chance in that.
+    ``realism`` None is the default of the persona; ``seed`` draws its random values.
 
-    ``unix_offset`` is Unix time minus ``now``; 0 where there is no wall clock (SYSTEM_TIME then
-    says unknown). With a ``key`` it signs, and hears only what is signed with it.
+    ``unix_offset`` is Unix time minus ``now``; 0 if there is no wall clock (SYSTEM_TIME then says
+    unknown). With a ``key``, the rover signs and accepts only packets signed with that key.
     """
     kind = persona.realism if realism is None else realism
     autopilot = Autopilot(

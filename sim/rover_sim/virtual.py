@@ -1,7 +1,6 @@
-"""A world in virtual time: whoever takes part is joined by a memory net, and nobody waits.
+"""A world in virtual time: a memory net connects all parties, and nobody waits.
 
-Time jumps from one thing that is due to the next, so that minutes of driving take as long as their
-arithmetic.
+Time jumps from one due event to the next, so minutes of driving take only their computing time.
 """
 
 from collections.abc import Callable
@@ -12,19 +11,19 @@ from rover_sim.vehicle import Vehicle
 
 
 class Party(Protocol):
-    """One who takes part: a server, a rover, a client."""
+    """A participant: a server, a rover, a client."""
 
     def next_deadline(self) -> float | None:
-        """Return when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` is due, unless something arrives before; None: never."""
         ...
 
     def turn(self, *, now: float) -> None:
-        """Read what has arrived, do what is due, send what follows."""
+        """Read what arrived, do what is due, send the results."""
         ...
 
 
 class VirtualWorld:
-    """Moves time for all parties of one net."""
+    """Advances time for all parties of one net."""
 
     def __init__(self, net: MemoryNet) -> None:
         self.net = net
@@ -33,15 +32,15 @@ class VirtualWorld:
 
     @property
     def now(self) -> float:
-        """Virtual seconds since the world began."""
+        """Virtual seconds since the start of the world."""
         return self.net.now
 
     def join(self, *parties: Party) -> None:
-        """Let parties take part from now on."""
+        """Add parties."""
         self._parties += parties
 
     def leave(self, party: Party) -> None:
-        """Take a party out, as if its process had been killed."""
+        """Remove a party, as if its process had been killed."""
         self._parties.remove(party)
 
     def watch(self, watcher: Callable[[float], None]) -> None:
@@ -49,11 +48,11 @@ class VirtualWorld:
         self._watchers.append(watcher)
 
     def run(self, seconds: float) -> None:
-        """Let this much time pass."""
+        """Advance time by ``seconds``."""
         self.run_until(lambda: False, within=seconds)
 
     def run_until(self, condition: Callable[[], bool], *, within: float) -> bool:
-        """Let time pass until the condition holds; whether it did within so many seconds."""
+        """Advance time until the condition holds; return whether it held within the time."""
         end = self.now + within
         while not condition():
             if not self.step(end=end):
@@ -61,7 +60,7 @@ class VirtualWorld:
         return True
 
     def step(self, *, end: float) -> bool:
-        """Let time pass up to what is due next, or else to ``end``; whether anything was."""
+        """Advance to the next due event, but at most to ``end``; return whether there was one."""
         at = self.next_due()
         if at is None or at > end:
             self.net.now = end
@@ -75,7 +74,7 @@ class VirtualWorld:
         return True
 
     def next_due(self) -> float | None:
-        """Return when the next thing is due; None: nothing ever is."""
+        """Return when the next event is due, or None if there is none."""
         due = [party.next_deadline() for party in self._parties]
         due.append(self.net.next_arrival())
         return min((at for at in due if at is not None), default=None)
@@ -93,7 +92,7 @@ class RoverParty:
         return self.vehicle.next_deadline()
 
     def turn(self, *, now: float) -> None:
-        """Let the rover hear, live and speak."""
+        """Receive, run due control steps, and send."""
         for peer, data in self._link.receive(len(self._link.arrived)):
             self.vehicle.receive(data, peer, now=now)
         self.vehicle.handle_deadline(now=now)

@@ -1,1 +1,1 @@
-"""What the tests share: the virtual world, fake clients, observers."""
+"""Shared code of the tests: the virtual world, fake clients, observers."""

@@ -1,7 +1,7 @@
-"""``python -m tests.kit.asleep SECONDS serve …``: mav-tasks on a machine that is put to sleep.
+"""``python -m tests.kit.asleep SECONDS serve …``: mav-tasks on a machine that is suspended.
 
-At each SIGUSR1 the server's clock goes on by SECONDS of which the process, its timers and
-CLOCK_MONOTONIC know nothing, as after a suspension.
+At each SIGUSR1 the server's clock jumps by SECONDS, while timers and CLOCK_MONOTONIC do not, as
+after a suspension.
 """
 
 import signal
@@ -12,7 +12,7 @@ from mav_tasks.cli.app import main
 
 
 def sleep_at_signal(seconds: float) -> None:
-    """Arrange it, before anybody imports the clock by name."""
+    """Patch the clock, before another module imports it by name."""
     awake = clock.boot_time
     slept = 0.0
 

@@ -1,7 +1,7 @@
-"""Runs ``mav-tasks`` and writes down what files it opens: ``python audited.py OUT command ...``.
+"""Runs ``mav-tasks`` and records the files that it opens: ``python audited.py OUT command ...``.
 
-A process of its own, because an audit hook stays for good. SQLite opens its files itself: of those
-only the name shows that the store gives it.
+It is a separate process, because an audit hook is permanent. SQLite opens its files itself, so only
+the name in sqlite3.connect shows.
 """
 
 import json
@@ -16,7 +16,7 @@ UNINTERESTING = ("os.putenv", "os.unsetenv", "os.fwalk")
 def main() -> None:
     out, sys.argv = Path(sys.argv[1]), ["mav-tasks", *sys.argv[2:]]
     seen: list[tuple[str, list[object]]] = []
-    sys.dont_write_bytecode = True  # what the interpreter keeps for itself is not ours
+    sys.dont_write_bytecode = True  # Python's bytecode cache is not of interest
     fd = os.open(out, os.O_WRONLY | os.O_CREAT, 0o600)
 
     def hook(event: str, arguments: tuple[object, ...]) -> None:

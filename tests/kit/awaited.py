@@ -1,4 +1,4 @@
-"""Tests that are coroutines: each on a loop of its own, with a limit."""
+"""Tests that are coroutines: each on its own loop, with a time limit."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
@@ -11,7 +11,7 @@ LIMIT = 50.0  # s
 
 
 def awaited(test: Callable[P, Coroutine[Any, Any, None]]) -> Callable[P, None]:
-    """Run a test that is a coroutine to its end."""
+    """Run a coroutine test to its end."""
 
     @wraps(test)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:

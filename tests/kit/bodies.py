@@ -1,11 +1,11 @@
-"""Bodies with a fault of their own."""
+"""Bodies with faults."""
 
 from rover_sim.body import Body, BodyState, Pose
 from tests.kit.world import kinematic_body
 
 
 class WeakBrakes:
-    """A body that slows down no faster than at ``braking`` m/s²; implements ``Body``."""
+    """A body that decelerates at most at ``braking`` m/s²; implements ``Body``."""
 
     def __init__(self, start: Pose, *, braking: float) -> None:
         self._body: Body = kinematic_body(start)
@@ -15,7 +15,7 @@ class WeakBrakes:
 
     @property
     def lag(self) -> float:
-        """How late the wheels do what ``drive`` demands, s."""
+        """Delay of the wheels behind ``drive``, s."""
         return self._body.lag
 
     @property
@@ -28,7 +28,7 @@ class WeakBrakes:
         self._wanted, self._yaw_rate = forward_speed, yaw_rate
 
     def advance(self, duration: float) -> None:
-        """Move on."""
+        """Move by ``duration`` seconds."""
         least = self._braking * duration
         before, wanted = self._given, self._wanted
         if before > 0:
@@ -41,13 +41,13 @@ class WeakBrakes:
         self._body.advance(duration)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: the body holds no resources."""
 
 
 class Sticky:
-    """A body whose wheels stand below a speed, and which rolls on freely; implements ``Body``.
+    """A body that needs a least speed to start, and rolls on freely; implements ``Body``.
 
-    ``least`` m/s moves it, slower does not. On zero it slows down at ``rolling`` m/s².
+    A demand below ``least`` m/s does not move it. On zero it decelerates at ``rolling`` m/s².
     """
 
     def __init__(self, start: Pose, *, least: float, rolling: float) -> None:
@@ -58,7 +58,7 @@ class Sticky:
 
     @property
     def lag(self) -> float:
-        """How late the wheels do what ``drive`` demands, s."""
+        """Delay of the wheels behind ``drive``, s."""
         return 0.1
 
     @property
@@ -71,7 +71,7 @@ class Sticky:
         self._wanted, self._yaw_rate = forward_speed, yaw_rate
 
     def advance(self, duration: float) -> None:
-        """Move on."""
+        """Move by ``duration`` seconds."""
         wanted = self._wanted if abs(self._wanted) >= self._least else 0.0
         step = self._rolling * duration
         if abs(wanted) < abs(self._given) or wanted * self._given < 0.0:
@@ -83,11 +83,11 @@ class Sticky:
         self._body.advance(duration)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: the body holds no resources."""
 
 
 class LateStart:
-    """A body that stands for ``LATE`` seconds of being driven before it moves; ``Body``."""
+    """A body that moves only after a demand of ``LATE`` seconds; implements ``Body``."""
 
     LATE = 4.0
 
@@ -98,7 +98,7 @@ class LateStart:
 
     @property
     def lag(self) -> float:
-        """How late the wheels do what ``drive`` demands, s."""
+        """Delay of the wheels behind ``drive``, s."""
         return self._body.lag
 
     @property
@@ -111,7 +111,7 @@ class LateStart:
         self._wanted = (forward_speed, yaw_rate)
 
     def advance(self, duration: float) -> None:
-        """Move on."""
+        """Move by ``duration`` seconds."""
         forward, yaw_rate = self._wanted
         self._driven = self._driven + duration if forward else 0.0
         moves = self._driven > self.LATE or abs(self.state.forward_speed) > 0.0
@@ -119,4 +119,4 @@ class LateStart:
         self._body.advance(duration)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: the body holds no resources."""

@@ -1,4 +1,4 @@
-"""Lets a rover that speaks UDP be reached over TCP, as an ArduPilot SITL is, or a serial line."""
+"""Bridges a rover's UDP port to TCP, as an ArduPilot SITL has it, or to a serial line."""
 
 import os
 import select
@@ -14,27 +14,27 @@ from tests.kit.lines import Device
 from tests.kit.processes import free_tcp_ports
 
 LOOPBACK = "127.0.0.1"
-TICK = 0.05  # s, to look whether the other end has changed
+TICK = 0.05  # s between two checks for a changed far end
 END_LIMIT = 10.0  # s
 MAGIC, HEADER, CRC = 0xFD, 10, 2
 SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
 
 
 class Far(Protocol):
-    """The end at which the server is."""
+    """The end that the server connects to."""
 
     url: str
 
     def descriptor(self) -> int | None:
-        """Return what to read and write, None while nobody is there."""
+        """Return the descriptor of the connection, or None without one."""
         ...
 
     def cut(self) -> None:
-        """Let it be gone."""
+        """Break the connection."""
         ...
 
     def mend(self) -> None:
-        """Let it be there again."""
+        """Permit connections again."""
         ...
 
 
@@ -49,11 +49,11 @@ class TcpFar:
 
     @property
     def url(self) -> str:
-        """How the server reaches it."""
+        """The server's URL for it."""
         return f"tcp:{LOOPBACK}:{self._port}"
 
     def descriptor(self) -> int | None:
-        """Return the connection, or a newer one."""
+        """Return the latest connection."""
         if self._listening is not None and select.select([self._listening], [], [], 0.0)[0]:
             if self._accepted is not None:
                 self._accepted.close()
@@ -62,7 +62,7 @@ class TcpFar:
         return None if self._accepted is None else self._accepted.fileno()
 
     def cut(self) -> None:
-        """Close the connection and answer no more."""
+        """Close the connection and stop listening."""
         for each in (self._accepted, self._listening):
             if each is not None:
                 each.close()
@@ -75,7 +75,7 @@ class TcpFar:
 
 
 class DiallingFar:
-    """Dials the server, as a rover with a modem of its own does."""
+    """Dials the server, like a rover with its own modem."""
 
     def __init__(self) -> None:
         (self._port,) = free_tcp_ports(1)
@@ -83,11 +83,11 @@ class DiallingFar:
 
     @property
     def url(self) -> str:
-        """Where the server is to listen."""
+        """The URL at which the server listens."""
         return f"tcpin:{LOOPBACK}:{self._port}"
 
     def descriptor(self) -> int | None:
-        """Return the connection, if the server is there."""
+        """Return the connection, and dial if there is none."""
         if self._socket is None:
             with suppress(OSError):
                 self._socket = socket.create_connection((LOOPBACK, self._port), 1.0)
@@ -95,17 +95,17 @@ class DiallingFar:
         return None if self._socket is None else self._socket.fileno()
 
     def cut(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
     def mend(self) -> None:
-        """Nothing is to be done: it dials again."""
+        """Do nothing: the next ``descriptor`` dials again."""
 
 
 class SerialFar:
-    """A serial device that is plugged in and unplugged."""
+    """A serial device that can be plugged and unplugged."""
 
     def __init__(self, path: Path, *, baud: int) -> None:
         self._device = Device(path)
@@ -116,24 +116,24 @@ class SerialFar:
         return self._device.far if self._device.far >= 0 else None
 
     def cut(self) -> None:
-        """Unplug it."""
+        """Unplug the device."""
         self._device.unplug()
 
     def mend(self) -> None:
-        """Plug it in again."""
+        """Plug the device in again."""
         self._device.plug()
 
 
 class Bridge:
     """Passes packets between a rover's UDP port and ``far``.
 
-    What comes from the server is cut into packets by their lengths alone: it must be whole packets,
-    one after the other and nothing between.
+    It splits the server's bytes into packets by their lengths alone: they must be whole packets
+    without anything in between.
     """
 
     def __init__(self, rover_port: int, far: Far) -> None:
-        self.setpoints: list[float] = []  # when they came
-        self.broken: list[bytes] = []  # what is no packet where one should begin
+        self.setpoints: list[float] = []  # monotonic times of arrival
+        self.broken: list[bytes] = []  # bytes where a packet should begin
         self._far = far
         self._lock = Lock()
         self._rover = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -146,22 +146,22 @@ class Bridge:
 
     @property
     def url(self) -> str:
-        """How the server reaches the rover."""
+        """The server's URL for the rover."""
         return self._far.url
 
     def cut(self) -> None:
-        """Part the server from the rover."""
+        """Disconnect the server from the rover."""
         with self._lock:
             self._far.cut()
             self._buffer = b""
 
     def mend(self) -> None:
-        """Let them meet again."""
+        """Permit the connection again."""
         with self._lock:
             self._far.mend()
 
     def close(self) -> None:
-        """End, and say whether all was well."""
+        """End the bridge; fail if bytes were broken."""
         self._is_over.set()
         self._thread.join(END_LIMIT)
         assert not self._thread.is_alive()
@@ -175,7 +175,7 @@ class Bridge:
                 far = self._far.descriptor()
                 there = [self._rover.fileno(), *([] if far is None else [far])]
             ready: list[int] = []
-            with suppress(OSError):  # cut while it was waited for
+            with suppress(OSError):  # cut during the wait
                 ready = select.select(there, [], [], TICK if far is not None else 0.01)[0]
             with self._lock, suppress(OSError):
                 if self._far.descriptor() != far:
@@ -206,7 +206,7 @@ class Bridge:
 
 @contextmanager
 def bridge(rover_port: int, far: Far) -> Iterator[Bridge]:
-    """Have a bridge while the block runs."""
+    """Run a bridge for a ``with`` block."""
     made = Bridge(rover_port, far)
     try:
         yield made

@@ -1,4 +1,4 @@
-"""What a server sends to its rover, with the time of each packet: a proxy that only looks."""
+"""Records a server's packets to its rover with their times: a proxy that changes nothing."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -9,30 +9,30 @@ from mav_tasks.links.memory import Conditions
 from tests.kit.lossy_udp import LossyUdp, _Way
 
 SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
-SPEEDS = slice(10 + 16, 10 + 28)  # vx, vy, vz of it
+SPEEDS = slice(10 + 16, 10 + 28)  # its vx, vy, vz
 
 
 def moves(speeds: bytes) -> bool:
-    """Whether velocities, as they are on the wire, move a rover; a PX4 stands on 1 mm/s."""
+    """Return whether velocities, as on the wire, move a rover; a PX4 stands on 1 mm/s."""
     return any(not abs(speed) < 0.002 for (speed,) in iter_unpack("<f", speeds.ljust(12, b"\0")))
 
 
 class Capture(LossyUdp):
-    """Stands between the server and one rover, and passes everything on at once."""
+    """A proxy between the server and one rover that forwards everything at once."""
 
     def __init__(self, rover_port: int) -> None:
         super().__init__(rover_port, Conditions(), seed=0)
-        #: when each setpoint came, monotonic seconds, and whether it was to move the rover
+        #: per setpoint: monotonic seconds, and whether it moves the rover
         self.setpoints: list[tuple[float, bool]] = []
 
     @property
     def url(self) -> str:
-        """Where the server finds the rover."""
+        """The server's URL for the rover."""
         return f"udpout:127.0.0.1:{self.port}"
 
     @property
     def moving(self) -> list[float]:
-        """Return when setpoints came, from the first that moved the rover to the last."""
+        """Return the times of setpoints, from the first moving one to the last."""
         moved = [number for number, (_, moves) in enumerate(self.setpoints) if moves]
         return [at for at, _ in self.setpoints[moved[0] : moved[-1] + 1]]
 
@@ -44,6 +44,6 @@ class Capture(LossyUdp):
 
 @contextmanager
 def captured(rover_port: int) -> Iterator[Capture]:
-    """Run one while the block runs."""
+    """Run a capture for a ``with`` block."""
     with closing(Capture(rover_port)) as capture:
         yield capture

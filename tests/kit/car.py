@@ -1,4 +1,4 @@
-"""A body that steers as a car, and a rover that has it and does what tasks demand."""
+"""A body with car-like steering, and a rover with this body that follows tasks' demands."""
 
 from collections import deque
 from dataclasses import replace
@@ -16,14 +16,14 @@ from tests.unit.tasks.samples import idle_vehicle, ours
 class Car:
     """A body with a steered axle: it turns only while it rolls; implements ``Body``.
 
-    ``radius`` is its least turning radius in m, ``share`` the curvature that it reaches of the one
-    that is asked for: half with ArduPilot's default gains (4.6.3, SITL).
+    ``radius`` is its least turning radius in m. ``share`` is the reached fraction of the demanded
+    curvature: half with ArduPilot's default gains (4.6.3, SITL).
     """
 
-    STEP = 0.0125  # s, at the most
+    STEP = 0.0125  # s, at most
     PUSH = 3.0  # m/s²
     ENGINE_LAG, STEERING_LAG = 0.1, 0.2  # s
-    STANDS = 0.05  # m/s; slower, the angle of the wheels is not reckoned from the turn rate
+    STANDS = 0.05  # m/s; below it, the wheel angle is not computed from the yaw rate
 
     def __init__(self, start: Pose, *, radius: float, share: float = 1.0) -> None:
         self._most = 1 / radius
@@ -34,7 +34,7 @@ class Car:
 
     @property
     def lag(self) -> float:
-        """How late its engine does what is demanded, s."""
+        """Delay of the engine behind ``drive``, s."""
         return self.ENGINE_LAG
 
     @property
@@ -51,7 +51,7 @@ class Car:
         self._wanted, self._wanted_rate = forward_speed, yaw_rate
 
     def advance(self, duration: float) -> None:
-        """Move on."""
+        """Move by ``duration`` seconds."""
         left = duration
         while left > 1e-9:
             seconds = min(self.STEP, left)
@@ -59,11 +59,11 @@ class Car:
             left -= seconds
 
     def shift(self, *, east: float) -> None:
-        """Put it elsewhere, m."""
+        """Move the body east by metres."""
         self._pose = replace(self._pose, east=self._pose.east + east)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: the body holds no resources."""
 
     def _step(self, seconds: float) -> None:
         change = (self._wanted - self._speed) * (1 - exp(-seconds / self.ENGINE_LAG))
@@ -87,10 +87,10 @@ class Car:
 
 
 class CarRover:
-    """A car that is driven by a yaw rate, or, if it does not honour one, by course as PX4's is."""
+    """A car driven by yaw rate or, if it does not honour one, by course like PX4's."""
 
     STANDS = 0.01  # m/s
-    YAW_GAIN = 2.0  # 1/s, heading error -> turn rate, of one that is driven by course
+    YAW_GAIN = 2.0  # 1/s, yaw rate per heading error, if driven by course
 
     def __init__(
         self,
@@ -107,22 +107,22 @@ class CarRover:
         self.known_radius = radius
         self._turning = Turning.STEERED
         self._honours_yaw_rate = honours_yaw_rate
-        self.overspeed = 1.0  # of the speed asked for
-        #: the last that it measured of itself, the oldest first, which is what the server sees
+        self.overspeed = 1.0  # times the demanded speed
+        #: latest measurements, oldest first; the server sees the oldest
         self.measured: deque[Motion] = deque(maxlen=1)
 
     @property
     def pose(self) -> TaskPose:
-        """Where it is."""
+        """True pose."""
         state = self.body.state
         return TaskPose(state.north, state.east, state.yaw)
 
     def turns_on_spot(self) -> None:
-        """Let the server take it for one that does."""
+        """Make the server believe that the rover turns on the spot."""
         self._turning = Turning.ON_SPOT
 
     def view(self, now: float) -> VehicleView:
-        """What the server sees of it."""
+        """Return the server's view of the rover."""
         made = ours if self.is_ours else idle_vehicle
         state = self.body.state
         self.measured.append(Motion(self.pose, state.forward_speed, 0.0, state.yaw_rate, now))
@@ -137,7 +137,7 @@ class CarRover:
         )
 
     def follow(self, demand: Demand, *, seconds: float) -> None:
-        """Do what is demanded for a while."""
+        """Follow a demand for ``seconds``."""
         if demand.kind in (DemandKind.TAKE, DemandKind.DRIVE):
             self.is_ours = True
         elif demand.kind in (DemandKind.HAND_BACK, DemandKind.STOP, DemandKind.HALT):

@@ -1,7 +1,8 @@
-"""A fake client on a memory link: plain pymavlink on its own, nothing of the server's codec.
+"""A fake client on a memory link: plain pymavlink, without the server's codec.
 
-It speaks as a stock client does: heartbeats once a second, commands repeated as MAVSDK repeats them
-if asked to. What it hears is kept raw and decoded when a test looks at it: most telemetry never is.
+It behaves like a stock client: heartbeats once a second, commands repeated like MAVSDK's if
+requested. It stores raw packets and decodes them when a test reads them, because most telemetry is
+never read.
 """
 
 import os
@@ -37,7 +38,7 @@ ACK = IDS["COMMAND_ACK"]
 
 
 class TaskStatus(NamedTuple):
-    """TASK_STATUS, decoded by hand as ``dialects/README.md`` says one may."""
+    """TASK_STATUS, decoded manually as ``dialects/README.md`` permits."""
 
     time_boot_ms: int
     task_id: int
@@ -81,7 +82,7 @@ class TaskStatus(NamedTuple):
 
 @dataclass(slots=True)
 class Received:
-    """One packet that came in."""
+    """One received packet."""
 
     at: float
     raw: bytes
@@ -105,7 +106,7 @@ class Received:
 
 @dataclass(slots=True)
 class Sent:
-    """A command under way, and what came back to it."""
+    """A command under way, with its answer."""
 
     message: Message
     at: float
@@ -138,7 +139,7 @@ class _Stream:
 
 
 class Role(Protocol):
-    """A longer conversation that a client has, such as an upload."""
+    """A longer conversation of a client, such as an upload."""
 
     def next_deadline(self) -> float | None: ...
     def turn(self, *, now: float) -> None: ...
@@ -155,10 +156,10 @@ class FakeClient:
     component_id: int = 190
     server: str = CLIENT_LINK
     heartbeats: bool = True
-    #: says so as soon as it hears of a rover: TASK_STATUS goes to no other
+    #: requests TASK_STATUS when it first hears a rover: only clients that ask for it get it
     reads_dialect: bool = True
     received: list[Received] = field(default_factory=list)
-    #: told of each message that it sends, with its bytes, before these leave
+    #: called with each message and its bytes, before they are sent
     on_sent: Callable[[Message, bytes], None] = lambda *_: None
 
     def __post_init__(self) -> None:
@@ -166,21 +167,21 @@ class FakeClient:
         self._mav = common.MAVLink(None, self.system_id, self.component_id)
         self._decoder = common.MAVLink(None)
         self._verifier: Any = None
-        #: packets heard while signing: signed well, and not
+        #: packets received while signing: with a valid signature, and without
         self.verified = 0
         self.disbelieved: list[bytes] = []
         self._next_heartbeat = self.net.now
         self._under_way: list[Sent] = []
         self._streams: list[_Stream] = []
         self._has_said_so = False
-        self._is_owed_ack = False  # of that
+        self._is_owed_ack = False  # of that request
         self.acks: list[Message] = []
         self.roles: list[Role] = []
 
     def sign(self, secret: bytes, *, utc: float, link_id: int = 1) -> None:
-        """Sign from now on, and take only what is signed with the same key: pymavlink's own code.
+        """Sign, and accept only packets signed with the same key, by pymavlink's code.
 
-        ``utc`` is what its clock says now, seconds since 1970.
+        ``utc`` is the present time of its clock, seconds since 1970.
         """
         self._verifier = common.MAVLink(None)
         for end in (self._mav, self._verifier):
@@ -196,7 +197,7 @@ class FakeClient:
         return raw
 
     def _is_believed(self, raw: bytes) -> bool:
-        """Whether pymavlink takes a packet; of ids unknown to it it says nothing."""
+        """Return whether pymavlink accepts a packet's signature; unknown ids are not counted."""
         try:
             is_known = self._verifier.decode(bytearray(raw)).get_msgId() >= 0
         except common.MAVError:
@@ -204,10 +205,10 @@ class FakeClient:
         self.verified += is_known
         return True
 
-    # what it sends
+    # sending
 
     def send(self, message: Message) -> bytes:
-        """Send one message now; gives its bytes."""
+        """Send one message now; return its bytes."""
         raw: bytes = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         self.on_sent(message, raw)
@@ -215,7 +216,7 @@ class FakeClient:
         return raw
 
     def send_repeated(self, message: Message) -> bytes:
-        """Pack a message as the next one, for whoever sends it in this client's place."""
+        """Return a message packed with the next sequence number, for another sender to send."""
         raw: bytes = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         return raw
@@ -225,7 +226,7 @@ class FakeClient:
         self.link.send(self.server, data)
 
     def stream(self, message: Message, *, rate: float) -> None:
-        """Send a message again and again, from now on."""
+        """Send a message periodically, from now on."""
         self._streams.append(_Stream(message, 1.0 / rate, self.net.now))
 
     def end_streams(self) -> None:
@@ -284,7 +285,7 @@ class FakeClient:
         return self.command(PAUSE_CONTINUE, 0, target=target, **kw)
 
     def mode(self, mode: int, *, target: tuple[int, int] = (1, 1), **kw: Any) -> Sent:
-        """Ask for a mode by command."""
+        """Request a mode by command."""
         return self.command(SET_MODE, 1, mode, target=target, **kw)
 
     def arm(self, armed: bool = True, *, target: tuple[int, int] = (1, 1), **kw: Any) -> Sent:
@@ -292,13 +293,13 @@ class FakeClient:
         return self.command(ARM, 1 if armed else 0, target=target, **kw)
 
     def request_status(self, task_id: int, **kw: Any) -> Sent:
-        """Ask for a TASK_STATUS."""
+        """Request a TASK_STATUS."""
         return self.command(REQUEST, TASK_STATUS, task_id, **kw)
 
-    # what it heard
+    # receiving
 
     def decoded(self, packet: Received) -> Message:
-        """Return the message of a packet; those of our dialect by hand."""
+        """Return the message of a packet; TASK_STATUS is decoded manually."""
         if packet.message_id == TASK_STATUS:
             return TaskStatus.of(packet.payload)
         return self._decoder.decode(bytearray(packet.raw))
@@ -312,11 +313,11 @@ class FakeClient:
         return [self.decoded(packet) for packet in self.of_id(IDS[name])]
 
     def heard(self, name: str) -> bool:
-        """Whether a message of this type has come."""
+        """Return whether a message of this type was received."""
         return any(True for _ in self.of_id(IDS[name]))
 
     def texts(self) -> list[str]:
-        """Return the STATUSTEXTs received; a long one as its chunks joined."""
+        """Return the received STATUSTEXTs, with chunks joined."""
         texts: list[str] = []
         open_id = 0
         for message in self.of_type("STATUSTEXT"):
@@ -337,7 +338,7 @@ class FakeClient:
         return [(a.result, a.result_param2) for a in self.acks if a.command == command]
 
     def gaps(self, source: tuple[int, int]) -> int:
-        """Count the packets of a source that its sequence numbers say are missing."""
+        """Return the number of missing packets of a source, from its sequence numbers."""
         numbers = [packet.seq for packet in self.received if packet.source == source]
         return sum((after - before - 1) % 256 for before, after in pairwise(numbers))
 
@@ -409,7 +410,7 @@ class FakeClient:
 def command_long(
     command: int, *params: float, target: tuple[int, int] = (1, 191), confirmation: int = 0
 ) -> Message:
-    """Return a COMMAND_LONG; parameters not named are 0."""
+    """Return a COMMAND_LONG; missing parameters are 0."""
     filled = (*params, *(0.0,) * (7 - len(params)))
     return common.MAVLink_command_long_message(*target, command, confirmation, *filled)
 
@@ -432,11 +433,11 @@ def sticks(x: int = 0, y: int = 0, z: int = 0, r: int = 0, *, system: int = 1) -
 
 
 def rc_override(*channels: int, system: int = 1) -> Message:
-    """Return an RC_CHANNELS_OVERRIDE; channels not named are left alone."""
+    """Return an RC_CHANNELS_OVERRIDE; missing channels are 0 (released)."""
     filled = (*channels, *(0,) * (8 - len(channels)))
     return common.MAVLink_rc_channels_override_message(system, 1, *filled)
 
 
 def set_mode(mode: int, *, system: int = 1) -> Message:
-    """Return the old message SET_MODE."""
+    """Return the deprecated message SET_MODE."""
     return common.MAVLink_set_mode_message(system, 1, mode)

@@ -1,4 +1,4 @@
-"""``mav-tasks`` as an operator or a script runs it."""
+"""Runs ``mav-tasks`` like an operator or a script."""
 
 import io
 import json
@@ -17,7 +17,7 @@ LIMIT = 40.0  # s
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A command that has ended."""
+    """The result of a command."""
 
     status: int
     output: str
@@ -35,7 +35,7 @@ class Done:
 
 
 def called(*arguments: str, server: str = "") -> Done:
-    """Run a command within this process: the same, without the second that a process takes."""
+    """Run a command within this process, which saves the second that a process takes."""
     output, error = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
     status: object = None
     with redirect_stdout(output), redirect_stderr(error):
@@ -54,7 +54,7 @@ def called(*arguments: str, server: str = "") -> Done:
 def mav_tasks(
     *arguments: str, server: str = "", folder: Path | None = None, **environment: str
 ) -> Done:
-    """Run a command in pipes; ``server`` is the link to one, ``folder`` where it is run."""
+    """Run a command with pipes; ``server``: its URL, ``folder``: the working directory."""
     done = subprocess.run(
         [sys.executable, "-m", "mav_tasks.cli", *arguments],
         capture_output=True,

@@ -1,8 +1,8 @@
 """``python -m tests.kit.crashing POINT serve …``: mav-tasks, killed at one point of its writing.
 
 POINT is ``before:EVENT`` or ``after:EVENT``: before the transaction with the first such event, or
-when it is committed and nobody has been told. EVENT is an event's class name; of a TaskChanged with
-its new state, as in ``TaskChanged.EXECUTING``.
+after its commit but before the report. EVENT is an event's class name; for a TaskChanged with its
+new state, as in ``TaskChanged.EXECUTING``.
 """
 
 import os
@@ -18,13 +18,13 @@ from mav_tasks.tasks.events import Event, TaskChanged
 
 
 def name_of(event: Event) -> str:
-    """Return what an event is called in a point."""
+    """Return an event's name in a point."""
     name = type(event).__name__
     return f"{name}.{event.new.name}" if isinstance(event, TaskChanged) else name
 
 
 def die_at(point: str) -> None:
-    """Arrange it."""
+    """Patch the writer to kill the process at a point."""
     when, _, wanted = point.partition(":")
     write_events, write_batch = Writer._write, Database.write
     is_here = False

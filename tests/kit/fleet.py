@@ -1,4 +1,4 @@
-"""Many rovers on many links: worlds in which links go down and several rovers share a radio."""
+"""Many rovers on many links: links that go down, and several rovers behind one radio."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -36,7 +36,7 @@ from tests.kit.world import (
 WORK = (75, 76, 84)  # COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED
 GOOD = Conditions()
 
-#: link, endpoint on it, and the rovers behind that: more than one, as behind a radio
+#: link: endpoint on it: rovers behind it; several, as behind a radio
 Layout = Mapping[str, Mapping[str, tuple[int, ...]]]
 
 
@@ -44,10 +44,10 @@ Layout = Mapping[str, Mapping[str, tuple[int, ...]]]
 
 
 class FleetNet(ObservedNet):
-    """A net with several vehicle links, as bad as told; that of the clients is a good one.
+    """A net with several degraded vehicle links; the clients' link is good.
 
-    Each pair of ends has a luck of its own, so that what one rover says more or less does not
-    change what becomes of another's packets.
+    Each pair of ends has its own random numbers, so that a rover's extra traffic does not change
+    the fate of another's packets.
     """
 
     def __init__(self, *, seed: int, conditions: Conditions) -> None:
@@ -56,19 +56,19 @@ class FleetNet(ObservedNet):
         self._bad = conditions
         self._luck: dict[tuple[str, str], Random] = {}
         self._decoder = common.MAVLink(None)
-        #: the server's link that an endpoint reaches, and nothing else
+        #: the only server link that an endpoint reaches
         self.link_of: dict[str, str] = {}
-        #: links that carry nothing now
+        #: links that are down
         self.down: set[str] = set()
-        #: who looks at what comes from an endpoint and goes to it
+        #: observers of the traffic at each endpoint
         self.observers_at: dict[str, tuple[Observer, ...]] = {}
-        #: s that all that a rover says takes, by its system id
+        #: s, delay of all packets from a rover, by its system id
         self.late: dict[int, float] = {}
-        #: what left the server for each endpoint
+        #: packets that left the server, by endpoint
         self.towards: dict[str, list[tuple[float, bytes]]] = {}
 
     def send(self, source: str, target: str, data: bytes) -> None:
-        """Show what the server sends, and carry it if these two ends can reach each other."""
+        """Show the server's packet to observers, and carry it if both ends can reach each other."""
         if target in self.link_of and source.startswith("server:"):
             self.towards.setdefault(target, []).append((self.now, data))
             for observer in self._meant(target, data):
@@ -93,7 +93,7 @@ class FleetNet(ObservedNet):
         MemoryNet.send(self, source, target, data)
 
     def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
-        """Show what arrives at a rover or at the server."""
+        """Show a packet that arrives at a rover or at the server."""
         if link.name in self.down:
             return
         for observer in self._meant(link.name, data):
@@ -103,7 +103,7 @@ class FleetNet(ObservedNet):
         MemoryNet.arrive(self, link, source, data)
 
     def deliver(self) -> None:
-        """Deliver, and show what the server now knows."""
+        """Deliver packets, and show what the server has received."""
         MemoryNet.deliver(self)
         for link, source, data in self._unread:
             if link == CLIENT_LINK:
@@ -117,7 +117,7 @@ class FleetNet(ObservedNet):
         return list({id(o): o for at in self.observers_at.values() for o in at}.values())
 
     def _meant(self, endpoint: str, data: bytes) -> list[Observer]:
-        """Return the observers of the rovers that a packet to an endpoint is for."""
+        """Return the observers of the rovers that a packet at an endpoint is for."""
         there = self.observers_at.get(endpoint, ())
         if len(there) < 2:
             return list(there)
@@ -127,33 +127,33 @@ class FleetNet(ObservedNet):
 
 
 class FleetServer(InMemoryServer):
-    """The server with as many vehicle links as a test wants; they may go down."""
+    """The server with any number of vehicle links, which may go down."""
 
     def up(self, link: MemoryLink, *, now: float) -> None:
-        """Let a vehicle link come up."""
+        """Bring a vehicle link up."""
         self._links[link.name] = link
         self.pump.handle(link_changed(link, LinkSide.VEHICLES), now=now)
         self.pump.turn(now=now)
 
     def down(self, link: MemoryLink, *, now: float) -> None:
-        """Let a vehicle link go down, as a link's owner says it to the engine."""
+        """Take a vehicle link down, and report it to the engine as its owner does."""
         self.pump.handle(LinkChanged(link.name, LinkSide.VEHICLES, up=False), now=now)
         self.pump.turn(now=now)
 
 
 class Radio:
-    """One endpoint, and the rovers behind it, each of which hears everything."""
+    """One endpoint with the rovers behind it, each of which receives everything."""
 
     def __init__(self, link: MemoryLink, vehicles: list[Vehicle]) -> None:
         self.link = link
         self.vehicles = vehicles
 
     def next_deadline(self) -> float | None:
-        """Return when a rover's next control step is due."""
+        """Return when the next control step of a rover is due."""
         return min((v.next_deadline() for v in self.vehicles), default=None)
 
     def turn(self, *, now: float) -> None:
-        """Let the rovers hear, live and speak."""
+        """Receive, run due control steps, and send."""
         for peer, data in self.link.receive(len(self.link.arrived)):
             for vehicle in self.vehicles:
                 vehicle.receive(data, peer, now=now)
@@ -200,7 +200,7 @@ class Fleet(World):
             for endpoint, there in endpoints.items():
                 self.add_radio(name, endpoint, [self.rovers[n - 1] for n in there])
                 self.watched.observers_at[endpoint] = tuple(self.observers[n - 1] for n in there)
-                if name in dials_in:  # the rover calls by itself: it knows where the server is
+                if name in dials_in:  # the rover speaks first: it knows the server's address
                     greeting = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
                     self.net.send(self.links[name].name, endpoint, packed(greeting, 250, 191))
             self.server.up(self.links[name], now=0.0)
@@ -216,17 +216,17 @@ class Fleet(World):
         return radio
 
     def link_down(self, name: str) -> None:
-        """Let a vehicle link of the server go down: it carries nothing any more."""
+        """Take a vehicle link of the server down; it carries nothing."""
         self.watched.down.add(self.links[name].name)
         self.server.down(self.links[name], now=self.now)
 
     def link_up(self, name: str) -> None:
-        """Let it come up again."""
+        """Bring the link up again."""
         self.watched.down.remove(self.links[name].name)
         self.server.up(self.links[name], now=self.now)
 
     def moves_house(self, number: int, *, source: str, target: str) -> None:
-        """Let a rover be at another endpoint from now on."""
+        """Move a rover to another endpoint."""
         vehicle = self.rovers[number - 1]
         self.radios[source].vehicles.remove(vehicle)
         self.radios[target].vehicles.append(vehicle)
@@ -234,7 +234,7 @@ class Fleet(World):
         watched[target] = (*watched[target], self.observers[number - 1])
 
     def break_rover(self, number: int, faults: Faults) -> None:
-        """Break something in one rover; ``Faults()`` mends it."""
+        """Set the faults of one rover; ``Faults()`` clears them."""
         self.rovers[number - 1].autopilot.set_faults(faults)
 
     def pose_of(self, number: int) -> tuple[float, float, float]:
@@ -243,33 +243,33 @@ class Fleet(World):
         return truth.north, truth.east, degrees(truth.yaw)
 
     def queue_paused(self, number: int) -> R:
-        """Return why a rover's queue stands."""
+        """Return the reason why a rover's queue is paused."""
         return self.seen(number).paused
 
     def is_heard(self, number: int) -> bool:
-        """Whether the server hears a rover."""
+        """Return whether the server hears a rover."""
         return self.seen(number).heard
 
     def seen(self, number: int) -> VehicleSnapshot:
-        """Return what the server knows of a rover."""
+        """Return the server's state of a rover."""
         found = self.server.engine.snapshot(now=self.now).vehicles
         return next(vehicle for vehicle in found if vehicle.system_id == number)
 
     def sent_to(self, number: int, since: float) -> list[str]:
-        """Return in words what the server has sent to a rover."""
+        """Return the server's packets to a rover, in words."""
         return self.observers[number - 1].sent_since(since)
 
     def journal_of(self, number: int) -> list[object]:
-        """Return all that the journal has of one rover."""
+        """Return all events of one rover in the journal."""
         return [event for event in self.events(object) if _vehicle_of(event) == number]
 
     def when(self, task_id: int, state: S) -> float:
-        """Return when a task came into a state first."""
+        """Return the time at which a task first entered a state."""
         changes = self.events(TaskChanged)
         return next(e.at for e in changes if (e.task_id, e.new) == (task_id, state))
 
     def work_at(self, endpoint: str, since: float) -> list[float]:
-        """Return when setpoints and commands left the server for an endpoint."""
+        """Return the times at which setpoints and commands left the server for an endpoint."""
         sent = self.watched.towards.get(endpoint, [])
         return [at for at, data in sent if at >= since and data[7] in WORK]
 
@@ -292,5 +292,5 @@ def packed(message: Any, system_id: int, component_id: int) -> bytes:
 
 
 def start_of(number: int) -> Pose:
-    """Return where a rover begins: three metres from the next one, facing north."""
+    """Return a rover's start: three metres apart, facing north."""
     return Pose(east=3.0 * (number - 1))

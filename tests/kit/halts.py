@@ -1,14 +1,13 @@
-"""One rule, judged by where a rover truly is: what somebody halted stands until somebody says go.
+"""One rule, judged by the rover's true pose: a halted rover stands until it is released.
 
-After an acknowledged halt (STOP, pause, HOLD, disarm; a switch at the rover; cancel of what runs)
-the rover comes to a stand within its stopping distance, and stays there until a go word that was
-*first sent* after the server had read the halt, or which the sender of the halt itself sent after
-it. After STOP only a *continue* is such a word; a submission never is. What is refused lets nothing
-go.
+After an acknowledged halt (STOP, pause, HOLD, disarm; a switch at the rover; cancel of the active
+task) the rover stops within its stopping distance. It stays there until a go request that was
+*first sent* after the server had read the halt, or that the sender of the halt sent after it. After
+STOP only *continue* is such a request; a submission never is. A refused request releases nothing.
 
-It looks at clients' packets when the server reads them, at answers when they are sent, and at the
-rover's body; nothing of the server's own state is asked. Not judged: a rover that hears nothing, or
-that a person or another station drives by its own ways.
+The judge sees clients' packets when the server reads them, answers when they are sent, and the
+rover's body, but none of the server's own state. It does not judge a rover that receives nothing,
+or that a person or another station drives.
 """
 
 from collections import Counter, deque
@@ -22,22 +21,22 @@ from rover_sim.vehicle import Vehicle
 from tests.kit.soak.words import Kind, Word
 
 ACCEPTED, IN_PROGRESS = 0, 5  # MAV_RESULT
-STOPS_WITHIN = 2.5  # s, by repeated requests over a net that loses a fifth, from 1 m/s
-SLACK, SLACK_ANGLE = 0.3, 0.4  # m, rad; beyond speed times STOPS_WITHIN while it brakes
-MOVED, TURNED = 0.1, 0.2  # m, rad, of a rover that had come to a stand
-UNHEARD = 6.0  # s after something was wrong with the way to the rover
-LATE = 1.0  # s on its way
-FLIGHT = 0.1  # s, longer than the net takes: two words of two people that passed each other there
-MODE_TAKES = 0.5  # s from a mode request's arrival until the rover shows the mode
+STOPS_WITHIN = 2.5  # s, from 1 m/s, with repeated requests over a net that loses a fifth
+SLACK, SLACK_ANGLE = 0.3, 0.4  # m, rad; beyond speed times STOPS_WITHIN while braking
+MOVED, TURNED = 0.1, 0.2  # m, rad, after standstill
+UNHEARD = 6.0  # s after a fault on the way to the rover
+LATE = 1.0  # s in transit
+FLIGHT = 0.1  # s, longer than the net's delay: requests of two clients may cross within it
+MODE_TAKES = 0.5  # s from a mode request's arrival until the rover is in the mode
 BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL})
-REMEMBERED = 50  # go words
+REMEMBERED = 50  # go requests
 WEIGHTS = {Kind.WISH: 1, Kind.MOTION: 2, Kind.GO: 3}
 CONTINUE, CANCEL, STOP, HOLD = "continue", "cancel", "STOP", "HOLD"
 
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """The rule was broken: which halt, and what was read since then that was older than it."""
+    """A breach of the rule: the halt, and the likeliest older request that was read after it."""
 
     at: float
     halt: str
@@ -47,7 +46,7 @@ class Broken:
 
     @property
     def kind(self) -> str:
-        """Name it without its figures."""
+        """The breach without its figures."""
         return f"{self.halt}, then {self.since}"
 
     def __str__(self) -> str:
@@ -60,23 +59,23 @@ class _Halt:
     name: str
     word: Word | None  # None: a person at the rover
     read_at: float
-    at: float  # acknowledged
+    at: float  # of the acknowledgement
     pose: BodyState
     is_stop: bool
     has_stood: bool = False
-    since: str = "no word"  # what was read since then and does not end it, the likeliest of it
-    weight: int = 0  # of that
-    pauses: bool = True  # else what is submitted after it may drive: a HOLD with nothing to hold
-    fresh: set[tuple[str, int]] = field(default_factory=set)  # go words that nobody answered yet
+    since: str = "no word"  # the likeliest request since then that does not end the halt
+    weight: int = 0  # of ``since``
+    pauses: bool = True  # False: later submissions may drive, after a HOLD without a task
+    fresh: set[tuple[str, int]] = field(default_factory=set)  # unanswered go requests
 
     def note(self, word: Word, text: str) -> None:
-        """Keep what may be why the rover moves in spite of it: a go word before all others."""
+        """Keep a possible cause of later motion; a go request outranks all others."""
         weight = WEIGHTS[word.kind]
         if weight >= self.weight:
             self.weight, self.since = weight, text
 
     def note_older(self, word: Word, *, now: float) -> None:
-        """Keep a word that is older than the halt."""
+        """Keep a request that is older than the halt."""
         how = "a copy of an older" if word.is_copy else "an older"
         late = " that was late" if now - word.first_sent > LATE else ""
         self.note(word, f"{how} {word.name}{late}")
@@ -86,64 +85,64 @@ class _Halt:
 class _Go:
     word: Word
     read_at: float
-    granted: bool | None = None  # None: not answered
+    granted: bool | None = None  # None: unanswered
 
 
 class Halts:
-    """Watches one rover."""
+    """Judges one rover."""
 
     def __init__(self, vehicle: Vehicle, system_id: int) -> None:
         self.system_id = system_id
         self._vehicle = vehicle
         self._halt: _Halt | None = None
-        self._suspended: _Halt | None = None  # let go by a word that may still be refused
+        self._suspended: _Halt | None = None  # a request that may still be refused ended it
         self._asked: dict[tuple[str, int], tuple[Word, float]] = {}
-        self._gos: deque[_Go] = deque(maxlen=REMEMBERED)  # that were read last
+        self._gos: deque[_Go] = deque(maxlen=REMEMBERED)  # the latest go requests
         self._disturbed_at = -1e9
         self._mode = vehicle.autopilot.mode
-        self._mode_sent_at = -1e9  # a request of the server for a mode reached the rover
-        self._passed: dict[int, float] = {}  # commands of clients, when they reached the rover
-        self._pauses = True  # of the last halt that was read
-        self._is_by_itself = False  # in a mode of its own, and not by the server
+        self._mode_sent_at = -1e9  # when a mode request of the server reached the rover
+        self._passed: dict[int, float] = {}  # when clients' commands reached the rover
+        self._pauses = True  # of the last halt
+        self._is_by_itself = False  # in a mode of its own, which the server did not request
         self.halted: Counter[str] = Counter()  # by name
-        self.refused: Counter[str] = Counter()  # go words
-        self.in_flight = 0  # go words that passed a halt on their way
+        self.refused: Counter[str] = Counter()  # go requests
+        self.in_flight = 0  # go requests that crossed a halt in transit
         self.broken: list[Broken] = []
 
     def __repr__(self) -> str:
         return f"Halts({self.system_id}, {self._halt})"
 
-    # what it is told
+    # inputs
 
     def disturb(self, until: float) -> None:
-        """The rover may not hear the server until then."""
+        """Note that the rover may not hear the server until then."""
         self._disturbed_at = max(self._disturbed_at, until)
 
     def person(self, name: str, *, drives: bool, now: float) -> None:
-        """Somebody at the rover has turned its switch, or armed or disarmed it."""
+        """Note that a person at the rover turned its switch, or armed or disarmed it."""
         self._halt = self._suspended = None
         if not drives:
             self._begin(name, None, read_at=now, now=now)
 
     def pushed(self) -> None:
-        """Another station, past the server, has sent the rover somewhere."""
+        """Note that another station sent the rover somewhere, bypassing the server."""
         self._halt = self._suspended = None
 
     def mode_arrived(self, *, now: float) -> None:
-        """A request of the server for a mode reaches the rover."""
+        """Note that a mode request of the server reached the rover."""
         self._mode_sent_at = now
 
     def passed(self, command: int, *, now: float) -> None:
-        """A client's command reaches the rover, and counts even if its answer is lost."""
+        """Note that a client's command reached the rover; it counts even if its answer is lost."""
         self._passed[command] = now
 
     def began_task(self) -> None:
-        """Another task begins: what was called off before has nothing to do with it."""
+        """Note that another task starts; a previous cancel does not apply to it."""
         if self._halt is not None and self._halt.name == CANCEL:
             self._halt = None
 
     def read(self, word: Word, *, running: int | None, now: float, has_tasks: bool = True) -> None:
-        """The server reads a word of a client; ``running`` is the task that is being driven.
+        """Note that the server reads a client's request; ``running`` is the id of the active task.
 
         ``has_tasks``: some task of the rover is not over.
         """
@@ -160,7 +159,7 @@ class Halts:
             self._read_wish(word)
 
     def answered(self, peer: str, command: int, result: int, *, now: float) -> None:
-        """The server answers a client."""
+        """Note the server's answer to a client."""
         key = peer, command
         is_granted = result in (ACCEPTED, IN_PROGRESS)
         word, read_at = self._asked.pop(key, (None, 0.0))
@@ -179,7 +178,7 @@ class Halts:
         self._settle(key, is_granted=is_granted)
 
     def look(self, now: float) -> Iterator[Broken]:
-        """Yield the rule's breach, once for each halt."""
+        """Yield a breach of the rule, once per halt."""
         self._look_at_mode(now)
         halt = self._halt
         if halt is None:
@@ -201,10 +200,10 @@ class Halts:
         if far:
             found = Broken(now, halt.name, halt.since, moved, turned)
             self.broken.append(found)
-            self._halt = None  # once
+            self._halt = None  # report it once
             yield found
 
-    # how it comes to that
+    # internals
 
     def _begin(self, name: str, word: Word | None, *, read_at: float, now: float) -> None:
         self.halted[name] += 1
@@ -255,11 +254,11 @@ class Halts:
         halt.fresh.discard(key)
         if is_granted:
             self._suspended = None
-        elif not halt.fresh:  # all were refused: it holds as before
+        elif not halt.fresh:  # all were refused: the halt remains
             self._suspended, self._halt = None, halt
 
     def _ends(self, word: Word, halt: _Halt) -> bool:
-        """Whether a go word is newer than a halt, if it is granted."""
+        """Return whether a go request, if granted, is newer than a halt."""
         if halt.is_stop and word.name != CONTINUE:
             return False
         if word.first_sent > halt.read_at:
@@ -283,7 +282,7 @@ class Halts:
 
 
 def _passed(word: Word, halt: _Halt) -> bool:
-    """Whether it was on its way, from somebody else, when the halt was read."""
+    """Return whether another client's request was in transit when the halt was read."""
     of_another = halt.word is None or halt.word.peer != word.peer
     is_older = word.first_sent <= halt.read_at
     return of_another and is_older and not word.is_copy and word.first_sent > halt.read_at - FLIGHT

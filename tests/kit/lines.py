@@ -9,15 +9,15 @@ from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
 
-BITS = 10  # of a byte on the line
+BITS = 10  # per byte on the line
 TICK = 0.01  # s
 END_LIMIT = 10.0  # s
 
 
 class Device:
-    """A serial device at ``path``, and the far end of its line, a descriptor.
+    """A serial device at ``path``, and the descriptor of the far end of its line.
 
-    As with an adapter whose name udev keeps, a device plugged in again has the same path.
+    A device that is plugged in again has the same path, as with a udev rule for an adapter.
     """
 
     def __init__(self, path: Path) -> None:
@@ -27,14 +27,14 @@ class Device:
         self.plug()
 
     def plug(self) -> None:
-        """Let the device be there."""
+        """Plug the device in."""
         self.far, self._near = os.openpty()
         tty.setraw(self._near)
         os.set_blocking(self.far, False)
         self.path.symlink_to(os.ttyname(self._near))
 
     def unplug(self) -> None:
-        """Let it be gone; who has it open is told by the system."""
+        """Unplug the device; the system reports it to processes that have it open."""
         if self.far < 0:
             return
         self.path.unlink()
@@ -45,7 +45,7 @@ class Device:
 
 @contextmanager
 def device(path: Path) -> Iterator[Device]:
-    """Have a device while the block runs."""
+    """Plug a device in for a ``with`` block."""
     made = Device(path)
     try:
         yield made
@@ -54,22 +54,21 @@ def device(path: Path) -> Iterator[Device]:
 
 
 class SlowLine:
-    """Two devices joined by a line of so many bits a second; what it does not take waits in them.
+    """Two devices joined by a line with a limited rate; excess bytes wait in the devices.
 
-    A pseudo-terminal says of nothing that it is on its way: to who writes, it is a wire without end
-    until it is full.
+    A pseudo-terminal does not report bytes in transit: it accepts bytes until it is full.
     """
 
     def __init__(self, one: Device, other: Device, *, baud: int) -> None:
         self._ways = ((one.far, other.far), (other.far, one.far))
         self._rate = baud / BITS
-        self.passed = [0, 0]  # bytes, from one to the other and back
+        self.passed = [0, 0]  # bytes, in each direction
         self._is_over = Event()
         self._thread = Thread(target=self._run, name="slow line", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Stop passing anything on."""
+        """Stop forwarding."""
         self._is_over.set()
         self._thread.join(END_LIMIT)
         assert not self._thread.is_alive()
@@ -90,7 +89,7 @@ class SlowLine:
 
 @contextmanager
 def slow_line(folder: Path, *, baud: int) -> Iterator[tuple[Path, Path]]:
-    """Return the paths of two devices that are joined while the block runs."""
+    """Return the paths of two devices that are joined for a ``with`` block."""
     with device(folder / "ttyOne") as one, device(folder / "ttyOther") as other:
         line = SlowLine(one, other, baud=baud)
         try:
@@ -100,7 +99,7 @@ def slow_line(folder: Path, *, baud: int) -> Iterator[tuple[Path, Path]]:
 
 
 def read_from(descriptor: int, count: int, *, within: float = END_LIMIT) -> bytes:
-    """Return so many bytes of a descriptor, or AssertionError."""
+    """Return ``count`` bytes of a descriptor. Raise AssertionError if they are late."""
     data, end = b"", monotonic() + within
     with selectors.DefaultSelector() as selector:
         selector.register(descriptor, selectors.EVENT_READ)

@@ -1,4 +1,4 @@
-"""A UDP proxy on loopback that loses, doubles and reorders what passes, in both directions."""
+"""A UDP proxy on loopback that loses, duplicates and reorders datagrams, in both directions."""
 
 import heapq
 import selectors
@@ -14,22 +14,22 @@ from time import monotonic
 from mav_tasks.links.memory import Conditions
 
 LOOPBACK = "127.0.0.1"
-MOST_CLIENTS = 64  # a datagram of one more is passed over
-MOST_UNDER_WAY = 10_000  # datagrams; beyond, they are lost
-AT_A_TIME = 64  # datagrams read from one socket before the others have their turn
+MOST_CLIENTS = 64  # datagrams of further clients are ignored
+MOST_UNDER_WAY = 10_000  # datagrams; excess ones are lost
+AT_A_TIME = 64  # datagrams per socket before the others have their turn
 MAX_DATAGRAM = 65_536
-BUFFER = 1 << 20  # bytes; what the system loses, too, would be one thing more to reckon with
+BUFFER = 1 << 20  # bytes; so that the system does not lose datagrams, too
 END_LIMIT = 10.0  # s
 
 
 @dataclass(slots=True)
 class Traffic:
-    """What became of the datagrams of one direction."""
+    """Counts of the datagrams in one direction."""
 
     came: int = 0
     lost: int = 0
     doubled: int = 0
-    overtaken: int = 0  # delivered, a copy counting as one, after what had come later
+    overtaken: int = 0  # delivered after a later one; a copy counts separately
 
 
 @dataclass(slots=True, eq=False)
@@ -43,10 +43,10 @@ class _Way:
 
 
 class LossyUdp:
-    """Stands between clients and a server; each client has an endpoint of its own towards it.
+    """A proxy between clients and a server; each client has its own endpoint towards the server.
 
-    The numbers are random by a seed, but what meets which of them is up to the machine's timing:
-    a run is not repeated exactly.
+    The random numbers depend on a seed, but their order depends on the machine's timing: a run
+    cannot be repeated exactly.
     """
 
     def __init__(self, server_port: int, conditions: Conditions, *, seed: int) -> None:
@@ -59,7 +59,7 @@ class LossyUdp:
         self._under_way: list[tuple[float, int, int, _Way, bytes]] = []
         self._selector = selectors.DefaultSelector()
         self._ways_up: dict[tuple[str, int], _Way] = {}  # by the client's endpoint
-        self._ways_down: dict[socket.socket, _Way] = {}  # by the socket that stands for it
+        self._ways_down: dict[socket.socket, _Way] = {}  # by the socket that represents it
         self._front = _udp_socket()
         self._selector.register(self._front, selectors.EVENT_READ)
         self._is_ending, self._end = socket.socketpair()
@@ -72,12 +72,12 @@ class LossyUdp:
 
     @property
     def port(self) -> int:
-        """The port at which clients find the server."""
+        """The port at which clients reach the proxy."""
         return int(self._front.getsockname()[1])
 
     def close(self) -> None:
-        """Deliver at once what is still under way, and end."""
-        self._end.close()  # is seen at the other end of the pair
+        """Deliver pending datagrams at once, and end."""
+        self._end.close()  # the other end of the pair becomes readable
         self._thread.join(END_LIMIT)
         assert not self._thread.is_alive(), "the proxy does not end"
         self._selector.close()
@@ -85,7 +85,7 @@ class LossyUdp:
             each.close()
 
     def see(self, data: bytes, *, is_for_server: bool) -> None:
-        """Look at a datagram that has come; a proxy that keeps some does more."""
+        """Hook for subclasses: called with each datagram that arrives."""
 
     def _run(self) -> None:
         is_ending = False
@@ -97,12 +97,12 @@ class LossyUdp:
                 elif isinstance(key.fileobj, socket.socket):
                     self._take(key.fileobj)
             self._deliver(monotonic())
-        while self._take(self._front):  # what clients had sent before the end was asked for
+        while self._take(self._front):  # datagrams that clients sent before the end
             pass
         self._deliver(float("inf"))
 
     def _take(self, source: socket.socket) -> bool:
-        """Take in what has come to a socket; False: there was nothing."""
+        """Read datagrams of a socket; return whether there were any."""
         taken = 0
         with suppress(BlockingIOError, ConnectionRefusedError):  # refused: the server has ended
             while taken < AT_A_TIME:
@@ -117,14 +117,14 @@ class LossyUdp:
         way = self._ways_up.get(client)
         if way is None and len(self._ways_up) < MOST_CLIENTS:
             sock = _udp_socket()
-            sock.connect(self._server)  # hears nobody else
+            sock.connect(self._server)  # receives from the server only
             self._selector.register(sock, selectors.EVENT_READ)
             way = self._ways_up[client] = _Way(sock, self._server, self.to_server)
             self._ways_down[sock] = _Way(self._front, client, self.to_clients)
         return way
 
     def _put_under_way(self, way: _Way, data: bytes) -> None:
-        """As the virtual net of the scenarios does it."""
+        """Apply the conditions like the virtual net of the scenarios."""
         self.see(data, is_for_server=way.traffic is self.to_server)
         how, number, traffic = self._conditions, next(self._numbers), way.traffic
         traffic.came += 1
@@ -142,7 +142,7 @@ class LossyUdp:
             _, number, _, way, data = heapq.heappop(self._under_way)
             way.traffic.overtaken += number < way.latest
             way.latest = max(way.latest, number)
-            with suppress(OSError):  # not taken, or nobody is there: lost as on any network
+            with suppress(OSError):  # refused or nobody there: lost, as on any network
                 if way.sender is self._front:
                     way.sender.sendto(data, way.to)
                 else:
@@ -159,6 +159,6 @@ def _udp_socket() -> socket.socket:
 
 @contextmanager
 def lossy_udp(server_port: int, conditions: Conditions, *, seed: int) -> Iterator[LossyUdp]:
-    """Run a proxy while the block runs; what is under way at its end is delivered at once."""
+    """Run a proxy for a ``with`` block; datagrams pending at its end are delivered at once."""
     with closing(LossyUdp(server_port, conditions, seed=seed)) as proxy:
         yield proxy

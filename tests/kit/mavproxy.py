@@ -1,27 +1,27 @@
-"""The real MAVProxy, unmodified, at its own command line in a pseudo-terminal.
+"""The real MAVProxy, unmodified, at its command line in a pseudo-terminal.
 
-What is good to know of release 1.8.75, found by trying and in its source:
+Behaviour of release 1.8.75, from experiments and its source:
 
-- It locks onto the address of the first autopilot's heartbeat, (N, 1), and passes over texts of all
-  other components. Told ``--target-system N`` it leaves the component at 0: commands go to (N, 0),
-  and the texts of the task server are shown, as "AP: Task 1 done".
-- A COMMAND_ACK is shown by name, "Got COMMAND_ACK: DO_SET_MODE: ACCEPTED"; one for a command number
-  that it has no name for as the whole message, which brings ``result_param2``.
-- ``long NUMBER …`` fills what is not given with 0, so a task has priority 0; "nan" can be said.
-- It asks for parameters by file transfer first, and by PARAM_REQUEST_LIST once that is refused, by
-  itself if it has none yet, else when told again; unanswered it tries for 11 s.
-- It does not say that a ``param set`` worked, only if it did not.
-- Coordinates of ``wp``, ``fence`` and ``guided`` are cut to 1e-7 degrees, not rounded: 149.1657
-  goes out as 149.1656999.
-- ``mode NAME`` works for ArduPilot only: of a PX4's modes it has a table of triples, and takes one
-  for a number ("required argument is not a float"). ``long DO_SET_MODE 1 4 3`` works.
-- A mode is announced every 2 s at the most; the prompt shows each one, but is written only along
-  with the next line. An empty line brings it forth.
-- A message that its dialects lack comes from component 0 of system 0 as pymavlink sees it, so each
-  leaves a hole in the numbers of who sent it, and is counted as lost.
-- A rover that does not call its fence healthy makes it say "fence breach", though there is none.
-- A rover that restarts after half a minute or more makes it say "Time has wrapped".
-- ``exit`` needs an end of file in place of the next line, and its exit code is 1 however it ends.
+- It locks onto the address of the first autopilot's heartbeat, (N, 1), and ignores texts of all
+  other components. ``--target-system N`` leaves the component at 0: commands go to (N, 0), and it
+  shows the texts of the task server, as "AP: Task 1 done".
+- It shows a COMMAND_ACK by name, "Got COMMAND_ACK: DO_SET_MODE: ACCEPTED". If it has no name for
+  the command, it shows the whole message, with ``result_param2``.
+- ``long NUMBER …`` fills missing parameters with 0, so a task has priority 0; it accepts "nan".
+- It requests parameters by file transfer first, and by PARAM_REQUEST_LIST after a refusal: by
+  itself if it has none yet, else on the next command. Without an answer it retries for 11 s.
+- It reports a ``param set`` only if it failed.
+- It truncates coordinates of ``wp``, ``fence`` and ``guided`` to 1e-7 degrees: 149.1657 is sent as
+  149.1656999.
+- ``mode NAME`` works for ArduPilot only: its table of PX4's modes has triples, and it treats one as
+  a number ("required argument is not a float"). ``long DO_SET_MODE 1 4 3`` works.
+- It announces a mode at most every 2 s. The prompt shows each mode, but it is written only with
+  the next line; an empty line triggers it.
+- For pymavlink, a message that its dialects lack comes from component 0 of system 0. Each one
+  leaves a gap in its sender's sequence numbers, and is counted as lost.
+- If a rover does not report its fence healthy, it says "fence breach", though there is none.
+- If a rover restarts after half a minute or more, it says "Time has wrapped".
+- ``exit`` needs an end of file instead of the next line, and its exit code is always 1.
 """
 
 import os
@@ -40,12 +40,12 @@ from typing import NamedTuple
 
 from tests.kit.processes import STOP_LIMIT, wait_until
 
-STAMP_LENGTH = 8  # of a packet in a tlog; those that it sends are there, too
+STAMP_LENGTH = 8  # of a packet in a tlog, which includes sent packets
 HEADER_LENGTH, CRC_LENGTH = 10, 2
 MAVLINK_2 = 0xFD
 ITS_SYSTEM = 255
 END_OF_FILE = b"\x04"
-#: What it says when something is not as it should be, be it its own finding or a rover's answer.
+#: Its messages about problems, its own findings as well as a rover's answers.
 COMPLAINT = re.compile(
     r"error|fail|time?d? ?out|no ack|no link|link \d+ down|\blost\b|re-requesting|unexpected|denied"
     r"|unsupported|reject|not in control|cancelled|traceback|exception|wrapped|breach|stale"
@@ -54,7 +54,7 @@ COMPLAINT = re.compile(
 )
 PATIENCE = 10.0  # s, for an answer
 PROMPT_WITHIN = 0.1  # s, after a line
-#: Often there is something behind it on its line.
+#: Output may follow on the same line.
 PROMPT = re.compile(r"^[\w()]+> ", re.MULTILINE)
 LINK = re.compile(
     r"link 1 (?P<state>\w+) \((?P<packets>\d+) packets, .* (?P<lost>\d+) lost, (?P<loss>[\d.]+)%"
@@ -71,7 +71,7 @@ class Logged(NamedTuple):
 
 
 class MavProxy:
-    """A session: type a line, wait for what it says."""
+    """A session: type a line, wait for its output."""
 
     def __init__(self, popen: subprocess.Popen[bytes], terminal: int, folder: Path) -> None:
         self.popen = popen
@@ -79,27 +79,27 @@ class MavProxy:
         self._folder = folder
         self._heard = bytearray()
         self._mark = 0
-        # All the while, lest it stands still with its terminal full and loses packets.
+        # Read continuously: with a full terminal it would block and lose packets.
         self._reader = threading.Thread(target=self._read, name="mavproxy", daemon=True)
         self._reader.start()
 
     @property
     def text(self) -> str:
-        """Return all that it has said, and the echo of what was typed."""
+        """All output, including the echo of typed lines."""
         return self._text_from(0)
 
     @property
     def answer(self) -> str:
-        """Return what it has said since the last line typed, and that line."""
+        """The output since the last typed line, including that line."""
         return self._text_from(self._mark)
 
     def type(self, line: str) -> None:
-        """Type a line; what is waited for from here on comes after it."""
+        """Type a line; later waits look only at output after it."""
         self._mark = len(self._heard)
         os.write(self._terminal, f"{line}\n".encode())
 
     def wait_for(self, pattern: str, *, within: float = PATIENCE) -> re.Match[str]:
-        """Wait until it has said something that matches since the last line typed."""
+        """Wait until the output since the last typed line matches."""
         return wait_until(
             lambda: re.search(pattern, self.answer, re.MULTILINE),
             within=within,
@@ -122,16 +122,16 @@ class MavProxy:
         wait_until(is_shown, within=within, what=lambda: f"mode {name} in:\n{self.text}")
 
     def complaints(self, *, but: str = r"(?!)") -> list[str]:
-        """Return the lines that say that something is wrong, but for those that match."""
+        """Return the output lines about problems, except those that match ``but``."""
         said = [line for line in self.text.splitlines() if not LINK.search(line)]
         return [line for line in said if COMPLAINT.search(line) and not re.search(but, line)]
 
     def link(self) -> dict[str, str]:
-        """Ask for its own count of the link: state, packets, lost, loss (%)."""
+        """Return MAVProxy's own count of the link: state, packets, lost, loss (%)."""
         return self.ask("link", LINK.pattern).groupdict()
 
     def heard(self) -> list[Logged]:
-        """Return the packets that have come, as far as its log is written."""
+        """Return the received packets, as far as its log is written."""
         log = (self._folder / "mav.tlog").read_bytes()
         packets: list[Logged] = []
         at = STAMP_LENGTH
@@ -145,7 +145,7 @@ class MavProxy:
         return packets
 
     def end(self) -> None:
-        """Let it end as a user does; it is killed if it does not."""
+        """End it like a user does; kill it if it does not end."""
         if self.popen.poll() is None:
             with suppress(OSError):
                 os.write(self._terminal, END_OF_FILE)
@@ -161,7 +161,7 @@ class MavProxy:
         return PROMPT.sub(r"\g<0>\n", said)
 
     def _read(self) -> None:
-        with suppress(OSError):  # how a terminal ends whose other side is gone
+        with suppress(OSError):  # raised when the other side is closed
             while said := os.read(self._terminal, 65536):
                 self._heard += said
 
@@ -170,16 +170,16 @@ class MavProxy:
 def mavproxy(
     port: int, folder: Path, *options: str, prepare: Callable[[], None] = lambda: None
 ) -> Iterator[MavProxy]:
-    """Run it while the block runs, connected to a UDP port; all that it writes is in the folder.
+    """Run it for a ``with`` block, connected to a UDP port; it writes its files to the folder.
 
-    ``prepare`` puts what it is to find there.
+    ``prepare`` creates files that it reads.
     """
     script = Path(sysconfig.get_path("scripts")) / "mavproxy.py"
     state = folder / "mavproxy"
     state.mkdir()
     prepare()
     terminal, its_side = pty.openpty()
-    termios.tcsetwinsize(its_side, (50, 500))  # a longer line would be shown by its end alone
+    termios.tcsetwinsize(its_side, (50, 500))  # it would show only the end of a longer line
     popen = subprocess.Popen(
         [
             *(sys.executable, str(script), "--master", f"udpout:127.0.0.1:{port}"),

@@ -1,5 +1,6 @@
-"""A client's ends of the mission protocol, as MAVSDK 4.1 behaves: retries, time-outs, what it
-believes. Decoded by hand where pymavlink's definitions lack the ids of plans.
+"""A client's side of the mission protocol, as in MAVSDK 4.1: retries, time-outs, reactions.
+
+Plan ids, which pymavlink's definitions lack, are decoded manually.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 COUNT, ITEM_INT, REQUEST, REQUEST_INT, MISSION_ACK, CURRENT, REACHED = 44, 73, 40, 51, 47, 42, 46
 ARDUPILOTMEGA = 3  # MAV_AUTOPILOT
 RETRY = 0.5  # s
-TRIES = 5  # of an upload: sends of one message, and waits for the next request, together
+TRIES = 5  # of an upload: sends of a message plus waits for the next request
 TIMEOUT = -1  # instead of a MAV_MISSION_RESULT
 
 
@@ -104,7 +105,7 @@ class Count(NamedTuple):
 
 @dataclass
 class Upload:
-    """One upload; ``result`` is a MAV_MISSION_RESULT, TIMEOUT, or None while it goes on."""
+    """One upload; ``result`` is a MAV_MISSION_RESULT, TIMEOUT, or None while it is active."""
 
     client: FakeClient
     items: Sequence[Item]
@@ -113,7 +114,7 @@ class Upload:
     result: int | None = None
     opaque_id: int = 0
     requests: list[int] = field(default_factory=list)
-    #: requests for items beyond the next one: MAVSDK only warns, but sends its count no more
+    #: requests beyond the next item: MAVSDK only warns, but stops sending its count
     ahead: list[int] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -144,7 +145,7 @@ class Upload:
             return
         if packet.message_id == REQUEST and not self._is_ardupilot:
             self.client.send(common.MAVLink_mission_ack_message(*self.target, 3, self.kind))
-            self._end(3)  # as MAVSDK, which knows it of ArduPilot only
+            self._end(3)  # like MAVSDK, which accepts it from ArduPilot only
         elif packet.message_id in (REQUEST, REQUEST_INT):
             seq, _, _, kind = struct.unpack("<HBBB", packet.payload.ljust(5, b"\0")[:5])
             if kind == self.kind:
@@ -152,7 +153,7 @@ class Upload:
         elif packet.message_id == MISSION_ACK:
             ack = Ack.of(packet.payload)
             if ack.kind != self.kind:
-                self._end(1)  # MAVSDK breaks off
+                self._end(1)  # MAVSDK aborts
                 return
             is_early = ack.result == 0 and self._next != len(self.items)
             self.opaque_id = ack.opaque_id
@@ -160,17 +161,17 @@ class Upload:
 
     @property
     def _is_ardupilot(self) -> bool:
-        """Whether the last heartbeat of the autopilot says so."""
+        """Whether the autopilot's last heartbeat shows ArduPilot."""
         beats = [p for p in self.client.of_id(0) if p.source == (self.target[0], 1)]
         return bool(beats) and self.client.decoded(beats[-1]).autopilot == ARDUPILOTMEGA
 
     def cancel(self) -> None:
-        """Give up, and say so."""
+        """Cancel the upload with a MISSION_ACK."""
         self.client.send(common.MAVLink_mission_ack_message(*self.target, 15, self.kind))
         self._end(15)
 
     def vanish(self) -> None:
-        """Give up without a word."""
+        """Stop without a message."""
         self._end(TIMEOUT)
 
     def _take_request(self, seq: int, *, now: float) -> None:
@@ -195,7 +196,7 @@ class Upload:
 
 @dataclass
 class Download:
-    """One download; ``items`` are the messages in their order, once ``is_done``."""
+    """One download; ``items`` are the messages in order, once ``is_done``."""
 
     client: FakeClient
     kind: int = 0
@@ -258,7 +259,7 @@ class Download:
 
 
 def currents(client: FakeClient) -> list[Current]:
-    """Return the MISSION_CURRENTs received."""
+    """Return the received MISSION_CURRENTs."""
     return [Current.of(packet.payload) for packet in client.of_id(CURRENT)]
 
 
@@ -268,5 +269,5 @@ def reached(client: FakeClient) -> list[int]:
 
 
 def acks(client: FakeClient) -> list[Ack]:
-    """Return the MISSION_ACKs received."""
+    """Return the received MISSION_ACKs."""
     return [Ack.of(packet.payload) for packet in client.of_id(MISSION_ACK)]

@@ -1,8 +1,8 @@
-"""Whether the engine's timers say what its parts need: each part is asked, one by one, each time.
+"""Checks that the engine's timers agree with its parts: every part is asked after every step.
 
-A part sets its timer when its need changes, and nobody asks it again. One that forgets to is called
-too late, or never: a task that does not begin, an upload that hangs. So after each step of each
-scenario what the engine says is held against what its parts would say.
+A part sets its timer when its deadline changes, and the engine does not ask it again. If a part
+forgets that, it is called too late or never: a task does not start, an upload hangs. So after each
+step of each scenario the engine's deadline is compared with those of its parts.
 """
 
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ from mav_tasks.engine.timers import Timer
 
 
 class Needs:
-    """Looks at every step of every engine, and keeps what its timers do not know."""
+    """Checks every step of every engine, and records deadlines that its timers miss."""
 
     def __init__(self) -> None:
         self.surprises: list[str] = []
 
     def look_on(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Look from here on."""
+        """Start checking."""
         for name in ("__init__", "handle", "handle_deadline"):
             monkeypatch.setattr(Engine, name, self._then_compare(getattr(Engine, name)))
 
@@ -34,7 +34,7 @@ class Needs:
         return step
 
     def compare(self, engine: Engine, *, now: float) -> None:
-        """Ask every part of an engine, and the engine itself."""
+        """Compare the timers of an engine with the deadlines of its parts."""
         due = engine.next_deadline()
         timers = {timer for _, _, _, timer in engine._timers.heap if timer.at < inf}
         first = min([timer.at for timer in timers], default=inf)
@@ -42,7 +42,7 @@ class Needs:
             self.surprises.append(f"at {now}: {due} instead of {first}")
         rhythms = sum(timer.period < inf for timer in timers)
         links = len(list(engine._vehicles.links))
-        if rhythms != links + 1:  # the clients' heartbeats
+        if rhythms != links + 1:  # plus one for the clients' heartbeats
             self.surprises.append(f"at {now}: {rhythms} rhythms, {links} links to vehicles")
         for timer, need, who in needs_of(engine):
             if timer.at != need:
@@ -50,7 +50,7 @@ class Needs:
 
 
 def needs_of(engine: Engine) -> Iterator[tuple[Timer, float, object]]:
-    """Yield when each part has something to do, by its state alone; with its timer."""
+    """Yield the timer of each part, its deadline computed from its state alone, and the part."""
     e: Any = engine
     for vehicle in e._vehicles.all:
         yield e._vehicles.deadline_heap._due[vehicle.system_id], vehicle.next_deadline(), vehicle

@@ -1,22 +1,22 @@
-"""Watches everything between clients, server and one rover: the rules that always hold.
+"""Watches all traffic between clients, server and one rover, and checks rules that always hold.
 
-Rules about what the server does are judged when a packet leaves it, against what had reached it by
-then: a bad net is not its fault. protocol.md, sections 6 and 7:
+Rules about the server's actions are judged when a packet leaves it, against the packets that had
+reached it by then: it is not to blame for a bad net. protocol.md, sections 6 and 7:
 
-- a setpoint is finite; one that moves, whoever sent it, goes only to a rover seen armed; ours only
-  in our mode, after a zero in that mode, on position and attitude that came not more than 0.3 s
-  ago, and left the rover not more than 0.4 s ago: its clock is known to a tenth of a second
+- a setpoint is finite. A moving one, from any sender, goes only to a rover seen armed. Ours goes
+  only in our mode, after a zero in that mode, on position and attitude that came at most 0.3 s
+  ago and left the rover at most 0.4 s ago: its clock is known to a tenth of a second
 - order, ArduPilot: mode, zero, arm, motion; no arming in any other mode. PX4: HOLD, arm, a second
-  of zeros, mode, motion; no arming but in HOLD
+  of zeros, mode, motion; arming in HOLD only
 - control is taken only from HOLD, from our mode, or from MANUAL while disarmed
 - motion comes at 20 Hz: no gap without a zero, no burst
-- after STOP zero and HOLD leave in the same step; then nothing that could move the rover passes
-  until somebody continues
-- after a takeover no more setpoints (one zero where the rover was not yet told by its mode)
+- after STOP, zero and HOLD leave in the same step; then nothing that could move the rover passes
+  until a client continues
+- after a takeover no more setpoints (one zero if the rover's mode did not announce it)
 - never two sources of motion
 
-One rule is judged by the truth at the rover, when a moving setpoint of ours arrives there: it is
-armed and in our mode, unless what changed that could not be known yet.
+One rule is judged by the rover's true state, when a moving setpoint of ours arrives there: the
+rover is armed and in our mode, unless the server could not know of a change yet.
 """
 
 from collections import deque
@@ -36,23 +36,23 @@ SENT = 0.4  # s
 GAP = 0.12  # s between setpoints while driving: 20 Hz, one tick missed
 BURST = 4  # moving setpoints in 0.1 s
 ENGAGED = 0.2  # s since the last setpoint: the server is driving
-NO_AUTOPILOT = 8  # MAV_AUTOPILOT of a heartbeat that a rover's own does not have
-OWN_REQUEST = 3.0  # s in which a change to HOLD or disarmed follows from our own request
-KNOWN = 0.5  # s since the server heard of it: no setpoint from before is on its way any more
+NO_AUTOPILOT = 8  # MAV_AUTOPILOT of heartbeats that do not come from an autopilot
+OWN_REQUEST = 3.0  # s in which our own request explains a change to HOLD or disarmed
+KNOWN = 0.5  # s since the server learned of it: no earlier setpoint is in transit any more
 GREETING = (
     4  # zeros in a row that are not driving: a client's OFFBOARD needs two, and may be asked twice
 )
-BY_CLIENT = 2.5  # s after a client's wish to arm, in which that the rover is armed is its doing
+BY_CLIENT = 2.5  # s after a client's arm request, in which arming is attributed to it
 TWO_SOURCES = 1.0  # s between moving setpoints of two sources
 STICKS = 50
-INITIALISING = 16  # custom_mode of an ArduPilot that starts
-SAME_PACKET = 5.0  # s; then numbers may have begun anew, and it is another one
+INITIALISING = 16  # custom_mode of a booting ArduPilot
+SAME_PACKET = 5.0  # s; later, sequence numbers may have restarted, and it is another packet
 REMEMBERED = 64  # commands of clients
-ROVER_TIMEOUT = 3.0  # s without a setpoint until the rover stops by itself: ArduPilot's; PX4's is 1
+ROVER_TIMEOUT = 3.0  # s without a setpoint until the rover stops: ArduPilot's; PX4's is 1
 ANOTHER_COURSE = 0.05  # rad
-ENTERS = 0.3  # s from the request for OFFBOARD until it has a setpoint of that time
-TURN = 8.0  # s, half a turn at the slowest that tasks ask for here
-FAR = 60.0  # s of driving by itself, to a place or in a mode of the rover's own
+ENTERS = 0.3  # s after the OFFBOARD request, until a newer setpoint counts
+TURN = 8.0  # s, half a turn at the slowest rate that tasks use here
+FAR = 60.0  # s of driving to a place or in a mode of the rover's own
 
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 SHOW = "show"  # the request for a heartbeat
@@ -67,22 +67,22 @@ ACK, ACCEPTED = 77, 0
 NO_PLACE = 0x7FFFFFFF
 LEAD_IN = 0.95  # s of zeros before PX4's OFFBOARD
 
-#: the ids that any rule looks at; telemetry beyond these is not decoded
+#: the ids that the rules need; other telemetry is not decoded
 WATCHED = {0, 11, 30, 32, 69, 70, 75, 76, 82, 84, 86, 139, 144}
 
 
 class Ways(NamedTuple):
-    """What tells one make of rover from another."""
+    """What differs between makes of rover."""
 
     ours: int  # custom_mode
     hold: int
     manual: frozenset[int]
     arms_in_hold: bool
     sub_modes: bool  # DO_SET_MODE names main and sub mode
-    given_back: frozenset[int]  # modes by which a client has the server drive: return, mission
+    given_back: frozenset[int]  # modes in which a client lets the server drive: return, mission
 
     def mode_of(self, message: Any) -> int:
-        """Return the mode that a DO_SET_MODE asks for, -1 for nonsense."""
+        """Return the mode that a DO_SET_MODE requests, -1 if it is invalid."""
         if not (0 <= message.param2 < 2**32 and 0 <= message.param3 < 2**32):
             return -1
         if not self.sub_modes:
@@ -104,7 +104,7 @@ PX4_WAYS = Ways(
 
 
 class Reached(NamedTuple):
-    """One packet at the rover."""
+    """One packet that reached the rover."""
 
     at: float
     kind: int  # message id
@@ -113,78 +113,78 @@ class Reached(NamedTuple):
 
 @dataclass
 class Observer:
-    """Sees what passes by one rover; ``check`` raises what was wrong."""
+    """Observes the traffic of one rover; ``check`` raises on violations."""
 
     system_id: int = 1
     ways: Ways = ARDUPILOT_WAYS
-    #: a test that stops the server's clock expects a gap
+    #: for tests that stop the server's clock
     expects_gaps: bool = False
     expects_late_modes: bool = False  # from before a halt: zeros go with the HOLD that undoes them
-    #: a world that does several things in one step: which came first is not known
+    #: for worlds with several inputs per step, whose order is unknown
     batches: bool = False
-    #: whether the rover is really armed and in our mode
+    #: returns whether the rover is truly armed and in our mode
     is_ready: Callable[[], bool] = lambda: True
-    #: seen so by the server
+    #: as the server knows it
     armed: bool = False
     mode: int = -1
     stopped: bool = False
     taken_over: bool = False
     violations: list[str] = field(default_factory=list)
-    #: setpoints and commands that left the server, whoever they are from
+    #: setpoints and commands that left the server, from any sender
     driven: list[tuple[float, Any]] = field(default_factory=list)
-    #: everything that reached the rover
+    #: every packet that reached the rover
     reached: list[Reached] = field(default_factory=list)
-    #: until then the rover may move for what has reached it, whoever sent that
+    #: until then the rover may move because of packets that reached it, from any sender
     may_move_until: float = -1e9
     #: when the server read the last STOP that is in force
     stopped_at: float = -1e9
     _zeros_left: int = 0
-    _newest: tuple[int, float] = (0, -1e9)  # of its heartbeats: number, and when it came
+    _newest: tuple[int, float] = (0, -1e9)  # sequence number and arrival of its latest heartbeat
     _wishes: Wishes = field(default_factory=Wishes)
     _zero_in_mode: bool = False
-    _unready_since: float | None = None  # of heartbeats that say so, one after the other
+    _unready_since: float | None = None  # of consecutive heartbeats that are not ready
     _position_at: float = -1e9
     _attitude_at: float = -1e9
     _position_sent_at: float = -1e9
     _attitude_sent_at: float = -1e9
     _setpoint_at: float = -1e9
     _zeros_since: float = 1e9
-    _in_row: int = 0  # of the server's setpoints
+    _in_row: int = 0  # of the server's consecutive setpoints
     _hold_at: float = -1e9
-    _stick_hold_at: float = -1e9  # the last request for HOLD that a stick has brought
+    _stick_hold_at: float = -1e9  # the last request for HOLD because of a stick
     _sticks_at: float = -2e9
     _disarm_at: float = -1e9
-    _disarmed_at: float = -1e9  # when it was seen that somebody else has disarmed it
-    _mode_at: float = -1e9  # when it was last heard that the mode is another one
-    _hold_wished_at: float = -1e9  # when a client last asked for HOLD
-    _pause_at: float = -1e9  # when a client last asked for a pause
-    _greeting_at: float = -1e9  # when a client last asked for our mode: zeros may go before it
-    _hold_due: float | None = None  # when a zero left of which only HOLD says why
-    _client_arms_at: float = -1e9  # through the server, while it may be taking control
+    _disarmed_at: float = -1e9  # when another party was seen to have disarmed it
+    _mode_at: float = -1e9  # when another mode was last heard
+    _hold_wished_at: float = -1e9  # when a client last requested HOLD
+    _pause_at: float = -1e9  # when a client last requested a pause
+    _greeting_at: float = -1e9  # when a client last requested our mode: zeros may precede it
+    _hold_due: float | None = None  # when a zero left that needs a HOLD to explain it
+    _client_arms_at: float = -1e9  # through the server, which may be taking control
     _moved_last: bool = False
-    _brakes: bool = False  # zeros have followed motion, and nothing else since
+    _brakes: bool = False  # zeros have followed motion, and nothing since
     _stop_due: tuple[float, set[str]] | None = None
     _last_source: tuple[float, tuple[int, int]] | None = None
-    _course: float | None = None  # rad, of the last setpoint that arrived without speed
-    _course_at: float = -1e9  # when it became another one
-    _given_to: tuple[int, int] | None = None  # who last asked the rover for our mode
+    _course: float | None = None  # rad, of the last zero-speed setpoint that arrived
+    _course_at: float = -1e9  # when that course changed
+    _given_to: tuple[int, int] | None = None  # the last requester of our mode
 
     def __post_init__(self) -> None:
         self._decoder = common.MAVLink(None)
         self._asked: dict[tuple[str, bytes], float] = {}
         self._recent: deque[float] = deque(maxlen=BURST)
 
-    # where it looks
+    # inputs
 
     def asked(self, now: float, data: bytes, *, peer: str) -> None:
-        """A client's datagram reaches the server."""
+        """Note that a client's datagram reaches the server."""
         message = self._decode(data)
         if message is None or self._is_for_another(message):
             return
         kind = message.get_type()
         if kind in COMMANDS and message.command != STOP:
             if now - self._asked.get((peer, data), -1e9) <= SAME_PACKET:
-                return  # the same packet again is not acted on
+                return  # the server ignores a repeated packet
             self._asked[peer, data] = now
             if len(self._asked) > REMEMBERED:
                 del self._asked[next(iter(self._asked))]
@@ -194,11 +194,11 @@ class Observer:
             self._see_wish_of_client(now, message.custom_mode)
         elif kind in BY_HAND and _off_centre(message):
             self._sticks_at = now
-            if not self._brakes:  # else it is brought to a stand already, and handed back
+            if not self._brakes:  # else it is stopping already, and will be handed back
                 self._take_over(now, zeros=1)
 
     def heard(self, now: float, data: bytes, *, sent_at: float) -> None:
-        """A datagram from the vehicles' side reaches the server."""
+        """Note that a datagram from the vehicles' side reaches the server."""
         message = self._decode(data)
         if message is None or self._is_overtaken(now, data):
             return
@@ -217,7 +217,7 @@ class Observer:
                 self._attitude_sent_at = max(self._attitude_sent_at, sent_at)
 
     def _is_overtaken(self, now: float, data: bytes) -> bool:
-        """Whether it is a heartbeat of the rover, and a newer one came before: it is history."""
+        """Return whether a newer heartbeat of the rover came before this one."""
         if (data[5], data[6], data[7]) != (self.system_id, 1, 0):
             return False
         seq, at = self._newest
@@ -227,7 +227,7 @@ class Observer:
         return False
 
     def answered(self, now: float, data: bytes) -> None:
-        """The server sends a datagram to a client: to go on ends nothing if it is refused."""
+        """Note that the server answers a client: a refused request to continue ends nothing."""
         if int.from_bytes(data[7:10], "little") != ACK or data[5] != self.system_id:
             return
         message = self._decoder.decode(bytearray(data))
@@ -236,7 +236,7 @@ class Observer:
             self.stopped, self.taken_over = left
 
     def sent(self, now: float, data: bytes) -> None:
-        """The server sends a datagram to the rover."""
+        """Note that the server sends a datagram to the rover."""
         self._check_stop(now)
         message = self._decode(data)
         if message is None:
@@ -252,7 +252,7 @@ class Observer:
             self._check_stopped(now, message)
 
     def arrived(self, now: float, data: bytes) -> None:
-        """A datagram reaches the rover."""
+        """Note that a datagram reaches the rover."""
         if len(data) >= 12 and data[0] == 0xFD:
             kind = int.from_bytes(data[7:10], "little")
             self.reached.append(Reached(now, kind, (data[5], data[6])))
@@ -264,8 +264,8 @@ class Observer:
             self.may_move_until = max(self.may_move_until, now + ROVER_TIMEOUT)
         source = (message.get_srcSystem(), message.get_srcComponent())
         if self._is_wish_for_our_mode(message):
-            self._given_to = source  # whoever asks for our mode drives from here on
-            if self.ways.arms_in_hold:  # a PX4 goes on with the last that it followed before
+            self._given_to = source  # the requester of our mode drives from here on
+            if self.ways.arms_in_hold:  # a PX4 resumes the last setpoint that it followed
                 self.may_move_until = max(self.may_move_until, now + ENTERS)
         if message.get_type() in SETPOINTS and _moves(message):
             if source == SERVER and not self.is_ready() and self._is_known_unready(now):
@@ -283,21 +283,21 @@ class Observer:
         return is_of_mode and self.ways.mode_of(message) == self.ways.ours
 
     def server_restarted(self) -> None:
-        """Another server knows nothing of what the first one saw, and drives nothing yet."""
+        """Note that a new server starts: it has no knowledge, and drives nothing yet."""
         self.armed, self.mode = False, -1
         self._moved_last = self._zero_in_mode = self._brakes = False
 
     def check(self, *, now: float = float("inf")) -> None:
-        """Raise AssertionError if anything was wrong."""
+        """Raise AssertionError if there were violations."""
         self._check_stop(now)
         assert not self.violations, "\n".join(self.violations)
 
-    # what a test may ask
+    # queries
 
     def sent_since(self, at: float) -> list[str]:
-        """Return what the server sent from ``at`` on, in words: zero, move, HOLD, arm, 511, ...
+        """Return the server's packets from ``at`` on, in words: zero, move, HOLD, arm, 511, ...
 
-        That it asks for a heartbeat now and then is left out.
+        Its periodic requests for a heartbeat are left out.
         """
         names = [self._name(message) for t, message in self.driven if t >= at]
         return [name for name in names if name != SHOW]
@@ -309,7 +309,7 @@ class Observer:
         if message.command == STOP:
             self.stopped, self.taken_over, self.stopped_at = True, False, now
             self._wishes.stopped()
-            if self.mode >= 0:  # else it is not found yet, and is stopped when it is
+            if self.mode >= 0:  # else it is stopped when it is found
                 self._stop_due = (now, {"zero", "HOLD"})
         elif message.command == PAUSE_CONTINUE:
             is_continue = param1 == 1.0
@@ -341,18 +341,18 @@ class Observer:
     def _see_heartbeat(self, now: float, message: Any) -> None:
         armed, mode = bool(message.base_mode & 128), int(message.custom_mode)
         if self.stopped and self.mode < 0:
-            self._stop_due = (now, {"zero", "HOLD"})  # found now
+            self._stop_due = (now, {"zero", "HOLD"})  # it is found now
         if self.armed and not armed and now - self._disarm_at > OWN_REQUEST:
-            self._take_over(now, zeros=1)  # what the rover keeps must not drive it when armed again
-            self._disarmed_at = now  # nor where it was taken over before
+            self._take_over(now, zeros=1)  # its kept setpoint must not drive it when armed
+            self._disarmed_at = now  # nor where it was taken over
         if mode != self.mode:
             self._zero_in_mode = self._brakes = False
             self._mode_at = now
             asked = mode == self.ways.hold and now - self._hold_at < OWN_REQUEST
-            by_us = asked and not self._moved_last  # driving on, we had not asked for this one
-            # news of HOLD in the step in which a client asks for it, and in which we ask the rover
+            by_us = asked and not self._moved_last  # while driving, we had not requested it
+            # in one step: the news of HOLD, a client's request for it, and ours to the rover
             by_us |= self.batches and mode == self.ways.hold and now == self._hold_wished_at
-            # it has restarted before it was driven: the task that is to drive it begins again
+            # it restarted before it was driven: the starting task starts again
             by_us |= mode == INITIALISING and not self._moved_last
             if self.mode == self.ways.ours and not by_us:
                 self._take_over(now, zeros=0)
@@ -366,19 +366,19 @@ class Observer:
         return self._unready_since is not None and now - self._unready_since > KNOWN
 
     def _is_held_for_sticks(self, now: float) -> bool:
-        """Whether it was asked for HOLD in the step of a stick: with zeros until it shows that."""
+        """Return whether a stick caused a HOLD request, with zeros until the rover shows HOLD."""
         return now - self._stick_hold_at <= OWN_REQUEST
 
     @property
     def _is_held_since_stick(self) -> bool:
-        """Whether it is in our mode, and was asked for HOLD because of a stick."""
+        """Whether the rover is in our mode, after a HOLD request because of a stick."""
         return self.mode == self.ways.ours and self._stick_hold_at >= self._sticks_at > -1e9
 
     def _take_over(self, now: float, *, zeros: int) -> None:
-        """Somebody else has the rover; of interest only while the server is driving."""
-        self._in_row = 0  # it may have been handing it back, and ends that, too
+        """Note that another party has the rover; relevant only while the server drives."""
+        self._in_row = 0  # it may have been handing back, which ends, too
         if not self._moved_last and now - self._hold_at < OWN_REQUEST:
-            return  # it was handing it back
+            return  # it was handing the rover back
         if now - self._setpoint_at < ENGAGED and not self.stopped and not self.taken_over:
             self.taken_over = True
             self._zeros_left = zeros
@@ -396,7 +396,7 @@ class Observer:
                 self._violation(now, "a client's setpoint while the server drives")
             return
         if self.taken_over and (moves or now != self._greeting_at):
-            # a zero goes with HOLD or soon after it: for a pause, or to undo what came late
+            # a zero accompanies or follows HOLD: for a pause, or to undo a late request
             hold_at = self._hold_at if self.expects_late_modes else -1e9
             is_held = now - max(hold_at, self._stick_hold_at) <= OWN_REQUEST
             is_pause = now == self._pause_at or self._is_held_since_stick
@@ -468,7 +468,7 @@ class Observer:
             is_for_stick = self._is_held_for_sticks(now) or self._is_held_since_stick
             if now == self._sticks_at or is_for_stick:
                 self._stick_hold_at = now
-            if now == self._pause_at:  # carried out as HOLD it is a wish for HOLD
+            if now == self._pause_at:  # carried out as HOLD, it is a request for HOLD
                 self._see_wish_of_client(now, wanted)
             self._hold_due = None
             if self._stop_due is not None:
@@ -481,14 +481,14 @@ class Observer:
             elif now - self._zeros_since < LEAD_IN or now - self._setpoint_at > GAP:
                 self._violation(now, "our mode asked for before a second of zeros")
         elif self.batches and now == self._mode_at:
-            pass  # it left in the step in which the news came, and perhaps before them
+            pass  # it left in the step of the news, and perhaps before it
         elif self.mode not in (ways.hold, ways.ours) and (
             (self.armed and now - self._client_arms_at > BY_CLIENT) or self.mode not in ways.manual
         ):
             self._violation(now, f"our mode taken from mode {self.mode}")
 
     def _check_stopped(self, now: float, message: Any) -> None:
-        """While STOP is latched nothing passes that could move the rover."""
+        """Check that nothing that could move the rover passes while STOP is latched."""
         kind = message.get_type()
         moves = (kind in SETPOINTS and _moves(message)) or kind in (*MOTION[2:], *BY_HAND)
         if kind in COMMANDS:
@@ -503,9 +503,9 @@ class Observer:
             self._violation(now, f"passed in spite of STOP: {self._name(message)}")
 
     def _keeps_moving(self, message: Any) -> float:
-        """Return how long, in seconds, the rover may move for a packet that nothing follows."""
+        """Return how long the rover may move after a packet if nothing follows, s."""
         kind, never = message.get_type(), -1e9
-        quiet = (self.ways.ours, self.ways.hold)  # modes in which it waits for more
+        quiet = (self.ways.ours, self.ways.hold)  # modes in which it waits
         if kind in SETPOINTS:
             return ROVER_TIMEOUT if _moves(message) else never
         if kind == "SET_MODE":
@@ -518,7 +518,7 @@ class Observer:
         return FAR if goes else never
 
     def _turns(self, now: float, message: Any) -> bool:
-        """Whether a setpoint without speed turns the rover: a PX4 one faces along its course."""
+        """Return whether a zero-speed setpoint turns the rover: a PX4 faces along its course."""
         if _moves(message) or not (message.vx or message.vy):
             return False
         course = atan2(message.vy, message.vx)
@@ -528,7 +528,7 @@ class Observer:
         return now - self._course_at <= TURN
 
     def _check_stop(self, now: float) -> None:
-        """Zero and HOLD left in the step in which STOP, or a pause, came."""
+        """Check that zero and HOLD left in the step of a STOP, or HOLD in that of a pause."""
         if self._hold_due is not None and now > self._hold_due:
             self._violation(self._hold_due, "setpoint after a takeover: zero without HOLD")
             self._hold_due = None
@@ -551,7 +551,7 @@ class Observer:
             return None  # garbage that a test sends
 
     def _name(self, message: Any) -> str:
-        """Return a packet to the rover in one word."""
+        """Return one word for a packet to the rover."""
         kind = message.get_type()
         if kind in SETPOINTS:
             return "move" if _moves(message) else "zero"
@@ -571,7 +571,7 @@ class Observer:
 
 
 def _moves(message: Any) -> bool:
-    """Whether a setpoint asks for motion; 1 mm/s along a course asks a PX4 rover to stand."""
+    """Return whether a setpoint demands motion; 1 mm/s along a course makes a PX4 rover stand."""
     speeds = (message.vx, message.vy, message.vz, message.yaw_rate)
     return any(not abs(speed) < 0.002 for speed in speeds)
 
@@ -585,7 +585,7 @@ def _off_centre(message: Any) -> bool:
 
 
 def _is_to_stay(message: Any) -> bool:
-    """Whether it is a "go to" without a place."""
+    """Return whether it is a "go to" without a place."""
     return (
         message.command == REPOSITION
         and message.get_type() == "COMMAND_INT"

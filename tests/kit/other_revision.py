@@ -1,4 +1,4 @@
-"""Another revision of the project in a folder of its own, for whoever compares with it."""
+"""Exports another revision of the project to a folder, for comparisons."""
 
 import subprocess
 import sys
@@ -26,9 +26,9 @@ def commit_of(revision: str) -> str:
 
 @contextmanager
 def checked_out(revision: str) -> Iterator[Path]:
-    """Return a folder with the files of a revision and its generated dialect; it is removed after.
+    """Return a folder with the files of a revision and its generated dialect; it is removed later.
 
-    It is an export, not a work tree of git: nothing is left behind in the repository.
+    It is an export, not a git worktree, so nothing is left behind in the repository.
     """
     commit = commit_of(revision)
     with TemporaryDirectory(prefix=f"mav-tasks-{commit[:8]}-") as name:

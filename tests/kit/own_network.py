@@ -1,8 +1,8 @@
-"""Runs a Python program in a network of its own, which has nothing but its loopback.
+"""Runs a Python program in its own network namespace, which has only a loopback.
 
-For what listens on every interface and cannot be told not to. Linux only, and not everywhere
-allowed: ``is_possible`` asks. ``python -m tests.kit.own_network ARGUMENT...`` becomes
-``python ARGUMENT...`` there.
+For programs that always listen on every interface. Linux only, and not permitted everywhere:
+``is_possible`` tells. ``python -m tests.kit.own_network ARGUMENT...`` becomes ``python
+ARGUMENT...`` there.
 """
 
 import ctypes
@@ -20,18 +20,18 @@ IFF_UP = 1  # linux/if.h
 
 
 def is_possible() -> bool:
-    """Whether this machine lets us, asked of a process of its own."""
+    """Return whether this machine permits it, tried in a child process."""
     command = [sys.executable, "-m", "tests.kit.own_network", "-c", ""]
     root = Path(__file__).resolve().parents[2]
     return subprocess.run(command, cwd=root, capture_output=True, check=False).returncode == 0
 
 
 def enter() -> None:
-    """Leave the machine's network for an empty one, and take its loopback up; OSError if not."""
+    """Enter a new network namespace and bring its loopback up. Raise OSError if forbidden."""
     user, group = os.getuid(), os.getgid()
     try:
         _unshare(CLONE_NEWNET)
-    except PermissionError:  # not the superuser: in a name space of users one may
+    except PermissionError:  # not root: a user namespace may permit it
         _unshare(CLONE_NEWUSER | CLONE_NEWNET)
         Path("/proc/self/setgroups").write_text("deny", encoding="ascii")
         Path("/proc/self/uid_map").write_text(f"{user} {user} 1", encoding="ascii")

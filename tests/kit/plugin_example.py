@@ -1,4 +1,4 @@
-"""A stranger's test file, as sim/README.md shows it."""
+"""A user's test file, as shown in sim/README.md."""
 
 EXAMPLE = """\
 import pytest

@@ -1,4 +1,4 @@
-"""A probe and a simulated rover on one net, in virtual time; what may never be is watched."""
+"""A probe and a simulated rover on one net, in virtual time, with invariants checked each step."""
 
 from collections.abc import Callable
 from math import hypot, isfinite
@@ -18,10 +18,10 @@ from rover_sim.vehicle import make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.world import PX4_HOLD, kinematic_body
 
-BOOT = 5.0  # s before anybody asks: its estimate has settled
+BOOT = 5.0  # s until the start: the rover's estimate has settled
 OVER_WITHIN = 120.0  # s
-BOX = 1.0  # m from its middle to a side
-GUIDED_BEFORE = 0.2  # s that a setpoint may be under way after the rover has left the mode
+BOX = 1.0  # m from the middle to a side
+GUIDED_BEFORE = 0.2  # s for which a setpoint may be in transit after the rover left the mode
 
 
 class ProbeParty:
@@ -38,7 +38,7 @@ class ProbeParty:
         return None if self.probe.is_over else self.probe.next_deadline()
 
     def turn(self, *, now: float) -> None:
-        """Read, do what is due, send."""
+        """Read packets, do what is due, send packets."""
         for _, data in self._link.receive(len(self._link.arrived)):
             for packet in split_datagram(data):
                 if not self.probe.is_over:
@@ -54,7 +54,7 @@ class ProbeParty:
 
 
 class ProbeWorld(VirtualWorld):
-    """One rover that has just settled, and who probes it."""
+    """One settled rover, and the probe."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class ProbeWorld(VirtualWorld):
         self.start = start
         self.rover = make_vehicle(body(start), system_id=1, now=0.0, persona=persona, realism=EXACT)
         if "COM_OBL_RC_ACT" in self.rover.autopilot.parameters:
-            # by default a PX4 rover drives home when setpoints stop: some tests set that back
+            # by default a PX4 rover drives home when setpoints stop; some tests restore that
             self.rover.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
         self.join(RoverParty(self.rover, self.net.link("rover1")))
         self.run(BOOT)
@@ -80,51 +80,51 @@ class ProbeWorld(VirtualWorld):
         self.party = ProbeParty(link, options, now=self.now)
         self.farthest = 0.0
         self._looked_at = 0
-        self._driven_at = -1.0  # when it was last really armed and in the mode for it
+        self._driven_at = -1.0  # when it was last truly armed and in GUIDED
         self.join(self.party)
         self.watch(self._look)
 
     @property
     def probe(self) -> Probe:
-        """The probe itself."""
+        """The probe."""
         return self.party.probe
 
     @property
     def driven(self) -> Drive:
-        """What came of driving."""
+        """The result of driving."""
         assert self.probe.findings.drive is not None
         return self.probe.findings.drive
 
     def finish(self) -> Probe:
-        """Let time pass until the probe is over."""
+        """Let time pass until the probe is over; return it."""
         assert self.run_until(lambda: self.probe.is_over, within=OVER_WITHIN), repr(self.probe)
         return self.probe
 
     def until_moving(self) -> None:
-        """Let time pass until the rover really moves."""
+        """Let time pass until the rover truly moves."""
         moving = self.run_until(lambda: abs(self.rover.truth.forward_speed) > 0.15, within=60)
         assert moving, repr(self.probe)
 
     def fault(self, faults: Faults) -> None:
-        """Break something in the rover; ``Faults()`` mends it."""
+        """Set faults of the rover; ``Faults()`` clears them."""
         self.rover.autopilot.set_faults(faults)
 
     def somebody_sends(self, message: m.Message, source: Address) -> None:
-        """Let the probe hear a message of somebody else."""
+        """Send a message of another sender to the probe."""
         self._stranger.send("probe", Encoder(source).encode(message))
 
     def stands(self) -> bool:
-        """Whether the rover really stands."""
+        """Return whether the rover truly stands."""
         truth = self.rover.truth
         return abs(truth.forward_speed) < 0.01 and abs(truth.yaw_rate) < 0.01
 
     def rests(self) -> bool:
-        """Whether it stands in HOLD, disarmed."""
+        """Return whether the rover stands in HOLD, disarmed."""
         autopilot = self.rover.autopilot
         return self.stands() and autopilot.mode is Mode.HOLD and not autopilot.armed
 
     def commands(self) -> list[tuple[int, float]]:
-        """Return id and first parameter of every command that was sent."""
+        """Return id and first parameter of every sent command."""
         return [
             (message.command, message.param1)
             for _, message in self.party.sent
@@ -132,7 +132,7 @@ class ProbeWorld(VirtualWorld):
         ]
 
     def setpoints(self) -> list[tuple[float, m.SetPositionTargetLocalNed]]:
-        """Return every setpoint that was sent, and when."""
+        """Return every sent setpoint with its time."""
         return [
             (at, message)
             for at, message in self.party.sent
@@ -140,7 +140,7 @@ class ProbeWorld(VirtualWorld):
         ]
 
     def _look(self, now: float) -> None:
-        """No NaN, nothing that moves it unless it is armed and in the mode for it, and the box."""
+        """Check the box, and setpoints: finite, and moving only if armed in GUIDED."""
         autopilot, truth = self.rover.autopilot, self.rover.truth
         if autopilot.armed and autopilot.mode is Mode.GUIDED:
             self._driven_at = now
@@ -158,5 +158,5 @@ class ProbeWorld(VirtualWorld):
 
 
 def is_moving(message: m.SetPositionTargetLocalNed) -> bool:
-    """Whether a setpoint asks for any motion."""
+    """Return whether a setpoint demands motion."""
     return any(abs(v) >= 0.002 for v in (message.vx, message.vy, message.vz, message.yaw_rate))

@@ -1,4 +1,4 @@
-"""Real processes on loopback: the server, the simulated rover, and where the rover truly is."""
+"""Real processes on loopback: the server, the simulated rover, and the rover's true poses."""
 
 import csv
 import os
@@ -23,27 +23,27 @@ from mav_tasks.services.command_receiver import COPIED
 
 T = TypeVar("T")
 
-START_LIMIT = 20.0  # s, for a process to say that it is there (cold caches, busy machine)
+START_LIMIT = 20.0  # s, for a process to report its start (cold caches, busy machine)
 STOP_LIMIT = 10.0  # s
-PORTS = range(20_000, 32_000)  # below those that Linux gives by itself, above 14550 and its like
-WORKERS = 8  # of pytest-xdist, each with ports of its own
-TOLD_OF_A_FAILURE = 8_000  # characters of what each process had said
+PORTS = range(20_000, 32_000)  # below Linux's ephemeral ports, above 14550 and its like
+WORKERS = 8  # of pytest-xdist, each with its own ports
+TOLD_OF_A_FAILURE = 8_000  # characters of each process's output
 
 
 @dataclass
 class Process:
-    """A process that we started, and what it says."""
+    """A started process, and its output."""
 
     popen: subprocess.Popen[bytes]
     output: Path
 
     @property
     def text(self) -> str:
-        """Return all that it has written so far."""
+        """Its output so far."""
         return self.output.read_text(encoding="utf-8", errors="replace")
 
     def wait_for(self, pattern: str, *, within: float = START_LIMIT) -> re.Match[str]:
-        """Wait until it writes something that matches."""
+        """Wait until the output matches; return the match."""
         return wait_until(
             lambda: re.search(pattern, self.text),
             within=within,
@@ -51,7 +51,7 @@ class Process:
         )
 
     def end(self, number: int = signal.SIGTERM) -> float:
-        """Send a signal and wait for the end; gives the seconds that it took."""
+        """Send a signal and wait for the end; return the seconds that it took."""
         began = time.monotonic()
         self.popen.send_signal(number)
         self.popen.wait(STOP_LIMIT)
@@ -61,7 +61,7 @@ class Process:
 def wait_until(
     condition: Callable[[], T | None], *, within: float, what: Callable[[], str] | str = "condition"
 ) -> T:
-    """Ask until the answer is true; AssertionError names what did not come in time."""
+    """Poll a condition until it is true, and return it. Raise AssertionError with ``what``."""
     end = time.monotonic() + within
     while not (answer := condition()):
         if time.monotonic() > end:
@@ -71,7 +71,7 @@ def wait_until(
 
 
 def environment_with(**variables: str) -> dict[str, str]:
-    """Return our environment without its user's configuration, and with these variables."""
+    """Return our environment without the user's configuration, plus these variables."""
     return {**os.environ, "MAV_TASKS_CONFIG": "", **variables}
 
 
@@ -79,10 +79,10 @@ def environment_with(**variables: str) -> dict[str, str]:
 def process(
     *arguments: str, folder: Path, name: str, python: str = sys.executable
 ) -> Iterator[Process]:
-    """Run a Python process while the block runs; it is killed if it is still there after it.
+    """Run a Python process for a ``with`` block; kill it if it is still running.
 
-    A server in it that is told no store has one in ``folder``: never its user's own, and none of
-    its user's configuration and keys.
+    Without a store option, a server's store is in ``folder``; it never uses the user's store,
+    configuration or keys.
     """
     output = folder / f"{name}.log"
     with output.open("wb") as sink:
@@ -111,7 +111,7 @@ def process(
 
 @dataclass
 class Stand:
-    """A server and a rover, running."""
+    """A running server and rover."""
 
     server: Process
     rover: Process
@@ -122,7 +122,7 @@ class Stand:
     _links: list[Any] = field(default_factory=list)
 
     def truth(self) -> list[dict[str, float]]:
-        """Return the true poses so far, ten a second; a last half line is left out."""
+        """Return the true poses so far, at 10 Hz, without an incomplete last line."""
         text = self.truth_file.read_text(encoding="ascii")
         rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
         return [{key: float(value) for key, value in row.items()} for row in rows]
@@ -132,20 +132,20 @@ class Stand:
         return abs(self.truth()[-1]["forward_speed"])
 
     def connect(self, *, source_system: int = 255) -> Any:
-        """Return a stock pymavlink connection to the server that has heard the rover."""
+        """Return a stock pymavlink connection to the server; it has heard the rover."""
         return self.heard(f"udpout:127.0.0.1:{self.client_port}", source_system)
 
     def connect_to_rover(self) -> Any:
-        """Give one to the rover itself, past the server."""
+        """Return a stock pymavlink connection to the rover, bypassing the server."""
         return self.heard(f"udpout:127.0.0.1:{self.rover_port}", 254)
 
     def close(self) -> None:
-        """Close every connection given."""
+        """Close every connection."""
         for link in self._links:
             link.close()
 
     def heard(self, url: str, source_system: int = 255, **options: Any) -> Any:
-        """Return a stock pymavlink connection that has said hello and heard the rover."""
+        """Return a stock pymavlink connection that has sent a heartbeat and heard the rover."""
         link = mavutil.mavlink_connection(url, source_system=source_system, **options)
         self._links.append(link)
         link.mav.heartbeat_send(6, 8, 0, 0, 4)
@@ -155,7 +155,7 @@ class Stand:
         return link
 
     def heard_by(self, url: str, source_system: int = 255) -> Any:
-        """Give one to which the server comes: who is there can be spoken to only then."""
+        """Return a connection to which the server speaks first; only then can it be answered."""
         link = mavutil.mavlink_connection(url, source_system=source_system)
         self._links.append(link)
         wait_for(link, "HEARTBEAT")
@@ -164,14 +164,14 @@ class Stand:
         return link
 
     def drive(self, link: Any, distance: float) -> int:
-        """Submit a move, wait until the rover is at speed; gives the task's id."""
+        """Submit a move and wait until the rover is at speed; return the task's id."""
         task_id = submit(link, 54000, distance)
         wait_until(lambda: self.speed() > 0.3, within=15, what="the rover at speed")
         return task_id
 
 
 def udp_to(rover_port: int) -> AbstractContextManager[str]:
-    """Return the way to a rover past which there is nothing."""
+    """Return the rover's plain UDP URL."""
     return nullcontext(f"udpout:127.0.0.1:{rover_port}")
 
 
@@ -187,21 +187,20 @@ def stand(
     module: tuple[str, ...] = ("mav_tasks.cli",),
     way: Callable[[int], AbstractContextManager[str]] = udp_to,
 ) -> Iterator[Stand]:
-    """Run a server and a rover of that make on ports of their own.
+    """Run a server and a rover of a persona on their own ports.
 
-    ``module`` is what runs the server, with its arguments before ``serve``. ``way`` makes of the
-    rover's UDP port the URL by which the server is to reach it, ``client_options`` stand behind the
-    URL for clients.
+    ``module`` runs the server, with its arguments before ``serve``. ``way`` turns the rover's UDP
+    port into the server's URL for it. ``client_options`` follow the URL for clients.
     """
     client_port, rover_port, push_port = free_udp_ports(3)
     truth = folder / "truth.csv"
     rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", body, "--persona", persona]
-    # The scenarios on processes were written for exact arithmetic; px4 then has many peers.
+    # The process scenarios need exact arithmetic; px4 then answers many peers.
     rover += ["--noise", "off", "--truth", str(truth), *rover_options]
     serve = ["-m", *module, "serve"]
     serve += ["--client", f"udpin:127.0.0.1:{client_port}{client_options}"]
     serve += ["--push", f"127.0.0.1:{push_port}"]
-    # a PX4 rover drives home by itself when setpoints stop: tests that are about that say so
+    # a PX4 rover drives home when setpoints stop; tests of that set their own option
     if not any("loss_failsafe" in option for option in serve_options):
         serve += ["--set", "rules.loss_failsafe=accept"]
     serve += ["--store", serve_store, *serve_options]
@@ -220,7 +219,7 @@ def stand(
 
 
 def submit(link: Any, command: int, *params: float, target: tuple[int, int] = (1, 191)) -> int:
-    """Send a COMMAND_LONG, wait for its acceptance; gives result_param2, the task's id."""
+    """Send a COMMAND_LONG and wait for its acceptance; return result_param2, the task's id."""
     ack = command_long(link, command, *params, target=target)
     assert ack.result == 0, ack
     return int(ack.result_param2)
@@ -229,7 +228,7 @@ def submit(link: Any, command: int, *params: float, target: tuple[int, int] = (1
 def command_long(
     link: Any, command: int, *params: float, target: tuple[int, int] = (1, 191)
 ) -> Any:
-    """Send a COMMAND_LONG and give its COMMAND_ACK."""
+    """Send a COMMAND_LONG and return its COMMAND_ACK."""
     filled = (*params, *(0.0,) * (7 - len(params)))
     link.mav.command_long_send(*target, command, 0, *filled)
     ack = link.recv_match(
@@ -240,17 +239,17 @@ def command_long(
 
 
 def after_a_restart() -> None:
-    """Wait until the server, just started again, takes no word for a copy of an older one."""
+    """Wait until a restarted server no longer treats a request as a copy of an older one."""
     time.sleep(COPIED + 0.5)
 
 
 def free_tcp_ports(count: int) -> list[int]:
-    """Return TCP ports of the loopback that nobody uses at this moment."""
+    """Return free TCP ports of the loopback."""
     return _free_ports(count, socket.SOCK_STREAM)
 
 
 def free_udp_ports(count: int) -> list[int]:
-    """Return UDP ports of the loopback that nobody uses at this moment."""
+    """Return free UDP ports of the loopback."""
     return _free_ports(count, socket.SOCK_DGRAM)
 
 
@@ -268,15 +267,15 @@ def _is_free(port: int, kind: socket.SocketKind) -> bool:
 
 
 def _ports_of_this_process() -> Iterator[int]:
-    """Return ports that no other process of this run is given, none again before all have been.
+    """Yield ports that no other process of this run gets, each again only after all others.
 
-    They lie below those that the system gives by itself: a server goes on sending to who has just
-    left, and pushes to where nobody may listen. What comes next to such a port would hear it, and
-    take a stranger's rover for its own.
+    They lie below the system's ephemeral ports: a server keeps sending to a client that has just
+    left, and pushes to ports where nobody may listen. The next user of such a port would receive
+    that, and take another test's rover for its own.
     """
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     own = PORTS[worker % WORKERS :: WORKERS]
-    begin = os.getpid() * 97 % len(own)  # two runs beside each other begin at different ones
+    begin = os.getpid() * 97 % len(own)  # concurrent runs start at different ports
     return cycle((*own[begin:], *own[:begin]))
 
 
@@ -286,7 +285,7 @@ _own_ports = _ports_of_this_process()
 def wait_for(
     link: Any, kind: str | list[str], condition: str | None = None, *, within: float = 10
 ) -> Any:
-    """Wait for a message of a kind."""
+    """Wait for a message of a type; return it."""
     message = link.recv_match(type=kind, condition=condition, blocking=True, timeout=within)
     assert message is not None, f"no {kind} ({condition}) in {within} s"
     return message
@@ -294,7 +293,7 @@ def wait_for(
 
 @contextmanager
 def frozen(process: Process) -> Iterator[None]:
-    """Have a process do nothing for a while."""
+    """Stop a process (SIGSTOP) for a ``with`` block."""
     process.popen.send_signal(signal.SIGSTOP)
     try:
         yield

@@ -1,4 +1,4 @@
-"""PX4 and generic rovers of the scenarios, and what clients ask of them."""
+"""PX4 and generic rovers of the scenarios, and requests of their clients."""
 
 from dataclasses import replace
 from math import nan
@@ -15,14 +15,14 @@ MANUAL, HOLD, MISSION, RETURN, OFFBOARD = (
     4 << 16 | 5 << 24,
     6 << 16,
 )
-ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED, which MAVSDK sends along
+ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED, which MAVSDK sets, too
 
-#: show each change at once, so that the times are those of the server alone
+#: they announce each change at once, so that times depend on the server alone
 PROMPT_PX4, PROMPT_GENERIC = (replace(each, announces_changes=True) for each in (PX4, GENERIC))
 
 
 def go_to(world: World, north: float, east: float, *, yaw: float = nan) -> int:
-    """Send the rover to a place, metres from the origin; gives the task's id."""
+    """Send the rover to a place, metres from the origin; return the task's id."""
     place = at(north, east)
     sent = world.client.command_int(REPOSITION, -1, 1, 0, yaw, **place, frame=6, target=(1, 1))
     world.run(0.2)
@@ -30,5 +30,5 @@ def go_to(world: World, north: float, east: float, *, yaw: float = nan) -> int:
 
 
 def ask_mode(client: FakeClient, mode: int, *, target: tuple[int, int] = (1, 1)) -> Sent:
-    """Ask for a mode as MAVSDK does."""
+    """Request a mode as MAVSDK does."""
     return client.command(SET_MODE, 1 | ARMED, mode >> 16 & 0xFF, mode >> 24, target=target)

@@ -1,5 +1,6 @@
-"""A world in which a rover says nothing but that it is there: for what passes between clients and
-the server alone, many seeds of it.
+"""A world whose rover sends only heartbeats, for traffic between clients and server.
+
+It is cheap enough for many seeds.
 """
 
 from collections.abc import Callable
@@ -18,7 +19,7 @@ ROVER = "rover1"
 
 
 class QuietWorld(VirtualWorld):
-    """A server, a rover that only beats, and clients; the net between is as bad as told."""
+    """A server, a rover that sends only heartbeats, and clients; tests can degrade the net."""
 
     def __init__(self, *, seed: int) -> None:
         self.seed = seed
@@ -32,7 +33,7 @@ class QuietWorld(VirtualWorld):
         self.until(lambda: self.server.engine.snapshot(now=self.now).vehicles, within=5)
 
     def add_client(self, name: str) -> FakeClient:
-        """Let another client take part."""
+        """Add another client."""
         client = FakeClient(self.net, name)
         self.join(client)
         return client
@@ -42,24 +43,24 @@ class QuietWorld(VirtualWorld):
         return self.server.engine.snapshot(now=self.now).tasks
 
     def until(self, condition: Callable[[], object], *, within: float) -> None:
-        """Let time pass until the condition holds; AssertionError if it does not."""
+        """Let time pass until the condition holds. Raise AssertionError if it does not."""
         came = self.run_until(lambda: bool(condition()), within=within)
         assert came, f"not within {within} s (seed {self.seed}, t={self.now:.2f})"
 
 
 class Wire(MemoryNet):
-    """A net that notes what passes about uploads: what the server heard, and what it said."""
+    """A net that records the traffic of uploads: requests, counts and acks."""
 
     def __init__(self, *, seed: int, conditions: Conditions) -> None:
         super().__init__(seed=seed, conditions=conditions)
-        #: (client, item) that the server asked for; item None: a count of the client's arrived
+        #: (client, item) per request of the server; item None: a client's count arrived
         self.asked: list[tuple[str, int | None]] = []
-        #: (client, ack) that the server sent, whether it arrived or not
+        #: (client, ack) per ack of the server, whether it arrived or not
         self.acks: list[tuple[str, Ack]] = []
         self._newest: dict[str, int] = {}
 
     def send(self, source: str, target: str, data: bytes) -> None:
-        """Note what the server says."""
+        """Record the server's requests and acks."""
         if source == CLIENT_LINK and (_is(data, REQUEST) or _is(data, REQUEST_INT)):
             self.asked.append((target, int.from_bytes(_payload(data)[:2], "little")))
         elif source == CLIENT_LINK and _is(data, MISSION_ACK):
@@ -67,7 +68,7 @@ class Wire(MemoryNet):
         super().send(source, target, data)
 
     def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
-        """Note a count that is newer than all that came before."""
+        """Record a count that is newer than all packets before."""
         if link.name == CLIENT_LINK:
             newest = self._newest.get(source)
             if newest is None or (data[4] - newest) % 256 < 128:
@@ -86,7 +87,7 @@ def _payload(data: bytes) -> bytes:
 
 
 class Beacon:
-    """A rover's heartbeats."""
+    """A rover that sends only heartbeats."""
 
     def __init__(self, net: MemoryNet) -> None:
         self._link = net.link(ROVER)

@@ -1,8 +1,8 @@
-"""Runs a test again that failed while the machine stood still; nothing else is run again.
+"""Reruns a test that failed while the machine stalled; other failures are not rerun.
 
-A server kept from running for half a second holds what it drives, as it must. Such a failure says
-nothing of what was tried. The test begins anew with all that it shares with others: a server that
-holds a task would fail whoever comes next.
+A server that does not run for half a second holds its tasks, as it must, and such a failure says
+nothing about the test. The rerun gets new shared fixtures, because a server with a held task would
+fail the next test.
 """
 
 from collections.abc import Generator, Iterator
@@ -15,29 +15,29 @@ from _pytest.runner import runtestprotocol
 
 from tests.kit.stalls import StallWatch
 
-AGAIN = 2  # times at the most
+AGAIN = 2  # reruns, at most
 OUTCOME = "rerun"  # of a report
 
 
 class MachineStoodStill(AssertionError):
-    """What failed did so while nothing on this machine ran."""
+    """A test failed while nothing on this machine ran."""
 
 
 class RunAgain:
-    """The plugin of pytest that does it, in each process that runs tests."""
+    """The pytest plugin, one instance per test process."""
 
     def __init__(self) -> None:
         self._watch: StallWatch | None = None
-        self._timer: Any = None  # what pytest-timeout was last set to
+        self._timer: Any = None  # the last setting of pytest-timeout
         self._stood_still = False
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item, nextitem: pytest.Item | None) -> bool:
-        """Run a test, in the place of pytest's own."""
+        """Run a test, instead of pytest's own protocol."""
         if self._watch is None:
             self._watch = StallWatch()
         for times in range(1 + AGAIN):
-            if times and self._timer is not None:  # each time for itself
+            if times and self._timer is not None:  # restart it for each run
                 item.ihook.pytest_timeout_cancel_timer(item=item)
                 item.ihook.pytest_timeout_set_timer(item=item, settings=self._timer)
             self._stood_still = False
@@ -55,40 +55,40 @@ class RunAgain:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_setup(self) -> Generator[None, None, None]:
-        """See whether what fails in a fixture has such a cause."""
+        """Detect a stall during the setup."""
         with self._seen():
             return (yield)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self) -> Generator[None, None, None]:
-        """See whether what fails in the test itself has such a cause."""
+        """Detect a stall during the test."""
         with self._seen():
             return (yield)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_teardown(self, item: pytest.Item) -> Generator[None, None, None]:
-        """Leave nothing of it to whatever comes next."""
+        """Tear down shared fixtures after a stall."""
         yield
         if self._stood_still:
             item.session._setupstate.teardown_exact(None)
 
     @pytest.hookimpl(wrapper=True, optionalhook=True)
     def pytest_timeout_set_timer(self, settings: Any) -> Generator[None, Any, Any]:
-        """Note to what a test's timer is set."""
+        """Record the setting of a test's timer."""
         self._timer = settings
         return (yield)
 
     def pytest_report_teststatus(self, report: Any) -> tuple[str, str, str] | None:
-        """Return the letter and the word that are shown."""
+        """Return the status letter and word of a rerun."""
         return (OUTCOME, "R", "RERUN") if report.outcome == OUTCOME else None
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        """Name each that was run again, and why."""
+        """List each rerun with its reason."""
         for report in terminalreporter.getreports(OUTCOME):
             terminalreporter.line(f"RERUN {report.nodeid}: {report.longrepr.reprcrash.message}")
 
     def pytest_unconfigure(self) -> None:
-        """End the watcher."""
+        """Stop the stall watcher."""
         if self._watch is not None:
             self._watch.close()
 

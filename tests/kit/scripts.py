@@ -1,4 +1,4 @@
-"""Scripts that use MAVSDK, each a process of its own: a crash takes down nothing else."""
+"""Scripts that use MAVSDK, each in its own process, so that a crash affects nothing else."""
 
 import signal
 import subprocess
@@ -16,8 +16,7 @@ from tests.kit.processes import STOP_LIMIT, Stand
 FACES = {"sync": "", "asyncio": "asyncio_"}
 LOSS = 0.2  # of the datagrams, each way
 NETS = {0.0: "nothing lost", LOSS: "a fifth lost"}
-#: each make of rover on each net, each face on each net: not each with each, which would take ten
-#: minutes more
+#: each make on each net, and each face on each net; the full product would take ten minutes more
 CASES = (
     ("ardupilot", "sync", 0.0),
     ("ardupilot", "asyncio", 0.0),
@@ -31,8 +30,8 @@ CASES = (
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 150.0  # s for a script
 SEED = 20
-#: How often an operation may be tried where datagrams get lost; one that MAVSDK gives up has
-#: been sent four times by itself.
+#: How often an operation may be tried on a lossy net; MAVSDK itself has sent it four times before
+#: it gives up.
 TRIES = 8
 
 each_case = pytest.mark.parametrize(
@@ -47,7 +46,7 @@ each_net = pytest.mark.parametrize("loss", list(NETS), ids=list(NETS.values()))
 
 @contextmanager
 def clients_port(running: Stand, loss: float) -> Iterator[int]:
-    """Return the port at which clients reach the server, through a net that loses so much."""
+    """Return the port at which clients reach the server, through a net with this loss."""
     if not loss:
         yield running.client_port
         return
@@ -61,17 +60,17 @@ def clients_port(running: Stand, loss: float) -> Iterator[int]:
 
 
 def run_script(script: str, running: Stand, *, persona: str, loss: float) -> str:
-    """Run one of ``tests/interop/scripts`` to its end; gives what it printed."""
+    """Run one of ``tests/interop/scripts`` to its end; return its output."""
     with clients_port(running, loss) as port:
         address = f"udpout://127.0.0.1:{port}"
         return finish(script, address, persona=persona, loss=loss, running=running)
 
 
 def finish(script: str, address: str, *, persona: str, loss: float, running: Stand) -> str:
-    """As ``run_script``, where MAVSDK is told that address.
+    """Run a script like ``run_script``, with this address for MAVSDK.
 
-    It must end by itself and well: a signal, an abort or an error of MAVSDK's that is left after
-    the last try is a failure, and so is one that never ends.
+    It must end by itself and successfully: a signal, an abort, a MAVSDK error after the last try,
+    or a time-out fails the test.
     """
     tries = TRIES if loss else 1
     module = f"tests.interop.scripts.{script}"
@@ -85,7 +84,7 @@ def finish(script: str, address: str, *, persona: str, loss: float, running: Sta
         try:
             said, _ = process.communicate(timeout=LIMIT)
         except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGABRT)  # tells where each of its threads is
+            process.send_signal(signal.SIGABRT)  # prints the stack of each thread
             said, _ = process.communicate(timeout=STOP_LIMIT)
         finally:
             process.kill()

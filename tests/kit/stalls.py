@@ -1,6 +1,6 @@
-"""When the machine stood still: a small process beside the tests that only sleeps and looks.
+"""Detects stalls of the machine: a small process beside the tests only sleeps and checks the time.
 
-Started as a program it writes a line for each time it was kept from running, until its parent ends.
+Run as a program, it writes a line for each time it was kept from running, until its parent ends.
 """
 
 import os
@@ -9,13 +9,13 @@ import sys
 from dataclasses import dataclass, field
 from time import monotonic, sleep
 
-STALL = 0.25  # s; half of watch.late_tick, by which a server holds what it drives
+STALL = 0.25  # s; half of watch.late_tick, after which a server holds its tasks
 PERIOD = 0.02  # s
 
 
 @dataclass(frozen=True)
 class Stall:
-    """From when to when, monotonic seconds, which all processes of a machine share."""
+    """Begin and end in monotonic seconds, which all processes of a machine share."""
 
     begin: float
     end: float
@@ -23,7 +23,7 @@ class Stall:
 
 @dataclass
 class StallWatch:
-    """Knows the stalls since it was made."""
+    """Records the stalls since its creation."""
 
     stalls: list[Stall] = field(default_factory=list)
 
@@ -32,7 +32,7 @@ class StallWatch:
             [sys.executable, "-I", "-S", __file__], stdout=subprocess.PIPE
         )
         assert self._watcher.stdout is not None
-        self._watcher.stdout.readline()  # it watches
+        self._watcher.stdout.readline()  # it has started
         self._told = self._watcher.stdout.fileno()
         os.set_blocking(self._told, False)
         self._rest = b""
@@ -43,8 +43,8 @@ class StallWatch:
         return self._watcher.pid
 
     def since(self, begin: float) -> list[Stall]:
-        """Return the stalls that ended after that time."""
-        sleep(3 * PERIOD)  # of one that has just ended the watcher has yet to tell
+        """Return the stalls that ended after ``begin``."""
+        sleep(3 * PERIOD)  # the watcher reports a stall only after its end
         self._read()
         return [stall for stall in self.stalls if stall.end > begin]
 
@@ -68,7 +68,7 @@ class StallWatch:
 
 
 def watch() -> None:
-    """Write an empty line, then begin and end of each stall, until the parent is gone."""
+    """Write an empty line, then begin and end of each stall, until the parent ends."""
     parent, last = os.getppid(), monotonic()
     print(flush=True)
     while os.getppid() == parent:

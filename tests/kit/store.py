@@ -1,4 +1,4 @@
-"""A store whose disk is as slow as a test wants it."""
+"""Stores for tests in virtual time."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ from mav_tasks.tasks.events import Event
 
 
 class PromptSqliteStore(SqliteStore):
-    """The real one, on a real file; in virtual time, which does not pass while it writes."""
+    """The real store on a real file; virtual time stands still while it writes."""
 
     def __init__(self, path: Path, *, wall_offset: float) -> None:
         super().__init__(path, wall_offset=lambda: wall_offset)
@@ -41,7 +41,7 @@ class LateStore:
 
     def __init__(self, *, delay: float = 0.0) -> None:
         self.delay = delay
-        self.clock: Callable[[], float] = lambda: 0.0  # the world's, set by it
+        self.clock: Callable[[], float] = lambda: 0.0  # the world sets its own clock
         self.events: list[Event] = []
         self._under_way: deque[tuple[float, int]] = deque()
         self._failure: str | None = None
@@ -67,7 +67,7 @@ class LateStore:
         return outcomes
 
     def fileno(self) -> None:
-        """The world asks at every step."""
+        """Return None: the world polls at every step."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: nothing is open."""

@@ -1,7 +1,7 @@
 """``python -m tests.kit.suspended FLAG serve …``: mav-tasks, stopped in the middle of a turn.
 
-When there is a file FLAG, the server stands still (SIGSTOP) at the worst moment there is: a
-setpoint that is to move a rover has been made, and has not left yet.
+When the file FLAG exists, the server stops (SIGSTOP) at the worst moment: a moving setpoint is
+ready, but has not left yet.
 """
 
 import os
@@ -19,7 +19,7 @@ VELOCITIES = slice(10 + 16, 10 + 28)  # vx, vy, vz of SET_POSITION_TARGET_LOCAL_
 
 
 def stop_at(flag: Path) -> None:
-    """Arrange it."""
+    """Patch the engine to stop the process at a moving setpoint."""
     take_packets = Engine.take_packets
 
     def of_engine(self: Engine) -> list[Outgoing]:

@@ -1,4 +1,4 @@
-"""A program at a terminal of a size, and what an emulator of such a terminal then shows."""
+"""A program at a terminal of a given size, with an emulator of its screen."""
 
 import os
 import pty
@@ -16,7 +16,7 @@ import pyte
 from tests.kit.processes import STOP_LIMIT
 
 CTRL_C = b"\x03"
-#: makes the terminal its own, so that Ctrl-C and a change of size reach it as they reach a shell's
+#: makes it the controlling terminal, so that Ctrl-C and resizing work as in a shell
 LAUNCH = (
     "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0);"
     "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
@@ -24,7 +24,7 @@ LAUNCH = (
 
 
 class Terminal:
-    """A running program with its screen; ``written`` are all bytes that came, as they came."""
+    """A running program with its screen; ``written`` has all raw bytes of its output."""
 
     def __init__(
         self, popen: subprocess.Popen[bytes], own_side: int, size: tuple[int, int]
@@ -38,7 +38,7 @@ class Terminal:
 
     @property
     def lines(self) -> list[str]:
-        """Return what the screen shows, without blanks at the ends of lines, and lines below."""
+        """The screen's lines, without trailing blanks and trailing empty lines."""
         lines = [str(line).rstrip() for line in self._screen.display]
         while lines and not lines[-1]:
             del lines[-1]
@@ -46,11 +46,11 @@ class Terminal:
 
     @property
     def text(self) -> str:
-        """The same as one text."""
+        """The screen as one text."""
         return "\n".join(self.lines)
 
     def wait_for(self, condition: Callable[[str], object], *, within: float = 20.0) -> None:
-        """Wait until the screen shows something."""
+        """Wait until the screen's text meets a condition."""
         end = time.monotonic() + within
         while not condition(self.text):
             assert time.monotonic() < end, f"not in {within} s on:\n{self.text}"
@@ -61,23 +61,23 @@ class Terminal:
         os.write(self._own_side, keys)
 
     def resize(self, rows: int, columns: int) -> None:
-        """Return the window another size; the program is told so by the system."""
+        """Resize the window; the system signals the program."""
         self._screen.resize(rows, columns)
         termios.tcsetwinsize(self._own_side, (rows, columns))
 
     def end(self, *, within: float = 20.0) -> int:
-        """Read to the end; gives the exit status."""
+        """Read to the end; return the exit status."""
         end = time.monotonic() + within
         while self._read(end - time.monotonic()):
             assert time.monotonic() < end, f"still there after {within} s:\n{self.text}"
         return self.popen.wait(STOP_LIMIT)
 
     def _read(self, within: float) -> bool:
-        """Read what there is, after so long at the most; whether more may come."""
+        """Read available output within ``within`` seconds; return False at its end."""
         if not select.select([self._own_side], [], [], max(within, 0.0))[0]:
             return True
         data = b""
-        with suppress(OSError):  # how a terminal ends whose other side is gone
+        with suppress(OSError):  # raised when the other side is closed
             data = os.read(self._own_side, 65536)
         self.written += data
         self._stream.feed(data)
@@ -88,7 +88,7 @@ class Terminal:
 def terminal(
     *arguments: str, size: tuple[int, int] = (24, 80), environment: dict[str, str] | None = None
 ) -> Iterator[Terminal]:
-    """Run Python with these arguments at a terminal of so many rows and columns."""
+    """Run Python with these arguments at a terminal of this size (rows, columns)."""
     own_side, its_side = pty.openpty()
     termios.tcsetwinsize(its_side, size)
     unset = ("NO_COLOR", "COLUMNS", "LINES", "FORCE_COLOR")

@@ -1,4 +1,4 @@
-"""A simulated rover, as unkind as the real ones, as the ground of a field trial in virtual time."""
+"""A realistic simulated rover as the ground of a field trial, in virtual time."""
 
 import asyncio
 from collections.abc import Coroutine
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 SEED = 1
 ROVER = "rover1"
-SLIP = 0.3  # of the kinematic body, as the pytest plugin's
+SLIP = 0.3  # of the kinematic body, as in the pytest plugin
 NEUTRAL = 1500  # µs
 MOST_VIRTUAL, MOST_REAL = 7200.0, 300.0  # s, of one trial
 SIGTERM_WITHIN = 5.0  # s
@@ -34,7 +34,7 @@ LOOK = 0.05  # s
 
 @dataclass(frozen=True, slots=True)
 class Make:
-    """A rover, and what its owner has set beside the factory's values."""
+    """A rover, with its owner's parameters."""
 
     persona: str
     frame: Frame
@@ -43,7 +43,7 @@ class Make:
 
 
 STANDS_AT_LOSS = ("COM_OBL_RC_ACT", 5.0)  # what mav-tasks probe --set-failsafe sets
-FOLLOWS = (("RO_SPEED_P", 0.4), ("RO_SPEED_I", 0.5))  # below it does not move at 0.5 m/s
+FOLLOWS = (("RO_SPEED_P", 0.4), ("RO_SPEED_I", 0.5))  # with less, it does not move at 0.5 m/s
 MAKES = {
     "ardupilot skid": Make("ardupilot", Frame.SKID),
     "ardupilot ackermann": Make("ardupilot", Frame.ACKERMANN),
@@ -83,11 +83,11 @@ class TrialGround:
             return runner.run(trial)
 
     async def start_server(self) -> None:
-        """Start it on what the last one had stored."""
+        """Start the server on the store of the previous one."""
         self._server.start()
 
     async def end_server(self) -> None:
-        """Its orderly end."""
+        """End the server in order."""
         if self._server.is_running:
             self._server.stop()
         for _ in range(round(SIGTERM_WITHIN / LOOK)):
@@ -97,7 +97,7 @@ class TrialGround:
         raise TimeoutError(f"the server still runs {SIGTERM_WITHIN} s after it was asked to end")
 
     async def kill_server(self) -> None:
-        """It is gone from one moment to the next."""
+        """Kill the server."""
         self._server.kill()
 
     def client(self) -> Client:
@@ -106,7 +106,7 @@ class TrialGround:
         return Client(self._net.link(f"client{self._clients}", peers=(CLIENT_LINK,)))
 
     def rover_link(self) -> Link:
-        """Return a link in the place of the server's, to which the rover speaks."""
+        """Return a link at the server's address, to which the rover speaks."""
         return self._net.link(VEHICLE_LINK, peers=(ROVER,))
 
     can_reboot = True
@@ -118,7 +118,7 @@ class TrialGround:
     can_push_stick = True
 
     def push_stick(self, throttle: int | None) -> None:
-        """Hold the transmitter's throttle stick so."""
+        """Hold the transmitter's throttle stick; None is neutral."""
         pulse = NEUTRAL if throttle is None else throttle
         self.vehicle.autopilot.operator_pulses(pulse, NEUTRAL)
 

@@ -1,22 +1,22 @@
-"""What clients wish, and the server has not answered yet, of what may end a STOP or a takeover.
+"""Requests of clients, not answered yet, that may end a STOP or a takeover.
 
-Several wishes may be read in one step, from several clients; their answers come later, in order.
+Several requests of several clients may be read in one step; their answers come later, in order.
 """
 
 from typing import NamedTuple
 
-UNANSWERED = 1.0  # s; a wish of which nothing was heard by then is answered by nobody
+UNANSWERED = 1.0  # s; without an answer by then, a request is never answered
 
 
 class Latches(NamedTuple):
-    """What keeps the server from driving."""
+    """The latches that keep the server from driving."""
 
     stopped: bool
     taken_over: bool
 
 
 class Wish(NamedTuple):
-    """A command that a client has sent, and what it ends if it is granted."""
+    """A client's command, and the latches that it ends if granted."""
 
     command: int
     ends_stop: bool
@@ -24,7 +24,7 @@ class Wish(NamedTuple):
 
 
 class Wishes:
-    """Remembers what is in force if those that are still open are refused."""
+    """Keeps the latches that remain if the open requests are refused."""
 
     def __init__(self) -> None:
         self._open: list[Wish] = []
@@ -35,7 +35,7 @@ class Wishes:
         return f"Wishes({self._open}, {self._left})"
 
     def asked(self, now: float, wish: Wish, latches: Latches) -> Latches:
-        """A wish is read while these are in force; gives what is, if it is granted."""
+        """Add a request read under these latches; return the latches if it is granted."""
         if not self._open or now - self._at > UNANSWERED:
             self._open, self._left = [], latches
         self._open.append(wish)
@@ -43,15 +43,15 @@ class Wishes:
         return _without(latches, wish)
 
     def taken_over_no_more(self) -> None:
-        """Something that is not refused has ended a takeover."""
+        """Note that an event that cannot be refused has ended a takeover."""
         self._left = self._left._replace(taken_over=False)
 
     def stopped(self) -> None:
-        """STOP comes after all that was asked before."""
+        """Note a STOP, which overrides all earlier requests."""
         self._open.clear()
 
     def answered(self, command: int, *, is_granted: bool) -> Latches | None:
-        """One is answered; gives what is in force, once it was the last one."""
+        """Note an answer; return the latches once no request is open."""
         wish = next((each for each in self._open if each.command == command), None)
         if wish is None:
             return None

@@ -34,7 +34,7 @@ from tests.kit.store import LateStore
 
 E = TypeVar("E")
 
-LOOK = 0.02  # s of virtual time between two looks at what a test waits for
+LOOK = 0.02  # s of virtual time between two checks of a condition
 PX4_HOLD = 5  # of COM_OBL_RC_ACT
 STANDS = 0.01  # m/s and rad/s
 COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
@@ -44,23 +44,23 @@ INT_COMMAND, MODE_COMMAND = 75, 76  # COMMAND_INT, COMMAND_LONG
 SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
 HEADER = 10  # bytes
 MEASURED = (30, 32)  # ATTITUDE, LOCAL_POSITION_NED
-REMEMBERED = 10_000  # of these: 20 s of ten rovers
+REMEMBERED = 10_000  # of MEASURED messages: 20 s of ten rovers
 
-#: shows each change at once, so that a scenario's times are those of the server alone; what a
-#: second of not knowing does is test_one_hertz's
+#: announces each change at once, so that a scenario's times depend on the server alone;
+#: test_one_hertz tests changes that are up to a second late
 PROMPT = replace(ARDUPILOT, announces_changes=True)
 
 
-SETTINGS_SPEED = 0.5  # m/s, also of tasks that name none: Driving.speed
+SETTINGS_SPEED = 0.5  # m/s, Driving.speed, also of tasks without a speed
 
 
 def kinematic_body(start: Pose) -> Body:
-    """Return the body that scenarios drive: it slips a little, as a skid-steered one does."""
+    """Return the default body of scenarios: it slips a little, like a skid-steered one."""
     return KinematicBody(start=start, slip=0.1, seed=None)
 
 
 def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
-    """Return another vehicle that has the same system id; by its unique id it is another one."""
+    """Return another vehicle with the same system id but another unique id."""
     body = kinematic_body(start)
     autopilot = Autopilot(
         system_id=99,
@@ -77,14 +77,14 @@ def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
 
 
 def is_ready_to_be_driven(rover: Vehicle) -> bool:
-    """Whether a rover is really armed and in the mode in which setpoints drive it."""
+    """Return whether a rover is truly armed and in the mode in which setpoints drive it."""
     return rover.autopilot.armed and rover.autopilot.mode is Mode.GUIDED
 
 
 class World(VirtualWorld):
-    """One server, one rover (or more) and one client (or more).
+    """One server, one or more rovers, and one or more clients.
 
-    Scenarios get theirs from the fixture ``make_world``, which checks the observers at the end.
+    Scenarios get it from the fixture ``make_world``, which checks the observers at the end.
     """
 
     def __init__(
@@ -106,10 +106,10 @@ class World(VirtualWorld):
         realism: Realism = EXACT,
         heading: float = 0.0,
     ) -> None:
-        """``records``: a folder, for a record of each server that there is.
+        """Create a world; ``records`` is a folder for a record of each server.
 
-        Rovers begin at a ``heading`` in degrees. With ``rover_key`` they sign, and hear only what
-        is signed. The rest is InMemoryServer's.
+        Rovers start at a ``heading`` in degrees. With ``rover_key`` they sign, and accept only
+        signed packets. The other arguments are InMemoryServer's.
         """
         self._policies, self._keys, self._wall_offset = policies, keys, wall_offset
         self.seed = seed
@@ -133,12 +133,12 @@ class World(VirtualWorld):
                 realism=realism,  # EXACT: most scenarios were written for exact arithmetic
             )
             if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
-                # by default a PX4 rover drives home when setpoints stop, and is not driven at all;
-                # tests that are about that set it back
+                # by default a PX4 rover drives home when setpoints stop, and the server does not
+                # drive it; tests of that restore the default
                 vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
             if persona.speed_parameter == PX4.speed_parameter:
-                vehicle.autopilot.parameters[PX4.speed_parameter] = -1.0  # no limit of its own
-            if persona.name == ARDUPILOT.name:  # scenarios name the speeds that matter to them
+                vehicle.autopilot.parameters[PX4.speed_parameter] = -1.0  # no limit by the rover
+            if persona.name == ARDUPILOT.name:  # scenarios set the speeds that matter to them
                 vehicle.autopilot.parameters["CRUISE_SPEED"] = SETTINGS_SPEED
             link = self.net.link(f"rover{number}")
             ways = ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
@@ -170,7 +170,7 @@ class World(VirtualWorld):
 
     @property
     def truth(self) -> BodyState:
-        """Where the first rover really is."""
+        """The first rover's true state."""
         return self.rover.truth
 
     def add_client(
@@ -181,7 +181,7 @@ class World(VirtualWorld):
         component_id: int = 190,
         reads_dialect: bool = True,
     ) -> FakeClient:
-        """Let another client take part."""
+        """Add another client."""
         client = FakeClient(
             self.net,
             name,
@@ -195,12 +195,12 @@ class World(VirtualWorld):
     # time
 
     def ready(self) -> "World":
-        """Wait until the server has found every rover and knows where it is."""
+        """Wait until the server has found every rover and the client has its position."""
         self.until(self._is_ready, within=30)
         return self
 
     def until(self, condition: Callable[[], object], *, within: float) -> None:
-        """Let time pass until the condition holds; AssertionError if it does not."""
+        """Let time pass until the condition holds. Raise AssertionError if it does not."""
         end = self.now + within
         while not condition():
             assert self.now < end, f"not within {within} s (seed {self.seed}): {self.describe()}"
@@ -215,7 +215,7 @@ class World(VirtualWorld):
         self.until(lambda: self.is_idle(tasks=tasks), within=within)
 
     def suspend_server(self, seconds: float) -> None:
-        """Let the server's machine stand still for a while: nothing in it is called."""
+        """Suspend the server's machine for ``seconds``: none of its code runs."""
         self.leave(self.server)
         self.watched.is_server_away = True
         self.run(seconds)
@@ -223,27 +223,27 @@ class World(VirtualWorld):
         self.join(self.server)
 
     def end_server(self) -> None:
-        """Let the server be gone from one moment to the next, with all that it had in memory."""
+        """Kill the server; everything in its memory is lost."""
         self.leave(self.server)
         self.watched.is_server_away = True
         self.watched.forget_unread()
 
     def start_server(self, store: Store, restored: Restored) -> None:
-        """Start another server on what an earlier one had stored."""
+        """Start another server on the store of an earlier one."""
         self.watched.is_server_away = False
-        self.watched.forget_unread()  # what came meanwhile came to nobody
+        self.watched.forget_unread()  # packets that arrived without a server are lost
         self.server = self._new_server(store, restored)
         self.join(self.server)
         for observer in self.observers:
             observer.server_restarted()
 
     def end_records(self) -> list[Path]:
-        """Return the records, complete, in the order of the servers."""
+        """Close the records and return their paths, in the order of the servers."""
         for recorder in self.recorders:
             recorder.close()
         return [recorder.path for recorder in self.recorders]
 
-    # what a person at the rover does, and what breaks
+    # actions of a person at the rover, and faults
 
     def operator_mode(self, mode: Mode) -> None:
         """Turn the mode switch at the first rover."""
@@ -254,17 +254,17 @@ class World(VirtualWorld):
         self.rover.autopilot.operator_arm(armed, now=self.now)
 
     def replace_rover(self, *, switched_on: float) -> None:
-        """Put another rover, by its unique id, in the place of the first one, with its address."""
+        """Replace the first rover by one with another unique id, at the same place and address."""
         there = self.truth
         start = Pose(north=there.north, east=there.east, yaw=there.yaw)
         self.rovers[0] = self.rover_parties[0].vehicle = twin_of(1, start=start, now=switched_on)
 
     def fault(self, faults: Faults) -> None:
-        """Break something in the first rover; ``Faults()`` mends it."""
+        """Set faults of the first rover; ``Faults()`` clears them."""
         self.rover.autopilot.set_faults(faults)
 
     def passed_on(self, source: tuple[int, int]) -> set[int]:
-        """Return the ids of a client's messages that go to rovers from here on, as they come."""
+        """Return a set that collects ids of a client's messages to rovers, from now on."""
         ids: set[int] = set()
 
         def look(sender: str, _target: str, data: bytes) -> bool:
@@ -276,7 +276,7 @@ class World(VirtualWorld):
         return ids
 
     def commands_passed_on(self) -> set[int]:
-        """Return the numbers of the commands that go to rovers from here on, as they come."""
+        """Return a set that collects the numbers of commands that go to rovers from now on."""
         numbers: set[int] = set()
 
         def look(sender: str, _target: str, data: bytes) -> bool:
@@ -288,11 +288,11 @@ class World(VirtualWorld):
         return numbers
 
     def bring_late(self, data: bytes) -> None:
-        """Bring the first rover a packet of the server's that the net has kept until now."""
+        """Deliver a packet of the server to the first rover late."""
         MemoryNet.send(self.net, VEHICLE_LINK, "rover1", data)
 
     def lose_acks(self) -> list[bytes]:
-        """From now on lose the acks of the first rover; gives the list that they end up in."""
+        """Lose the first rover's acks from now on; return a list that collects them."""
         lost: list[bytes] = []
 
         def loses(source: str, target: str, data: bytes) -> bool:
@@ -305,7 +305,7 @@ class World(VirtualWorld):
         return lost
 
     def lose_next_towards(self, name: str, count: int) -> list[int]:
-        """Lose the next datagrams to a rover; gives a list that is empty once all are lost."""
+        """Lose the next datagrams to a rover; return a list that is empty once all are lost."""
         left = [count]
 
         def loses(source: str, target: str, data: bytes) -> bool:
@@ -320,17 +320,17 @@ class World(VirtualWorld):
         return left
 
     def from_vehicle_side(self, data: bytes, *, peer: str = "stranger") -> None:
-        """Let a datagram reach the server's vehicle link."""
+        """Deliver a datagram to the server's vehicle link."""
         self.net.send(peer, VEHICLE_LINK, data)
 
-    # what a test looks at
+    # queries
 
     def task(self, task_id: int) -> Task:
-        """Return a task as the server has it now."""
+        """Return a task in its present state."""
         return {task.id: task for task in self.tasks()}[TaskId(task_id)]
 
     def state(self, task_id: int) -> tuple[TaskState, TaskReason]:
-        """Return a task's state and reason; UNKNOWN if there is none of that id."""
+        """Return a task's state and reason; UNKNOWN if there is no such task."""
         for task in self.tasks():
             if task.id == task_id:
                 return task.state, task.reason
@@ -341,15 +341,15 @@ class World(VirtualWorld):
         return self.server.engine.snapshot(now=self.now).tasks
 
     def control(self) -> str:
-        """Return how far the server's control of the first rover has come."""
+        """Return the phase of the server's control of the first rover."""
         return self.server.engine.snapshot(now=self.now).vehicles[0].control
 
     def paused(self) -> TaskReason:
-        """Return why the first rover's queue stands."""
+        """Return the reason why the first rover's queue is paused."""
         return self.server.engine.snapshot(now=self.now).vehicles[0].paused
 
     def is_idle(self, *, tasks: int) -> bool:
-        """Whether so many tasks were submitted, all are over, and the rover is handed back."""
+        """Return whether ``tasks`` tasks exist, all are over, and the rover is handed back."""
         snapshot = self.server.engine.snapshot(now=self.now)
         return (
             len(snapshot.tasks) == tasks
@@ -358,7 +358,7 @@ class World(VirtualWorld):
         )
 
     def stands(self, number: int = 1) -> bool:
-        """Whether a rover really stands."""
+        """Return whether a rover truly stands."""
         truth = self.rovers[number - 1].truth
         return hypot(truth.forward_speed, truth.lateral_speed) < STANDS and (
             abs(truth.yaw_rate) < STANDS
@@ -370,24 +370,24 @@ class World(VirtualWorld):
         return truth.north, truth.east, degrees(truth.yaw)
 
     def events(self, kind: type[E]) -> list[E]:
-        """Return the journal's events of one kind, in order."""
+        """Return the journal's events of one type, in order."""
         store = self.server.store
         kept = getattr(store, "events", None)
         assert kept is not None, f"{store} shows no events"
         return [event for event in kept if isinstance(event, kind)]
 
     def history(self, task_id: int) -> list[tuple[TaskState, TaskReason]]:
-        """Return the states that a task went through, with reasons."""
+        """Return a task's past states, with reasons."""
         return [(e.new, e.reason) for e in self.events(TaskChanged) if e.task_id == task_id]
 
     def describe(self) -> str:
-        """Return the state of affairs in a few words, for a failing test."""
+        """Return the state of the world in a few words, for a failing test."""
         vehicles = self.server.engine.snapshot(now=self.now).vehicles
         tasks = [(t.id, t.state.name, t.reason.name) for t in self.tasks()]
         return f"t={self.now:.2f} {vehicles} {tasks} {self.rover!r}"
 
     def check(self) -> None:
-        """Raise what any observer saw that must never be."""
+        """Raise AssertionError for the observers' violations."""
         for observer in self.observers:
             observer.check()
 
@@ -420,25 +420,25 @@ class World(VirtualWorld):
 
 
 class ObservedNet(MemoryNet):
-    """A net that shows to each rover's observer what concerns it."""
+    """A net that shows each rover's observer the rover's traffic."""
 
     def __init__(self, *, seed: int, conditions: Conditions) -> None:
         super().__init__(seed=seed, conditions=conditions)
         self.observers: dict[str, Observer] = {}
         self.is_server_away = False
         self._unread: list[tuple[str, str, bytes]] = []
-        self._sent_at: dict[bytes, float] = {}  # what rovers said of their motion, the newest last
-        #: whether rovers are reached by requests for a heartbeat; else they show each second only
+        self._sent_at: dict[bytes, float] = {}  # rovers' motion reports, newest last
+        #: whether rovers receive heartbeat requests; else they send heartbeats at 1 Hz only
         self.shows_on_request = True
-        #: loses (source, target, datagram) for which it says so
+        #: returns whether to lose (source, target, datagram)
         self.loses: Callable[[str, str, bytes], bool] = lambda *_: False
-        #: told of (client, datagram) when the server reads it
+        #: called with (client, datagram) when the server reads it
         self.on_read: Callable[[str, bytes], None] = lambda *_: None
-        #: told of (rover, source, datagram) when it arrives there
+        #: called with (rover, source, datagram) on its arrival
         self.on_arrival: Callable[[str, str, bytes], None] = lambda *_: None
 
     def send(self, source: str, target: str, data: bytes) -> None:
-        """Show what the server sends to a rover."""
+        """Show the server's packets to observers, then send."""
         if source == VEHICLE_LINK and target in self.observers:
             self.observers[target].sent(self.now, data)
         elif source == CLIENT_LINK and f"rover{data[5]}" in self.observers:
@@ -453,7 +453,7 @@ class ObservedNet(MemoryNet):
         super().send(source, target, data)
 
     def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
-        """Show what arrives at a rover or at the server."""
+        """Show packets that arrive at a rover or at the server."""
         if link.name in self.observers:
             self.observers[link.name].arrived(self.now, data)
             self.on_arrival(link.name, source, data)
@@ -462,11 +462,11 @@ class ObservedNet(MemoryNet):
         super().arrive(link, source, data)
 
     def forget_unread(self) -> None:
-        """What waited at the server is gone with it."""
+        """Forget packets that waited at the server."""
         self._unread.clear()
 
     def deliver(self) -> None:
-        """Deliver, and show what the server now knows: what waits while it is away it does not."""
+        """Deliver, and show packets that the server reads; none while it is away."""
         super().deliver()
         if self.is_server_away:
             return
@@ -483,7 +483,7 @@ class ObservedNet(MemoryNet):
 
 
 def asks_for_heartbeat(data: bytes) -> bool:
-    """Whether a packet is a REQUEST_MESSAGE of HEARTBEAT, whose number is zero."""
+    """Return whether a packet is a REQUEST_MESSAGE of HEARTBEAT, whose id is zero."""
     is_request = data[7] == MODE_COMMAND and data[COMMAND_ID] == REQUEST.to_bytes(2, "little")
     return is_request and not any(data[10:14])
 
@@ -495,7 +495,7 @@ def at(north: float, east: float) -> dict[str, Any]:
 
 
 def is_at(world: World, north: float, east: float) -> bool:
-    """Whether the first rover really is at a place."""
+    """Return whether the first rover is truly at a place."""
     return hypot(world.truth.north - north, world.truth.east - east) < 0.03
 
 
@@ -506,6 +506,6 @@ def near_pose(
     metres: float = 0.02,
     angle: float = 1.0,
 ) -> bool:
-    """Whether two poses (north, east, heading in degrees) are the same within tolerance."""
+    """Return whether two poses (north, east, heading in degrees) agree within tolerance."""
     apart = hypot(actual[0] - wanted[0], actual[1] - wanted[1])
     return apart <= metres and abs(remainder(actual[2] - wanted[2], 360)) <= angle

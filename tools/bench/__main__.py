@@ -1,9 +1,9 @@
 """Measures the server and prints one table. Nothing is asserted: take ratios, not figures.
 
-Everything is on loopback, bounded in count and time. ``--profile FILE`` with one of ``commands``,
-``forwarding`` and ``uploads`` writes cProfile's figures of the server process.
-``--against REVISION`` measures a server of that revision as well, turn and turn about with this
-one, by the same clients. ``--names N`` with ``turns`` prints the functions that are called most.
+Everything runs on loopback, bounded in count and time. ``--profile FILE`` with one of ``commands``,
+``forwarding`` and ``uploads`` writes cProfile's figures of the server process. ``--against
+REVISION`` also measures a server of that revision, alternating with this one, with the same
+clients. ``--names N`` with ``turns`` prints the functions that are called most.
 """
 
 import argparse
@@ -45,7 +45,7 @@ PROFILED: dict[str, Callable[[str], list[Row]]] = {
     "forwarding": forwarding.measure,
     "uploads": uploads.measure,
 }
-#: those of a server in a process of its own, which may be another revision's
+#: measurements of a server process, which may run another revision
 OF_A_SERVER = (
     "commands",
     "durable",
@@ -59,7 +59,7 @@ OF_A_SERVER = (
 
 
 def main() -> None:
-    """Measure what the command line names, or everything."""
+    """Run the measurements on the command line, or all of them."""
     parser = argparse.ArgumentParser(prog="tools/bench/run", description=__doc__)
     parser.add_argument("what", nargs="*", help=", ".join(MEASUREMENTS) + "; default: all")
     parser.add_argument("--profile", metavar="FILE", help="profile the server of one measurement")

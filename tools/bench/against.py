@@ -1,8 +1,8 @@
-"""The same measurements of this server and of another revision's, turn and turn about in one run.
+"""The same measurements of this server and of another revision's, alternating in one run.
 
 Clients, floods and simulated rovers are this revision's for both: only the server differs. Each
-measurement is repeated, and who goes first changes, so that a machine that gets slower in between
-wrongs neither. Of each figure the median counts.
+measurement is repeated in alternating order, so that a machine that slows down affects both alike.
+The median of each figure counts.
 """
 
 import json
@@ -26,7 +26,7 @@ HEAD = ("what", "here", "there", "here/there", "here, all rounds", "there, all r
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """One figure of both, as many times as there were rounds."""
+    """One figure of both servers, one value per round."""
 
     what: str
     unit: str
@@ -35,7 +35,7 @@ class Pair:
 
 
 def measure(revision: str, names: Sequence[str], *, rounds: int) -> list[Pair]:
-    """Return what each measurement says of both servers."""
+    """Return the figures of each measurement for both servers."""
     pairs: list[Pair] = []
     with checked_out(revision) as tree:
         for name in names:
@@ -53,7 +53,7 @@ def render(pairs: Sequence[Pair]) -> str:
 
 
 def _figures(name: str, tree: Path) -> dict[str, str]:
-    """Run one measurement in a process of its own; gives its figures by what they are."""
+    """Run one measurement in its own process; return its figures by name."""
     print(f"{name}: {'here' if tree == ROOT else 'there'}", file=sys.stderr, flush=True)
     ended = subprocess.run(
         [sys.executable, "-m", "tools.bench", "--json", name],
@@ -81,7 +81,7 @@ def _numbers(rounds: Sequence[dict[str, str]], what: str) -> tuple[float, ...]:
 
 
 def _unit(figure: str) -> str:
-    """Return what stands behind the first number."""
+    """Return the text behind the first number, up to a comma."""
     behind = NUMBER.split(figure, maxsplit=1)[1]
     return behind.partition(",")[0].strip()
 

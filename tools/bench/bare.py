@@ -1,4 +1,4 @@
-"""The yardstick: asyncio's own UDP endpoints doing nothing but echo or forward.
+"""The baseline: asyncio's own UDP endpoints that only echo or forward.
 
 ``python -m tools.bench.bare echo PORT`` · ``python -m tools.bench.bare forward PORT TO_PORT``
 """
@@ -15,23 +15,23 @@ class Echo(asyncio.DatagramProtocol):
     """Sends each datagram back."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Keep the way back."""
+        """Keep the transport for the answers."""
         self._transport = cast(asyncio.DatagramTransport, transport)  # in 3.11 only in fact
 
     def datagram_received(self, data: bytes, addr: tuple[str | int, int]) -> None:
-        """Echo."""
+        """Send the datagram back."""
         self._transport.sendto(data, addr)
 
 
 class Forward(asyncio.DatagramProtocol):
-    """Sends each datagram on by another socket."""
+    """Forwards each datagram through another socket."""
 
     def __init__(self, out: asyncio.DatagramTransport, to: tuple[str, int]) -> None:
         self._out = out
         self._to = to
 
     def datagram_received(self, data: bytes, _addr: tuple[str | int, int]) -> None:
-        """Forward."""
+        """Forward the datagram."""
         self._out.sendto(data, self._to)
 
 

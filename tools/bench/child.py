@@ -1,4 +1,4 @@
-"""Processes that a measurement talks to: started, waited for, ended by their own id."""
+"""Child processes of a measurement: started, waited for, ended by their own id."""
 
 import os
 import socket
@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-#: names a folder whose server is measured in place of this one: another revision's (``against``)
+#: environment variable: folder of the measured server, for another revision (``against``)
 SERVER_FROM = "MAV_TASKS_BENCH_SERVER_FROM"
 HOST = "127.0.0.1"
-READY = "ready"  # what a child prints once its sockets are open
+READY = "ready"  # a child prints it once its sockets are open
 END_WITHIN = 10.0  # s
 
 
@@ -20,11 +20,10 @@ END_WITHIN = 10.0  # s
 def child(
     module: str, *arguments: str, quiet: bool = False, pass_fds: tuple[int, ...] = ()
 ) -> Iterator[list[str]]:
-    """Run a module of this package as a process of its own while the block runs.
+    """Run a module of this package as a process for a ``with`` block.
 
-    A server is that of the folder that SERVER_FROM names, if it names one. What a ``quiet`` one
-    writes to stderr, its log, is thrown away by the system. The list that it gives holds, after the
-    block, the lines that the process printed in the end.
+    A server runs from the folder in SERVER_FROM, if set. ``quiet`` discards stderr, where the log
+    goes. After the block, the list has the lines that the process printed at its end.
     """
     said: list[str] = []
     process = subprocess.Popen(
@@ -47,7 +46,7 @@ def child(
 
 @contextmanager
 def simulated_rovers(count: int, port: int) -> Iterator[None]:
-    """Run kinematic rovers on a UDP port while the block runs."""
+    """Run kinematic rovers on a UDP port for a ``with`` block."""
     command = [sys.executable, "-m", "rover_sim", "--body", "kinematic", "--noise", "off"]
     command += ["--count", str(count), "--port", str(port)]
     simulator = subprocess.Popen(command, stdout=subprocess.DEVNULL)
@@ -59,14 +58,14 @@ def simulated_rovers(count: int, port: int) -> Iterator[None]:
 
 
 def free_port() -> int:
-    """Return a UDP port of the loopback interface that nobody has at the moment."""
+    """Return a free UDP port of the loopback interface."""
     with udp_socket() as probe:
         port: int = probe.getsockname()[1]
         return port
 
 
 def udp_socket(port: int = 0) -> socket.socket:
-    """Return a bound loopback UDP socket that waits at most a second."""
+    """Return a bound loopback UDP socket with a time-out of one second."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
     sock.bind((HOST, port))

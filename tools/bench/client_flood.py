@@ -1,6 +1,6 @@
-"""Floods a server's link for clients: ``PORT KIND RATE`` (datagrams/s), from a socket of its own.
+"""Floods a server's client link: ``PORT KIND RATE`` (datagrams/s), from its own socket.
 
-What the server answers is not read. A ``strangers`` flood comes from ever other sockets.
+It does not read the server's answers. A ``strangers`` flood keeps changing its sockets.
 """
 
 import random
@@ -20,7 +20,7 @@ from .child import HOST, READY, udp_socket
 from .scripted import CLIENT, ground_station
 
 BATCH = 20
-AT_A_TIME = 64  # sockets of strangers
+AT_A_TIME = 64  # sockets of strangers at once
 NAN = float("nan")
 SECRET = b"nobody knows this key at all ..."
 
@@ -47,7 +47,7 @@ def _broken() -> Callable[[int], bytes]:
 
 
 def _uploads() -> Callable[[int], bytes]:
-    """Begun, and never gone on with; each as if by another script behind one socket."""
+    """Start uploads and never continue them, each from another system id on one socket."""
     encoders = [Encoder(CLIENT._replace(system_id=number)) for number in range(1, 255)]
     return lambda number: encoders[number % 254].encode(
         m.MissionCount(1, (1, 191)[number % 2], 1000, number % 3)
@@ -55,7 +55,7 @@ def _uploads() -> Callable[[int], bytes]:
 
 
 def _requests() -> Callable[[int], bytes]:
-    """Every message there is, at the highest rate; and at once."""
+    """Request every message id, alternating between the highest rate and a single message."""
     encoder = Encoder(CLIENT)
 
     def request(number: int) -> bytes:
@@ -90,7 +90,7 @@ KINDS: dict[str, Callable[[], Callable[[int], bytes]]] = {
 
 
 def main(port: int, kind: str, rate: float) -> None:
-    """Send until ended."""
+    """Send until the process is ended."""
     made = KINDS[kind]()
     assert kind == "broken" or len(split_datagram(made(0))) == 1
     sockets = [udp_socket()]

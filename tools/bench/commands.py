@@ -1,7 +1,7 @@
-"""COMMAND_LONG (TASK_MOVE, each its own nonce) → COMMAND_ACK, beside a bare echo.
+"""COMMAND_LONG (TASK_MOVE, each with its own nonce) → COMMAND_ACK, compared with a bare echo.
 
-The client is one process with blocking sockets; it packs everything beforehand and looks at
-nothing of an answer but its message id.
+The client is one process with blocking sockets. It packs everything beforehand and reads only the
+message id of an answer.
 """
 
 import os
@@ -25,7 +25,7 @@ WARM_UP = 2_000
 ONE_BY_ONE = 5_000
 OUTSTANDING = 64
 MANY = 60_000
-PATIENCE = 0.3  # s without an answer: what was under way is lost
+PATIENCE = 0.3  # s without an answer, after which outstanding commands count as lost
 BEAT = 0.5  # s, between the vehicle's heartbeats
 
 GOAL_RATIO = 4.0
@@ -56,9 +56,9 @@ def measure(profile: str | None = None) -> list[Row]:
 
 
 def measure_durable() -> list[Row]:
-    """Return the same with the store on a disk, beside an echo and one fsync of that disk."""
+    """Return the rows with the store on a disk, compared with an echo plus one fsync."""
     packets = _packets()
-    with TemporaryDirectory(dir=Path.cwd()) as folder:  # the disk that the project is on
+    with TemporaryDirectory(dir=Path.cwd()) as folder:  # the project's disk
         sync = _fsync(Path(folder))
         echo = _echo(packets)
         ours = _server(packets, "--store", str(Path(folder) / "tasks.sqlite3"))
@@ -80,7 +80,7 @@ def measure_durable() -> list[Row]:
 
 
 def measure_recorded() -> list[Row]:
-    """Return latency and rate with each kind of record, beside those without any."""
+    """Return latency and rate with each kind of record, compared with those without."""
     packets = _packets()
     without = _server(packets)
     rows: list[Row] = []
@@ -115,7 +115,7 @@ def _server(packets: list[bytes], *options: str) -> tuple[float, float, float]:
 
 
 def _fsync(folder: Path) -> tuple[float, float]:
-    """Return p50 and p99, in seconds, of appending a page to a file and forcing it to the disk."""
+    """Return p50 and p99, in seconds, of appending a page to a file with an fsync."""
     times: list[float] = []
     with (folder / "bare").open("ab", buffering=0) as file:
         for _ in range(SYNCS):
@@ -145,7 +145,7 @@ def _run(
     answer_id: int,
     vehicle: ScriptedVehicle | None,
 ) -> tuple[float, float, float]:
-    """Return p50 and p99 in seconds with one outstanding, and answers a second with many."""
+    """Return p50 and p99 in seconds with one outstanding command, and answers/s with many."""
     supply = iter(packets)
     _one_by_one(client, list(islice(supply, WARM_UP)), answer_id, vehicle)
     times = _one_by_one(client, list(islice(supply, ONE_BY_ONE)), answer_id, vehicle)
@@ -173,7 +173,7 @@ def _one_by_one(
 def _many(
     client: socket.socket, packets: list[bytes], answer_id: int, vehicle: ScriptedVehicle | None
 ) -> float:
-    """Return the answers a second while OUTSTANDING commands are under way."""
+    """Return the answers per second with OUTSTANDING commands under way."""
     client.settimeout(PATIENCE)
     supply = iter(packets)
     answered = lost = under_way = 0

@@ -1,4 +1,4 @@
-"""Sends a vehicle's telemetry on a socket that was handed over: ``FD PORT RATE`` (datagrams/s)."""
+"""Sends a vehicle's telemetry on an inherited socket: ``FD PORT RATE`` (datagrams/s)."""
 
 import socket
 import sys
@@ -14,7 +14,7 @@ BATCH = 10
 
 
 def main(fd: int, port: int, rate: float) -> None:
-    """Send until ended."""
+    """Send until the process is ended."""
     sock = socket.socket(fileno=fd)
     encoder = Encoder(VEHICLE)
     print(READY, flush=True)

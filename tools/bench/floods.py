@@ -1,7 +1,7 @@
-"""Floods of clients: what STOP, setpoints and somebody else's commands take meanwhile.
+"""Floods from clients: their effect on STOP, setpoints and memory.
 
-The flood comes on the same link, which is the worst place. What the kernel drops before the server
-can read it is counted as lost.
+The flood comes on the same link, which is the worst case. A command that the kernel drops counts as
+lost.
 """
 
 import json
@@ -23,7 +23,7 @@ from .client_flood import KINDS
 from .scripted import CLIENT, ScriptedVehicle, ground_station, loopback, meet
 from .table import Row
 
-RATE = 20_000  # datagrams/s asked for; a slow machine sends fewer
+RATE = 20_000  # datagrams/s demanded; a slow machine sends fewer
 STOPS = 150
 BETWEEN = 0.01  # s
 PATIENCE = 0.25  # s without an effect: lost
@@ -38,12 +38,12 @@ ROVERS = 5
 
 @dataclass(slots=True)
 class Figures:
-    """What was measured beside one flood, in seconds."""
+    """Figures under one flood, in seconds."""
 
     stop_p99: float
     stops_lost: int
     setpoint_p99: float
-    grown: int  # kB of memory, of a server that is flooded for a while
+    grown: int  # kB of memory that the server grew under the flood
 
 
 def measure() -> list[Row]:
@@ -162,7 +162,7 @@ def _setpoints(kind: str) -> tuple[list[float], int]:
 
 
 def _server_of(port: int) -> int:
-    """Return the process of ours that has a port: children of this one are few."""
+    """Return the process id of the server with this port in its arguments."""
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
             words = (folder / "cmdline").read_bytes().split(b"\0")
@@ -172,7 +172,7 @@ def _server_of(port: int) -> int:
 
 
 def _resident(process: int) -> int:
-    """Return the memory that a process holds, in kB."""
+    """Return the resident memory of a process, in kB."""
     pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") // KILOBYTE
 

@@ -1,8 +1,8 @@
-"""Packets forwarded vehicle → client, beside a bare forwarder.
+"""Packets forwarded from vehicle to client, compared with a bare forwarder.
 
-What is sent is a second of a rover's telemetry, at the rates that the server asks for, over and
-over. One process is both vehicle and client and keeps a window of packets under way, so that
-nothing is lost to full buffers and the two processes have a core each.
+The packets repeat one second of a rover's telemetry, at the rates that the server requests. One
+process is both vehicle and client. It keeps a window of packets under way, so that full buffers
+lose nothing and each of the two processes has a core.
 """
 
 import socket
@@ -21,7 +21,7 @@ from .table import Row
 WINDOW = 64
 WARM_UP = 5_000
 PACKETS = 100_000
-PATIENCE = 0.3  # s without a packet: what was under way is lost
+PATIENCE = 0.3  # s without a packet, after which packets under way count as lost
 GOAL = 0.6
 
 
@@ -61,7 +61,7 @@ def _ours(profile: str | None) -> float:
 
 
 def _rate(vehicle: socket.socket, client: socket.socket, to: tuple[str, int]) -> float:
-    """Return the packets a second that reach the client."""
+    """Return the packets per second that reach the client."""
     vehicle.connect(to)
     client.settimeout(PATIENCE)
     packets = cycle(_telemetry())
@@ -74,7 +74,7 @@ def _rate(vehicle: socket.socket, client: socket.socket, to: tuple[str, int]) ->
 
 
 def _pump(vehicle: socket.socket, client: socket.socket, packets: list[bytes]) -> tuple[int, float]:
-    """Send all with a window under way; gives how many arrived, and the time lost in waiting."""
+    """Send packets through a window; return how many arrived, and the seconds of waiting."""
     supply = iter(packets)
     arrived, waited, under_way = 0, 0.0, 0
     for packet in islice(supply, WINDOW):
@@ -87,7 +87,7 @@ def _pump(vehicle: socket.socket, client: socket.socket, packets: list[bytes]) -
             waited += PATIENCE
             under_way = 0
         else:
-            if source != bytes(VEHICLE):  # the server's own
+            if source != bytes(VEHICLE):  # sent by the server
                 continue
             arrived += 1
             under_way -= 1
@@ -98,7 +98,7 @@ def _pump(vehicle: socket.socket, client: socket.socket, packets: list[bytes]) -
 
 
 def _telemetry() -> list[bytes]:
-    """A second of telemetry, numbered without a gap over as many seconds as that takes."""
+    """Return a second of telemetry, repeated until its sequence numbers wrap."""
     heartbeat = m.Heartbeat(
         MavType.GROUND_ROVER, MavAutopilot.ARDUPILOTMEGA, 1, HOLD, MavState.STANDBY, 3
     )

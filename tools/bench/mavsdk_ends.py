@@ -1,8 +1,8 @@
-"""MAVSDK's own ends of an upload, each in a process of its own.
+"""MAVSDK's own ends of an upload, each in its own process.
 
-``python -m tools.bench.mavsdk_ends vehicle PORT`` is an autopilot that takes missions in, and keeps
-them in memory. ``… client URL URL`` uploads to both in turn, and prints as JSON the seconds that
-each upload took: by URL, by number of items.
+``python -m tools.bench.mavsdk_ends vehicle PORT`` is an autopilot that receives missions and keeps
+them in memory. ``… client URL URL`` uploads to both in turn, and prints the seconds of each upload
+as JSON: by URL, by number of items.
 """
 
 import json
@@ -23,18 +23,18 @@ from .child import HOST, READY
 SIZES = (50, 500)  # items
 REPEATS = 30
 WARM_UP = 3
-#: s, before each upload: one that follows within 0.6 s of the one before the server makes wait for
-#: items that are late (services/mission_receiver.py), and between two to one end there is another
+#: s before each upload. Within 0.6 s of the previous upload, the server waits for late items
+#: (services/mission_receiver.py); the upload to the other end is in between
 BETWEEN = 0.35
 FIND_WITHIN = 10.0  # s
-LATITUDE, LONGITUDE = -353632621, 1491652374  # degE7, where the simulated rover starts
+LATITUDE, LONGITUDE = -353632621, 1491652374  # degE7, the simulated rover's start
 METRE = 90  # degE7 of latitude, about
 WAYPOINT = 16
 GLOBAL_RELATIVE_ALT_INT = 6
 
 
 def _take_in(port: int) -> None:
-    """Be an autopilot until SIGTERM."""
+    """Run an autopilot until SIGTERM."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
     with Mavsdk(Configuration.create_with_component_type(ComponentType.AUTOPILOT)) as mavsdk:
         mavsdk.add_any_connection(f"udpin://{HOST}:{port}")
@@ -54,7 +54,7 @@ def _upload(urls: list[str]) -> None:
                 for url, end in ends.items():
                     sleep(BETWEEN)
                     start = perf_counter()
-                    end.upload_mission(items)  # raises unless it was accepted
+                    end.upload_mission(items)  # raises unless accepted
                     times[url][count].append(perf_counter() - start)
         for count in SIZES:
             items = _items(count, number + 1)
@@ -77,7 +77,7 @@ def _connect(url: str, stack: ExitStack) -> Any:
 
 
 def _items(count: int, number: int) -> list[Any]:
-    """Return a line of waypoints, a metre apart; no two numbers have one in common."""
+    """Return a line of waypoints, a metre apart; items of different numbers are all different."""
     return [
         MissionItem(
             seq=seq,
@@ -104,13 +104,13 @@ def _compare(url: str, came: list[Any], sent: list[Any]) -> None:
 
 
 def _as_came(item: Any) -> Any:
-    """Return an item as the library has it: float32, as on the wire."""
+    """Return an item with the library's values: float32, as on the wire."""
     return MissionItem.from_c_struct(item.to_c_struct())
 
 
 def main(kind: str, *arguments: str) -> None:
-    """Be one of the two ends."""
-    log_subscribe(lambda *_: True)  # its log goes to where we print
+    """Run one of the two ends."""
+    log_subscribe(lambda *_: True)  # its log would mix with our output
     if kind == "vehicle":
         _take_in(int(arguments[0]))
     else:

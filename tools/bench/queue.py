@@ -1,4 +1,4 @@
-"""100,000 waiting tasks: what one costs to submit and to take, to keep, and to have back."""
+"""100,000 waiting tasks: the cost to submit and take one, memory, and restart."""
 
 import gc
 import tracemalloc
@@ -19,7 +19,7 @@ from mav_tasks.tasks.task import Draft, Marks, Submitter, Terms
 from .table import Row
 
 FEW, MANY = 1_000, 100_000
-SAMPLE = 2_000  # tasks submitted and taken on top of those that wait
+SAMPLE = 2_000  # tasks submitted and taken while the others wait
 GOAL_RATIO = 2.0
 GOAL_BYTES = 2_048
 GOAL_RESTART = 3.0  # s
@@ -79,7 +79,7 @@ def _fill(count: int) -> tuple[TaskRegistry, PendingTasks]:
 
 
 def _times(count: int) -> tuple[float, float]:
-    """Return seconds for each task submitted and taken, and bytes for each that waits."""
+    """Return seconds per task submitted and taken, and bytes per waiting task."""
     book, room = _fill(count)
     drafts = [_draft(count + number) for number in range(SAMPLE)]
     start = perf_counter()
@@ -100,7 +100,7 @@ def _times(count: int) -> tuple[float, float]:
 
 
 def _restart() -> float:
-    """Return the seconds from opening the store to an engine that has all tasks again."""
+    """Return the seconds from opening the store to an engine with all tasks restored."""
     with TemporaryDirectory(dir=Path.cwd()) as folder:
         path = Path(folder) / "tasks.sqlite3"
         store = SqliteStore(path, wall_offset=_no_offset)
@@ -111,7 +111,7 @@ def _restart() -> float:
         store.append(book.take_events())
         store.close()
         gc.collect()
-        gc.disable()  # as the server does until all is there
+        gc.disable()  # like the server, until everything is restored
         start = perf_counter()
         store = SqliteStore(path, wall_offset=_no_offset)
         Engine(SETTINGS, now=monotonic(), restored=store.load())

@@ -1,4 +1,4 @@
-"""A vehicle and a client by script: they say what is needed to be served, and little else."""
+"""A scripted vehicle and client, with just enough behaviour for the server to serve them."""
 
 import socket
 from time import monotonic
@@ -15,11 +15,11 @@ VEHICLE = Address(1, 1)
 CLIENT = Address(245, 190)
 HOLD = 4  # ArduPilot Rover's mode number
 MEET_WITHIN = 5.0  # s
-QUIET = 0.3  # s without a request: the server has asked for all that it wants
+QUIET = 0.3  # s without a request: the server has completed its requests
 
 
 class ScriptedVehicle:
-    """A disarmed ArduPilot rover in HOLD, which accepts every command and does nothing."""
+    """A disarmed ArduPilot rover in HOLD that accepts every command and executes none."""
 
     def __init__(self, sock: socket.socket) -> None:
         self._socket = sock
@@ -28,7 +28,7 @@ class ScriptedVehicle:
         self.server: tuple[str, int] | None = None
 
     def answer(self, *, wait: float) -> bool:
-        """Take one datagram and answer it; whether one came in time."""
+        """Receive one datagram and answer it; return whether one came in time."""
         self._socket.settimeout(wait)
         try:
             data, self.server = self._socket.recvfrom(2048)
@@ -57,17 +57,17 @@ class ScriptedVehicle:
 
 
 def meet(vehicle: ScriptedVehicle, client: socket.socket, server: tuple[str, int]) -> None:
-    """Make vehicle and client known to the server, and wait until it asks for nothing more."""
+    """Make vehicle and client known to the server, and wait until its requests end."""
     end = monotonic() + MEET_WITHIN
     while vehicle.answer(wait=QUIET) or vehicle.server is None:
         if monotonic() > end:
             break
     client.sendto(Encoder(CLIENT).encode(ground_station()), server)
-    client.recv(2048)  # the vehicle's heartbeat: the server has introduced it
+    client.recv(2048)  # the vehicle's heartbeat, with which the server introduces it
 
 
 def loopback(port: int) -> tuple[str, int]:
-    """Return the address of a port of this machine."""
+    """Return the loopback address with a port."""
     return (HOST, port)
 
 

@@ -1,12 +1,11 @@
-"""A real server on loopback with room for every task of a measurement, and no thinning.
+"""A real server on loopback with room for every task of a measurement, and no rate limits.
 
 ``python -m tools.bench.server CLIENT_PORT VEHICLE_PORT [--store FILE] [--profile FILE] [--drive]
-[--tlog FOLDER] [--record FOLDER] [--default-limits]``.
-Unless ``--default-limits`` is said, no client is limited in what it may send. With ``--profile``,
-cProfile's figures of the whole run are written to that file. With ``--drive`` the server arms and
-drives; otherwise no task is ever begun. When it ends it prints, as JSON, by how many seconds each
-interval between two setpoints that move one vehicle missed 1/20 s: a zero that ends the drive
-leaves at once, whenever that is.
+[--tlog FOLDER] [--record FOLDER] [--default-limits]``. Without ``--default-limits``, clients may
+send any amount. ``--profile`` writes cProfile's figures of the whole run to a file. With
+``--drive`` the server arms and drives; otherwise no task starts. At its end it prints as JSON the
+deviation from 1/20 s, in seconds, of each interval between two moving setpoints to one vehicle. The
+zero that ends a drive leaves at once and is not counted.
 """
 
 import argparse
@@ -34,13 +33,13 @@ from .child import HOST, READY
 
 PERIOD = 0.05  # s between setpoints
 SETPOINT = m.SetPositionTargetLocalNed.id
-FORWARD = slice(10 + 16, 10 + 20)  # the place of vx, and of the system that it is for,
+FORWARD = slice(10 + 16, 10 + 20)  # offset of vx, and of target_system,
 TARGET_SYSTEM = 10 + 50  # in a whole MAVLink 2 SET_POSITION_TARGET_LOCAL_NED
-MOVING = 2 * PERIOD  # s; after a longer interval the stream had ended in between
+MOVING = 2 * PERIOD  # s; after a longer interval the stream had ended
 
 
 class TimedLink(UdpLink):
-    """A vehicle link that keeps when setpoints left it."""
+    """A vehicle link that measures the intervals of setpoints."""
 
     def __init__(self, url: LinkUrl) -> None:
         super().__init__(url)
@@ -48,7 +47,7 @@ class TimedLink(UdpLink):
         self.errors: list[float] = []
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send, and note the time of a setpoint."""
+        """Send, and record the time of a setpoint."""
         super().send(peer, data)
         if data[7] != SETPOINT or data[8] != 0 or len(data) <= TARGET_SYSTEM:
             return

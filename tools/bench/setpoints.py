@@ -1,4 +1,4 @@
-"""How evenly setpoints leave at 20 Hz with 1, 20 and 100 driven kinematic rovers in one server."""
+"""Evenness of 20 Hz setpoints with 1, 20 and 100 kinematic rovers driven by one server."""
 
 import json
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from .table import Row
 
 ROVERS = (1, 20, 100)
 DRIVING = 12.0  # s
-GATHER = 6.0  # s until all rovers are known and have said where they are
+GATHER = 6.0  # s until all rovers are known and have sent a position
 GOAL = 5e-3  # s
 EACH = 0.003  # s between the submissions to two rovers
 
@@ -61,5 +61,5 @@ def _drive(send: Callable[[bytes], object], rovers: int) -> None:
         send(encoder.encode(move))
         sleep(EACH)
     end = monotonic() + DRIVING
-    while monotonic() < end:  # it reads nothing: to be told costs the server as much
+    while monotonic() < end:  # it reads nothing; sending to it costs the server as much
         sleep(0.1)

@@ -1,4 +1,4 @@
-"""One pybullet rover with its MAVLink, driven by setpoints, beside pybullet's own stepping loop."""
+"""One pybullet rover with MAVLink, driven by setpoints, compared with bare stepping."""
 
 from itertools import count
 from time import perf_counter
@@ -27,7 +27,7 @@ GOAL = 0.6
 
 
 def measure() -> list[Row]:
-    """Return the row of the simulation; where pybullet is missing, a row that says so."""
+    """Return the row of the simulation; without pybullet, rows that say so."""
     try:
         plain = _plain()
     except MissingExtra as missing:
@@ -50,13 +50,13 @@ def _missing(missing: MissingExtra) -> Row:
 
 
 def _plain() -> float:
-    """Simulated seconds a second of stepSimulation at 240 Hz, the rover driving its circle."""
+    """Return simulated seconds per second of stepSimulation at 240 Hz, with a rover on a circle."""
     body = BulletBody(start=Pose())
     try:
         import pybullet  # noqa: PLC0415 - optional
 
         body.drive(FORWARD, YAW_RATE)
-        body.advance(1 / PHYSICS_RATE)  # sets pybullet to one physics step a call
+        body.advance(1 / PHYSICS_RATE)  # sets one physics step per call
         client = body._client
         for _ in range(round(WARM_UP * PHYSICS_RATE)):
             pybullet.stepSimulation(client)
@@ -70,7 +70,7 @@ def _plain() -> float:
 
 
 def _with_mavlink() -> float:
-    """Simulated seconds a second of a whole vehicle: physics, autopilot, telemetry, setpoints."""
+    """Return simulated seconds per second of a whole vehicle, with telemetry and setpoints."""
     body = BulletBody(start=Pose())
     vehicle = make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
     try:
@@ -89,7 +89,7 @@ def _with_mavlink() -> float:
 
 
 class _Driver:
-    """Streams setpoints to a vehicle in simulated time, and takes its telemetry."""
+    """Streams setpoints to a vehicle in simulated time, and receives its telemetry."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
@@ -98,7 +98,7 @@ class _Driver:
         self._heard = 0
 
     def take_control(self) -> None:
-        """Ask for 20 Hz of position and attitude, GUIDED, arming."""
+        """Request 20 Hz of position and attitude, GUIDED and arming."""
         self._send(m.Heartbeat(6, 8, 0, 0, 4, 3), now=0.0)
         for message_id in (m.LocalPositionNed.id, m.Attitude.id):
             self._command(MavCmd.SET_MESSAGE_INTERVAL, message_id, 1e6 * SETPOINT_PERIOD)
@@ -107,7 +107,7 @@ class _Driver:
         self._command(MavCmd.COMPONENT_ARM_DISARM, 1)
 
     def run(self, seconds: float) -> None:
-        """Let so much time pass in control steps, with a setpoint for each SETPOINT_PERIOD."""
+        """Advance by ``seconds`` in control steps, with a setpoint each SETPOINT_PERIOD."""
         steps = round(seconds / CONTROL_PERIOD)
         each = max(1, round(SETPOINT_PERIOD / CONTROL_PERIOD))
         for step in range(steps):

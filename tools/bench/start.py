@@ -1,4 +1,4 @@
-"""How long it takes until the server serves, says how it is used, or a script can begin."""
+"""Time until the server serves, prints its help, or a script can begin."""
 
 import os
 import select
@@ -17,7 +17,7 @@ REPEATS = 5
 GIVE_UP = 10.0  # s
 MAV_TASKS = Path(sys.executable).with_name("mav-tasks")
 
-#: in which modules are kept compiled, as where the package is installed
+#: in which Python caches bytecode, as in an installation
 ENVIRONMENT = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
 
 GOAL_START = 1.0  # s
@@ -58,14 +58,14 @@ def _row(what: str, seconds: float, python: float, goal: float | None) -> Row:
 
 
 def _run(*command: str) -> float:
-    """Seconds of a process; all but the first find their modules compiled."""
+    """Return the seconds of a process; all but the first find cached bytecode."""
     start = perf_counter()
     subprocess.run(command, stdout=subprocess.DEVNULL, check=True, env=ENVIRONMENT)
     return perf_counter() - start
 
 
 def _first_heartbeat() -> float:
-    """Seconds from spawning the server to the first packet at a client that it pushes to."""
+    """Return the seconds from spawning the server to its first packet at a pushed client."""
     with udp_socket() as client, udp_socket() as vehicle_socket, udp_socket() as spare:
         vehicle = ScriptedVehicle(vehicle_socket)
         listen, push, dial = (s.getsockname()[1] for s in (spare, client, vehicle_socket))

@@ -1,4 +1,4 @@
-"""The one table that a run of the benchmarks prints."""
+"""The table of a benchmark run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One figure beside its yardstick, measured in the same run on the same machine.
+    """One figure with its yardstick, measured in the same run on the same machine.
 
-    ``met`` is None where there is no goal.
+    ``met`` is None without a goal.
     """
 
     what: str

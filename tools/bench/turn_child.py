@@ -1,17 +1,16 @@
-"""One engine in this process, asked over standard input: how many calls a turn makes, or how long.
+"""Measures one engine in this process, on commands from stdin: calls or CPU time of a turn.
 
 It runs with the modules of any revision that has ``mav_tasks.engine.engine`` on its path, so it
-imports nothing of this package:
-``PYTHONPATH=TREE python -P tools/bench/turn_child.py``; a line ``calls`` or ``cpu TURNS`` is
-answered by a line of JSON.
+imports nothing of this package: ``PYTHONPATH=TREE python -P tools/bench/turn_child.py``. It answers
+a line ``calls`` or ``cpu TURNS`` with a line of JSON.
 
-A turn is what a TASK_MOVE makes the engine do: ``handle(Packets)``, ``take_packets``,
-``take_events``, then ``handle(Committed)``, ``take_packets``, ``take_events``. Meanwhile the rover
-is armed and in HOLD, one task is being begun (the rover does not follow the mode request yet), and
-ten wait: the submission is only queued, and answered by COMMAND_ACK, STATUSTEXT and TASK_STATUS.
+A turn is the engine's work on a TASK_MOVE: ``handle(Packets)``, ``take_packets``, ``take_events``,
+then ``handle(Committed)``, ``take_packets``, ``take_events``. The rover is armed and in HOLD, one
+task is starting (the rover does not follow the mode request yet), and ten wait: the submission is
+only queued, and answered by COMMAND_ACK, STATUSTEXT and TASK_STATUS.
 
 An idle wake-up is ``handle_deadline``, ``take_packets``, ``take_events`` and ``next_deadline``,
-with one rover that stands disarmed in HOLD, sends what it was asked to send, and has no task.
+with one rover that stands disarmed in HOLD, sends the requested telemetry, and has no task.
 """
 
 import json
@@ -37,19 +36,18 @@ MOVE, REQUEST = 54000, 512
 WAITING = 10  # tasks
 BEAT, TELEMETRY = 1.0, 0.05  # s
 MEETING = 5.0  # s, after which the server knows the rover
-SETTLED = 30.0  # s, after which it asks the rover for nothing more
-APART = 0.1  # s, between the submissions of those that wait
+SETTLED = 30.0  # s, after which the server's requests to the rover have ended
+APART = 0.1  # s, between the submissions of the waiting tasks
 BETWEEN = 0.001  # s of virtual time between two turns
-AT_ONCE = 100  # turns with one engine: then the task would no longer be being begun
+AT_ONCE = 100  # turns with one engine; more would outlast the starting of the task
 WATCHED = 10.0  # s in which idle wake-ups are counted
 
 
 class Calls:
-    """Counts calls while it is entered: of Python functions by name, and of C functions.
+    """Counts calls while entered: Python functions by name, and C functions.
 
-    These are the events "call" and "c_call" of ``sys.setprofile``. A comprehension is a function of
-    its own up to Python 3.11, and each step of a generator is a call. What it does itself is not
-    in it.
+    It counts the events "call" and "c_call" of ``sys.setprofile``. A comprehension is a function up
+    to Python 3.11, and each step of a generator is a call. Its own calls are not counted.
     """
 
     def __init__(self) -> None:
@@ -74,7 +72,7 @@ class Calls:
 
 
 def _made(frame: FrameType) -> str:
-    """Name what a generated constructor makes: a dataclass, or a named tuple."""
+    """Return the class of a generated constructor (a dataclass or a named tuple), or ""."""
     if frame.f_code.co_filename != "<string>":
         return ""
     kind = frame.f_locals.get("_cls") or type(frame.f_locals.get("self"))
@@ -86,7 +84,7 @@ def _short(path: str) -> str:
 
 
 class Clock:
-    """Adds up the processor's nanoseconds while it is entered."""
+    """Adds up CPU nanoseconds while entered."""
 
     def __init__(self) -> None:
         self.spent = 0
@@ -101,7 +99,7 @@ class Clock:
 
 
 class Stand:
-    """An engine, a rover and a client by script, in virtual time."""
+    """An engine with a scripted rover and client, in virtual time."""
 
     def __init__(self, *, base_mode: int) -> None:
         unlimited = Limits(quota=10_000_000, rate=1e9)
@@ -123,7 +121,7 @@ class Stand:
         self._take(LinkChanged(CLIENTS, LinkSide.CLIENTS, True))
 
     def turn(self, packet: bytes, measure: AbstractContextManager[object]) -> list[Outgoing]:
-        """Let the client's packet be answered, and measure what that takes."""
+        """Let the engine answer the client's packet, and measure the effort."""
         engine, now = self.engine, self.now
         with measure:
             engine.handle(Packets(CLIENTS, [(CLIENT, packet)]), now=now)
@@ -138,7 +136,7 @@ class Stand:
         return [*packets, *answers]
 
     def wake_up(self, measure: AbstractContextManager[object]) -> list[Outgoing]:
-        """Do what is due now, and measure what that takes."""
+        """Run due work, and measure the effort."""
         engine, now = self.engine, self.now
         with measure:
             engine.handle_deadline(now=now)
@@ -149,7 +147,7 @@ class Stand:
         return packets
 
     def run(self, seconds: float, look: Callable[[], list[Outgoing]] | None = None) -> None:
-        """Let time pass; ``look`` does what is due instead, and gives the packets of it."""
+        """Advance time; ``look`` replaces the due work and returns its packets."""
         end = self.now + seconds
         while self.now < end:
             due = self.engine.next_deadline() or end
@@ -171,7 +169,7 @@ class Stand:
         return self._command(MOVE, 1.0, 0.0, 0.0, self._submitted, 0.0, 0.0, 5.0)
 
     def say(self, packet: bytes) -> None:
-        """Let the client say something, and everything that follows happen."""
+        """Send a packet from the client, and process its consequences."""
         self._take(Packets(CLIENTS, [(CLIENT, packet)]))
 
     def _command(self, command: int, *params: float) -> bytes:
@@ -198,7 +196,7 @@ class Stand:
         self._drain()
 
     def _drain(self) -> None:
-        """Let the rover accept every command, and every event be durable."""
+        """Let the rover accept every command, and commit every event."""
         while True:
             packets, events = self.engine.take_packets(), self.engine.take_events()
             for outgoing in packets:
@@ -210,7 +208,7 @@ class Stand:
                 return
 
     def _hear(self, outgoing: Outgoing) -> None:
-        """Let the rover do what it is asked to."""
+        """Let the rover answer requests."""
         for packet in split_datagram(outgoing.data) if outgoing.link == VEHICLES else ():
             message = self._decoder.decode(packet)
             if isinstance(message, m.CommandLong):
@@ -225,7 +223,7 @@ class Stand:
 
 
 def stand_with_queue() -> Stand:
-    """Return an engine as it is when turns are measured."""
+    """Return an engine in the state in which turns are measured."""
     stand = Stand(base_mode=CUSTOM | ARMED)
     stand.run(MEETING)
     for _ in range(WAITING):
@@ -235,7 +233,7 @@ def stand_with_queue() -> Stand:
 
 
 def counted_turn() -> dict[str, Any]:
-    """Return the calls of one turn; the first few are those of an engine that is not warm yet."""
+    """Return the calls of one turn; the first turns only warm up the engine."""
     stand = stand_with_queue()
     for _ in range(3):
         stand.run(3 * APART)
@@ -246,7 +244,7 @@ def counted_turn() -> dict[str, Any]:
 
 
 def counted_wake_ups() -> list[dict[str, Any]]:
-    """Return the calls of each wake-up of some seconds in which nothing happens."""
+    """Return the calls of each wake-up during WATCHED idle seconds."""
     stand = Stand(base_mode=CUSTOM)
     stand.run(SETTLED)
     counted: list[dict[str, Any]] = []
@@ -262,7 +260,7 @@ def counted_wake_ups() -> list[dict[str, Any]]:
 
 
 def cpu(turns: int) -> float:
-    """Return the processor's seconds of one turn, on average over about so many."""
+    """Return the mean CPU seconds of a turn, over at least ``turns`` turns."""
     clock, rounds = Clock(), -(-turns // AT_ONCE)
     for _ in range(rounds):
         stand = stand_with_queue()
@@ -279,8 +277,8 @@ def _said(calls: Calls, packets: list[Outgoing]) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Answer each line until there are no more."""
-    cpu(AT_ONCE)  # warm
+    """Answer each line of stdin."""
+    cpu(AT_ONCE)  # warm up
     print(json.dumps("ready"), flush=True)
     for line in sys.stdin:
         what, *numbers = line.split()

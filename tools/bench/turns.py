@@ -1,7 +1,7 @@
-"""What one TASK_MOVE costs inside the engine: calls and processor time, beside another revision.
+"""The cost of one TASK_MOVE in the engine: calls and CPU time, compared with another revision.
 
-``turn_child`` says exactly what a turn and an idle wake-up are. Calls are those of Python functions
-and, where it says so, of C functions as well; both are exact and the same in each run.
+``turn_child`` defines a turn and an idle wake-up. Calls are those of Python functions and, where
+stated, also of C functions; both are exact and the same in each run.
 """
 
 import json
@@ -21,7 +21,7 @@ from .child import END_WITHIN, ROOT
 from .table import Row
 
 CHILD = Path(__file__).with_name("turn_child.py")
-FIRST = "7ae03a8"  # the revision that the goals are measured against
+FIRST = "7ae03a8"  # the revision to which the goals refer
 ROUNDS = 9
 TURNS = 1_000  # in each round
 GOAL_CALLS = 200
@@ -36,7 +36,7 @@ def measure(against: str = FIRST, *, names: int = 0) -> list[Row]:
         ours = stack.enter_context(_asked(ROOT))
         here, there = ours.calls(), theirs.calls()
         times: list[tuple[float, float]] = []
-        for number in range(ROUNDS):  # whoever is first has the warmer cache: take turns
+        for number in range(ROUNDS):  # alternate: the second one has a colder cache
             first, second = (ours, theirs) if number % 2 else (theirs, ours)
             seconds = {each: each.cpu() for each in (first, second)}
             times.append((seconds[ours], seconds[theirs]))
@@ -46,7 +46,7 @@ def measure(against: str = FIRST, *, names: int = 0) -> list[Row]:
 
 
 class _Asked:
-    """A child that is asked by lines."""
+    """A child that answers lines."""
 
     def __init__(self, process: "subprocess.Popen[str]") -> None:
         self._process = process
@@ -74,7 +74,7 @@ class _Asked:
 
 @contextmanager
 def _asked(tree: Path) -> Iterator[_Asked]:
-    """Run the child on the modules of a tree while the block runs."""
+    """Run the child on the modules of a tree for a ``with`` block."""
     process = subprocess.Popen(
         [sys.executable, "-P", str(CHILD)],
         stdin=subprocess.PIPE,

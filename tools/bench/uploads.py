@@ -1,7 +1,7 @@
 """Missions uploaded by the real MAVSDK, to the server and to MAVSDK's own mission server.
 
-The server has its store on the disk and the simulated rover behind it; MAVSDK's keeps what it gets
-in memory, and has nothing else to do. The client's own costs are in both figures.
+The server has its store on the disk and a simulated rover; MAVSDK's keeps missions in memory and
+has no other work. Both figures include the client's own cost.
 """
 
 import json
@@ -20,10 +20,10 @@ GOAL = 3.0  # times MAVSDK's own
 
 
 def measure(profile: str | None = None) -> list[Row]:
-    """Return two rows for each number of items; each upload is acknowledged once it is durable."""
+    """Return two rows per number of items; each upload is acknowledged once it is durable."""
     port, vehicle_port, mavsdk_port = free_port(), free_port(), free_port()
     url, mavsdk_url = f"udpout://{HOST}:{port}", f"udpout://{HOST}:{mavsdk_port}"
-    with TemporaryDirectory(dir=Path.cwd()) as folder:  # the disk that the project is on
+    with TemporaryDirectory(dir=Path.cwd()) as folder:  # the project's disk
         options = ["--store", str(Path(folder) / "tasks.sqlite3")]
         options += [] if profile is None else ["--profile", profile]
         with (

@@ -1,6 +1,6 @@
-"""``python -m rover_sim.check_vehicle URL``: does this vehicle do what is expected of it?
+"""``python -m rover_sim.check_vehicle URL``: check whether a vehicle behaves as expected.
 
-The command line, the link and the signals; what is checked is in ``contract``.
+This file has the command line, the link and the signals; ``contract`` lists the checks.
 """
 
 import argparse
@@ -20,7 +20,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the checks; give the exit status: 0 all passed, 1 some failed, 2 usage or no vehicle."""
+    """Run the checks; return the exit status: 0 passed, 1 failed, 2 usage or no vehicle."""
     parser = make_parser()
     values = parser.parse_args(arguments)
     try:
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Return the command line."""
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(
         prog="rover_sim.check_vehicle",
         description="Check what a task server and its clients expect of a MAVLink rover. Nothing"
@@ -98,7 +98,7 @@ def _run(url: Url, values: argparse.Namespace) -> int:
 
 
 def _interrupt_once(_number: int, _frame: object) -> None:
-    """End, bringing a vehicle to rest; a second signal does not cut that short."""
+    """Raise KeyboardInterrupt, which brings the vehicle to rest; ignore further signals."""
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     raise KeyboardInterrupt
@@ -110,7 +110,7 @@ def _show(line: Line) -> None:
 
 
 def _silent(_line: Line) -> None:
-    """JSON comes at the end."""
+    """Print nothing: the JSON list comes at the end."""
 
 
 def _complain(text: str) -> int:

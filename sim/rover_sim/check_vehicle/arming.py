@@ -1,4 +1,4 @@
-"""Arming and disarming, in HOLD; with ``arm`` only."""
+"""Arming and disarming in HOLD; only with ``arm``."""
 
 from rover_sim.check_vehicle.context import Context
 from rover_sim.check_vehicle.drive_controller import ARM_DISARM, bring_to_rest
@@ -6,11 +6,11 @@ from rover_sim.check_vehicle.modes import SHOWN_WITHIN, ask_mode, shows
 from rover_sim.check_vehicle.probe import ARMED, HEARTBEAT, Answer
 
 EXTENDED_SYS_STATE, IN_AIR = 245, 2
-PATIENCE = 15.0  # s in which a vehicle that has just started may still refuse
+PATIENCE = 15.0  # s in which a vehicle may still refuse after its start
 
 
 def check_arming(context: Context) -> None:
-    """Arm and disarm; the heartbeat shows each."""
+    """Arm and disarm; the heartbeat must show both."""
     probe, report = context.probe, context.report
     if not context.options.arm:
         report.skip("arm and disarm", "not without --arm")
@@ -36,7 +36,7 @@ def check_arming(context: Context) -> None:
 
 
 def arm(context: Context) -> bool:
-    """Arm, with patience; a line says how it went."""
+    """Arm, with retries; report the result in a line."""
     probe = context.probe
     mark, end = probe.mark(), probe.now + PATIENCE
     while True:
@@ -55,7 +55,7 @@ def arm(context: Context) -> bool:
 
 
 def shows_armed(context: Context, *, armed: bool) -> bool:
-    """Wait for a heartbeat that says so."""
+    """Wait for a heartbeat with this arming state; return whether it came."""
     beat = context.probe.wait(
         HEARTBEAT,
         SHOWN_WITHIN,
@@ -66,7 +66,7 @@ def shows_armed(context: Context, *, armed: bool) -> bool:
 
 
 def _check_seen_flying(context: Context) -> None:
-    """QGroundControl hides "go to" and "pause" from what does not count as flying."""
+    """Check landed_state: QGroundControl hides "go to" and "pause" unless the vehicle flies."""
     if not context.way.landed_state_counts:
         return
     probe, name = context.probe, "counts as under way while armed"

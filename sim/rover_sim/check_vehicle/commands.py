@@ -1,4 +1,4 @@
-"""That every question gets an answer: silence costs a client seconds, or its whole link."""
+"""Answers: every request gets one, because silence costs a client seconds, or its whole link."""
 
 from typing import Any
 
@@ -12,10 +12,10 @@ PROTOCOL_VERSION, TIMESYNC, FILE_TRANSFER, AVAILABLE_MODES = 300, 111, 110, 435
 PROTOCOL_VERSION_EXTRA = 217  # CRC_EXTRA
 MAVLINK_2_VERSION = 200
 HEADER_LENGTH = 10  # of MAVLink 2
-UNKNOWN_COMMAND = 31_999  # a user command that nobody has
+UNKNOWN_COMMAND = 31_999  # a user command that no vehicle implements
 OPEN_FILE, TERMINATE_SESSION, FTP_ACK, FTP_NAK = 4, 1, 128, 129
-OUR_TIME = 123_456_789_000  # ns, to be given back as it is
-#: what QGroundControl asks for when it connects, beside what is checked elsewhere
+OUR_TIME = 123_456_789_000  # ns, to be returned unchanged
+#: requested by QGroundControl at connect, besides those that other checks cover
 OPTIONAL = {
     397: "COMPONENT_METADATA",
     395: "COMPONENT_INFORMATION",
@@ -25,7 +25,7 @@ UNKNOWN_MESSAGE = 12_000
 
 
 def check_answers(context: Context) -> None:
-    """Requests that few vehicles can meet, and one that none can."""
+    """Send requests that few vehicles support, and some that none does."""
     probe, report = context.probe, context.report
     mark = probe.mark()
     answer = probe.command(REQUEST_MESSAGE, HEARTBEAT)
@@ -75,7 +75,7 @@ def check_answers(context: Context) -> None:
 
 
 def check_addresses(context: Context) -> None:
-    """Acks name who asked, come once and from whom was asked; others' commands are not ours."""
+    """Check acks: for the sender, once, from the target; commands to others get none."""
     probe, report = context.probe, context.report
     answer = probe.command(REQUEST_MESSAGE, AUTOPILOT_VERSION)
     targets = {(each.message.target_system, each.message.target_component) for each in answer.acks}
@@ -103,7 +103,7 @@ def check_addresses(context: Context) -> None:
 
 
 def check_modes_list(context: Context) -> None:
-    """AVAILABLE_MODES, one by one and all at once; or a refusal at once."""
+    """Request AVAILABLE_MODES, singly; a prompt refusal is acceptable, too."""
     probe, report = context.probe, context.report
     mark = probe.mark()
     answer = probe.command(REQUEST_MESSAGE, AVAILABLE_MODES, 1)
@@ -137,7 +137,7 @@ def check_modes_list(context: Context) -> None:
 
 
 def check_time(context: Context) -> None:
-    """TIMESYNC is answered."""
+    """Check the answer to TIMESYNC."""
     probe, report = context.probe, context.report
     mark = probe.mark()
     probe.send(probe.messages.timesync_encode(0, OUR_TIME))
@@ -151,7 +151,7 @@ def check_time(context: Context) -> None:
 
 
 def check_files(context: Context) -> None:
-    """MAVLink FTP works or says no."""
+    """Check that MAVLink FTP answers with an ACK or a NAK."""
     probe, report = context.probe, context.report
     mark = probe.mark()
     probe.send(_ftp(context, 1, OPEN_FILE, b"@PARAM/no_such_file"))
@@ -182,7 +182,7 @@ def _expect_answer(context: Context, message_id: int, name: str, why: str = "") 
 
 
 def _greatest_version(packet: bytes) -> int:
-    """Read PROTOCOL_VERSION, which no set of pymavlink has; -1: its checksum is wrong."""
+    """Return max_version of PROTOCOL_VERSION, which pymavlink cannot decode; -1: bad checksum."""
     length = packet[1]
     checked = packet[1 : HEADER_LENGTH + length] + bytes([PROTOCOL_VERSION_EXTRA])
     checksum = int.from_bytes(packet[HEADER_LENGTH + length :][:2], "little")

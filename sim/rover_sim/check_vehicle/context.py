@@ -1,4 +1,4 @@
-"""What every check is given."""
+"""The arguments of every check."""
 
 from dataclasses import dataclass
 
@@ -9,17 +9,17 @@ from rover_sim.check_vehicle.report import Report
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What a run may do to the vehicle. By default nothing that lasts or moves it."""
+    """What a run may do to the vehicle. By default it changes and moves nothing for good."""
 
     arm: bool = False
     drive: bool = False
-    write: bool = False  # missions and fences; what was there is put back
+    write: bool = False  # missions and fences; the previous ones are restored
     persona: str = "auto"
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """A conversation with a vehicle, what is expected of it, and where the lines go."""
+    """The link to a vehicle, what is expected of it, and the report."""
 
     probe: Probe
     way: Conventions

@@ -1,4 +1,4 @@
-"""The whole contract: which checks there are and in what order."""
+"""The list of checks, in their order."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -24,7 +24,7 @@ FIRST_HEARD = 10.0  # s to wait for a vehicle
 
 
 class Check(NamedTuple):
-    """One check, and the heading of its lines."""
+    """One check, and the group of its lines."""
 
     group: str
     run: Callable[[Context], None]
@@ -52,7 +52,7 @@ GROUPS = tuple(dict.fromkeys(check.group for check in CHECKS))
 
 
 class NothingHeard(Exception):
-    """There is no vehicle at the other end; the message is one line for the user."""
+    """No vehicle answered; the message is one line for the user."""
 
 
 def check_vehicle(
@@ -63,9 +63,9 @@ def check_vehicle(
     show: Callable[[Line], None],
     groups: tuple[str, ...] = GROUPS,
 ) -> Report:
-    """Run the checks of these groups in order; ``show`` gets each line as it comes.
+    """Run the checks of these groups in order; call ``show`` with each line at once.
 
-    ``system_id`` None: the first vehicle that is heard. Raises NothingHeard.
+    ``system_id`` None selects the first vehicle that is heard. Raise NothingHeard.
     """
     probe = Probe(wire, system_id=system_id)
     first = probe.find(FIRST_HEARD)

@@ -1,4 +1,4 @@
-"""What each make of vehicle is expected to do in its own way: numbers and names, as data."""
+"""What differs between makes of vehicle: numbers and names, as data."""
 
 from dataclasses import dataclass
 
@@ -32,25 +32,25 @@ PX4_IN_SETUP = (
 
 @dataclass(frozen=True, slots=True)
 class Conventions:
-    """One make's way."""
+    """The conventions of one make."""
 
     name: str
     hold: int  # HEARTBEAT.custom_mode
     control: int  # the mode that follows setpoints: GUIDED, OFFBOARD
-    nonsense: int  # a mode that there is not
-    accepts_nonsense: bool  # says ACCEPTED to it, and stays as it is
+    nonsense: int  # a mode that does not exist
+    accepts_nonsense: bool  # answers it with ACCEPTED, and changes nothing
     mode_in_two_parts: bool  # DO_SET_MODE: main mode in param2, sub mode in param3
     control_needs_stream: bool  # setpoints first, then the mode; else the mode first
-    bytewise: bool  # an integer parameter's bytes stand in the float; else it is cast
+    bytewise: bool  # the float carries an integer parameter's bytes; else its value
     has_digest: bool  # answers a read of _HASH_CHECK
-    system_id_parameters: tuple[str, ...]  # whichever there is shows the system id
-    at_connect: frozenset[str]  # parameters that QGroundControl misses when it connects
-    in_setup: frozenset[str]  # and when Vehicle Setup is opened
+    system_id_parameters: tuple[str, ...]  # any of them shows the system id
+    at_connect: frozenset[str]  # parameters that QGroundControl requires at connect
+    in_setup: frozenset[str]  # and in Vehicle Setup
     needs_mode_list: bool  # AVAILABLE_MODES
     honours_yaw_rate: bool
-    stops_within: float  # s from the last setpoint until it stands
-    home_is_item_0: bool  # of a mission
-    landed_state_counts: bool  # for QGroundControl, to know that it is under way
+    stops_within: float  # s from the last setpoint to standstill
+    home_is_item_0: bool  # in a mission
+    landed_state_counts: bool  # QGroundControl needs it to see that the vehicle moves
 
 
 ARDUPILOT_WAY = Conventions(
@@ -91,7 +91,7 @@ PX4_WAY = Conventions(
     home_is_item_0=False,
     landed_state_counts=True,
 )
-#: one that is neither is driven in PX4's way; QGroundControl asks nothing more of it
+#: an unknown make is driven like PX4; QGroundControl needs nothing more from it
 GENERIC_WAY = Conventions(
     name="generic",
     hold=PX4_WAY.hold,
@@ -115,5 +115,5 @@ WAYS = {way.name: way for way in (ARDUPILOT_WAY, PX4_WAY, GENERIC_WAY)}
 
 
 def way_of(autopilot: int) -> Conventions:
-    """Return the make of a MAV_AUTOPILOT."""
+    """Return the conventions for a MAV_AUTOPILOT."""
     return {ARDUPILOTMEGA: ARDUPILOT_WAY, PX4: PX4_WAY}.get(autopilot, GENERIC_WAY)

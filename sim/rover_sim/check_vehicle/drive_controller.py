@@ -1,7 +1,8 @@
-"""Setpoints with a guard: what keeps a checked vehicle from running away.
+"""Setpoints with a guard that keeps a checked vehicle from running away.
 
-A setpoint other than zero leaves only while the last heartbeat is fresh and says armed and in the
-control mode, within a few metres of where it began. ``bring_to_rest`` is called on every way out.
+A setpoint other than zero is sent only while the last heartbeat is fresh and shows the vehicle
+armed, in the control mode, and while it is within a few metres of its start. Every exit path calls
+``bring_to_rest``.
 """
 
 import math
@@ -15,19 +16,19 @@ ARM_DISARM = 400
 LOCAL_NED, BODY_NED = 1, 8  # MAV_FRAME
 VELOCITY, VELOCITY_AND_RATE, POSITION = 0x0DC7, 0x05C7, 0x0DF8  # type masks
 PERIOD = 0.05  # s between two setpoints
-FRESH = 2.5  # s, of a heartbeat
-FRESH_POSITION = 1.0  # s, of its position
-FARTHEST = 15.0  # m from where it began
+FRESH = 2.5  # s, age of a heartbeat
+FRESH_POSITION = 1.0  # s, age of a position
+FARTHEST = 15.0  # m from its start
 STANDING = 0.1  # m/s
 REST_TRIES = 5
 
 
 class Interference(Exception):
-    """The vehicle is not as it must be to be driven; the message is one line."""
+    """The vehicle must not be driven in its state; the message is one line."""
 
 
 class DriveController:
-    """Drives a vehicle by setpoints, 20 a second."""
+    """Drives a vehicle with setpoints at 20 Hz."""
 
     def __init__(self, context: Context) -> None:
         self._probe = context.probe
@@ -40,7 +41,7 @@ class DriveController:
 
     @property
     def position(self) -> "Position":
-        """Where it says it is, and how fast."""
+        """Reported position and speed. Raise Interference if a message is missing."""
         message = self._probe.last(LOCAL_POSITION_NED)
         attitude = self._probe.last(ATTITUDE)
         if message is None or attitude is None:
@@ -50,22 +51,22 @@ class DriveController:
     def velocity(
         self, vx: float, vy: float, seconds: float, *, frame: int, yaw_rate: float | None = None
     ) -> None:
-        """Ask for a velocity (m/s; rad/s) for so long."""
+        """Stream a velocity (m/s; rad/s) for ``seconds``."""
         mask = VELOCITY if yaw_rate is None else VELOCITY_AND_RATE
         values = (0.0, 0.0, 0.0, vx, vy, 0.0, 0.0, 0.0, 0.0, 0.0, yaw_rate or 0.0)
         self._stream(frame, mask, values, seconds, moves=(vx, vy, yaw_rate or 0.0) != (0, 0, 0))
 
     def zeros(self, seconds: float) -> None:
-        """Ask it to stand."""
+        """Stream zero velocity."""
         self.velocity(0.0, 0.0, seconds, frame=LOCAL_NED)
 
     def go_to(self, north: float, east: float, seconds: float) -> None:
-        """Ask for a place (m) for so long."""
+        """Stream a position (m) for ``seconds``."""
         values = (north, east, *(0.0,) * 9)
         self._stream(LOCAL_NED, POSITION, values, seconds, moves=True)
 
     def wait_standing(self, within: float, *, silent: bool = False) -> float | None:
-        """Return the seconds until it stands, with zeros or in silence; None: it does not."""
+        """Return the seconds to standstill, with zeros or silent; None if still moving."""
         began = self._probe.now
         while self._probe.now - began < within:
             if silent:
@@ -106,7 +107,7 @@ class DriveController:
 
 
 class Position:
-    """Where a vehicle is and where it points."""
+    """Reported position, speed and yaw of a vehicle."""
 
     __slots__ = ("speed", "x", "y", "yaw")
 
@@ -114,16 +115,16 @@ class Position:
         self.x, self.y, self.speed, self.yaw = x, y, speed, yaw
 
     def ahead_of(self, other: "Position") -> float:
-        """How far it is ahead of where it was, along its heading there, m."""
+        """Return the distance ahead of ``other``, along its heading, m."""
         return (self.x - other.x) * math.cos(other.yaw) + (self.y - other.y) * math.sin(other.yaw)
 
     def distance_to(self, other: "Position") -> float:
-        """How far apart two are, m."""
+        """Return the distance between two positions, m."""
         return math.hypot(self.x - other.x, self.y - other.y)
 
 
 def bring_to_rest(context: Context) -> bool:
-    """Zeros, HOLD, disarm, until seen; gives whether they were. Also after Ctrl-C."""
+    """Send zeros, HOLD and disarm until shown; return success. Runs on Ctrl-C, too."""
     probe, way = context.probe, context.way
     for _ in range(REST_TRIES):
         for _ in range(3):

@@ -1,4 +1,4 @@
-"""Driving by setpoints, a few metres; with ``drive`` only."""
+"""Driving by setpoints for a few metres; only with ``drive``."""
 
 import math
 from typing import Any
@@ -24,17 +24,17 @@ from rover_sim.check_vehicle.telemetry import (
 )
 
 SPEED = 0.6  # m/s
-TURN_RATE = 0.4  # rad/s: at that speed a curve of 1.5 m
+TURN_RATE = 0.4  # rad/s: a curve of 1.5 m radius at that speed
 LEG = 2.5  # s of driving
 AHEAD = 3.0  # m, to the place of a position setpoint
-STOP_LIMIT = 4.0  # s until it stands
+STOP_LIMIT = 4.0  # s to standstill
 STREAM_RATE = 20.0  # Hz, of position and attitude
 WAY_TOLERANCE = 0.3  # m
 SPEED_TOLERANCE = 0.3  # m/s
 
 
 def check_driving(context: Context) -> None:
-    """Arm, drive, stop; whatever happens: zeros, HOLD, disarm."""
+    """Arm, drive, stop; on every exit send zeros, HOLD and disarm."""
     probe, report = context.probe, context.report
     if not context.options.drive:
         report.skip("driving", "not without --drive")
@@ -62,7 +62,7 @@ def check_driving(context: Context) -> None:
 
 
 def _take_control(context: Context) -> bool:
-    """In the order that is safe for this make; a zero clears what was left from before."""
+    """Take control in the order that is safe for this make; zeros replace an old setpoint."""
     if context.way.control_needs_stream:
         ask_mode(context, context.way.hold)
         return arm(context) and _enter(context)
@@ -127,7 +127,7 @@ def _check_velocity(context: Context, wheel: DriveController, frame: int) -> Non
 
 
 def _check_places_agree(context: Context, before: Any, after: Any) -> None:
-    """Two pairs of (LOCAL_POSITION_NED, GLOBAL_POSITION_INT): the same way in both."""
+    """Check that LOCAL_POSITION_NED and GLOBAL_POSITION_INT show the same displacement."""
     if None in (*before, *after):
         context.report.skip("one way", "no GLOBAL_POSITION_INT")
         return
@@ -155,7 +155,7 @@ def _both_positions(context: Context) -> tuple[Any, Any]:
 
 
 def _check_yaw_rate(context: Context, wheel: DriveController) -> None:
-    """A curve and backwards, where yaw rates count; on the spot, where the rover can."""
+    """Check a curve and reverse where yaw rates are honoured; note a turn on the spot."""
     if not context.way.honours_yaw_rate:
         turned, _ = _turn(wheel, 0.0, TURN_RATE)
         said = f"{math.degrees(turned):.0f}° in {LEG:g} s (its make passes over yaw rates)"
@@ -185,7 +185,7 @@ def _check_yaw_rate(context: Context, wheel: DriveController) -> None:
 
 
 def _turn(wheel: DriveController, speed: float, rate: float) -> tuple[float, float]:
-    """Drive for a leg; gives the turn (rad, clockwise) and the way ahead (m)."""
+    """Drive for a leg; return the turn (rad, clockwise) and the distance ahead (m)."""
     before = wheel.position
     wheel.velocity(speed, 0.0, LEG, frame=BODY_NED, yaw_rate=rate)
     after = wheel.position

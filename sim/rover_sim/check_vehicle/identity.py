@@ -1,4 +1,4 @@
-"""Who it is: heartbeat, packets, version and capabilities."""
+"""Identity: heartbeat, packets, version and capabilities."""
 
 from itertools import pairwise
 
@@ -9,13 +9,13 @@ from rover_sim.check_vehicle.probe import AUTOPILOT, HEARTBEAT
 REQUEST_MESSAGE, AUTOPILOT_VERSION = 512, 148
 ROVER, BOAT = 10, 11  # MAV_TYPE
 LISTENING = 5.0  # s
-LONGEST_GAP = 1.9  # s; with one lost it is 2
+LONGEST_GAP = 1.9  # s; with one lost heartbeat it is 2
 LOSS_LIMIT = 0.01  # of the packets
 CAPABILITIES = {4: "MISSION_INT", 8: "COMMAND_INT", 8192: "MAVLINK2"}
 
 
 def check_heartbeat(context: Context) -> None:
-    """Listen for a while; look at the heartbeats."""
+    """Listen for a while and check the heartbeats."""
     probe, report = context.probe, context.report
     mark = probe.mark()
     probe.listen(LISTENING)
@@ -53,7 +53,7 @@ def check_heartbeat(context: Context) -> None:
 
 
 def check_version(context: Context) -> None:
-    """Ask for AUTOPILOT_VERSION, by either form of the command."""
+    """Request AUTOPILOT_VERSION, with both forms of the command."""
     probe, report = context.probe, context.report
     mark = probe.mark()
     answer = probe.command(REQUEST_MESSAGE, AUTOPILOT_VERSION)
@@ -80,7 +80,7 @@ def check_version(context: Context) -> None:
 
 
 def check_packets(context: Context) -> None:
-    """Look at every packet of the whole run: the last check."""
+    """Check every packet of the whole run; this is the last check."""
     probe, report = context.probe, context.report
     packets, lost = probe.packets[AUTOPILOT], probe.lost[AUTOPILOT]
     report.expect(

@@ -1,4 +1,4 @@
-"""Modes of a disarmed vehicle: HOLD, the control mode, and one that there is not."""
+"""Modes of a disarmed vehicle: HOLD, the control mode, and one that does not exist."""
 
 from rover_sim.check_vehicle.context import Context
 from rover_sim.check_vehicle.conventions import CUSTOM_MODE
@@ -11,7 +11,7 @@ ZERO_PERIOD = 0.05  # s
 
 
 def check_modes(context: Context) -> None:
-    """Enter each and see the heartbeat show it; then the mode that it was in."""
+    """Enter each mode and wait for the heartbeat to show it; then restore the previous mode."""
     probe, report, way = context.probe, context.report, context.way
     if probe.armed:
         report.skip("modes", "it is armed: changing its mode could move it")
@@ -37,7 +37,7 @@ def check_modes(context: Context) -> None:
 
 
 def ask_mode(context: Context, custom_mode: int) -> Answer:
-    """Send DO_SET_MODE as this make has it."""
+    """Send DO_SET_MODE in this make's form."""
     if context.way.mode_in_two_parts:
         params = (CUSTOM_MODE, custom_mode >> 16 & 0xFF, custom_mode >> 24)
         return context.probe.command(DO_SET_MODE, *params)
@@ -45,7 +45,7 @@ def ask_mode(context: Context, custom_mode: int) -> Answer:
 
 
 def shows(context: Context, custom_mode: int, within: float = SHOWN_WITHIN) -> float | None:
-    """Wait for a heartbeat with a mode; gives how long it took, or None."""
+    """Wait for a heartbeat with a mode; return the seconds that it took, or None."""
     began, mark = context.probe.now, context.probe.mark()
     beat = context.probe.wait(
         HEARTBEAT, within, since=mark, condition=lambda m: bool(m.custom_mode == custom_mode)
@@ -54,14 +54,14 @@ def shows(context: Context, custom_mode: int, within: float = SHOWN_WITHIN) -> f
 
 
 def enter_control(context: Context) -> Answer:
-    """Ask for the control mode, after a stream of zeros where it needs one. Never moves it."""
+    """Request the control mode, after zeros if the make needs them. Never moves the vehicle."""
     if context.way.control_needs_stream:
         send_zeros(context, STREAM_FIRST)
     return ask_mode(context, context.way.control)
 
 
 def send_zeros(context: Context, seconds: float) -> None:
-    """Stream velocity zero for so long."""
+    """Stream zero velocity for ``seconds``."""
     probe = context.probe
     end = probe.now + seconds
     while probe.now < end:
@@ -89,7 +89,7 @@ def _check_entering(context: Context, name: str, mode: int) -> None:
 
 
 def _check_old_message(context: Context) -> None:
-    """SET_MODE, as QGroundControl sends it to PX4; some vehicles ack it, none needs to."""
+    """Check SET_MODE, as QGroundControl sends it to PX4; some vehicles ack it, none has to."""
     probe, hold = context.probe, context.way.hold
     probe.send(probe.messages.set_mode_encode(probe.system_id, CUSTOM_MODE, hold))
     took = shows(context, hold)

@@ -1,4 +1,4 @@
-"""The parameter protocol. A value is only ever set to what it already is."""
+"""The parameter protocol. The checks set a parameter only to its present value."""
 
 from collections.abc import Set
 from struct import pack, unpack
@@ -8,16 +8,16 @@ from rover_sim.check_vehicle.context import Context
 from rover_sim.check_vehicle.probe import AUTOPILOT, Heard
 
 PARAM_VALUE, REAL32, UINT32 = 22, 9, 5
-LIST_LIMIT = 60.0  # s for all of them
-QUIET = 1.5  # s without another one: that was all
-ROUNDS = 3  # in which missing ones are read by index
+LIST_LIMIT = 60.0  # s for the whole list
+QUIET = 1.5  # s without a new one end the list
+ROUNDS = 3  # of reading missing ones by index
 ANSWER_LIMIT = 1.0  # s
 DIGEST = "_HASH_CHECK"
 UNNUMBERED = 65535
 
 
 def check_parameters(context: Context) -> None:
-    """Read the list, then single ones; set one to what it is."""
+    """Read the list, then single parameters; set one to its present value."""
     values = _read_list(context)
     if not values:
         return
@@ -42,7 +42,7 @@ def _read_list(context: Context) -> dict[str, Any]:
         heard = found
         if heard and len(heard) >= heard[0].param_count:
             break
-    probe.listen(0.3)  # one too many would come now
+    probe.listen(0.3)  # a surplus one would come now
     heard = _listed(probe.since(mark, PARAM_VALUE))
     if not report.expect(
         "list",
@@ -63,9 +63,9 @@ def _read_list(context: Context) -> dict[str, Any]:
 
 
 def _listed(heard: list[Heard]) -> list[Any]:
-    """Return those of the list: one without an index was sent for another reason.
+    """Return the messages of the list; one without an index has another cause.
 
-    An ArduPilot tells so of what it changes itself (4.6.3), a PX4 of its _HASH_CHECK (1.17).
+    ArduPilot sends parameters that it changes itself this way (4.6.3), PX4 its _HASH_CHECK (1.17).
     """
     return [each.message for each in heard if each.message.param_index != UNNUMBERED]
 
@@ -115,7 +115,7 @@ def _check_single_reads(context: Context, values: dict[str, Any]) -> None:
 
 
 def _check_set(context: Context, values: dict[str, Any]) -> None:
-    """Floats only: in an integer's place a misunderstood encoding would write another value."""
+    """Set a float only: with a misunderstood encoding, an integer would change its value."""
     probe = context.probe
     listed = next((each for each in values.values() if each.param_type == REAL32), None)
     if listed is None:

@@ -1,4 +1,4 @@
-"""Missions, fences and rally points: download, and with ``write`` upload. Put back at the end."""
+"""Missions, fences and rally points: download, and with ``write`` upload and restore."""
 
 import math
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ TYPES = {0: "mission", 1: "fence", 2: "rally points"}
 CAPABILITY = {1: 16384, 2: 32768}  # MAV_PROTOCOL_CAPABILITY: fence, rally
 WAYPOINT, FENCE_CIRCLE, RALLY_POINT = 16, 5003, 5100
 GLOBAL_RELATIVE_ALT = 3
-FENCE_RADIUS = 1000.0  # m: nothing that a rover would notice
+FENCE_RADIUS = 1000.0  # m: too large to affect a rover
 
 
 def check_plans(context: Context) -> None:
-    """Download each plan; with ``write`` upload another, compare, clear, and put it back."""
+    """Download each plan; with ``write`` upload another, compare, clear, and restore."""
     for mission_type, name in TYPES.items():
         capability = CAPABILITY.get(mission_type, 0)
         version = context.probe.last(AUTOPILOT_VERSION)
@@ -71,7 +71,7 @@ def _check_upload(context: Context, mission_type: int, name: str) -> None:
         seen=result,
     )
     back = _download(context, mission_type)
-    first = 1 if mission_type == 0 and context.way.home_is_item_0 else 0  # it may replace home
+    first = 1 if mission_type == 0 and context.way.home_is_item_0 else 0  # home may replace it
     same = not isinstance(back, str) and [_gist(each) for each in back[first:]] == [
         _gist(each) for each in plan[first:]
     ]
@@ -95,7 +95,7 @@ def _check_upload(context: Context, mission_type: int, name: str) -> None:
 
 
 def _download(context: Context, mission_type: int) -> list[Any] | str:
-    """Return the items, or what went wrong."""
+    """Return the items, or a description of the failure."""
     probe, target = context.probe, (context.probe.system_id, AUTOPILOT)
 
     def of_type(message: Any) -> bool:
@@ -121,7 +121,7 @@ def _download(context: Context, mission_type: int) -> list[Any] | str:
 
 
 def _upload(context: Context, mission_type: int, plan: Sequence[Any]) -> str:
-    """Upload a plan; gives "accepted", or what went wrong."""
+    """Upload a plan; return "accepted", or a description of the failure."""
     probe, target = context.probe, (context.probe.system_id, AUTOPILOT)
     mark = probe.mark()
     probe.send(probe.messages.mission_count_encode(*target, len(plan), mission_type))
@@ -157,7 +157,7 @@ def _ask(context: Context, message: Any, answer: int, condition: Any) -> Any:
 
 
 def _plan(context: Context, mission_type: int) -> list[Any]:
-    """A small plan around where the rover is."""
+    """Return a small plan around the rover's position."""
     place = context.probe.last(GLOBAL_POSITION_INT)
     latitude, longitude = (place.lat, place.lon) if place is not None else (0, 0)
     if mission_type == 0:
@@ -174,7 +174,7 @@ def _item(
     context: Context, seq: int, command: int, param1: float, x: int, y: int, mission_type: int
 ) -> Any:
     frame = GLOBAL_RELATIVE_ALT if mission_type == 0 else 0
-    yaw = math.nan if command == WAYPOINT else 0.0  # as QGroundControl: no heading asked for
+    yaw = math.nan if command == WAYPOINT else 0.0  # like QGroundControl: no heading
     return context.probe.messages.mission_item_int_encode(
         0, 0, seq, frame, command, int(seq == 0), 1, param1, 0.0, 0.0, yaw, x, y, 0.0, mission_type
     )

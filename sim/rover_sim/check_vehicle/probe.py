@@ -1,6 +1,6 @@
-"""A ground station that asks and listens: pymavlink's own codec over a wire, and what was heard.
+"""A ground station that sends requests and records messages, with pymavlink's own codec.
 
-It never sends a setpoint by itself, only its heartbeat.
+It sends only its heartbeat by itself, never a setpoint.
 """
 
 import math
@@ -13,29 +13,29 @@ from pymavlink.dialects.v20 import development as dialect
 from rover_sim.check_vehicle.wire import Wire
 
 AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
-OURS = (254, 190)  # not 255: an operator's failsafe may count that one's heartbeats
+OURS = (254, 190)  # not 255: an operator's failsafe may watch the heartbeats of 255
 NO_VEHICLES = {6, 18, 26, 27}  # MAV_TYPE: ground station, onboard computer, gimbal, ADS-B
 ARMED = 128  # MAV_MODE_FLAG
 MAVLINK_2 = 0xFD  # the first byte of a packet
 COMMAND_LIMIT = 1.0  # s for an answer to a command
-AFTERMATH = 0.2  # s in which a second answer would come
-PATIENCE = 0.05  # s between two looks at the clock
-REORDERED = 8  # packets that another one overtakes; PX4 1.17 lets two change places at times
+AFTERMATH = 0.2  # s in which a duplicate answer would come
+PATIENCE = 0.05  # s between two checks of the clock
+REORDERED = 8  # packets that another one overtakes; PX4 1.17 sometimes swaps two
 
 COMMAND_ACK, HEARTBEAT, STATUSTEXT = 77, 0, 253
 
 
 class Heard(NamedTuple):
-    """A message of the vehicle."""
+    """A received message of the vehicle."""
 
     at: float  # s
-    message: Any  # one that pymavlink does not know has no fields, but bytes
+    message: Any  # only bytes if pymavlink does not know it
     id: int
     component: int
 
 
 class Header(NamedTuple):
-    """What stands before the payload; pymavlink reads it only for messages that it knows."""
+    """The header; pymavlink decodes it only for messages that it knows."""
 
     version: int
     sequence: int
@@ -45,31 +45,31 @@ class Header(NamedTuple):
 
 
 def read_header(packet: bytes) -> Header:
-    """Read a packet's header."""
+    """Decode a packet's header."""
     if packet[0] == MAVLINK_2:
         return Header(2, packet[4], packet[5], packet[6], int.from_bytes(packet[7:10], "little"))
     return Header(1, packet[2], packet[3], packet[4], packet[5])
 
 
 class Answer(NamedTuple):
-    """What came of a command."""
+    """The answer to a command."""
 
-    acks: tuple[Heard, ...]  # those that name the command
+    acks: tuple[Heard, ...]  # acks of the command
     took: float  # s until the first
 
     @property
     def result(self) -> int | None:
-        """MAV_RESULT; None: silence."""
+        """MAV_RESULT, or None without an answer."""
         return int(self.acks[0].message.result) if self.acks else None
 
     @property
     def accepted(self) -> bool:
-        """Whether it was."""
+        """Whether the command was accepted."""
         return self.result == 0
 
     @property
     def refused(self) -> bool:
-        """Whether it was refused, in a way that every client understands."""
+        """Whether the command was refused with a result that every client knows."""
         return self.result in (1, 2, 3, 4)
 
     def __str__(self) -> str:
@@ -81,22 +81,22 @@ class Answer(NamedTuple):
 
 
 class _Out:
-    """What pymavlink writes to."""
+    """The file object that pymavlink writes to."""
 
     def __init__(self, wire: Wire) -> None:
         self.write = wire.send
 
 
 class Probe:
-    """One conversation with one vehicle."""
+    """The link to one vehicle, with a log."""
 
     def __init__(self, wire: Wire, *, system_id: int | None) -> None:
-        self.system_id = system_id  # until ``find`` has found one: the one to look for
+        self.system_id = system_id  # None until ``find`` finds one: any vehicle
         self.log: list[Heard] = []
         self.packets: Counter[int] = Counter()  # by component
-        self.lost: Counter[int] = Counter()  # sequence numbers that did not come
+        self.lost: Counter[int] = Counter()  # missing sequence numbers
         self.damaged = 0
-        self.mavlink_1 = 0  # packets of the old version
+        self.mavlink_1 = 0  # packets in MAVLink 1
         self._wire = wire
         self._mav: Any = dialect.MAVLink(_Out(wire), *OURS)
         self._mav.robust_parsing = True
@@ -108,16 +108,16 @@ class Probe:
 
     @property
     def now(self) -> float:
-        """The wire's time, s."""
+        """Time of the wire, s."""
         return self._wire.now()
 
     @property
     def messages(self) -> Any:
-        """What builds messages: pymavlink's ``…_encode``."""
+        """pymavlink's message builders, ``…_encode``."""
         return self._mav
 
     def find(self, within: float) -> Heard | None:
-        """Wait for a vehicle's heartbeat."""
+        """Wait for a vehicle's heartbeat; return it, or None."""
         end = self.now + within
         while self.now < end:
             self.pump()
@@ -127,7 +127,7 @@ class Probe:
         return None
 
     def send(self, message: Any) -> None:
-        """Send a message; none that would put NaN into a setpoint."""
+        """Send a message. Raise ValueError for a setpoint with NaN."""
         if message.get_msgId() in (84, 86) and not all(
             math.isfinite(value) for value in message.to_dict().values() if isinstance(value, float)
         ):
@@ -135,7 +135,7 @@ class Probe:
         self._mav.send(message)
 
     def pump(self, within: float = PATIENCE) -> None:
-        """Hear what comes next, and keep our heartbeat going."""
+        """Receive messages, and send our heartbeat when it is due."""
         if self.now >= self._heartbeat_due:
             self._heartbeat_due = self.now + 1.0
             self._mav.heartbeat_send(6, 8, 0, 0, 4)
@@ -143,17 +143,17 @@ class Probe:
             self._take(message)
 
     def listen(self, seconds: float) -> None:
-        """Hear for so long."""
+        """Receive for ``seconds``."""
         end = self.now + seconds
         while (left := end - self.now) > 0.0:
             self.pump(min(left, PATIENCE))
 
     def mark(self) -> int:
-        """Return a place in the log, for ``since`` and ``wait``."""
+        """Return a position in the log, for ``since`` and ``wait``."""
         return len(self.log)
 
     def since(self, mark: int, message_id: int) -> list[Heard]:
-        """Return what was heard of a kind, from the autopilot, since then."""
+        """Return the autopilot's messages with this id since a mark."""
         return [
             heard
             for heard in self.log[mark:]
@@ -161,12 +161,12 @@ class Probe:
         ]
 
     def last(self, message_id: int) -> Any:
-        """Return the last message of a kind from the autopilot, or None."""
+        """Return the autopilot's last message with this id, or None."""
         heard = self._last(message_id)
         return None if heard is None else heard.message
 
     def silence(self, message_id: int) -> float:
-        """Return the seconds since the last message of a kind from the autopilot."""
+        """Return the seconds since the autopilot's last message with this id."""
         heard = self._last(message_id)
         return math.inf if heard is None else self.now - heard.at
 
@@ -178,7 +178,7 @@ class Probe:
         since: int,
         condition: Callable[[Any], bool] = lambda _: True,
     ) -> Any:
-        """Wait for a message of a kind; None if it does not come. ``since``: a mark."""
+        """Wait for a message from the mark ``since`` on; return None if it does not come."""
         end = self.now + within
         seen = since
         while True:
@@ -192,7 +192,7 @@ class Probe:
             self.pump(min(PATIENCE, max(0.0, end - self.now)))
 
     def command(self, number: int, *params: float, system_id: int | None = None) -> Answer:
-        """Send COMMAND_LONG to the autopilot and wait for the answer, and for a second one."""
+        """Send COMMAND_LONG to the autopilot; wait for its answer and for duplicates."""
         padded = (*params, *(0.0,) * (7 - len(params)))
         target = self.system_id if system_id is None else system_id
         return self._ask(
@@ -200,7 +200,7 @@ class Probe:
         )
 
     def command_int(self, number: int, *params: float) -> Answer:
-        """The same by COMMAND_INT, without a place."""
+        """Send COMMAND_INT, without a place; else like ``command``."""
         padded = (*params, *(0.0,) * (4 - len(params)))
         target = (self.system_id, AUTOPILOT)
         return self._ask(
@@ -208,19 +208,19 @@ class Probe:
         )
 
     def texts(self, mark: int) -> str:
-        """Return what the vehicle said in words since then, to be added to a line."""
+        """Return the vehicle's texts since a mark, as a suffix for a line."""
         said = [heard.message.text for heard in self.log[mark:] if _is_text(heard)]
         return f' (it says: "{"; ".join(said[-3:])}")' if said else ""
 
     @property
     def armed(self) -> bool:
-        """Whether its last heartbeat says so."""
+        """Whether the last heartbeat shows the vehicle armed."""
         beat = self.last(HEARTBEAT)
         return beat is not None and bool(beat.base_mode & ARMED)
 
     @property
     def custom_mode(self) -> int:
-        """The mode that its last heartbeat says; -1: none yet."""
+        """The mode in the last heartbeat; -1 before the first."""
         beat = self.last(HEARTBEAT)
         return -1 if beat is None else int(beat.custom_mode)
 

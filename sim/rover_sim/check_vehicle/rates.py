@@ -1,4 +1,4 @@
-"""How often: SET_MESSAGE_INTERVAL and GET_MESSAGE_INTERVAL. What was set is put back."""
+"""Message rates: SET_MESSAGE_INTERVAL and GET_MESSAGE_INTERVAL. The interval is restored."""
 
 from rover_sim.check_vehicle.context import Context
 from rover_sim.check_vehicle.telemetry import ATTITUDE
@@ -12,7 +12,7 @@ TOLERANCE = 0.3
 
 
 def check_intervals(context: Context) -> None:
-    """Set two rates of ATTITUDE, measure each, ask for the second, and put back the first."""
+    """Set and measure two rates of ATTITUDE, read the second back, and restore the interval."""
     probe, report = context.probe, context.report
     before = _told(context)
     try:

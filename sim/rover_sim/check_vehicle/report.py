@@ -1,4 +1,4 @@
-"""What was checked and what came of it: a line for each check, and a summary."""
+"""The result of the checks: a line for each, and a summary."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -6,12 +6,12 @@ from enum import Enum
 
 
 class Outcome(Enum):
-    """How a check went; the value stands at the beginning of its line."""
+    """Outcome of a check; the value begins its line."""
 
     OK = "ok"
     FAIL = "FAIL"
     SKIPPED = "skipped"
-    NOTE = "note"  # not as clients like it, and nothing that the contract demands
+    NOTE = "note"  # clients would prefer otherwise, but the contract permits it
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Line:
 
 
 class Report:
-    """Collects lines, and shows each as it comes."""
+    """Collects lines, and shows each at once."""
 
     def __init__(self, show: Callable[[Line], None]) -> None:
         self.lines: list[Line] = []
@@ -39,23 +39,23 @@ class Report:
         return f"Report({self.summary()})"
 
     def ok(self, name: str, seen: str) -> None:
-        """It is as expected."""
+        """Add a passed check."""
         self._add(name, Outcome.OK, seen)
 
     def fail(self, name: str, *, expected: str, seen: str) -> None:
-        """It is not."""
+        """Add a failed check."""
         self._add(name, Outcome.FAIL, f"expected {expected}; seen: {seen}")
 
     def skip(self, name: str, why: str) -> None:
-        """It could not be, or was not to be, checked."""
+        """Add a check that was impossible or not wanted."""
         self._add(name, Outcome.SKIPPED, why)
 
     def note(self, name: str, said: str) -> None:
-        """It is worth knowing, and no fault."""
+        """Add a remark that is no failure."""
         self._add(name, Outcome.NOTE, said)
 
     def expect(self, name: str, met: bool, *, expected: str, seen: str) -> bool:
-        """Add the line that follows from whether an expectation was met; gives that back."""
+        """Add a passed or failed check; return ``met``."""
         if met:
             self.ok(name, seen)
         else:
@@ -64,11 +64,11 @@ class Report:
 
     @property
     def failed(self) -> list[Line]:
-        """The lines that failed."""
+        """The lines of failed checks."""
         return [line for line in self.lines if line.outcome is Outcome.FAIL]
 
     def summary(self) -> str:
-        """Say it in one line."""
+        """Return the counts in one line."""
         count = {each: sum(line.outcome is each for line in self.lines) for each in Outcome}
         return (
             f"{count[Outcome.OK]} ok, {count[Outcome.FAIL]} failed,"
@@ -76,7 +76,7 @@ class Report:
         )
 
     def as_json(self) -> list[dict[str, str]]:
-        """Return the lines for a machine."""
+        """Return the lines for JSON."""
         return [asdict(line) | {"outcome": line.outcome.value} for line in self.lines]
 
     def _add(self, name: str, outcome: Outcome, said: str) -> None:

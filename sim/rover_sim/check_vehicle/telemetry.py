@@ -1,4 +1,4 @@
-"""What it tells of itself: that each message comes, in the right units, and that they agree."""
+"""Telemetry: each message comes, in the right units, and messages agree with each other."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ HEADING_TOLERANCE = 10.0  # deg
 
 
 class Expected(NamedTuple):
-    """A message that clients need, and what its fields must be like."""
+    """A message that clients need, and the condition on its fields."""
 
     name: str
     what: str
@@ -77,7 +77,7 @@ TELEMETRY: Mapping[int, Expected] = {
     74: Expected(
         "VFR_HUD",
         "heading 0 to 360°, throttle 0 to 100 %, speed in m/s",
-        # a PX4 rover's airspeed is NaN: it has none (1.17)
+        # a PX4 rover's airspeed is NaN: it has no sensor (1.17)
         lambda m: 0 <= m.heading <= 360 and m.throttle <= 100 and abs(m.groundspeed) < 50,
     ),
     242: Expected("HOME_POSITION", "degrees × 10⁷, not 0/0", _on_earth),
@@ -94,14 +94,14 @@ TELEMETRY: Mapping[int, Expected] = {
 }  # fmt: skip
 
 
-#: of one by whose landed_state nobody goes: an ArduPilot Rover says 0, undefined (4.6.3)
+#: if landed_state is not needed: an ArduPilot Rover sends 0, undefined (4.6.3)
 ANY_LANDED_STATE = Expected(
     "EXTENDED_SYS_STATE", "landed_state 0 to 4", lambda m: 0 <= m.landed_state <= 4
 )
 
 
 def check_telemetry(context: Context) -> None:
-    """Each message has come by now, or comes on request; its last copy is looked at."""
+    """Check the last copy of each message; request those that have not come."""
     probe, report = context.probe, context.report
     asked = dict(TELEMETRY)
     if not context.way.landed_state_counts:
@@ -126,7 +126,7 @@ def check_telemetry(context: Context) -> None:
 
 
 def check_agreement(context: Context) -> None:
-    """Boot times run as the clock does, and two messages of the same thing agree."""
+    """Check that boot times follow the clock, and that redundant messages agree."""
     probe, report = context.probe, context.report
     _check_boot_times(context)
     attitude, position = probe.last(ATTITUDE), probe.last(GLOBAL_POSITION_INT)

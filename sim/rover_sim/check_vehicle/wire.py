@@ -1,4 +1,4 @@
-"""Bytes to and from a vehicle: a link of pymavlink's, opened by the URLs that the server takes."""
+"""Bytes to and from a vehicle: a pymavlink link, opened by the server's link URLs."""
 
 import time
 from ipaddress import ip_address
@@ -12,11 +12,11 @@ READ_SIZE = 4096  # bytes
 
 
 class BadUrl(Exception):
-    """The URL names no link; the message is one line for the user."""
+    """Not a link URL; the message is one line for the user."""
 
 
 class Wire(Protocol):
-    """Where bytes come from and go to, and the clock that goes with it."""
+    """Source and sink of bytes, with their clock."""
 
     def now(self) -> float:
         """Return the time of the vehicle's world, s."""
@@ -27,12 +27,12 @@ class Wire(Protocol):
         ...
 
     def receive(self, within: float) -> bytes:
-        """Return the next bytes; none if there are none within so many seconds."""
+        """Return the next bytes; empty if none come within ``within`` seconds."""
         ...
 
 
 class Url(NamedTuple):
-    """A URL, read."""
+    """A parsed link URL."""
 
     kind: str
     place: str  # host:port, or the device's path
@@ -40,7 +40,7 @@ class Url(NamedTuple):
 
     @property
     def is_local(self) -> bool:
-        """Whether nothing but this machine can be at the other end; a cable counts as not."""
+        """Whether the other end must be this machine; a serial cable is not local."""
         if self.kind == SERIAL:
             return False
         host = self.place.rpartition(":")[0]
@@ -48,7 +48,7 @@ class Url(NamedTuple):
 
 
 def read_url(text: str) -> Url:
-    """Read udpout:host:port, udpin:…, tcp:…, tcpin:… or serial:path:baud. Raises BadUrl."""
+    """Parse udpout:host:port, udpin:…, tcp:…, tcpin:… or serial:path:baud. Raise BadUrl."""
     kind, _, rest = text.partition(":")
     place, _, number = rest.rpartition(":")
     if kind not in (*NETWORK, SERIAL) or not place or not number.isdigit():
@@ -65,7 +65,7 @@ def read_url(text: str) -> Url:
 
 
 class MavutilWire:
-    """A real link. ``speed``: simulated seconds per second, for a rover whose time runs faster."""
+    """A real link. ``speed``: simulated seconds per second, for a rover in faster time."""
 
     def __init__(self, url: Url, *, speed: float = 1.0) -> None:
         self._speed = speed
@@ -79,7 +79,7 @@ class MavutilWire:
         return f"MavutilWire({self._link})"
 
     def now(self) -> float:
-        """Return the monotonic clock, as fast as the vehicle's."""
+        """Return the monotonic clock, scaled to the vehicle's time."""
         return time.monotonic() * self._speed
 
     def send(self, data: bytes) -> None:
@@ -87,7 +87,7 @@ class MavutilWire:
         self._link.write(data)
 
     def receive(self, within: float) -> bytes:
-        """Return the next bytes; none if there are none in time."""
+        """Return the next bytes; empty if none come in time."""
         if self._link.select(max(0.0, within / self._speed)):
             return bytes(self._link.recv(READ_SIZE) or b"")
         return b""

@@ -1,15 +1,15 @@
-"""Starts the comparison; an interrupt is no error at any moment, imports included."""
+"""Start the comparison; handle an interrupt at any moment, even during imports."""
 
 import sys
 from importlib.util import find_spec
 
 NO_PYMAVLINK = "compare_rovers: pymavlink is not installed: pip install 'mav-tasks[demo]'"
 USAGE_ERROR = 2
-INTERRUPTED = 130  # as a shell reports SIGINT
+INTERRUPTED = 130  # the shell's status for SIGINT
 
 
 def main() -> int:
-    """Run it; return the exit status."""
+    """Run the comparison; return the exit status."""
     if find_spec("pymavlink") is None:
         sys.stderr.write(f"{NO_PYMAVLINK}\n")
         return USAGE_ERROR

@@ -1,4 +1,4 @@
-"""Print what the simulated rovers do beside what real ones did, in the same manoeuvres.
+"""Compare simulated rovers with recordings of real ones, in the same manoeuvres.
 
 Virtual time, no server, no sockets. Exit status 0: each figure is within a factor of 1.5 of the
 real one or explained; 1: some differ; 2: usage.
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Return the command line."""
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(
         prog="compare_rovers", description=(__doc__ or "").partition("\n")[0]
     )

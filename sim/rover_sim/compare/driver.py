@@ -1,4 +1,4 @@
-"""What drives a rover through the manoeuvres: the seam, and the set-points that it streams."""
+"""The protocol for driving a rover through manoeuvres, and the setpoints that it streams."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -6,18 +6,18 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A set-point that is streamed for some seconds, then zeros."""
+    """A setpoint that is streamed for some seconds, then zeros."""
 
     name: str
     speed: float  # m/s
-    yaw_rate: float = 0.0  # rad/s, clockwise; a PX4 rover gets a velocity that turns so fast
-    aside: float = 0.0  # rad from the heading: the way of the velocity, on PX4
+    yaw_rate: float = 0.0  # rad/s, clockwise; a PX4 rover gets a velocity that turns at this rate
+    aside: float = 0.0  # rad from the heading: the direction of the velocity, on PX4
     seconds: float = 5.0
     rest: float = 5.0  # s of zeros
 
 
 class Driver(Protocol):
-    """Somebody who can drive a rover by MAVLink and who records what happens."""
+    """Drives a rover over MAVLink and records the messages."""
 
     @property
     def is_px4(self) -> bool:
@@ -26,7 +26,7 @@ class Driver(Protocol):
 
     @property
     def is_ready(self) -> bool:
-        """Whether it is armed and takes set-points."""
+        """Whether the rover is armed and follows setpoints."""
         ...
 
     @property
@@ -36,15 +36,15 @@ class Driver(Protocol):
 
     @property
     def reported_speed(self) -> float:
-        """The speed that it last reported, m/s."""
+        """Speed that the rover last reported, m/s."""
         ...
 
     def mark(self, name: str) -> None:
-        """Note that a manoeuvre begins."""
+        """Record the start of a manoeuvre."""
         ...
 
     def wait(self, seconds: float) -> None:
-        """Let time pass without a set-point."""
+        """Let time pass without setpoints."""
         ...
 
     def wait_for_rover(self) -> None:
@@ -52,25 +52,25 @@ class Driver(Protocol):
         ...
 
     def drive(self, seconds: float, step: Step) -> None:
-        """Stream the step's set-point."""
+        """Stream the step's setpoint."""
         ...
 
     def take_control(self) -> bool:
-        """Ask for the mode that takes set-points; return whether it was accepted."""
+        """Request the mode that follows setpoints; return whether it was accepted."""
         ...
 
     def hold(self) -> bool:
-        """Ask for the mode HOLD; return whether it was accepted."""
+        """Request HOLD; return whether it was accepted."""
         ...
 
     def arm(self) -> bool:
-        """Ask it to arm; return whether it was accepted."""
+        """Request arming; return whether it was accepted."""
         ...
 
     def disarm(self) -> bool:
-        """Ask it to disarm; return whether it was accepted."""
+        """Request disarming; return whether it was accepted."""
         ...
 
     def push_stick(self, throttle: int | None) -> None:
-        """Hold the throttle stick so (µs), by RC_CHANNELS_OVERRIDE; None releases it."""
+        """Hold the throttle at a pulse (µs) by RC_CHANNELS_OVERRIDE; None releases it."""
         ...

@@ -1,6 +1,6 @@
-"""Figures that differ from the real ones on purpose, or of necessity: each with the reason.
+"""Figures that differ from the real ones on purpose or unavoidably, each with the reason.
 
-An explanation covers a range of simulated values and no more, so that it cannot hide a change.
+An explanation covers only a range of simulated values, so that it cannot hide a change.
 """
 
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ from rover_sim.compare.pairs import Pair
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Why some figures of some rovers differ."""
+    """The reason why some figures of some rovers differ."""
 
     rovers: str  # a pattern of the pair's name
     group: str  # a pattern
     name: str  # a pattern
-    between: tuple[float, float] | str | None  # what the simulated value may be
+    between: tuple[float, float] | str | None  # permitted simulated values
     why: str
 
     def covers(self, pair: Pair, figure: Figure) -> bool:
-        """Return whether it is about this figure, with the value that it has."""
+        """Return whether this explains the figure with its value."""
         return self.is_about(pair, *figure.key) and self._allows(figure.value)
 
     def is_about(self, pair: Pair, group: str, name: str) -> bool:
-        """Return whether it is about the figure of that group and name."""
+        """Return whether this is about the figure with that group and name."""
         return (
             fnmatchcase(pair.name, self.rovers)
             and fnmatchcase(group, self.group)
@@ -215,5 +215,5 @@ EXPLANATIONS: tuple[Explanation, ...] = (
 
 
 def explanation_of(pair: Pair, figure: Figure) -> Explanation | None:
-    """Return why this figure may differ; None: there is no reason."""
+    """Return the explanation of a figure, or None."""
     return next((each for each in EXPLANATIONS if each.covers(pair, figure)), None)

@@ -1,4 +1,4 @@
-"""A figure: one number, or a few words, that tells how a rover behaves."""
+"""A figure: one number, or a few words, that describes the behaviour of a rover."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ Value = float | str | None  # None: it did not happen, or was never sent
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What a figure is counted in, and how small a value is as good as none."""
+    """Unit of a figure, and its smallest significant difference."""
 
     unit: str
     floor: float  # two values within ± floor are the same
@@ -44,7 +44,7 @@ class Figure:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What it is known by in the tables of reference values and of explanations."""
+        """Its key in the tables of reference values and explanations."""
         return self.group, self.name
 
 
@@ -67,13 +67,13 @@ class Group:
 
 
 def quantile(values: Sequence[float], share: float) -> float | None:
-    """Return the value below which that share of the values lies; None of none."""
+    """Return the value below which ``share`` of the values lie; None if there are none."""
     ordered = sorted(values)
     return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else None
 
 
 def unwrapped(angles: Sequence[float]) -> list[float]:
-    """Return the same angles without leaps by a full turn."""
+    """Return the angles without jumps by a full turn."""
     out: list[float] = []
     for angle in angles:
         out.append(out[-1] + math.remainder(angle - out[-1], math.tau) if out else angle)
@@ -81,11 +81,11 @@ def unwrapped(angles: Sequence[float]) -> list[float]:
 
 
 def turned(angles: Sequence[float]) -> float:
-    """Return the degrees from the first angle to the last, by way of all between."""
+    """Return the degrees from the first angle to the last, through all between."""
     smooth = unwrapped(angles)
     return math.degrees(smooth[-1] - smooth[0])
 
 
 def turned_either_way(angles: Sequence[float]) -> float:
-    """Return the degrees from the first angle to the last, where the direction is chance."""
+    """Return the degrees from the first angle to the last, without the sign, which is random."""
     return abs(turned(angles))

@@ -1,19 +1,19 @@
-"""The manoeuvres: what is asked of a rover, in which order and for how long.
+"""The manoeuvres: demands on a rover, their order and duration.
 
-They are those that the reference figures come from, so that the two can be compared.
+The reference figures come from the same manoeuvres, so that both can be compared.
 """
 
 import math
 
 from rover_sim.compare.driver import Driver, Step
 
-STANDING_TIME = 40.0  # s disarmed, half of it armed
-#: s from a real one's first message to its first HEARTBEAT, by which a driver knows it. The
-#: simulated ones begin with a HEARTBEAT
+STANDING_TIME = 40.0  # s disarmed; half as long armed
+#: s from a real rover's first message to its first HEARTBEAT, by which a driver detects it. The
+#: simulated ones send a HEARTBEAT first
 FIRST_HEARTBEAT = 1.0
 RETRY = 3.0  # s between two attempts to arm
 STICK = 1750  # µs, channel 3: half forward
-STILL = 0.15  # m/s reported; below it counts as standing while nothing is sent
+STILL = 0.15  # m/s reported; a slower rover counts as standing while nothing is sent
 ARMED = "armed for the first time"
 STANDING_DISARMED, STANDING_ARMED = "standing disarmed", "standing armed"
 READYING = "arming and taking control"
@@ -49,7 +49,7 @@ FULL = Step("1 m/s", 1.0)
 
 
 def drive_all(driver: Driver, *, standing: float = STANDING_TIME) -> None:
-    """Drive through all manoeuvres; ``standing``: seconds that it stands disarmed at first."""
+    """Drive all manoeuvres; ``standing`` is the time at rest, disarmed, at the start (s)."""
     _start(driver)
     _stand(driver, standing)
     turns = SIDEWAYS if driver.is_px4 else SPOT_TURNS
@@ -69,7 +69,7 @@ def _start(driver: Driver) -> None:
     driver.mark("start")
     driver.wait_for_rover()
     driver.wait(FIRST_HEARTBEAT)
-    in_control = driver.is_px4  # PX4 wants a stream before OFFBOARD
+    in_control = driver.is_px4  # PX4 needs a stream before OFFBOARD
     while not driver.is_armed:
         in_control = in_control or driver.take_control()
         driver.hold()
@@ -147,7 +147,7 @@ def _end_by_disarming(driver: Driver) -> None:
 
 
 def _wait_until_it_stands(driver: Driver, *, at_most: float) -> None:
-    """Wait until it has reported to stand for 5 s."""
+    """Wait until the rover has reported standstill for 5 s."""
     stood = waited = 0.0
     while stood < 5.0 and waited < at_most:
         driver.wait(0.1)

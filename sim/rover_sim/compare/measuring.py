@@ -1,4 +1,4 @@
-"""Measure a simulated rover: some runs, each with a chance of its own, and the middle of them."""
+"""Measure a simulated rover: several runs with different seeds, and their medians."""
 
 import statistics
 from collections import Counter
@@ -10,11 +10,11 @@ from rover_sim.compare.manoeuvres import drive_all
 from rover_sim.compare.pairs import Pair, make_rover
 from rover_sim.compare.virtual_driver import VirtualDriver
 
-RUNS = 5  # one could be as far off by chance as a recording is
+RUNS = 5  # a single run could deviate by chance as much as a recording
 
 
 def measure(pair: Pair, *, seed: int, runs: int = RUNS) -> list[Figure]:
-    """Return the figures of that simulated rover: of each the middle value of all runs."""
+    """Return the figures of a simulated rover, each the median of all runs."""
     drives = [_drive(pair, seed=seed + run) for run in range(runs)]
     return [
         replace(same[0], value=middle([figure.value for figure in same]))
@@ -23,7 +23,7 @@ def measure(pair: Pair, *, seed: int, runs: int = RUNS) -> list[Figure]:
 
 
 def middle(values: list[Value]) -> Value:
-    """Return the median of numbers; of words, or if it did not happen each time, what was most."""
+    """Return the median of numbers; for words, or if some are None, the most frequent value."""
     numbers = [value for value in values if isinstance(value, (int, float))]
     if len(numbers) == len(values):
         return statistics.median(numbers)

@@ -1,4 +1,4 @@
-"""The four rovers that are compared: an autopilot and a frame each."""
+"""The four compared rovers: an autopilot and a frame each."""
 
 import math
 from dataclasses import dataclass, replace
@@ -15,17 +15,17 @@ SYSTEM_ID = 1
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """An autopilot with a frame, and the real one whose figures it is held against."""
+    """An autopilot with a frame, and its real counterpart."""
 
     autopilot: str
     frame: Frame
     real: str  # autopilot, version, vehicle: the source of the reference figures
-    heading: float = 0.0  # rad, where the real one looked at the start
-    gps: Gps = Gps.FINE  # what the real one's errors are like
+    heading: float = 0.0  # rad, the real one's heading at the start
+    gps: Gps = Gps.FINE  # class of the real one's errors
 
     @property
     def name(self) -> str:
-        """What it is called on the command line and in the tables."""
+        """Its name on the command line and in the tables."""
         return f"{self.autopilot}-{self.frame.value}"
 
 
@@ -49,9 +49,9 @@ PAIRS = (ARDUPILOT_SKID, ARDUPILOT_ACKERMANN, PX4_DIFFERENTIAL, PX4_ACKERMANN)
 
 
 def make_rover(pair: Pair, *, seed: int) -> Vehicle:
-    """Return that simulated rover, just switched on, whose boot takes as long as a real one's.
+    """Return the simulated rover, just powered on, with a boot of real duration.
 
-    Its wheels neither slip nor differ from rover to rover: those of the recordings did not.
+    Its wheels neither slip nor vary between rovers, as in the recordings.
     """
     persona = PERSONAS[pair.autopilot].on(pair.frame)
     realism = replace(persona.realism, boot=persona.boot, estimator=persona.estimators[pair.gps])

@@ -1,4 +1,4 @@
-"""What the real rovers gave: the figures that the simulated ones are held against.
+"""The figures of the real rovers, for comparison with the simulated ones.
 
 ArduPilot Rover 4.6.3 SITL, vehicles ``rover-skid`` and ``rover``, true pose from SIM_STATE; PX4
 1.17.0 SITL, a kinematic differential rover in lock-step and the Ackermann rover of its SIH. All
@@ -17,7 +17,7 @@ Key = tuple[str, str]  # group and name of a figure
 
 
 def reference_of(pair: Pair) -> dict[Key, Value]:
-    """Return the real one's figures, by group and name; what it did not drive is left out."""
+    """Return the real rover's figures, by group and name, without those that it did not drive."""
     column = PAIRS.index(pair)
     return {
         (group, name): values[column]

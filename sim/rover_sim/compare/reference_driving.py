@@ -1,4 +1,4 @@
-"""The real figures of steps, turns, endings and sticks: what a rover does."""
+"""The real figures of steps, turns, endings and sticks: the motion of a rover."""
 
 from collections.abc import Mapping
 

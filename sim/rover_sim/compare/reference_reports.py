@@ -1,4 +1,4 @@
-"""The real figures of start, standing, estimate, timing and places: what a rover says."""
+"""The real figures of start, standing, estimate, timing and places: the messages of a rover."""
 
 from collections.abc import Mapping
 

@@ -4,8 +4,8 @@ from typing import Final
 
 from rover_sim.compare.figure import Value
 
-#: ArduPilot skid, ArduPilot Ackermann, PX4 differential, PX4 Ackermann. None: it did not happen,
-#: or was never sent. In texts, # stands for a number
+#: ArduPilot skid, ArduPilot Ackermann, PX4 differential, PX4 Ackermann. None: it did not happen, or
+#: was never sent. In texts, # replaces a number
 Row = tuple[Value, Value, Value, Value]
 
-NOT_DRIVEN: Final = "not driven"  # a manoeuvre that this one was not put through
+NOT_DRIVEN: Final = "not driven"  # this rover did not drive the manoeuvre

@@ -1,4 +1,4 @@
-"""The table: each figure, real beside simulated."""
+"""The table: each figure, real and simulated side by side."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -29,7 +29,7 @@ def lines(
 
 
 def summary(pair: Pair, comparisons: Sequence[Comparison]) -> str:
-    """Return how many figures are near, explained, and neither."""
+    """Return the number of near, explained and differing figures."""
     count = Counter(each.verdict for each in comparisons)
     return (
         f"{pair.name}: {len(comparisons)} figures, {count[Verdict.OK]} within a factor of 1.5,"

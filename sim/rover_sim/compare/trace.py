@@ -1,4 +1,4 @@
-"""What was said, heard and truly done while a rover drove through the manoeuvres."""
+"""Record of a drive through the manoeuvres: sent and received messages, and true poses."""
 
 import itertools
 import math
@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 
 class Span(NamedTuple):
-    """A stretch of time, s."""
+    """A time interval, s."""
 
     begin: float
     end: float
 
 
 class Heard(NamedTuple):
-    """A MAVLink message and when it came, or was sent."""
+    """A MAVLink message with the time at which it was received or sent."""
 
     time: float  # s
     message: Any  # its fields are attributes, in MAVLink's units
@@ -23,7 +23,7 @@ class Heard(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TruePose:
-    """Where the rover really was: metres and radians, from where it started."""
+    """True pose of the rover: metres and radians, relative to its start."""
 
     time: float  # s
     north: float
@@ -34,7 +34,7 @@ class TruePose:
 
 
 class Mark(NamedTuple):
-    """A manoeuvre begins."""
+    """The start of a manoeuvre."""
 
     time: float
     name: str
@@ -42,7 +42,7 @@ class Mark(NamedTuple):
 
 @dataclass(slots=True)
 class Trace:
-    """One drive through the manoeuvres. Each list is in the order of time."""
+    """One drive through the manoeuvres. Each list is in order of time."""
 
     poses: list[TruePose] = field(default_factory=list)
     heard: dict[str, list[Heard]] = field(default_factory=dict)
@@ -54,21 +54,21 @@ class Trace:
 
     @property
     def is_px4(self) -> bool:
-        """Whether the rover says that it is a PX4."""
+        """Whether the rover identifies itself as PX4."""
         return bool(self.heard["HEARTBEAT"][0].message.autopilot == 12)  # MAV_AUTOPILOT_PX4
 
     @property
     def first_heard(self) -> float:
-        """When the rover's first message came."""
+        """Time of the rover's first message."""
         return min(rows[0].time for rows in self.heard.values())
 
     @property
     def whole(self) -> Span:
-        """From the first mark to the last."""
+        """The interval from the first mark to the last."""
         return Span(self.marks[0].time, self.marks[-1].time)
 
     def span(self, mark: str) -> Span | None:
-        """Return the time from the first mark of that name to the next mark; None: not driven."""
+        """Return the interval from the first such mark to the next one; None: not driven."""
         for this, following in zip(self.marks, self.marks[1:], strict=False):
             if this.name == mark:
                 return Span(this.time, following.time)

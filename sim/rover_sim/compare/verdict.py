@@ -1,4 +1,4 @@
-"""Whether a simulated figure is near enough to the real one."""
+"""Decides whether a simulated figure is close enough to the real one."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -12,16 +12,16 @@ FACTOR = 1.5  # either way
 
 
 class Verdict(Enum):
-    """How a simulated figure compares with the real one."""
+    """Result of comparing a simulated figure with the real one."""
 
     OK = "ok"
-    EXPLAINED = "EXPLAINED"  # differs on purpose; a sentence says why
+    EXPLAINED = "EXPLAINED"  # differs on purpose; a sentence gives the reason
     DIFFERS = "DIFFERS"
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One figure, real beside simulated."""
+    """One figure, real and simulated."""
 
     figure: Figure  # of the simulated rover
     real: Value
@@ -30,7 +30,7 @@ class Comparison:
 
     @property
     def ratio(self) -> float | None:
-        """Simulated by real; None where that means nothing."""
+        """Simulated divided by real, or None if that is meaningless."""
         real, simulated = self.real, self.figure.value
         if isinstance(real, str) or isinstance(simulated, str) or not real or simulated is None:
             return None
@@ -38,13 +38,13 @@ class Comparison:
 
 
 def compare(pair: Pair, figures: list[Figure]) -> list[Comparison]:
-    """Compare each figure of which there is a real one."""
+    """Compare each figure that the real rover has."""
     real = reference_of(pair)
     return [_compare(pair, figure, real[figure.key]) for figure in figures if figure.key in real]
 
 
 def missing(pair: Pair, figures: list[Figure]) -> list[tuple[str, str]]:
-    """Return what the real one has and the simulated one lacks: a manoeuvre was not driven."""
+    """Return the real figures that the simulated rover lacks, because it skipped a manoeuvre."""
     found = {figure.key for figure in figures}
     return [key for key in reference_of(pair) if key not in found]
 

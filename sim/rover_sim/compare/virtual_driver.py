@@ -1,6 +1,6 @@
-"""Drives a simulated rover in virtual time, over MAVLink packets on a memory net; no task server.
+"""Drives a simulated rover in virtual time, with MAVLink over a memory net, without a task server.
 
-The other end of the link is pymavlink's, so that what is measured is what anybody would see.
+The other end of the link is pymavlink, so the figures show what any client would see.
 """
 
 import math
@@ -19,12 +19,12 @@ ROVER_LINK = "rover"
 SETPOINT_PERIOD = 0.05  # s, 20 Hz
 STICK_PERIOD = 0.1  # s between two RC_CHANNELS_OVERRIDE
 PLACES_PERIOD = 2.0  # s between two requests of home and origin
-RATES_PERIOD = 20.0  # s between two requests of rates: a rover that has restarted has lost them
-FAST_US = {True: 20_000, False: 25_000}  # µs; PX4: 50 Hz, ArduPilot: 40 Hz, the most it grants
+RATES_PERIOD = 20.0  # s between two requests of rates: a restarted rover has lost them
+FAST_US = {True: 20_000, False: 25_000}  # µs; PX4: 50 Hz, ArduPilot: 40 Hz, its maximum
 SLOW_US = 200_000
 TIMEOUT = 1.0  # s for an acknowledgement
 VELOCITY, VELOCITY_AND_YAW_RATE = 0x0DC7, 0x05C7  # type_mask
-UNTOUCHED = 65535  # a channel that an override leaves alone
+UNTOUCHED = 65535  # an override ignores the channel
 OFFBOARD, PX4_HOLD = (6, 0), (4, 3)  # main and sub mode
 GUIDED, ARDUPILOT_HOLD = (15, 0), (4, 0)
 FAST = (mav.MAVLINK_MSG_ID_ATTITUDE, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
@@ -36,11 +36,11 @@ SLOW = (
 )
 PLACES = (mav.MAVLINK_MSG_ID_HOME_POSITION, mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 NEVER = math.inf
-LOOPBACK = Conditions(delay=0.0001)  # s each way; the real ones were recorded on one machine
+LOOPBACK = Conditions(delay=0.0001)  # s each way; the real rovers were recorded on one machine
 
 
 class VirtualDriver:
-    """Implements ``Driver`` and takes part in the virtual world; see ``trace`` afterwards."""
+    """Implements ``Driver`` as a party of the virtual world; ``trace`` has the result."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.trace = Trace()
@@ -61,17 +61,17 @@ class VirtualDriver:
         }
 
     def write(self, data: bytes) -> None:
-        """Send: what pymavlink calls on its file."""
+        """Send bytes; pymavlink calls this on its file object."""
         self._link.send(ROVER_LINK, bytes(data))
 
-    # as one who takes part in the world
+    # as a party of the world
 
     def next_deadline(self) -> float:
-        """Return when something is to be sent."""
+        """Return the time of the next message to send."""
         return min(self._due.values())
 
     def turn(self, *, now: float) -> None:
-        """Read what has come and send what is due."""
+        """Read received messages and send those that are due."""
         for _, data in self._link.receive(len(self._link.arrived)):
             self._take(self._mav.decode(bytearray(data)))  # a datagram is one whole packet
         for send, at in self._due.items():
@@ -93,7 +93,7 @@ class VirtualDriver:
             pose = TruePose(state.time, state.north, state.east, state.yaw, speed, state.yaw_rate)
             poses.append(pose)
 
-    # what it sends by itself
+    # periodic messages
 
     def _send_heartbeat(self) -> None:
         self._mav.heartbeat_send(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4)
@@ -112,7 +112,7 @@ class VirtualDriver:
         self._due[self._ask_for_rates] = self._world.now + RATES_PERIOD
 
     def _send_stick(self) -> None:
-        throttle = 0 if self._throttle is None else self._throttle  # 0 gives the channel back
+        throttle = 0 if self._throttle is None else self._throttle  # 0 releases the channel
         channels = [UNTOUCHED, UNTOUCHED, throttle] + [UNTOUCHED] * 5
         self._mav.rc_channels_override_send(self._system, 1, *channels)
         again = NEVER if self._throttle is None else self._world.now + STICK_PERIOD
@@ -137,7 +137,7 @@ class VirtualDriver:
         self._world.run_until(lambda: result() is not None, within=TIMEOUT)
         return bool(result() == mav.MAV_RESULT_ACCEPTED)
 
-    # the driver's side
+    # as a Driver
 
     @property
     def _system(self) -> int:
@@ -150,28 +150,28 @@ class VirtualDriver:
 
     @property
     def is_armed(self) -> bool:
-        """Whether its last HEARTBEAT says armed."""
+        """Whether the last HEARTBEAT shows the rover armed."""
         return bool(self._last["HEARTBEAT"].base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)
 
     @property
     def is_ready(self) -> bool:
-        """Whether it is armed and takes set-points."""
+        """Whether the rover is armed and follows setpoints."""
         custom = self._last["HEARTBEAT"].custom_mode
         in_control = custom >> 16 & 0xFF == OFFBOARD[0] if self.is_px4 else custom == GUIDED[0]
         return self.is_armed and bool(in_control)
 
     @property
     def reported_speed(self) -> float:
-        """The speed that it last reported, m/s."""
+        """Speed that the rover last reported, m/s."""
         position = self._last["LOCAL_POSITION_NED"]
         return math.hypot(position.vx, position.vy)
 
     def mark(self, name: str) -> None:
-        """Note that a manoeuvre begins."""
+        """Record the start of a manoeuvre."""
         self.trace.marks.append(Mark(self._world.now, name))
 
     def wait(self, seconds: float) -> None:
-        """Let time pass without a set-point."""
+        """Let time pass without setpoints."""
         self._world.run(seconds)
 
     def wait_for_rover(self) -> None:
@@ -179,7 +179,7 @@ class VirtualDriver:
         self._world.run_until(lambda: "HEARTBEAT" in self._last, within=60.0)
 
     def drive(self, seconds: float, step: Step) -> None:
-        """Stream the step's set-point; a PX4 rover gets it along the heading that it has now."""
+        """Stream the step's setpoint; a PX4 rover gets it relative to its present heading."""
         begin = self._world.now
         course = self._last["ATTITUDE"].yaw + step.aside
         for count in range(round(seconds / SETPOINT_PERIOD)):
@@ -203,24 +203,24 @@ class VirtualDriver:
         self._mav.send(message)
 
     def take_control(self) -> bool:
-        """Ask for the mode that takes set-points; return whether it was accepted."""
+        """Request the mode that follows setpoints; return whether it was accepted."""
         return self._ask(mav.MAV_CMD_DO_SET_MODE, 1.0, *(OFFBOARD if self.is_px4 else GUIDED))
 
     def hold(self) -> bool:
-        """Ask for the mode HOLD; return whether it was accepted."""
+        """Request HOLD; return whether it was accepted."""
         return self._ask(
             mav.MAV_CMD_DO_SET_MODE, 1.0, *(PX4_HOLD if self.is_px4 else ARDUPILOT_HOLD)
         )
 
     def arm(self) -> bool:
-        """Ask it to arm; return whether it was accepted."""
+        """Request arming; return whether it was accepted."""
         return self._ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def disarm(self) -> bool:
-        """Ask it to disarm; return whether it was accepted."""
+        """Request disarming; return whether it was accepted."""
         return self._ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def push_stick(self, throttle: int | None) -> None:
-        """Hold the throttle stick so (µs), by RC_CHANNELS_OVERRIDE; None releases it."""
+        """Hold the throttle at a pulse (µs) by RC_CHANNELS_OVERRIDE; None releases it."""
         self._throttle = throttle
         self._send_stick()

@@ -1,12 +1,12 @@
-"""Starts the demonstration; an interrupt is no error at any moment, imports included."""
+"""Start the demonstration; handle an interrupt at any moment, even during imports."""
 
 import sys
 
-INTERRUPTED = 130  # as a shell reports SIGINT
+INTERRUPTED = 130  # the shell's status for SIGINT
 
 
 def main() -> int:
-    """Run it; gives the exit status."""
+    """Run the demonstration; return the exit status."""
     from rover_sim.demo.app import main as run  # noqa: PLC0415
 
     return run()

@@ -1,8 +1,8 @@
 """The demonstration: a rover drives the tutorial's three tasks, submitted by a third party.
 
-Forward 2.0 m at priority 3 starts at once; rotate 90 degrees at 8 and forward 1.5 m at 5 wait, and
-the more urgent of them runs first. Exit code 0 only if acknowledgements, order, states and the
-measured movement are all as they should be; 1 if not; 2 if it cannot be run.
+Forward 2.0 m at priority 3 starts at once; rotate 90 degrees at priority 8 and forward 1.5 m at
+priority 5 wait, and the one with the higher priority runs first. Exit code 0: acknowledgements,
+order, states and the measured movement are correct; 1: some are wrong; 2: it cannot be run.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from rover_sim.errors import MissingExtra
 OUTPUT = "demo-output"
 PICTURE = "track.png"
 
-PIPE_WIDTH = 110  # columns, where there is no terminal to fit
+PIPE_WIDTH = 110  # columns, if the output is no terminal
 
 NO_PICTURE = (
     "demo: no picture of the track: it needs matplotlib, which is not installed"
@@ -31,7 +31,7 @@ NO_WINDOW = "demo: --gui is pybullet's window: it needs pybullet, and goes witho
 
 
 def main() -> int:
-    """Run the demonstration; gives the exit code."""
+    """Run the demonstration; return the exit code."""
     options = _parser().parse_args()
     console = Console()
     if not console.is_terminal:

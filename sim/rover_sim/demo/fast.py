@@ -23,7 +23,7 @@ START = Pose()
 def drive(
     screen: Screen, *, body: str, noise: str, seed: int, record: str
 ) -> tuple[ThirdParty, list[Place]]:
-    """Run server, rover and third party; gives what the latter saw, and the true track.
+    """Run server, rover and third party; return the third party and the true track.
 
     ``record`` is the folder for a record of the server's decisions, "" for none.
     """
@@ -54,7 +54,7 @@ def drive(
 
 
 class _Member:
-    """The third party as one who takes part in the virtual world."""
+    """The third party as a party of the virtual world."""
 
     def __init__(self, link: MemoryLink, vehicle: Vehicle, screen: Screen) -> None:
         self._link = link
@@ -66,20 +66,20 @@ class _Member:
         self.party = ThirdParty(self._mav, self.truth, self._say)
 
     def write(self, data: bytes) -> None:
-        """Send: what pymavlink calls on its file."""
+        """Send bytes; pymavlink calls this on its file object."""
         self._link.send(CLIENT_LINK, bytes(data))
 
     def truth(self) -> Place:
-        """Return where the rover really is."""
+        """Return the true pose of the rover."""
         state = self._vehicle.truth
         return Place(state.north, state.east, state.yaw)
 
     def next_deadline(self) -> float:
-        """Look around ten times a second."""
+        """Return the next turn's time, at 10 Hz."""
         return self._now + 0.1
 
     def turn(self, *, now: float) -> None:
-        """Read, then send what is due."""
+        """Read messages, then send those that are due."""
         for _, data in self._link.receive(len(self._link.arrived)):
             for message in self._mav.parse_buffer(data) or ():
                 self.party.take(message)

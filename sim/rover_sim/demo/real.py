@@ -1,4 +1,4 @@
-"""The demonstration in real time: server and rover are processes of their own, joined by UDP."""
+"""The demonstration in real time: server and rover are separate processes, connected by UDP."""
 
 import csv
 import os
@@ -20,18 +20,18 @@ from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import Place, ThirdParty
 
 TIME_LIMIT = 85.0  # s, for everything
-STOP_LIMIT = 5.0  # s, for a process to end when asked to
+STOP_LIMIT = 5.0  # s, for a process to end after SIGTERM
 REFRESH = 0.2  # s
 
 
 class DemoError(Exception):
-    """The demonstration could not be run; the text says why."""
+    """The demonstration could not be run; the message has the reason."""
 
 
 def drive(
     screen: Screen, *, body: str, noise: str, gui: bool, seed: int, record: str
 ) -> tuple[ThirdParty, list[Place]]:
-    """Run server, rover and third party; gives what the latter saw, and the true track."""
+    """Run server, rover and third party; return the third party and the true track."""
     with tempfile.TemporaryDirectory(prefix="mav-tasks-demo-") as folder:
         truth_file = Path(folder) / "truth.csv"
         rover_port, client_port = free_ports(2)
@@ -83,9 +83,9 @@ def _watch(
 
 @contextmanager
 def process(command: list[str], log: Path) -> Iterator[Callable[[], None]]:
-    """Run a process while the block runs; afterwards ask it to end, and see that it did.
+    """Run a process for a ``with`` block; then end it with SIGTERM and check its exit status.
 
-    Gives a check that raises DemoError, with the process's last words, once it is gone.
+    The value is a check that raises DemoError, with the process's last line, if it has ended.
     """
     with log.open("wb") as output:
         running = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
@@ -111,14 +111,14 @@ def process(command: list[str], log: Path) -> Iterator[Callable[[], None]]:
 
 
 def read_track(truth_file: Path) -> list[Place]:
-    """Return the true poses that the rover has written so far; a last half line is left out."""
+    """Return the true poses that the rover has written so far, without an incomplete last line."""
     text = truth_file.read_text(encoding="ascii") if truth_file.exists() else ""
     rows = csv.DictReader(text[: text.rfind("\n") + 1].splitlines())
     return [Place(float(r["north"]), float(r["east"]), float(r["yaw"])) for r in rows]
 
 
 def free_ports(count: int) -> list[int]:
-    """Return UDP ports of the loopback that nobody uses at this moment."""
+    """Return free UDP ports of the loopback."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for each in sockets:

@@ -25,7 +25,7 @@ def measured(task: Seen) -> float:
 
 
 def problems(party: ThirdParty) -> list[str]:
-    """Return everything that is not as it should be, in words."""
+    """Return a description of every deviation from the expected result."""
     found = []
     ids = [task.task_id for task in party.tasks]
     if any(task.result != ACCEPTED for task in party.tasks):

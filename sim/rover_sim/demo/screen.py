@@ -1,4 +1,4 @@
-"""What the demonstration shows as it runs: lines, and in a terminal a live queue."""
+"""The running output of the demonstration: lines, and in a terminal a live queue."""
 
 from types import TracebackType
 from typing import Self
@@ -10,11 +10,11 @@ from rich.table import Table
 
 from rover_sim.demo.third_party import EXECUTING, FIRST_OVER, STATES, Seen, ThirdParty
 
-STEP = 25  # per cent of progress between two lines, where there is no live table
+STEP = 25  # per cent of progress between two lines, without a live table
 
 
 class Screen:
-    """Prints; in a terminal with a table at the bottom that is kept up to date."""
+    """Prints lines; in a terminal it also keeps a table at the bottom up to date."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -40,7 +40,7 @@ class Screen:
         self._console.print(text, highlight=False, markup=False)
 
     def update(self, party: ThirdParty) -> None:
-        """Show where the tasks are."""
+        """Show the state of the tasks."""
         if self._live is not None:
             self._live.update(_table(party.tasks), refresh=True)
             return

@@ -1,7 +1,7 @@
-"""A third party: stock pymavlink with its `common` dialect, and nothing of mav-tasks.
+"""A third party: stock pymavlink with its `common` dialect, and no code of mav-tasks.
 
-It submits each task when the one before is acknowledged, and keeps what it is told about them. The
-link is the caller's: this knows only pymavlink's `mav` object and the messages that come in.
+It submits each task once the previous one is acknowledged, and records their states. The caller
+owns the link: this file needs only pymavlink's `mav` object and the received messages.
 """
 
 import math
@@ -32,7 +32,7 @@ STATES = (
     "expired",
 )
 STARTING, EXECUTING, FIRST_OVER = 4, 5, 9
-POSITIONS = 5  # LOCAL_POSITION_NED messages after which the rover counts as there
+POSITIONS = 5  # LOCAL_POSITION_NED messages until the rover counts as present
 PROGRESS_INTERVAL_US = 200_000
 QUEUE_INTERVAL = 0.5  # s
 HEARTBEAT_INTERVAL = 1.0  # s
@@ -40,7 +40,7 @@ HEARTBEAT_INTERVAL = 1.0  # s
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One task as the tutorial has it."""
+    """One task of the tutorial."""
 
     name: str
     command: int
@@ -63,7 +63,7 @@ ORDER = (0, 1, 2)  # of execution, as indices of LEGS
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where the rover really is: metres and radians."""
+    """True pose of the rover: metres and radians."""
 
     north: float
     east: float
@@ -72,7 +72,7 @@ class Place:
 
 @dataclass(slots=True)
 class Seen:
-    """What the third party knows of one of its tasks."""
+    """The third party's knowledge of one of its tasks."""
 
     leg: Leg
     result: int | None = None
@@ -88,7 +88,7 @@ class Seen:
 
 @dataclass
 class ThirdParty:
-    """Submits LEGS and watches; ``truth`` tells where the rover really is, ``say`` what happens."""
+    """Submits LEGS and tracks them; ``truth`` returns the true pose, ``say`` prints a line."""
 
     mav: Any
     truth: Callable[[], Place]
@@ -102,13 +102,13 @@ class ThirdParty:
 
     @property
     def is_over(self) -> bool:
-        """Whether every task has ended, or was refused."""
+        """Whether every task has ended or was refused."""
         return all(
             task.state >= FIRST_OVER or task.result not in (None, ACCEPTED) for task in self.tasks
         )
 
     def step(self, now: float) -> None:
-        """Send what is due."""
+        """Send the messages that are due."""
         if now >= self._next_heartbeat:
             self._next_heartbeat = now + HEARTBEAT_INTERVAL
             self.mav.heartbeat_send(6, 8, 0, 0, 4)
@@ -121,13 +121,13 @@ class ThirdParty:
                     self._command(REQUEST_MESSAGE, TASK_STATUS, task.task_id)
 
     def take(self, message: Any) -> None:
-        """Take in one message."""
+        """Process one message."""
         match message.get_type():
             case "LOCAL_POSITION_NED":
                 self._positions += 1
             case "COMMAND_ACK" if message.command in (TASK_MOVE, TASK_ROTATE):
                 self._take_ack(message)
-            case "STATUSTEXT" if not message.text.startswith("Task "):  # TASK_STATUS says it
+            case "STATUSTEXT" if not message.text.startswith("Task "):  # TASK_STATUS has it
                 who = "server" if message.get_srcComponent() == TASK_SERVER else "rover"
                 self.say(f"{who} says: {message.text}")
             case "UNKNOWN_54000":
@@ -137,9 +137,9 @@ class ThirdParty:
         if self._submitted == len(LEGS):
             return
         if self._submitted and self.tasks[self._submitted - 1].result is None:
-            return  # one after another, so that each ack's task is known
+            return  # one at a time, so that each ack belongs to a known task
         if self._submitted and self.tasks[0].state < STARTING:
-            return  # it is to start at once: what comes after it waits
+            return  # the first one must start at once, so that later ones wait
         if self._submitted == 0:
             self._command(SET_MESSAGE_INTERVAL, TASK_STATUS, PROGRESS_INTERVAL_US)
         leg = LEGS[self._submitted]

@@ -1,4 +1,4 @@
-"""``python -m rover_sim.field_trial``: what ``tools/field_trial`` runs."""
+"""``python -m rover_sim.field_trial``, which ``tools/field_trial`` runs."""
 
 import sys
 

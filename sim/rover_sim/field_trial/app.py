@@ -1,7 +1,7 @@
-"""Drive a rover through a table of what must hold, with `mav-tasks serve` between, and print it.
+"""Drive a rover with `mav-tasks serve` through a table of requirements, and print the results.
 
-The server is started on a store that is thrown away, with default settings. The rover DRIVES: give
-it room. Ctrl-C stops the rover and ends the server. Exit status 0: each row that was tried passed;
+The server starts on a temporary store, with default settings. The rover DRIVES: give it room.
+Ctrl-C stops the rover and ends the server. Exit status 0: each row that was tried passed;
 1: one failed; 2: usage; 130: Ctrl-C.
 """
 
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Return the command line."""
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(
         prog="field_trial", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -170,7 +170,7 @@ def _folder(keep: str, stack: AsyncExitStack) -> Path:
 
 
 async def _leave(session: Session) -> None:
-    """Stop the rover, if anybody is there to be told, and end the server."""
+    """Stop the rover, if there is a client, and end the server."""
     with suppress(TrialError):
         await quietly(lambda: session.client.stop(within=2.0))
     await session.end()

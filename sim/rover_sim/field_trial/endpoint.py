@@ -1,4 +1,4 @@
-"""One end of a MAVLink link on the running loop, spoken with pymavlink instead of our codec."""
+"""One end of a MAVLink link on the running loop, with pymavlink instead of our codec."""
 
 import asyncio
 import os
@@ -13,12 +13,12 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
 
 BEAT = 1.0  # s between heartbeats
-READ = 64  # datagrams at once
+READ = 64  # datagrams per read
 TO_AUTOPILOT = 1  # component
 
 
 class Endpoint:
-    """Hears and says what it is told; sends a heartbeat each second."""
+    """Receives and sends messages; sends a heartbeat each second."""
 
     def __init__(self, link: Link, heard: Callable[[Any], None], *, system_id: int = 255) -> None:
         self._link = link
@@ -27,18 +27,18 @@ class Endpoint:
         self._peers: dict[Peer, None] = dict.fromkeys(link.peers)
         self._mav = mav.MAVLink(self, srcSystem=system_id, srcComponent=191)
         self._mav.robust_parsing = True
-        self.system = 1  # of the rover; as its heartbeat says
+        self.system = 1  # the rover's system id, updated by its heartbeat
         self.last: dict[str, Any] = {}
         self._loop.add_reader(link.fileno(), self._read)
         self._beating = asyncio.ensure_future(self._beat())
 
     @property
     def out(self) -> Any:
-        """What sends: pymavlink's methods."""
+        """pymavlink's send methods."""
         return self._mav
 
     def write(self, data: bytes) -> None:
-        """Send: what pymavlink calls on its file."""
+        """Send bytes; pymavlink calls this on its file object."""
         for peer in self._peers:
             self._link.send(peer, bytes(data))
 
@@ -48,7 +48,7 @@ class Endpoint:
         self._mav.command_long_send(self.system, TO_AUTOPILOT, number, 0, *values)
 
     async def close(self) -> None:
-        """Stop its heartbeats and close the link."""
+        """Stop the heartbeats and close the link."""
         self._beating.cancel()
         with suppress(asyncio.CancelledError):
             await self._beating

@@ -1,4 +1,4 @@
-"""The thirty tasks: what each asks, and where the rover is then."""
+"""The thirty tasks: goals, and expected ends."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,20 +8,20 @@ from mav_tasks.client.wire import Goal
 from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate
 from rover_sim.field_trial.track import Place
 
-COUNT = 30  # tasks that are driven
+COUNT = 30  # tasks to drive
 FAR = 30.0  # m, the longest go-to
 NEAR = 3.0  # m
 
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """Where the rover says that it is, and where it began the trial."""
+    """The reported place of the rover, now and at the start of the trial."""
 
     now: Place
     begun: Place
 
     def ahead(self, forward: float, right: float) -> LocalPlace:
-        """Return the place that is so far from the trial's beginning, as the rover stood then."""
+        """Return the place at this offset from the trial's start pose."""
         yaw = self.begun.yaw
         north = self.begun.north + forward * cos(yaw) - right * sin(yaw)
         east = self.begun.east + forward * sin(yaw) + right * cos(yaw)
@@ -30,20 +30,20 @@ class Where:
 
 @dataclass(frozen=True, slots=True)
 class TrialTask:
-    """One task: its words, its goals, and the end that it promises as the rover tells places."""
+    """One task: description, goals, and the expected end in reported coordinates."""
 
     words: str
     goals: tuple[Goal, ...]
-    end: Place | None = None  # None: a turn, or not known
+    end: Place | None = None  # None: a turn, or unknown
     turn: float | None = None  # rad
-    is_relative: bool = False  # to where the rover is when it begins: a move
+    is_relative: bool = False  # to the rover's place at its start, as for a move
 
 
 Maker = Callable[[Where], TrialTask]
 
 
 def move(distance: float) -> Maker:
-    """Return a move along the heading."""
+    """Return a maker of a move along the heading."""
 
     def make(where: Where) -> TrialTask:
         yaw = where.now.yaw
@@ -54,7 +54,7 @@ def move(distance: float) -> Maker:
 
 
 def turn(angle: float) -> Maker:
-    """Return a turn on the spot, deg."""
+    """Return a maker of a turn on the spot, deg."""
 
     def make(_where: Where) -> TrialTask:
         return TrialTask(f"turn {angle:g} deg", (Rotate(radians(angle)),), turn=radians(angle))
@@ -63,7 +63,7 @@ def turn(angle: float) -> Maker:
 
 
 def go(forward: float, right: float) -> Maker:
-    """Return a way to a place, by the trial's beginning."""
+    """Return a maker of a go-to, relative to the trial's start pose."""
 
     def make(where: Where) -> TrialTask:
         place = where.ahead(forward, right)
@@ -74,7 +74,7 @@ def go(forward: float, right: float) -> Maker:
 
 
 def near(distance: float) -> Maker:
-    """Return a way to a place so far ahead of where the rover is."""
+    """Return a maker of a go-to ahead of the rover."""
 
     def make(where: Where) -> TrialTask:
         yaw = where.now.yaw
@@ -85,7 +85,7 @@ def near(distance: float) -> Maker:
 
 
 def mission(where: Where) -> TrialTask:
-    """Return five places, 6 m apart in a wide arc that suits a car as well."""
+    """Return a mission of five places, 6 m apart on an arc wide enough for Ackermann steering."""
     bearings = (0.0, pi / 4, pi / 2, 3 * pi / 4, pi)
     forward, right, places = 4.0, 0.0, []
     for bearing in bearings:
@@ -98,13 +98,13 @@ def mission(where: Where) -> TrialTask:
 
 
 def home(where: Where) -> TrialTask:
-    """Return the way home: where it was first armed, which the trial need not know."""
+    """Return a go-to home, the place of the first arming, which the trial does not know."""
     del where
     return TrialTask("return", (GoTo(None),))
 
 
 def plan() -> Sequence[Maker]:
-    """Return the thirty tasks, with further moves where a rover turns down turns or reversing."""
+    """Return the thirty tasks; ``further`` replaces those that the rover cannot drive."""
     return (
         *(move(0.3), move(0.5), turn(90), move(1.0), turn(-90), move(2.0), move(-1.0), turn(45)),
         *(move(0.3), turn(-45), move(3.0), turn(180), move(3.0), turn(120), turn(60), near(NEAR)),
@@ -114,7 +114,7 @@ def plan() -> Sequence[Maker]:
 
 
 def further() -> Sequence[Maker]:
-    """Return what is driven instead of what the rover turns down, before the way home."""
+    """Return replacements for tasks that the rover cannot drive, for use before the way home."""
     return (
         *(near(NEAR), move(0.3), move(0.5), move(1.0), go(10.0, 4.0), move(2.0), near(NEAR)),
         *(move(0.3), go(18.0, -4.0), move(1.0), move(0.5), move(0.3), go(2.0, 0.0)),

@@ -1,4 +1,4 @@
-"""Drives the rover itself, without the server: which way of stopping is the better one?"""
+"""Drives the rover without the server, to measure which way of stopping is shorter."""
 
 import asyncio
 from collections.abc import Callable
@@ -17,22 +17,22 @@ RATE_US = 40_000  # of position and attitude
 OFFBOARD, PX4_HOLD = (6, 0), (4, 3)  # main and sub mode
 GUIDED, ARDUPILOT_HOLD = (15, 0), (4, 0)
 VELOCITY, VELOCITY_AND_YAW_RATE = 0x0DC7, 0x05C7  # type_mask
-READY_WITHIN = 60.0  # s; ArduPilot can be armed 41 s after it was switched on
+READY_WITHIN = 60.0  # s; ArduPilot can be armed 41 s after power-on
 ASK_AGAIN = 1.0  # s
-LOOK = 0.01  # s between two looks for an answer
-BRAKES = 6.0  # s that it has to stop
-PRESS_ON = 1e-3  # m/s, that PX4 keeps its course when it is to stand
+LOOK = 0.01  # s between two checks for an answer
+BRAKES = 6.0  # s to stop
+PRESS_ON = 1e-3  # m/s, so that a standing PX4 keeps its course
 
 
 class Way(Enum):
-    """A way of stopping."""
+    """A way to stop the rover."""
 
     ZEROS = "zeros"
     HOLD = "HOLD"
 
 
 class Pilot:
-    """Drives straight ahead, and measures how far the rover rolls."""
+    """Drives straight ahead, and measures the stopping distance."""
 
     def __init__(self, link: Link, truth: Track | None) -> None:
         self._told = Track()
@@ -42,7 +42,7 @@ class Pilot:
         self._acks: dict[int, int] = {}
 
     async def close(self) -> None:
-        """Let the rover stand, and give the link back."""
+        """Stop and disarm the rover, and close the link."""
         for _ in range(20):
             self._setpoint(0.0)
             await asyncio.sleep(PERIOD)
@@ -51,7 +51,7 @@ class Pilot:
         await self._endpoint.close()
 
     async def ready(self) -> bool:
-        """Have the rover armed and driven by setpoints; return whether it is."""
+        """Arm the rover in the mode that follows setpoints; return success."""
         end = self._loop.time() + READY_WITHIN
         while self._loop.time() < end:
             if "HEARTBEAT" in self._endpoint.last:
@@ -66,7 +66,7 @@ class Pilot:
         return False
 
     async def stopping(self, way: Way, *, speed: float, seconds: float) -> float | None:
-        """Return the metres that it rolls from such a speed; None: it did not come to it."""
+        """Return the stopping distance from ``speed``, m; None if it is not reached."""
         if not await self.ready():
             return None
         await self._stream(speed, seconds)
@@ -136,5 +136,5 @@ class Pilot:
 
 
 def better(distances: dict[Way, list[float]], middle: Callable[[list[float]], float]) -> float:
-    """Return the middle of the better way's distances, m."""
+    """Return the average (``middle``) distance of the better way, m."""
     return min(middle(values) for values in distances.values() if values)

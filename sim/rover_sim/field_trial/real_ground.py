@@ -1,4 +1,4 @@
-"""A real rover: ``mav-tasks serve`` as a process of its own, on a store that is thrown away."""
+"""A real rover: ``mav-tasks serve`` runs as a process, on the store in the trial's folder."""
 
 import asyncio
 import shlex
@@ -17,16 +17,16 @@ from mav_tasks.links.url import parse_url
 from rover_sim.field_trial.endpoint import Endpoint
 from rover_sim.field_trial.track import Track
 
-END_WITHIN = 15.0  # s; the server itself waits 3 s at most for the rover to stand
+END_WITHIN = 15.0  # s; the server waits up to 3 s for the rover to stop
 UP_WITHIN = 10.0  # s
-STICK_PERIOD = 0.1  # s between two RC_CHANNELS_OVERRIDE; they count for 3 s
-LET_GO = (1500,) * 5 + (0,)  # µs: it springs back before it is nobody's, or it lingers for 3 s
+STICK_PERIOD = 0.1  # s between two RC_CHANNELS_OVERRIDE; each is valid for 3 s
+LET_GO = (1500,) * 5 + (0,)  # µs: neutral before the release, or the last value lasts for 3 s
 UNTOUCHED = 65535
 THROTTLE = 2  # channel 3
 
 
 class RealGround:
-    """Implements ``Ground``."""
+    """A real rover; implements ``Ground``."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class RealGround:
 
     @property
     def log(self) -> Path:
-        """Where the server's words go."""
+        """The server's log file."""
         return self._folder / "server.log"
 
     async def start_server(self) -> None:
@@ -66,11 +66,11 @@ class RealGround:
                 *self._options,
                 stdout=output,
                 stderr=asyncio.subprocess.STDOUT,
-                start_new_session=True,  # Ctrl-C is ours: the server is ended when all is said
+                start_new_session=True,  # only we handle Ctrl-C, and end the server last
             )
 
     async def end_server(self) -> None:
-        """SIGTERM, and SIGKILL for one that does not heed it."""
+        """Send SIGTERM, and SIGKILL after END_WITHIN."""
         server, self._server = self._server, None
         if server is None or server.returncode is not None:
             return
@@ -82,7 +82,7 @@ class RealGround:
             await server.wait()
 
     async def kill_server(self) -> None:
-        """SIGKILL."""
+        """Send SIGKILL."""
         server, self._server = self._server, None
         if server is not None:
             with suppress(ProcessLookupError):
@@ -90,20 +90,20 @@ class RealGround:
             await server.wait()
 
     def client(self) -> Client:
-        """Return a client of it."""
+        """Return a client of the server."""
         return Client(f"udpout:127.0.0.1:{self._port}")
 
     def rover_link(self) -> Link | None:
-        """Return the rover's own link."""
+        """Return a link to the rover's URL."""
         return open_link(parse_url(self._url), limits=TO_VEHICLES)
 
     @property
     def can_reboot(self) -> bool:
-        """With a command, or over the second link."""
+        """Whether there is a reboot command or a second link."""
         return bool(self._reboot_command) or self._second is not None
 
     async def reboot(self) -> None:
-        """Run the command, or ask the rover."""
+        """Run the reboot command, or send the MAVLink command over the second link."""
         if self._reboot_command:
             process = await asyncio.create_subprocess_exec(
                 *shlex.split(self._reboot_command),
@@ -112,23 +112,23 @@ class RealGround:
             )
             await process.wait()
         elif self._second is not None:
-            # param1 1: the autopilot; param6 20190226: also while it is armed
+            # param1 1: the autopilot; param6 20190226: even while armed
             values = (1.0, 0.0, 0.0, 0.0, 0.0, 20190226.0)
             self._second.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, *values)
 
     @property
     def can_push_stick(self) -> bool:
-        """Over the second link."""
+        """Whether there is a second link."""
         return self._second is not None
 
     def push_stick(self, throttle: int | None) -> None:
-        """Send RC_CHANNELS_OVERRIDE of the throttle until let go."""
+        """Send RC_CHANNELS_OVERRIDE of the throttle until it is released."""
         self._stick = throttle
         if self._pushing is None:
             self._pushing = asyncio.ensure_future(self._push())
 
     async def close(self) -> None:
-        """End what runs."""
+        """Release the stick and end the server."""
         if self._pushing is not None:
             self._pushing.cancel()
             with suppress(asyncio.CancelledError):

@@ -13,12 +13,12 @@ NAME = "boot"
 ASKED = "3 tasks in the first 5 s of the boot"
 GOALS = (Move(0.5), Move(1.0), Move(0.3))
 BACK_WITHIN = 60.0  # s
-GONE = 1.5  # s, after which the rover boots: before, it is not there to be given a task
-DRIVEN_WITHIN = 180.0  # s; the watch.ready_timeout of the server is not reached by then
+GONE = 1.5  # s until the rover boots; before, the server has no rover for a task
+DRIVEN_WITHIN = 180.0  # s; below the server's watch.ready_timeout
 
 
 async def boot(session: Session) -> Row:
-    """Restart the rover while nothing runs, and submit at once."""
+    """Restart the idle rover, and submit at once."""
     if not session.ground.can_reboot:
         return not_tried(NAME, ASKED, "no way to restart it (--reboot-command)")
     await session.rest()

@@ -1,4 +1,4 @@
-"""Rows: the server ends, is killed, or the rover restarts in mid-task; then the rest is driven."""
+"""Rows: the server ends or is killed, or the rover restarts, during a task; then it is resumed."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -14,16 +14,16 @@ from rover_sim.field_trial.session import Session, TrialError
 from rover_sim.field_trial.track import Place
 
 DISTANCE = 5.0  # m
-DONE = 2.0  # m, after which it happens
+DONE = 2.0  # m, after which the event happens
 HELD_WITHIN = 30.0  # s, for the task to be held
-BACK_WITHIN = 90.0  # s, for a rover that restarts: ArduPilot arms 41 s later
+BACK_WITHIN = 90.0  # s, for a restarted rover: ArduPilot arms 41 s later
 FINISHED_WITHIN = 120.0  # s
-AGAIN = 2.0  # s between two tries of what is refused
+AGAIN = 2.0  # s between two attempts
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What happens in mid-task."""
+    """An event during a task."""
 
     name: str
     words: str
@@ -50,7 +50,7 @@ async def restart(session: Session) -> Row:
 
 
 async def kill(session: Session) -> Row:
-    """The same after SIGKILL."""
+    """Kill the server, start another one on its store, release the remainder."""
 
     async def happens() -> str:
         await session.disconnect()
@@ -64,7 +64,7 @@ async def kill(session: Session) -> Row:
 
 
 async def reboot(session: Session) -> Row:
-    """The rover restarts; released it is finished."""
+    """Restart the rover, and finish the task after its release."""
     if not session.ground.can_reboot:
         return not_tried(REBOOT.name, REBOOT.words, "no way to restart it (--reboot-command)")
 
@@ -101,7 +101,7 @@ async def _interrupted(
     wrong = _wrong(begun, after)
     holds = end.is_completed and not note
     holds = holds and (not event.is_exact or abs(wrong) <= session.limits.remainder)
-    # a simulated rover restarts where it began: how far that is from anything says nothing
+    # a simulated rover restarts at its start pose, so the distance means nothing
     figure = f"{wrong * 100:+.1f} cm" if event.is_exact else ""
     return judged(
         event.name, event.words, result=f"{note}{end}", figure=figure, limit=limit, holds=holds
@@ -125,7 +125,7 @@ async def _halted(session: Session, task: Task) -> None:
 
 
 async def _let_go_on(session: Session, task: Task) -> None:
-    """Release the remainder of a held task, and let the queue go on."""
+    """Release the remainder of a held task, and resume the queue."""
     end = session.now + BACK_WITHIN
     if (await session.client.status(task.id)).state is TaskState.HELD:
         await _insist(lambda: session.client.release(task.id, "remainder"), session, end=end)
@@ -134,7 +134,7 @@ async def _let_go_on(session: Session, task: Task) -> None:
 
 
 async def _insist(action: Callable[[], Awaitable[object]], session: Session, *, end: float) -> None:
-    """Do it, again and again while it is refused; TrialError at the end."""
+    """Repeat an action while it is refused. Raise TrialError after ``end``."""
     while True:
         try:
             await action()

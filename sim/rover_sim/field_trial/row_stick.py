@@ -1,4 +1,4 @@
-"""Row: somebody pushes the throttle stick forward while a task starts, drives, is called off."""
+"""Rows: a person pushes the throttle stick forward while a task starts, drives or is cancelled."""
 
 import asyncio
 from enum import Enum
@@ -12,11 +12,11 @@ NAME = "stick"
 ASKED = "throttle stick forward"
 FORWARD = 1700  # µs
 WATCHED = 12.0  # s
-LONG = 8.0  # m, of a move that is not over meanwhile
+LONG = 8.0  # m, of a move that lasts longer than the push
 
 
 class Moment(Enum):
-    """When the stick is pushed."""
+    """The moment of the push."""
 
     STARTING = "starting"
     DRIVING = "driving"
@@ -24,7 +24,7 @@ class Moment(Enum):
 
 
 async def stick(session: Session) -> list[Row]:
-    """Push it in each of the three moments."""
+    """Push the stick in each of the three moments."""
     rows = []
     for moment in Moment:
         asked = f"{ASKED}, task {moment.value}"
@@ -58,7 +58,7 @@ async def _push(session: Session, moment: Moment, asked: str) -> Row:
 
 
 async def _bring_about(session: Session, moment: Moment) -> float:
-    """Let the moment come and push the stick; return when."""
+    """Wait for the moment and push the stick; return the time."""
     if moment is Moment.STARTING:
         session.ground.push_stick(FORWARD)
         pushed = session.now

@@ -1,4 +1,4 @@
-"""Row: STOP at 1 m/s beside the better way of that rover, zeros or HOLD, measured just before."""
+"""Row: STOP at 1 m/s, compared with the shorter of zeros and HOLD, measured just before."""
 
 import asyncio
 from statistics import median
@@ -12,13 +12,13 @@ from rover_sim.field_trial.session import Session
 NAME = "stop"
 ASKED = "STOP at 1 m/s"
 SPEED = 1.0  # m/s
-RUN_UP = 5.0  # s; the slowest of the traces is at its speed after 4
+RUN_UP = 5.0  # s; the slowest recorded rover needs 4 s
 RUNS = 3  # of each way
 BRAKES = 6.0  # s
 
 
 async def measure_ways(session: Session) -> float | None:
-    """Measure zeros and HOLD with the server away; return the better one's metres."""
+    """Measure zeros and HOLD without the server; return the shorter distance in metres, or None."""
     link = session.ground.rover_link()
     if link is None:
         return None
@@ -38,7 +38,7 @@ async def measure_ways(session: Session) -> float | None:
 
 
 async def stop(session: Session, *, best: float | None) -> Row:
-    """Drive at 1 m/s and STOP."""
+    """Drive at 1 m/s and send STOP."""
     if best is None:
         return not_tried(NAME, ASKED, "the better way is not known (--stop-distance)")
     metres: list[float] = []

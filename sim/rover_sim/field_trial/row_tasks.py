@@ -1,4 +1,4 @@
-"""Row: thirty tasks, one after the other, each measured where the rover then stands."""
+"""Row: thirty tasks, one after another, each measured where the rover then stands."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -11,25 +11,25 @@ from rover_sim.field_trial.session import End, Session
 from rover_sim.field_trial.track import Place
 
 NAME = "tasks"
-WITHIN = 300.0  # s for one task, at 0.5 m/s: 45 m of way to a mission of 30 m, and bends
-MOST_SHOWN = 4  # of what went wrong
-UNABLE = ("not turn", "not reverse", "cannot turn")  # in refusals of what the rover cannot do
+WITHIN = 300.0  # s for one task, at 0.5 m/s: 45 m to a mission of 30 m, and curves
+MOST_SHOWN = 4  # failures shown
+UNABLE = ("not turn", "not reverse", "cannot turn")  # in refusals of impossible tasks
 
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """One task that was driven to its end, as it truly was and as the rover told it."""
+    """One completed task, in true and in reported places."""
 
     asked: TrialTask
     before: Place
     after: Place
-    told: Place  # before
+    told: Place  # reported place before
     told_after: Place
 
 
 @dataclass(slots=True)
 class Tally:
-    """What came of the tasks so far."""
+    """Results of the tasks so far."""
 
     ends: list[tuple[TrialTask, End]] = field(default_factory=list)
     refused: list[TrialTask] = field(default_factory=list)
@@ -37,17 +37,17 @@ class Tally:
     shifts: list[tuple[float, float]] = field(default_factory=list)
 
     def add_shift(self, true: Place, told: Place) -> None:
-        """Take in by how much the frames of truth and telemetry are apart, at rest."""
+        """Add the offset between the true and the reported frame, measured at rest."""
         self.shifts.append((true.north - told.north, true.east - told.east))
 
     @property
     def shift(self) -> tuple[float, float]:
-        """By how much they are, m: the mean, as each single one has the estimate's error in it."""
+        """The mean offset of the frames, m; averaging reduces the estimate's error in each."""
         return fmean(north for north, _ in self.shifts), fmean(east for _, east in self.shifts)
 
 
 async def drive_tasks(session: Session) -> Row:
-    """Drive them."""
+    """Drive the thirty tasks."""
     tally = Tally()
     true = await session.rest()
     begun = session.told_place()
@@ -55,7 +55,7 @@ async def drive_tasks(session: Session) -> Row:
     makers, instead = list(plan()), list(further())
     while makers:
         await _drive_one(session, makers.pop(0), begun, tally)
-        if len(makers) == 1:  # before the way home make up for what was turned down
+        if len(makers) == 1:  # before the way home, replace the refused tasks
             missing = len(tally.refused)
             makers[:0], instead = instead[:missing], []
     return _row(session, tally)
@@ -84,22 +84,22 @@ async def _drive_one(session: Session, maker: Maker, begun: Place, tally: Tally)
 
 
 def _is_turned_down(end: End) -> bool:
-    """Whether the rover was said to be unable: no failure, if it is."""
+    """Return whether the server refused a task that the rover cannot drive, which is no failure."""
     return end.state == "REFUSED" and (any(word in end.words for word in UNABLE))
 
 
 def _turned_wrong(driven: Driven) -> float:
-    """Return by how many degrees a turn ended beside what was asked."""
+    """Return the error of a turn, degrees."""
     assert driven.asked.turn is not None
     turned = driven.after.yaw - driven.before.yaw
     return degrees(abs(remainder(turned - driven.asked.turn, tau)))
 
 
 def _off(driven: Driven, shift: tuple[float, float]) -> tuple[float, float]:
-    """Return how far north and east of where it should be the rover ended, m.
+    """Return the error of the end, north and east, m.
 
-    A move ends at its distance from where it truly began, along the heading that was told. A place
-    is in the rover's frame, which is shifted against that of the truth.
+    A move should end at its distance from its true start, along the reported heading. A place is in
+    the rover's frame, which is shifted against the true one.
     """
     end = driven.asked.end
     assert end is not None
@@ -124,7 +124,7 @@ def _shown(driven: Driven, shift: tuple[float, float]) -> str:
 
 
 def _off_by_estimate(driven: Driven) -> float:
-    """Return how far from where it should be the rover believes to be, m: the server's part."""
+    """Return the error of the reported end, m: the part that the server causes."""
     end, told = driven.asked.end, driven.told_after
     assert end is not None
     return hypot(told.north - end.north, told.east - end.east)

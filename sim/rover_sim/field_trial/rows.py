@@ -1,4 +1,4 @@
-"""The rows of the table: what was asked, what came of it, the limit."""
+"""The rows of the table: request, result, figure, limit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Verdict(Enum):
-    """What is said of a row."""
+    """The verdict on a row."""
 
     PASS = "PASS"
     FAIL = "FAIL"
@@ -34,12 +34,12 @@ def judged(
 
 
 def not_tried(name: str, asked: str, why: str) -> Row:
-    """Return a row that was not tried, with why."""
+    """Return a row that was not tried, with the reason."""
     return Row(name, asked, why, "", "", Verdict.NOT_TRIED)
 
 
 def table(rows: Sequence[Row]) -> list[str]:
-    """Return the table as lines, columns as wide as they need."""
+    """Return the table as lines, with columns of minimal width."""
     head = ("row", "asked", "result", "figure", "limit", "verdict")
     cells = [head] + [(r.name, r.asked, r.result, r.figure, r.limit, r.verdict.value) for r in rows]
     widths = [max(len(line[n]) for line in cells) for n in range(len(head))]
@@ -49,7 +49,7 @@ def table(rows: Sequence[Row]) -> list[str]:
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """Return the value below or at which so large a share lies; 0 of none."""
+    """Return the value at or below which ``share`` of the values lie; 0 without values."""
     ordered = sorted(values)
     if not ordered:
         return 0.0

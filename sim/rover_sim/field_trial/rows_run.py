@@ -1,4 +1,4 @@
-"""Runs the rows that were chosen, in the order in which one leaves the rover ready for the next."""
+"""Runs the chosen rows; each leaves the rover ready for the next one."""
 
 from collections.abc import Awaitable, Callable, Collection, Sequence
 
@@ -17,7 +17,7 @@ async def run_rows(
     stop_distance: float | None = None,
     done: Callable[[Row], None] = lambda _row: None,
 ) -> Sequence[Row]:
-    """Run them; ``done`` is told each as it is there. The server runs only while it is needed."""
+    """Run rows, and call ``done`` with each; measure stop distances before the server starts."""
     best = stop_distance
     if "stop" in only and best is None:
         session.say("stop: the better way, without the server")

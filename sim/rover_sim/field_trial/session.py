@@ -1,4 +1,4 @@
-"""What the rows have in common: to submit, to wait with a limit, to look where the rover is."""
+"""The common parts of the rows: submit, wait with a limit, observe the rover's place."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
@@ -17,22 +17,22 @@ from rover_sim.field_trial.track import Place, Track
 
 T = TypeVar("T")
 
-LOOK = 0.1  # s between two looks at what is waited for
-SAMPLE = 0.05  # s between two places that the rover tells
-ASK = 0.5  # s between two questions for a task's state
+LOOK = 0.1  # s between two checks of a condition
+SAMPLE = 0.05  # s between two samples of the reported place
+ASK = 0.5  # s between two requests for a task's state
 FOUND_WITHIN = 60.0  # s; an ArduPilot restarts within 10 s, PX4 within 5 s
 STANDS_WITHIN = 8.0  # s
-RELEASED_WITHIN = 60.0  # s that a released task waits for a rover that boots: ArduPilot, 41 s
-SETTLE = 0.6  # s at rest before a place is measured: the window of ``Track.stands`` and a little
+RELEASED_WITHIN = 60.0  # s that a released task waits for a booting rover: ArduPilot, 41 s
+SETTLE = 0.6  # s at rest before a measurement: the window of ``Track.stands`` and a margin
 
 
 class TrialError(Exception):
-    """A row cannot go on; the text says why."""
+    """A row cannot continue; the message has the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """How a task ended, or that it did not in time."""
+    """The end of a task, or its time-out."""
 
     state: str
     words: str
@@ -40,7 +40,7 @@ class End:
 
     @property
     def is_completed(self) -> bool:
-        """Whether it was driven to its end."""
+        """Whether the task is completed."""
         return self.state == TaskState.COMPLETED.name
 
     def __str__(self) -> str:
@@ -64,15 +64,15 @@ class Session:
         self._client: Client | None = None
         self._sampling: asyncio.Task[None] | None = None
 
-    # the server's life
+    # server and client
 
     async def begin(self) -> None:
-        """Start the server, and be its client."""
+        """Start the server and connect a client."""
         await self.ground.start_server()
         await self.connect()
 
     async def connect(self) -> None:
-        """Be a client of the server that runs now."""
+        """Connect a client to the running server; wait for the rover and its position."""
         await self.disconnect()
         client = self.ground.client()
         client.open()
@@ -83,13 +83,13 @@ class Session:
         await self.until(lambda: len(self.track) > 0, within=20.0, what="the rover's position")
 
     async def disconnect(self) -> None:
-        """Be no client any more."""
+        """Close the client."""
         client, self._client = self._client, None
         if client is not None:
             await client.close()
 
     async def end(self) -> None:
-        """End client and server in order."""
+        """Close the client and end the server."""
         if self._sampling is not None:
             self._sampling.cancel()
             with suppress(asyncio.CancelledError):
@@ -98,28 +98,28 @@ class Session:
         await self.disconnect()
         await self.ground.end_server()
 
-    # what is there
+    # state
 
     @property
     def client(self) -> Client:
-        """The client that is connected. Raise TrialError if none is."""
+        """The connected client. Raise TrialError if there is none."""
         if self._client is None:
             raise TrialError("no client")
         return self._client
 
     @property
     def now(self) -> float:
-        """Seconds, of the loop's clock."""
+        """Time of the loop's clock, s."""
         return asyncio.get_running_loop().time()
 
     @property
     def track(self) -> Track:
-        """The true track, or else the one that the rover tells."""
+        """The true track if known, else the reported one."""
         return self.told if self.ground.truth is None else self.ground.truth
 
     @property
     def rover(self) -> VehicleStatus | None:
-        """The rover as the server tells it."""
+        """The server's status of the rover, or None."""
         found = () if self._client is None else self._client.vehicles()
         return found[0] if found else None
 
@@ -129,18 +129,18 @@ class Session:
         return self.rover is not None and self.rover.kind == "px4"
 
     def told_place(self) -> Place:
-        """Return where the rover says that it is."""
+        """Return the last reported place."""
         return self.told.last
 
     # waiting
 
     async def until(self, condition: Callable[[], bool], *, within: float, what: str) -> None:
-        """Wait for a condition; TrialError says what was waited for in vain."""
+        """Wait for a condition. Raise TrialError with ``what`` if it does not hold in time."""
         if not await self.comes_true(condition, within=within):
             raise TrialError(f"{what}: not within {within:g} s")
 
     async def comes_true(self, condition: Callable[[], bool], *, within: float) -> bool:
-        """Wait for a condition; return whether it came true in time."""
+        """Wait for a condition; return whether it held in time."""
         end = self.now + within
         while not condition():
             if self.now >= end:
@@ -149,7 +149,7 @@ class Session:
         return True
 
     async def rest(self, *, within: float = STANDS_WITHIN) -> Place:
-        """Wait until the rover stands; return where."""
+        """Wait until the rover stands; return its place."""
         await asyncio.sleep(SETTLE)
         await self.comes_true(self.track.stands, within=within)
         return self.track.last
@@ -157,7 +157,7 @@ class Session:
     # tasks
 
     async def submit(self, goals: Goal | Sequence[Goal], *, within: float = 20.0) -> Task:
-        """Submit, and again while nobody answers. Refused."""
+        """Submit, and repeat without an answer. Raise Refused, or NoAnswer after ``within``."""
         end, nonce = self.now + within, 0
         while True:
             try:
@@ -168,7 +168,7 @@ class Session:
                     raise
 
     async def outcome(self, task: Task, *, within: float) -> End:
-        """Wait until a task is over or held, or the time is; what still runs then is called off."""
+        """Wait until a task is over or needs a decision; cancel it after ``within`` seconds."""
         begun = self.now
         status: TaskStatus | None = None
         driven_at = begun
@@ -187,13 +187,13 @@ class Session:
         return End("TIMEOUT", f"{words}, after {within:g} s", self.now - begun)
 
     async def _waits_for_somebody(self, status: TaskStatus) -> bool:
-        """Whether a person has to decide; one that is released stays held until it starts."""
+        """Return whether a person must decide; a released task stays held until it starts."""
         if status.state is not TaskState.HELD:
             return False
         return (await self.client.queue(limit=0)).paused is not None
 
     async def drive(self, goals: Goal | Sequence[Goal], *, within: float) -> End:
-        """Submit and wait for the end; Refused is an end of its own."""
+        """Submit and wait for the end; a refusal is an end, too."""
         try:
             task = await self.submit(goals)
         except Refused as refused:
@@ -201,7 +201,7 @@ class Session:
         return await self.outcome(task, within=within)
 
     async def running_since(self, task: Task, distance: float, *, within: float) -> Place:
-        """Wait until a task has driven so far; return where it began. TrialError."""
+        """Wait until the rover has moved this far; return its start. Raise TrialError."""
         begun = self.track.last
         await self.until(
             lambda: self.track.last.apart(begun) >= distance,
@@ -211,7 +211,7 @@ class Session:
         return begun
 
     async def clean(self) -> None:
-        """Call everything off and let the queue run again."""
+        """Cancel every task and resume the queue."""
         for action in (lambda: self.client.clear(running_too=True), self._skip, self._resume):
             await quietly(action)
         await self.rest()
@@ -224,7 +224,7 @@ class Session:
         if queue.paused is not None:
             await self.client.resume()
 
-    # inside
+    # internals
 
     def _is_found(self) -> bool:
         rover = self.rover
@@ -242,6 +242,6 @@ class Session:
 
 
 async def quietly(action: Callable[[], Awaitable[object]]) -> None:
-    """Do it, and let a refusal or a missing answer pass."""
+    """Run the action; ignore a refusal or a missing answer."""
     with suppress(ClientError):
         await action()

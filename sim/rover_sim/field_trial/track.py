@@ -1,12 +1,12 @@
-"""Where the rover was, when: its true poses, or those that it tells."""
+"""Poses of the rover over time, true or reported."""
 
 from collections import deque
 from dataclasses import dataclass
 from math import hypot, remainder, tau
 
 KEPT = 20_000  # poses; 400 s at 50 Hz
-WINDOW = 0.5  # s, over which a displacement is a speed: no noise of one sample counts
-STANDS = 0.05  # m/s; real rovers' reported speed at rest wanders by 0.03 m/s (traces)
+WINDOW = 0.5  # s; a displacement over this time gives a speed without the noise of one sample
+STANDS = 0.05  # m/s; the speed that real rovers report at rest wanders by 0.03 m/s (traces)
 TURNS = 0.03  # rad/s
 
 
@@ -24,12 +24,12 @@ class Place:
         return hypot(self.north - other.north, self.east - other.east)
 
     def moved(self, north: float, east: float) -> "Place":
-        """Return the place that is so many metres from this one."""
+        """Return the place at this offset, m."""
         return Place(self.time, self.north + north, self.east + east, self.yaw)
 
 
 class Track:
-    """Poses in the order of their times."""
+    """Poses in order of time."""
 
     def __init__(self) -> None:
         self._places: deque[Place] = deque(maxlen=KEPT)
@@ -38,17 +38,17 @@ class Track:
         return len(self._places)
 
     def add(self, place: Place) -> None:
-        """Take one in; what is not later than the last one is passed over."""
+        """Add a place; ignore one that is not later than the last."""
         if not self._places or place.time > self._places[-1].time:
             self._places.append(place)
 
     @property
     def last(self) -> Place:
-        """The latest; IndexError before there is one."""
+        """The latest place. Raise IndexError if there is none."""
         return self._places[-1]
 
     def since(self, time: float) -> list[Place]:
-        """Return the places from a time on, and the one before."""
+        """Return the places since ``time``, and the one before."""
         found: list[Place] = []
         for place in reversed(self._places):
             found.append(place)
@@ -57,13 +57,13 @@ class Track:
         return found[::-1]
 
     def speed(self, *, window: float = WINDOW) -> float:
-        """Return the displacement of the last moment as a speed, m/s."""
+        """Return the speed from the displacement over the last ``window``, m/s."""
         places = self.since(self.last.time - window)
         first, last = places[0], places[-1]
         return last.apart(first) / max(last.time - first.time, 1e-6)
 
     def stands(self, *, window: float = WINDOW) -> bool:
-        """Whether it has neither moved nor turned in the last moment."""
+        """Return whether the rover has neither moved nor turned over the last ``window``."""
         places = self.since(self.last.time - window)
         first, last = places[0], places[-1]
         seconds = max(last.time - first.time, 1e-6)
@@ -71,7 +71,7 @@ class Track:
         return last.apart(first) / seconds < STANDS and turned < TURNS
 
     def stood_after(self, time: float, *, window: float = WINDOW) -> float | None:
-        """Return after how many seconds from a time it stood for good; None: it still moves."""
+        """Return the seconds from ``time`` until the rover stood for good; None if it moves."""
         places = self.since(time)
         if not self.stands(window=window):
             return None
@@ -86,5 +86,5 @@ class Track:
         return moving - time
 
     def travelled(self, time: float) -> float:
-        """Return how far from where it was at a time it is now, m."""
+        """Return the distance between the place at ``time`` and the last one, m."""
         return self.last.apart(self.since(time)[0])

@@ -1,4 +1,4 @@
-"""Where true poses come from: a file that grows, or a simulator's messages on a link."""
+"""Sources of true poses: a growing file, or a simulator's messages on a link."""
 
 import asyncio
 import json
@@ -16,10 +16,10 @@ from mav_tasks.links.url import parse_url
 from rover_sim.field_trial.endpoint import Endpoint
 from rover_sim.field_trial.track import Place, Track
 
-EARTH = 6_378_137.0  # m, the equator's radius of WGS 84, as autopilots reckon
+EARTH = 6_378_137.0  # m, the equator's radius of WGS 84, as in autopilots
 RATE_US = 40_000
-ASK_PERIOD = 2.0  # s between two requests of SIM_STATE: a rover that has restarted has lost them
-LOOK = 0.02  # s between two looks into a file
+ASK_PERIOD = 2.0  # s between two requests of SIM_STATE: a restarted rover has lost them
+LOOK = 0.02  # s between two reads of a file
 
 
 class FileTruth:
@@ -33,7 +33,7 @@ class FileTruth:
         self._following = asyncio.ensure_future(self._follow())
 
     async def close(self) -> None:
-        """Read no more."""
+        """Stop following and close the file."""
         self._following.cancel()
         with suppress(asyncio.CancelledError):
             await self._following
@@ -51,7 +51,7 @@ class FileTruth:
 
 
 def place_of(line: str, now: float) -> Place | None:
-    """Return what a line says, at the time at which it was read; None: it says nothing."""
+    """Parse a line into a place with time ``now``; return None if it is not valid."""
     try:
         if line.lstrip().startswith("{"):
             said = json.loads(line)
@@ -63,7 +63,7 @@ def place_of(line: str, now: float) -> Place | None:
 
 
 class LinkTruth:
-    """Hears SIM_STATE, which it asks for, and HIL_STATE_QUATERNION."""
+    """Requests SIM_STATE, and reads it and HIL_STATE_QUATERNION."""
 
     def __init__(self, url: str) -> None:
         self.track = Track()
@@ -74,7 +74,7 @@ class LinkTruth:
         self._asking = asyncio.ensure_future(self._ask())
 
     async def close(self) -> None:
-        """Hear no more."""
+        """Stop the requests and close the link."""
         self._asking.cancel()
         with suppress(asyncio.CancelledError):
             await self._asking

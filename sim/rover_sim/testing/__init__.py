@@ -1,7 +1,7 @@
-"""A pytest plugin with a simulated rover. What tests may name is here, imported when it is named.
+"""A pytest plugin with a simulated rover. This module imports the public names on first use.
 
-The plugin is loaded in every pytest run of whoever has it installed, so that this package must not
-import anything by itself.
+pytest loads the plugin in every run where it is installed, so this package must not import anything
+by itself.
 """
 
 from importlib import import_module

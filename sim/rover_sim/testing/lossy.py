@@ -1,4 +1,4 @@
-"""A net of which each way can be as bad as a test wants it, and that keeps the texts it carries."""
+"""A net that tests can degrade per leg, and that records the texts to clients."""
 
 from collections import deque
 from contextlib import AbstractContextManager
@@ -14,7 +14,7 @@ STATUSTEXT = 253
 MESSAGE_ID = slice(7, 10)  # in a MAVLink 2 packet
 TEXTS_KEPT = 200
 
-#: which ways are bad: between clients and server, between server and rovers, or both
+#: which legs to degrade: clients to server, server to rovers, or both
 Leg = Literal["client", "rover", "both"]
 LEGS: dict[str, frozenset[str]] = {
     "client": frozenset({CLIENT_LINK}),
@@ -25,7 +25,7 @@ LEGS: dict[str, frozenset[str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A STATUSTEXT that reached a client; one that is longer than 50 bytes comes in pieces."""
+    """A STATUSTEXT that reached a client; longer ones than 50 bytes come in pieces."""
 
     at: float  # virtual s
     system_id: int
@@ -37,7 +37,7 @@ class Text:
 
 
 class LossyNet(MemoryNet):
-    """A net that is good at first; ``worsen`` its ways to and from an end of the server."""
+    """A net that is good at first; ``ways`` degrades the links of one end of the server."""
 
     def __init__(self, *, seed: int) -> None:
         super().__init__(seed=seed)
@@ -46,7 +46,7 @@ class LossyNet(MemoryNet):
 
     @property
     def ways(self) -> dict[str, Conditions]:
-        """The conditions of the server's ends that differ from the net's."""
+        """The conditions at the server's ends, where they differ from the net's."""
         return dict(self._of_end)
 
     @ways.setter
@@ -54,14 +54,14 @@ class LossyNet(MemoryNet):
         self._of_end = dict(of_end)
 
     def conditions_between(self, source: str, target: str) -> Conditions:
-        """Return how bad a way is; one end of each is the server's."""
+        """Return the conditions between two ends, one of which is the server's."""
         for end in (source, target):
             if end in self._of_end:
                 return self._of_end[end]
         return self.conditions
 
     def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
-        """Keep what a client is told in words."""
+        """Record the texts that the server sends to a client."""
         if source == CLIENT_LINK and data[MESSAGE_ID] == STATUSTEXT.to_bytes(3, "little"):
             self.texts += (
                 Text(
@@ -77,7 +77,7 @@ class LossyNet(MemoryNet):
 
 
 class LossyLink:
-    """What the fixture gives: a call makes ways bad, from now on or while a ``with`` block runs."""
+    """The fixture's value: a call degrades legs, from now on or for a ``with`` block."""
 
     def __init__(self, net: LossyNet) -> None:
         self._net = net
@@ -91,9 +91,10 @@ class LossyLink:
         jitter: float = 0.0,
         leg: Leg = "client",
     ) -> AbstractContextManager[None]:
-        """Lose, double (probabilities 0–1), delay datagrams (s), both ways; ValueError.
+        """Lose and duplicate (probabilities 0–1) and delay (s) datagrams, both ways.
 
-        ``jitter`` is up to how much later one may come than others; so they overtake each other.
+        ``jitter`` is the largest extra delay of a datagram, so that datagrams can overtake each
+        other. Raise ValueError if a value is out of range.
         """
         if leg not in LEGS:
             raise ValueError(f"leg must be one of {', '.join(LEGS)}, not {leg!r}")
@@ -109,19 +110,19 @@ class LossyLink:
         return _Mending(self._net, before)
 
     def mend(self) -> None:
-        """Make every way good again."""
+        """Make every leg good again."""
         self._net.ways = {}
 
 
 class _Mending:
-    """Puts back what was, at the end of a ``with`` block."""
+    """Restores the previous conditions at the end of a ``with`` block."""
 
     def __init__(self, net: LossyNet, before: dict[str, Conditions]) -> None:
         self._net = net
         self._before = before
 
     def __enter__(self) -> None:
-        """It is bad already."""
+        """Do nothing: the call has already degraded the legs."""
 
     def __exit__(
         self,

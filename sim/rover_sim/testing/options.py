@@ -1,4 +1,4 @@
-"""What a test asks of its simulated rovers, as its markers say it, and the seed by its name."""
+"""The options of a test's simulated rovers, from its markers, and the seed from its name."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
@@ -17,7 +17,7 @@ FRAMES = ("", *(frame.value for frame in Frame))
 
 
 class MarkerError(Exception):
-    """A marker asks for what there is not; the message is one line for the test's author."""
+    """A marker with an invalid argument; the message is one line for the test's author."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,20 +27,20 @@ class RoverOptions:
     persona: str = "ardupilot"
     count: int = 1  # of rovers, with system ids in a row
     seed: int | None = None  # None: from the command line, or from the test's name
-    body: str = "kinematic"  # or "bullet": real physics, three times as slow
-    frame: str = ""  # "skid", "differential" or "ackermann"; "": as its persona
-    noise: str = "on"  # as unkind as its make; "off": exact, for tests of exact arithmetic
-    limit: float = 3600.0  # virtual s, for one thing that is waited for
-    real_limit: float = 60.0  # s, the same
+    body: str = "kinematic"  # or "bullet": real physics, a third of the speed
+    frame: str = ""  # "skid", "differential" or "ackermann"; "": the persona's
+    noise: str = "on"  # realistic; "off": exact, for tests of exact arithmetic
+    limit: float = 3600.0  # virtual s, for one wait
+    real_limit: float = 60.0  # s, for one wait
 
     @property
     def make(self) -> Persona:
-        """The make of autopilot, on its frame."""
+        """The persona, on the chosen frame."""
         persona = PERSONAS[self.persona]
         return persona.on(Frame(self.frame)) if self.frame else persona
 
     def __post_init__(self) -> None:
-        """Refuse what there is not."""
+        """Raise MarkerError for an invalid value."""
         _one_of("persona", self.persona, tuple(PERSONAS))
         _one_of("body", self.body, BODIES)
         _one_of("noise", self.noise, NOISES)
@@ -56,7 +56,7 @@ class RoverOptions:
 
 
 def read_markers(markers: Iterable[tuple[tuple[Any, ...], Mapping[str, Any]]]) -> RoverOptions:
-    """Join the arguments of markers, given from the outermost to the test's own. MarkerError."""
+    """Merge the arguments of markers, outermost first. Raise MarkerError."""
     known = [field.name for field in fields(RoverOptions)]
     joined: dict[str, Any] = {}
     for positional, named in markers:
@@ -67,7 +67,7 @@ def read_markers(markers: Iterable[tuple[tuple[Any, ...], Mapping[str, Any]]]) -
 
 
 def seed_of(node_id: str) -> int:
-    """Return a seed that a test has for as long as it and its file keep their names."""
+    """Return a seed that stays the same while the test and its file keep their names."""
     path, _, name = node_id.partition("::")
     return crc32(f"{path.rpartition('/')[2]}::{name}".encode())
 

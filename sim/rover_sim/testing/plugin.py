@@ -1,7 +1,7 @@
 """The pytest plugin: tests of rover code against a simulated rover, in virtual time.
 
-It is loaded in every pytest run of whoever has it installed: importing it imports nothing but
-pytest; the rest is imported when a test asks for a fixture.
+pytest loads it in every run where it is installed, so it imports only pytest; the rest is imported
+when a test requests a fixture.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ REAL_TIME = pytest.StashKey["RealTime"]()
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_load_initial_conftests(early_config: pytest.Config) -> None:
-    """Have our own modules loaded as they are.
+    """Exclude our own modules from pytest's assertion rewriting.
 
-    pytest rewrites the asserts of whatever is installed with a plugin. To read the generated
-    dialect for that takes two seconds, in each run that finds no bytecode of an earlier one; and
-    there is no other way to be left alone. With a pytest that does not look so inside, it does.
+    pytest rewrites the asserts of every package installed with a plugin. For the generated dialect
+    that takes two seconds in each run without cached bytecode, and pytest has no option to exclude
+    a module. On a pytest without this private attribute, the rewriting stays.
     """
     marked: set[str] = getattr(early_config.pluginmanager.rewrite_hook, "_must_rewrite", set())
     marked.difference_update(OURS)
@@ -54,7 +54,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make the marker known."""
+    """Register the marker."""
     config.addinivalue_line(
         "markers",
         f'{MARKER}(persona="ardupilot", count=1, seed=None, body="kinematic", frame="", noise="on",'
@@ -68,7 +68,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item,
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Show with a failing test where its rover was, and how to repeat it."""
+    """Add the rover's state and the seed to the report of a failing test."""
     report = yield
     if report.failed and (world := item.stash.get(WORLD, None)) is not None:
         from rover_sim.testing.report import describe_world  # noqa: PLC0415
@@ -81,7 +81,7 @@ def pytest_runtest_makereport(
 
 @pytest.fixture
 def task_server_settings() -> Settings:
-    """Return the task server's settings: override this fixture, or parametrize it, for others."""
+    """Return the task server's settings; override or parametrize this fixture to change them."""
     from mav_tasks.settings import Settings  # noqa: PLC0415
 
     return Settings()
@@ -102,25 +102,25 @@ def rover_world(
         pytest.fail(f"@pytest.mark.{MARKER}: {error}", pytrace=False)
     request.node.stash[WORLD] = world
     yield world
-    del request.node.stash[WORLD]  # what was tested stays until the last test is over
+    del request.node.stash[WORLD]  # the world stays inspectable until its last test is over
     world.close()
 
 
 @pytest.fixture
 def rover(rover_world: RoverWorld) -> SimulatedRover:
-    """Return the first simulated rover: where it truly is, and what one can do to it."""
+    """Return the first simulated rover: its true state, and actions on it."""
     return rover_world.rovers[0]
 
 
 @pytest.fixture
 def rovers(rover_world: RoverWorld) -> tuple[SimulatedRover, ...]:
-    """Return every simulated rover; the marker's ``count`` says how many."""
+    """Return every simulated rover, as many as the marker's ``count``."""
     return rover_world.rovers
 
 
 @pytest.fixture
 def task_server(rover_world: RoverWorld) -> TaskServer:
-    """Return the task server, running, with every rover found."""
+    """Return the running task server; it has found every rover."""
     rover_world.server.start()
     rover_world.until(lambda: rover_world.server.is_ready)
     return rover_world.server
@@ -131,14 +131,14 @@ def task_client(
     rover_world: RoverWorld,
     task_server: TaskServer,  # noqa: ARG001 (it runs)
 ) -> Iterator[SyncClient]:
-    """Return a client of the task server; each of its calls lets time pass until it is answered."""
+    """Return a client of the task server; each call advances time until its answer comes."""
     with rover_world.sync_client() as client:
         yield client
 
 
 @pytest.fixture
 def lossy_link(rover_world: RoverWorld) -> LossyLink:
-    """Return a way to make links bad: ``lossy_link(loss=0.3)``, for a while with ``with``."""
+    """Return a callable that degrades links: ``lossy_link(loss=0.3)``; ``with`` ends it."""
     return rover_world.lossy_link
 
 
@@ -156,18 +156,18 @@ def _real_time(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[RealT
 
 @pytest.fixture
 def rover_url(_real_time: RealTime) -> str:
-    """Return the URL of simulated rovers in a process, in real time: ``udpout:127.0.0.1:port``."""
+    """Return the URL of real-time simulated rovers in a process: ``udpout:127.0.0.1:port``."""
     return _real_time.start_rovers()
 
 
 @pytest.fixture
 def server_url(_real_time: RealTime, rover_url: str) -> str:
-    """Return the URL of a task server in a process, in real time, with every rover found."""
+    """Return the URL of a real-time task server in a process; it has found every rover."""
     return _real_time.start_server(rover_url)
 
 
 def _options_of(request: pytest.FixtureRequest) -> tuple[RoverOptions, int]:
-    """Return what the markers ask for, and the seed; a marker that asks wrongly fails the test."""
+    """Return the markers' options and the seed; fail the test if a marker is invalid."""
     from rover_sim.testing.options import MarkerError, read_markers, seed_of  # noqa: PLC0415
 
     node = request.node

@@ -1,4 +1,4 @@
-"""Rovers and a task server as processes, in real time: for code that opens a socket of its own."""
+"""Rovers and a task server as processes, in real time: for code that opens its own socket."""
 
 import os
 import re
@@ -13,19 +13,19 @@ from typing import Self
 
 from rover_sim.testing.options import RoverOptions
 
-START_LIMIT = 20.0  # s, for a process to say that it is there, on a busy machine
-STOP_LIMIT = 5.0  # s, for one to end that was asked to
-LOOK = 0.02  # s between two looks at what it says
-SETTINGS = "MAV_TASKS_"  # of the environment: those of whoever runs the tests are not the test's
-LAST_LINES = 10  # shown of each with a failing test
+START_LIMIT = 20.0  # s, for a process to report its start, on a busy machine
+STOP_LIMIT = 5.0  # s, for a process to end after SIGTERM
+LOOK = 0.02  # s between two reads of its output
+SETTINGS = "MAV_TASKS_"  # the user's environment settings must not affect the test
+LAST_LINES = 10  # of each process, shown with a failing test
 
 
 class ProcessFailed(Exception):
-    """A process did not start; the message has what it said."""
+    """A process did not start; the message has its output."""
 
 
 class OwnProcess:
-    """A module run as a process while a ``with`` block runs; it is ended by its own id."""
+    """A module run as a process for a ``with`` block; it is ended by its own id."""
 
     def __init__(self, module: str, arguments: Sequence[str], folder: Path) -> None:
         self.name = module
@@ -55,11 +55,11 @@ class OwnProcess:
 
     @property
     def text(self) -> str:
-        """What it has said so far."""
+        """Its output so far."""
         return self._output.read_text(encoding="utf-8", errors="replace")
 
     def wait_for(self, pattern: str) -> re.Match[str]:
-        """Wait until it says something that matches. ProcessFailed."""
+        """Wait until the output matches, and return the match. Raise ProcessFailed."""
         end = time.monotonic() + START_LIMIT
         while True:
             is_over = self._popen.poll() is not None
@@ -72,7 +72,7 @@ class OwnProcess:
 
 
 class RealTime:
-    """What the fixtures ``rover_url`` and ``server_url`` start, until ``close``."""
+    """The processes of the fixtures ``rover_url`` and ``server_url``, until ``close``."""
 
     def __init__(self, options: RoverOptions, *, seed: int, folder: Path) -> None:
         self._options = options
@@ -82,7 +82,7 @@ class RealTime:
         self._processes: list[OwnProcess] = []
 
     def start_rovers(self) -> str:
-        """Return the URL at which the rovers listen."""
+        """Start the rovers; return their URL."""
         options = self._options
         what = ["--body", options.body, "--persona", options.persona]
         what += ["--noise", options.noise, "--frame", options.make.frame.value]
@@ -92,7 +92,7 @@ class RealTime:
         return f"udpout:127.0.0.1:{port}"
 
     def start_server(self, rover_url: str) -> str:
-        """Return the URL at which the server listens, once it has found every rover."""
+        """Start the server; return its URL once it has found every rover."""
         port = _free_udp_port()
         links = ["--client", f"udpin:127.0.0.1:{port}", "--no-push", "--vehicle", rover_url]
         server = self._start(
@@ -103,7 +103,7 @@ class RealTime:
             *links,
             "--store",
             ":memory:",
-            # a PX4 rover would have to be told first to stand when setpoints stop
+            # a PX4 rover would first have to be configured to stop when setpoints stop
             "--set",
             "rules.loss_failsafe=accept",
         )
@@ -112,14 +112,14 @@ class RealTime:
         return f"udpout:127.0.0.1:{port}"
 
     def describe(self) -> str:
-        """Return what the processes said last, for a failing test."""
+        """Return the last output of the processes, for a failing test."""
         lines = [f"seed {self._seed} (the same again: --rover-seed {self._seed})"]
         for process in self._processes:
             lines += [f"{process.name}:", *process.text.splitlines()[-LAST_LINES:]]
         return "\n".join(lines)
 
     def close(self) -> None:
-        """End what was started, the last first."""
+        """End the processes, the last first."""
         self._stack.close()
 
     def _start(self, module: str, *arguments: str) -> OwnProcess:
@@ -129,7 +129,7 @@ class RealTime:
 
 
 def _free_udp_port() -> int:
-    """Return a port of the loopback that nobody uses at this moment."""
+    """Return a free port of the loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

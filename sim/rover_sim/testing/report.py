@@ -1,4 +1,4 @@
-"""What a failing test shows of its world: how to repeat it, where rovers were, who said what."""
+"""The report of a failing test: seed, rovers, tasks, events and texts."""
 
 from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import words_of
@@ -9,7 +9,7 @@ LAST_TASKS, LAST_EVENTS, LAST_TEXTS = 8, 12, 8
 
 
 def describe_world(world: RoverWorld) -> str:
-    """Return the state of affairs in lines."""
+    """Return the state of the world in lines."""
     options = world.options
     kind = f"{options.persona}, {options.body} body"
     lines = [

@@ -1,7 +1,7 @@
-"""The world of one test: rovers, a task server and clients, in a time that passes when waited for.
+"""The world of one test: rovers, a task server and clients in virtual time.
 
-While the test's own code runs, virtual time stands. It passes inside ``run``, ``sleep`` and
-``until``, and inside whatever a client waits for.
+Virtual time stands still while the test's own code runs. It advances inside ``run``, ``sleep`` and
+``until``, and while a client waits.
 """
 
 import asyncio
@@ -35,17 +35,17 @@ T = TypeVar("T")
 SPACING = 3.0  # m between rovers, side by side
 SLIP = 0.3  # of the kinematic body, before its seed varies it
 VARIATION = 0.3  # of the friction of bullet's ground
-LOOK = 0.02  # s of virtual time between two looks at what is waited for
-CLEAN_UP = 10.0  # virtual s for what was cut off to end
+LOOK = 0.02  # s of virtual time between two checks of a condition
+CLEAN_UP = 10.0  # virtual s for cancelled tasks to end
 
 
 class RoverWorld:
-    """Everything that takes part in one test. The same seed gives the same, bit for bit."""
+    """All parties of one test. The same seed gives the same run, bit for bit."""
 
     def __init__(self, options: RoverOptions, *, seed: int, settings: Settings) -> None:
         self.options = options
         self.seed = seed
-        self._began = round(time.time())  # whole seconds, as starts by the time of day are
+        self._began = round(time.time())  # whole seconds, as start times by the time of day are
         self._net = LossyNet(seed=seed)
         self._world = VirtualWorld(self._net)
         self._numbers = count(1)
@@ -64,12 +64,12 @@ class RoverWorld:
 
     @property
     def now(self) -> float:
-        """Virtual seconds since the world began."""
+        """Virtual seconds since the start of the world."""
         return self._world.now
 
     @property
     def utc(self) -> datetime:
-        """The time of day in this world; it began at the real one, to the second."""
+        """Time of day in this world; it starts at the real time, rounded to a second."""
         return datetime.fromtimestamp(self._began + self.now, UTC)
 
     @property
@@ -78,9 +78,9 @@ class RoverWorld:
         return list(self._net.texts)
 
     def run(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run a coroutine to its end in virtual time. Stalled, NotInVirtualTime.
+        """Run a coroutine to its end in virtual time. Raise Stalled or NotInVirtualTime.
 
-        Tasks that it leaves behind go on in the next call.
+        Tasks that it leaves behind continue in the next call.
         """
         __tracebackhide__ = True
         if _is_in_a_loop():
@@ -100,46 +100,46 @@ class RoverWorld:
         try:
             return self._runner.run(kept())
         except Stalled as stalled:
-            raise stalled.with_traceback(None) from None  # who waits is in its words
+            raise stalled.with_traceback(None) from None  # its message says who waits
         finally:
             if task is not None and not task.done():
                 self._cut_off(task)
 
     def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """As ``run``: what a SyncClient asks of the place where its coroutines run."""
+        """Run a coroutine like ``run``; SyncClient calls this."""
         __tracebackhide__ = True
         return self.run(coroutine)
 
     def sleep(self, seconds: float) -> None:
-        """Let virtual time pass. Stalled beyond the marker's ``limit``."""
+        """Let virtual time pass. Raise Stalled beyond the marker's ``limit``."""
         __tracebackhide__ = True
         self.run(asyncio.sleep(seconds))
 
     def until(self, condition: Callable[[], object], *, within: float = 60.0) -> None:
-        """Let virtual time pass until the condition holds; AssertionError if it does not."""
+        """Let virtual time pass until the condition holds. Raise AssertionError if it does not."""
         __tracebackhide__ = True
         end = self.now + within
-        while not condition():  # out of the loop, so that it can ask a SyncClient
+        while not condition():  # outside the loop, so that the condition can use a SyncClient
             assert self.now < end, f"not within {within:g} s of virtual time"
             self.sleep(LOOK)
 
     def link(self) -> MemoryLink:
-        """Return a new link to the server's clients' side, for one client."""
+        """Return a new link for one client to the server."""
         return self._net.link(f"client{next(self._numbers)}", peers=(CLIENT_LINK,))
 
     def client(self) -> Client:
-        """Return another client for ``async with``, inside of what ``run`` runs."""
+        """Return another client for ``async with``, for use in a coroutine that ``run`` runs."""
         return Client(self.link())
 
     def sync_client(self) -> SyncClient:
-        """Return another client for ``with``; each of its calls lets time pass until the answer."""
+        """Return another client for ``with``; each call advances time until its answer comes."""
         return SyncClient(self.link(), portal=self)
 
     def close(self) -> None:
-        """Cancel what still runs and give everything back."""
+        """Cancel running tasks and release all resources."""
         self._allow(CLEAN_UP)
         try:
-            self._runner.run(_nothing())  # it makes its loop on its first run
+            self._runner.run(_nothing())  # the runner creates its loop on its first run
             self._runner.close()
         finally:
             for body in self._bodies:
@@ -149,7 +149,7 @@ class RoverWorld:
         self._loop.allow(seconds, real_seconds=self.options.real_limit)
 
     def _cut_off(self, task: asyncio.Task[Any]) -> None:
-        """End what a stalled run left behind, so that it does not go on in the next."""
+        """Cancel the task of a stalled run, so that it does not continue in the next."""
         self._allow(CLEAN_UP * 2)
         task.cancel()
         self._runner.run(_ended(task))
@@ -167,7 +167,8 @@ class RoverWorld:
             seed=self.seed + number,
         )
         if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
-            # Hold: by default a PX4 rover drives home when setpoints stop, and no task is driven
+            # Hold: by default a PX4 rover drives home when setpoints stop, and the server drives no
+            # task
             vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = 5
         self._world.join(RoverParty(vehicle, self._net.link(_name_of(number))))
         return SimulatedRover(vehicle, body, persona=persona, clock=lambda: self.now)
@@ -193,7 +194,7 @@ def _is_in_a_loop() -> bool:
 
 
 async def _nothing() -> None:
-    """End at once."""
+    """Return at once."""
 
 
 async def _ended(task: asyncio.Task[Any]) -> None:

@@ -1,4 +1,4 @@
-"""A simulated rover in a test's hands: where it truly is, and what can happen to it."""
+"""A simulated rover for tests: its true state, and actions on it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -41,17 +41,17 @@ class SimulatedRover:
 
     @property
     def persona(self) -> str:
-        """Whose ways it has: "ardupilot", "px4" or "generic"."""
+        """The persona: "ardupilot", "px4" or "generic"."""
         return self._persona.name
 
     @property
     def north(self) -> float:
-        """Metres from where the ground's frame begins."""
+        """Metres north of the ground frame's origin."""
         return self._body.state.north
 
     @property
     def east(self) -> float:
-        """Metres from where the ground's frame begins."""
+        """Metres east of the ground frame's origin."""
         return self._body.state.east
 
     @property
@@ -76,7 +76,7 @@ class SimulatedRover:
 
     @property
     def stands(self) -> bool:
-        """Whether it moves no more."""
+        """Whether the rover stands still."""
         return abs(self.speed) < STANDS and abs(self.yaw_rate) < STANDS
 
     @property
@@ -89,12 +89,12 @@ class SimulatedRover:
         """Its mode: "guided", "hold", "manual", "auto", "rtl", "position" or "initialising"."""
         return self._vehicle.autopilot.mode.value
 
-    # what somebody beside it does
+    # actions of a person beside the rover
 
     def place(
         self, *, north: float | None = None, east: float | None = None, yaw: float | None = None
     ) -> None:
-        """Carry it somewhere at once; None: as it is. If it drives, it drives on from there."""
+        """Move the rover to a pose at once; None keeps a value. Its motion continues."""
         now = self._body.state
         self._body.place(
             Pose(
@@ -105,25 +105,27 @@ class SimulatedRover:
         )
 
     def push(self, *, forward: float = 0.0, right: float = 0.0, turn: float = 0.0) -> None:
-        """Move it at once by so many metres as it sees it, then turn it by so many radians."""
+        """Move the rover at once by metres along its own axes, then turn it by radians."""
         now = self._body.state
         north, east = turned(forward, right, now.yaw)
         self._body.place(Pose(now.north + north, now.east + east, now.yaw + turn))
 
     def block_wheels(self, side: str = "all") -> None:
-        """Hold its wheels, or those of one ``side``, "left" or "right": whatever is asked of them,
-        they stand. ValueError for anything else.
+        """Block the wheels of one ``side``, "left" or "right", or all.
+
+        Raise ValueError for any other side.
         """
         self._body.blocked |= wheels_of(side)
 
     def free_wheels(self) -> None:
-        """Let go of its wheels."""
+        """Release the wheels."""
         self._body.blocked = frozenset()
 
     def freeze_output(self, name: str) -> None:
-        """Let an output stay as it is, as long as the rover is armed, whatever mode it is in.
+        """Freeze an output at its present value while the rover is armed, in any mode.
 
-        "left" or "right"; an Ackermann rover has "throttle" and "steering". ValueError for others.
+        "left" or "right"; an Ackermann rover has "throttle" and "steering". Raise ValueError for
+        others.
         """
         frozen = self._vehicle.autopilot.faults.outputs_frozen | {
             output_of(name, self._persona.frame)
@@ -131,45 +133,45 @@ class SimulatedRover:
         self._change_faults(outputs_frozen=frozen)
 
     def free_outputs(self) -> None:
-        """Let every output follow again."""
+        """Release every output."""
         self._change_faults(outputs_frozen=frozenset())
 
     def lose_gps(self) -> None:
-        """Take its satellites away: it drives on for some seconds, then its position is gone."""
+        """Remove all satellites: after some seconds of driving, the position is lost."""
         self._change_faults(gps_lost=True)
 
     def regain_gps(self) -> None:
-        """Give its satellites back."""
+        """Restore the satellites."""
         self._change_faults(gps_lost=False)
 
     def arm(self) -> None:
-        """Arm it at the rover, past everybody."""
+        """Arm the rover locally, without a MAVLink command."""
         self._vehicle.autopilot.operator_arm(True, now=self._clock())
 
     def disarm(self) -> None:
-        """Disarm it at the rover, past everybody."""
+        """Disarm the rover locally, without a MAVLink command."""
         self._vehicle.autopilot.operator_arm(False, now=self._clock())
 
     def set_mode(self, mode: str) -> None:
-        """Turn its mode switch; ValueError for a mode that this make does not have."""
+        """Turn the mode switch. Raise ValueError for a mode that this make lacks."""
         known = [each.value for each in self._persona.modes.numbers]
         if mode not in known:
             raise ValueError(f"mode must be one of {', '.join(known)}, not {mode!r}")
         self._vehicle.autopilot.operator_mode(Mode(mode), now=self._clock())
 
     def hold_sticks(self, *, forward: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Hold the sticks of its remote control so, m/s and rad/s.
+        """Hold the sticks of the remote control at m/s and rad/s.
 
-        Heeded in "manual"; a rover as unkind as a real ArduPilot adds the throttle in "guided".
+        They drive in "manual"; on a realistic ArduPilot the throttle also adds speed in "guided".
         """
         self._vehicle.autopilot.operator_sticks(forward, yaw_rate)
 
     def reboot(self) -> None:
-        """Switch its autopilot off and on: a second in which it neither hears nor says anything."""
+        """Restart the autopilot: for a second it neither receives nor sends."""
         self._vehicle.autopilot.reboot(now=self._clock())
 
     def set_faults(self, faults: Faults) -> None:
-        """Break what ``faults`` names and mend all else; ``Faults()`` mends everything."""
+        """Replace the faults; ``Faults()`` clears them all."""
         self._vehicle.autopilot.set_faults(faults)
 
     def _change_faults(self, **changes: Any) -> None:

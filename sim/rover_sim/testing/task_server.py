@@ -1,6 +1,6 @@
-"""The task server in a test's hands: the one that ``mav-tasks serve`` runs, in virtual time.
+"""The task server for tests: the one that ``mav-tasks serve`` runs, in virtual time.
 
-It can be killed and started again; what it had acknowledged is there then, as from a disk.
+A test can kill and restart it; acknowledged tasks survive, as on a disk.
 """
 
 from dataclasses import replace
@@ -20,7 +20,7 @@ FOR_EVER = Retention(max_age=None, max_count=None)
 
 
 class TaskServer:
-    """One server for all rovers of a world, from its first life to its last."""
+    """One server for all rovers of a world, across its restarts."""
 
     def __init__(
         self,
@@ -28,9 +28,9 @@ class TaskServer:
         *,
         vehicles: tuple[str, ...],
         settings: Settings,
-        wall_offset: float,  # UTC less virtual time, s
+        wall_offset: float,  # UTC minus virtual time, s
     ) -> None:
-        self.settings = settings  # in force from the next start on
+        self.settings = settings  # applied at the next start
         self._world = world
         self._vehicles = vehicles
         self._wall_offset = wall_offset
@@ -45,12 +45,12 @@ class TaskServer:
 
     @property
     def is_running(self) -> bool:
-        """Whether it serves."""
+        """Whether the server runs."""
         return self._server is not None and not self._is_killed and not self._server.pump.is_over
 
     @property
     def is_ready(self) -> bool:
-        """Whether it serves and has found every rover."""
+        """Whether the server runs and has found every rover."""
         if self._server is None or not self.is_running:
             return False
         found = self._server.engine.snapshot(now=self._world.now).vehicles
@@ -58,22 +58,22 @@ class TaskServer:
 
     @property
     def tasks(self) -> tuple[Task, ...]:
-        """Every task that it knows, or knew when it ended, in the order of their ids."""
+        """Every task of the running server, or of its last run, in the order of their ids."""
         if self._server is None:
             return ()
         return self._server.engine.snapshot(now=self._world.now).tasks
 
     @property
     def events(self) -> list[Event]:
-        """The journal, of all its lives; ``str`` gives an event in words."""
+        """The journal over all runs; ``str`` describes an event."""
         return self._earlier + self._store.events
 
     def task(self, task_id: int) -> Task:
-        """Return a task by its id; KeyError."""
+        """Return a task by its id. Raise KeyError."""
         return {int(task.id): task for task in self.tasks}[task_id]
 
     def start(self) -> None:
-        """Start it, on what it had stored; it needs some seconds to find the rovers again."""
+        """Start the server on its store; it needs some seconds to find the rovers again."""
         if self.is_running:
             raise RuntimeError("the task server is running already")
         restored = self._end_life()
@@ -90,25 +90,25 @@ class TaskServer:
         self._world.join(self._server)
 
     def kill(self) -> None:
-        """Let it be gone from one moment to the next; nobody stops the rovers."""
+        """End the server abruptly; nothing stops the rovers."""
         if self._server is None or not self.is_running:
             raise RuntimeError("the task server is not running")
         self._is_killed = True
         self._world.leave(self._server)
 
     def stop(self) -> None:
-        """Ask for its orderly end: it stops the rovers, and within a second it is not running."""
+        """Request an orderly shutdown: the server stops the rovers and ends within a second."""
         if self._server is None or not self.is_running:
             raise RuntimeError("the task server is not running")
         self._server.shut_down(now=self._world.now)
 
     def restart(self) -> None:
-        """Kill it and start it at once, as after a crash: what ran is held, the queue paused."""
+        """Kill and start the server, as after a crash: active tasks are held, the queues paused."""
         self.kill()
         self.start()
 
     def _end_life(self) -> Restored | None:
-        """Put the life that is over aside; give what it has left behind, None if there was none."""
+        """Archive the events of the last run; return what it stored, or None without a run."""
         if self._server is None:
             return None
         if not self._is_killed:
@@ -125,7 +125,7 @@ class TaskServer:
 
 
 def stored(events: list[Event]) -> Restored:
-    """Return what the real store makes of events when a server starts on it."""
+    """Return what the real store restores from these events."""
     with TemporaryDirectory(prefix="rover-sim-") as folder:
         path = Path(folder) / "tasks.sqlite3"
         first = SqliteStore(path, wall_offset=_no_offset, retention=FOR_EVER)

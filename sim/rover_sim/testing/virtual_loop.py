@@ -1,7 +1,8 @@
-"""An asyncio loop in virtual time: where it would sleep, it moves a world to what is due next.
+"""An asyncio loop in virtual time: instead of sleeping, it advances a world to its next event.
 
-Tasks, timers and futures are asyncio's own. ``add_reader`` takes links of the world's net; what
-needs real time (sockets, processes, signals) is refused, and a thread's work is done on the spot.
+Tasks, timers and futures are asyncio's own. ``add_reader`` takes links of the world's net.
+Everything that needs real time (sockets, processes, signals) is refused. Work for a thread runs at
+once in the loop.
 """
 
 import asyncio
@@ -21,12 +22,12 @@ Ts = TypeVarTuple("Ts")
 
 Ready = list[tuple[selectors.SelectorKey, int]]
 
-MOST_TURNS = 100_000  # of the loop without time passing: a second or two of real time
+MOST_TURNS = 100_000  # turns of the loop at one time: a second or two of real time
 NO_REAL_TIME = "is not possible in virtual time: give the code under test a link of the world's net"
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """Runs in the time of a world; ``allow`` says how much of it one run may take."""
+    """Runs in the time of a world; ``allow`` limits the time of one run."""
 
     def __init__(self, world: VirtualWorld) -> None:
         self._world = world
@@ -35,11 +36,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self._pace.is_sealed = True
 
     def time(self) -> float:
-        """Virtual seconds since the world began."""
+        """Return virtual seconds since the start of the world."""
         return self._world.now
 
     def allow(self, seconds: float, *, real_seconds: float) -> None:
-        """From now on let so much time pass; Stalled is raised by whoever wants more."""
+        """Limit the time from now on; a run that needs more raises Stalled."""
         self._pace.allow(seconds, real_seconds)
 
     def run_in_executor(
@@ -48,11 +49,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         func: Callable[[*Ts], T],
         *args: *Ts,
     ) -> asyncio.Future[T]:
-        """Do the work now, while virtual time stands: a thread would race with it."""
+        """Do the work at once, in virtual time zero: a thread would race with it."""
         done: asyncio.Future[T] = self.create_future()
         try:
             done.set_result(func(*args))
-        except Exception as error:  # noqa: BLE001 (it is whoever awaits it who has it)
+        except Exception as error:  # noqa: BLE001 (the awaiting task gets it)
             done.set_exception(error)
         return done
 
@@ -97,14 +98,14 @@ for _name in (
 
 
 class _Pace(selectors.BaseSelector):
-    """What the loop waits on: it moves the world instead of waiting."""
+    """The loop's selector: it advances the world instead of waiting."""
 
     def __init__(self, world: VirtualWorld, stalled: Callable[[str], Stalled]) -> None:
         self._world = world
         self._stalled = stalled
         self._keys: dict[int, selectors.SelectorKey] = {}
-        self._turns = 0  # since time moved
-        self.is_sealed = False  # before, the loop itself registers its own wake-up
+        self._turns = 0  # since time last advanced
+        self.is_sealed = False  # until then, the loop registers its own wake-up
         self.allow(0.0, 0.0)
 
     def allow(self, seconds: float, real_seconds: float) -> None:
@@ -149,7 +150,7 @@ class _Pace(selectors.BaseSelector):
             )
 
     def _move(self, timeout: float | None) -> None:
-        """Move the world to what is due next: in it, or in the loop after ``timeout``."""
+        """Advance the world to the next event, of the world or of the loop after ``timeout``."""
         if timeout is None and self._world.next_due() is None:
             raise self._stalled("nothing will ever happen any more")
         if time.monotonic() > self._real_end:

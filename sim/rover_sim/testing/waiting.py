@@ -1,4 +1,4 @@
-"""Who waits for what, in words: for a test that waits for what does not come."""
+"""Describes which tasks wait where, for a test whose wait never ends."""
 
 import asyncio
 import linecache
@@ -7,12 +7,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-MOST_TASKS = 8  # told of
-OURS = Path(__file__).parent  # what wraps the test's own coroutines is not told of
+MOST_TASKS = 8  # described at most
+OURS = Path(__file__).parent  # frames that wrap the test's own coroutines are left out
 
 
 def describe_tasks(loop: asyncio.AbstractEventLoop) -> str:
-    """Return a line for each coroutine in which a task of the loop waits, the task's own first."""
+    """Return a line for each coroutine in which a task of the loop waits, outermost first."""
     tasks = sorted(asyncio.all_tasks(loop), key=lambda task: task.get_name())
     lines: list[str] = []
     for task in tasks[:MOST_TASKS]:
@@ -28,7 +28,7 @@ def describe_tasks(loop: asyncio.AbstractEventLoop) -> str:
 
 
 def _frames(awaitable: Any) -> Iterator[FrameType]:
-    """Yield the frame of a coroutine, of the one that it awaits, and so on."""
+    """Yield the frames of a coroutine, of the one that it awaits, and so on."""
     while awaitable is not None:
         for frame_name, next_name in (
             ("cr_frame", "cr_await"),

@@ -1,1 +1,1 @@
-"""Every state of control that a vehicle can come into, found by trying everything from each."""
+"""Every reachable state of a vehicle's control, found by trying every event in each."""

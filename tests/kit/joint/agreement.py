@@ -1,7 +1,7 @@
-"""Whether the server does what the model of joint control says: looked at with each event.
+"""Checks that the server agrees with the model of joint control, at each event.
 
-What the table leads to is walked through in the model (``graph``); that is worth as much as the
-model agrees with the server. So each event in each scenario is held against it.
+``graph`` explores the states of the model, which proves something about the server only if both
+agree. So each event of each scenario is compared with the model.
 """
 
 from functools import cache
@@ -19,14 +19,14 @@ LEFT_OPEN: dict[str, Any] = dict.fromkeys(FREE, False)
 
 
 class Agreement:
-    """Looks at every event of every vehicle, and keeps what the model does not know."""
+    """Checks every event of every vehicle, and records transitions that the model lacks."""
 
     def __init__(self) -> None:
         self.surprises: list[str] = []
         self._is_within = False
 
     def look_on(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Look from here on."""
+        """Start checking."""
         done = JointControl.on
 
         def on(joint: JointControl, event: Event, word: Word, *, now: float) -> Any:

@@ -1,4 +1,4 @@
-"""What may happen to a rover and its server: words of clients, a person at the rover, troubles."""
+"""Events for a rover and its server: clients' requests, a person at the rover, failures."""
 
 from collections.abc import Callable
 from enum import Enum, auto
@@ -12,37 +12,37 @@ from tests.kit.world import World, at
 
 WAYPOINT, START, CANCEL, CLEAR, RELEASE = 16, 300, 54010, 54011, 54013
 PX4_HOLD, PX4_OFFBOARD = 3 << 24 | 4 << 16, 6 << 16
-SPEED = 0.5  # m/s of the client's stream
-LATER = 6.0  # s until the task begins that is submitted for later
+SPEED = 0.5  # m/s of the client's setpoint stream
+LATER = 6.0  # s until the start of the later task
 
 
 class Kind(Enum):
-    """What a deed is to the rule of halts."""
+    """The class of a deed in the halt rule."""
 
-    HALT = auto()  # of a client, if it is accepted
+    HALT = auto()  # by a client, if accepted
     PARKING = auto()  # a halt at the rover itself
     DISARMING = auto()  # by a client
     DISARMED = auto()  # at the rover itself
     CONTINUE = auto()
     ARMING = auto()  # by a client
     ARMED = auto()  # at the rover itself
-    GRANT = auto()  # a client asks for the mode in which it drives
+    GRANT = auto()  # a client requests the mode in which it drives
     GO = auto()
     WISH = auto()
-    NOTHING = auto()  # that lets go: time, trouble, copies, a stream, a switch
+    NOTHING = auto()  # releases nothing: time, failures, copies, a stream, a switch
 
 
 class Deed(NamedTuple):
-    """One thing that may happen; ``act`` returns the command that is to be answered, if any."""
+    """One possible event; ``act`` returns the command that awaits an answer, if any."""
 
     name: str
     kind: Kind
     act: Callable[["Scene"], Sent | None]
-    takes: float = 1.5  # s until its effect is judged
+    takes: float = 1.5  # s until its effect is checked
 
 
 class Scene:
-    """A world with two clients: ``client`` lets the rover go, ``person`` halts it."""
+    """A world with two clients: ``client`` releases the rover, ``person`` halts it."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -57,7 +57,7 @@ class Scene:
         world.until(lambda: upload.result == 0, within=5)
 
     def go(self, sent: Sent) -> Sent:
-        """Remember a word that lets go, for its copy."""
+        """Store a go request for later copies."""
         self.last_go = sent.message
         return sent
 

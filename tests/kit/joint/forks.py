@@ -1,8 +1,8 @@
 """Processes as bookmarks: each holds one state of a world, from which every deed is tried.
 
-A world is full of what cannot be copied within a process; a fork copies all of it. A bookmark waits
-for a deed's number, forks, does it in the child, and the child tells what came of it. It is then
-either the next bookmark or ends. One thing happens at a time.
+A world cannot be copied within a process, but a fork copies all of it. A bookmark waits for a
+deed's number, forks, and the child does the deed and reports the result. The child then becomes the
+next bookmark or ends. Only one deed runs at a time.
 """
 
 import ctypes
@@ -16,15 +16,15 @@ from pathlib import Path
 from typing import Any
 
 PATIENCE = 60.0  # s for a deed
-PR_SET_PDEATHSIG = 1  # of prctl(2), Linux: a bookmark ends with the one that it was forked from
+PR_SET_PDEATHSIG = 1  # of prctl(2), Linux: a bookmark ends with its parent
 MOST = 1 << 20  # bytes of a report
 
 
 class Forks:
-    """The bookmarks of one search; ``do`` changes the world that is in this process."""
+    """The bookmarks of one search; ``do`` changes the world in its process."""
 
     def __init__(self, folder: Path, do: Callable[[int], Any]) -> None:
-        """``do`` does the deed of a number and returns what is reported, to be pickled."""
+        """Fork the first bookmark; ``do`` does a deed by number and returns a picklable report."""
         self._do = do
         self._folder = folder
         self._ours = self._socket("searcher")
@@ -37,20 +37,20 @@ class Forks:
         return f"Forks({self._last})"
 
     def attempt(self, bookmark: int, deed: int) -> tuple[int, Any]:
-        """Do a deed from a bookmark; gives the number of what may be kept, and the report."""
+        """Do a deed from a bookmark; return the number of the new state, and the report."""
         self._last += 1
         self._tell(bookmark, (deed, self._last))
         return self._last, self._hear()
 
     def decide(self, number: int, *, keep: bool) -> None:
-        """Keep what was attempted as a bookmark, or let it end."""
+        """Keep the new state as a bookmark, or end it."""
         if keep:
             self._kept.append(number)
         self._tell(number, keep)
 
     def close(self) -> None:
-        """End all bookmarks; those that were forked from another have nobody who waits for them."""
-        for number in reversed(self._kept):  # one that ends takes its own with it
+        """End all bookmarks; only the first one is our child and needs waiting."""
+        for number in reversed(self._kept):  # one that ends takes its children with it
             self._tell(number, None)
         self._ours.close()
         os.waitpid(self._pid, 0)
@@ -67,7 +67,7 @@ class Forks:
         return pickle.loads(self._ours.recv(MOST))
 
     def _fork_first(self) -> int:
-        """Fork the first bookmark, and wait until it can be told something."""
+        """Fork the first bookmark, and wait until it is ready."""
         pid = os.fork()
         if pid == 0:
             self._live(self._socket("0"), None)
@@ -75,11 +75,11 @@ class Forks:
         return pid
 
     def _live(self, end: socket.socket, report: object) -> None:
-        """Be a bookmark, or what may become one; never returns."""
+        """Run as a bookmark, or as a state that may become one; never returns."""
         status = 1
         try:
             ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-            signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # its children end by themselves
+            signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # its children are reaped automatically
             searcher = str(self._folder / "searcher")
             end.sendto(pickle.dumps(report), searcher)
             if report is not None and not pickle.loads(end.recv(MOST)):
@@ -92,7 +92,7 @@ class Forks:
                     end = self._socket(str(number))
                     try:
                         report = self._do(deed)
-                    except BaseException as mistake:  # noqa: BLE001 - told, and judged, elsewhere
+                    except BaseException as mistake:  # noqa: BLE001 - reported and judged elsewhere
                         report = mistake
                     self._live(end, report)
             status = 0

@@ -1,4 +1,4 @@
-"""The graph of joint control: every state that the table leads to, from the first of each make."""
+"""The graph of joint control: every state that the table reaches, from the first of each make."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -9,7 +9,7 @@ from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event
 from mav_tasks.engine.vehicles.joint_state import Grip, Queue, State, Work
 from tests.kit.joint.model import FREE, MAKES, START, happens, others_do, passes
 
-#: of each event, what its rows ask for that the graph leaves open
+#: per event, the conditions of its rows that the graph leaves open
 ASKED = {
     event: tuple(
         name for name in FREE if any(name in row.where for row in TABLE if row.event is event)
@@ -18,7 +18,7 @@ ASKED = {
 }
 
 
-TIME, PEOPLE = "time", "people"  # what else leads from one state to another
+TIME, PEOPLE = "time", "people"  # other causes of transitions
 
 
 def always(_state: State) -> bool:
@@ -27,7 +27,7 @@ def always(_state: State) -> bool:
 
 
 def can_happen(event: Event, state: State) -> bool:
-    """Whether an event can come about in a state; words can, in any."""
+    """Return whether an event is possible in a state; requests always are."""
     has_task = state.work not in (Work.NONE, Work.WAITS)
     match event:
         case Event.CANCEL:
@@ -38,14 +38,14 @@ def can_happen(event: Event, state: State) -> bool:
             return state.work is Work.RUNS
         case Event.MODE_IN_STOP:
             return state.queue is Queue.STOPPED
-        case Event.PARKED:  # the change of the mode has been seen to before
+        case Event.PARKED:  # the mode change was handled before
             rests = state.work in STANDS and not state.waits and not state.is_urgent
             return state.queue is not Queue.STOPPED and rests
         case Event.MODE | Event.LATE_MODE | Event.EXPLAINED | Event.GO_ON:
             return state.queue is not Queue.STOPPED
         case Event.LAPSED:
             return state.queue is not Queue.STOPPED and state.grip in (Grip.TAKING, Grip.DRIVING)
-        case Event.DISARMED:  # it has come, the heartbeat shows it
+        case Event.DISARMED:  # the heartbeat shows it disarmed
             return state.armed and state.grip is not Grip.STOPPING
         case Event.RUN_NOW:
             return state.queue is not Queue.STOPPED
@@ -54,13 +54,13 @@ def can_happen(event: Event, state: State) -> bool:
         case Event.COME_BACK_HALTED:
             return state.grip is Grip.FREE and not has_task and state.armed
         case Event.CLOSE:
-            return False  # nothing is after it
+            return False  # final: nothing follows
         case _:
             return True
 
 
 def variants(event: Event, state: State) -> Iterator[State]:
-    """Yield a state with all that an event's rows ask for beside it."""
+    """Yield the state with each combination of the conditions that the event's rows have."""
     names = ASKED[event]
     for values in product((False, True), repeat=len(names)):
         asked: dict[str, Any] = dict(zip(names, values, strict=True))
@@ -78,9 +78,9 @@ def after(event: Event, state: State) -> set[State]:
 
 
 def plain(state: State) -> Iterator[State]:
-    """Yield a state without what the graph leaves open, and with one thing at a time that waits.
+    """Yield a state without open conditions, and with one waiting effect at a time.
 
-    Of several each is taken off, and comes true, whatever becomes of the others.
+    Each of several waiting effects is removed or takes effect independently of the others.
     """
     state = state._replace(
         may_be_armed=False, is_idle=True, is_stopping=False, is_late=False, brakes=False
@@ -93,16 +93,16 @@ def plain(state: State) -> Iterator[State]:
 
 
 class Graph:
-    """Every state of one make of vehicle, and what leads from each to others."""
+    """Every state of one make of vehicle, with its transitions."""
 
     def __init__(self, make: str) -> None:
         make_of: dict[str, Any] = {**MAKES[make]}
         first = START._replace(**make_of)
-        #: each state, and what leads there from the first
+        #: each state, with the path to it from the first
         self.paths: dict[State, tuple[str, ...]] = {first: ()}
-        #: what can happen in a state, and the states to which that leads
+        #: each state's events, with the states to which they lead
         self.leads: dict[State, dict[str, frozenset[State]]] = {}
-        # each state, and each set of them, is there once: there are hundreds of thousands of sets
+        # Share equal states and sets: there are hundreds of thousands of sets.
         one: dict[State, State] = {}
         once: dict[frozenset[State], frozenset[State]] = {}
         waiting = deque([first])
@@ -124,9 +124,9 @@ class Graph:
     def leading_to(
         self, wanted: Callable[[State], bool], *names: str, within: Callable[[State], bool] = always
     ) -> set[State]:
-        """Return the states from which ways of these names lead to a wanted one at last.
+        """Return the states from which transitions with these names lead to a wanted state.
 
-        ``within``: on the way it is so.
+        All states on the path satisfy ``within``.
         """
         into: dict[State, list[State]] = {}
         for state, ways in self.leads.items():

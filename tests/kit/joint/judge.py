@@ -1,4 +1,4 @@
-"""Judges each deed by where the rover truly is: what is held stands until somebody lets it go."""
+"""Judges each deed by the rover's true pose: a held rover stands until it is released."""
 
 from math import hypot
 from typing import NamedTuple
@@ -10,45 +10,45 @@ from tests.kit.client import ACCEPTED, Sent
 from tests.kit.joint.deeds import CLEAR, DEEDS, Deed, Kind, Scene
 
 LOOK = 0.1  # s
-MOVED = 0.05  # m, of a rover that is held
-WAY_OUT = -1  # instead of a deed: whether there is one
-COMPLETES = 40.0  # s for a metre, with all that it may wait for
+MOVED = 0.05  # m, of a held rover
+WAY_OUT = -1  # instead of a deed: check that there is a way out
+COMPLETES = 40.0  # s for a metre, including waits
 
 
 class State(NamedTuple):
-    """What tells one state of a vehicle's control from another; the rest is figures."""
+    """The distinguishing state of a vehicle's control, without figures."""
 
-    queue: str  # why it stands, NONE: it runs
-    phase: str  # of our hold on it
+    queue: str  # why it is paused; NONE: it runs
+    phase: str  # of the server's control
     mode: str
     armed: bool
     may_arm: bool
-    active: str  # state and reason of the task that has the vehicle
+    active: str  # state and reason of the active task
     waiting: int  # tasks, at most 1
     immediate: bool
     grants: bool
-    marked: bool  # its mission begins when it is armed
+    marked: bool  # its mission starts when it is armed
     heard: bool
     streams: bool
     moves: bool
-    holds: frozenset[str]  # what keeps it standing, by the rule
+    holds: frozenset[str]  # what holds it, by the rule
 
 
 class Report(NamedTuple):
-    """What came of a deed."""
+    """The result of a deed."""
 
     state: State
     wrong: tuple[str, ...]
 
 
 class Judge:
-    """Does deeds in a scene, and keeps what holds the rover."""
+    """Does deeds in a scene, and tracks what holds the rover."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._holds: set[str] = set()
         self._pose = scene.world.pose()
-        self._seen = 0  # of the observer's violations
+        self._seen = 0  # number of the observer's violations
 
     def __repr__(self) -> str:
         return f"Judge({sorted(self._holds)})"
@@ -92,7 +92,7 @@ class Judge:
         return Report(self.state(), tuple(wrong))
 
     def state(self) -> State:
-        """Return what the present state is."""
+        """Return the present state."""
         world, vehicle = self.scene.world, self._vehicle
         tasks, autopilot = vehicle.tasks, world.rover.autopilot
         active = tasks.active
@@ -116,7 +116,7 @@ class Judge:
         )
 
     def _let_go(self, deed: Deed, sent: Sent | None) -> None:
-        """Take off what a word has lifted that was newer."""
+        """Remove the holds that a newer request has lifted."""
         runs = self.scene.world.paused() is TaskReason.NONE
         is_to_run = self._vehicle.tasks.immediate is not None
         is_accepted = sent is not None and sent.result == ACCEPTED
@@ -125,7 +125,7 @@ class Judge:
                 self._holds.clear()
             case Kind.ARMED:
                 self._holds.discard("disarm")
-            case Kind.ARMING if is_accepted or self.scene.is_silent:  # its answer was not heard
+            case Kind.ARMING if is_accepted or self.scene.is_silent:  # its answer was lost
                 self._holds.discard("disarm")
             case Kind.GRANT if is_accepted:
                 self._holds.discard("halt")
@@ -143,7 +143,7 @@ class Judge:
         was_moving: bool,
         was_armed: bool,
     ) -> None:
-        """Put on what a word holds, or what somebody has done at the rover."""
+        """Add the hold of a request, or of an action at the rover."""
         world = self.scene.world
         is_accepted = sent is not None and sent.result == ACCEPTED
         drove = was_mode is Mode.MANUAL or (was_mode is not Mode.HOLD and was_moving)
@@ -159,7 +159,7 @@ class Judge:
                     self._holds.add("halt")
 
     def _find_way_out(self) -> list[str]:
-        """From here on, as a person would: everything cleared, HOLD, continue, and a task."""
+        """Return problems on a person's way out: clear, HOLD, continue, a task."""
         scene, world = self.scene, self.scene.world
         scene.client.end_streams()
         world.watched.loses = lambda *_: False

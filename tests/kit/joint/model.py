@@ -1,7 +1,7 @@
-"""What each effect of the table comes to, and what time alone does: joint control as a graph.
+"""The effects of the table and of time on states: joint control as a graph.
 
-It knows nothing of vehicles, only of states. ``tests/kit/joint/agreement.py`` holds it against what
-the server really does, in each scenario.
+It models only states, not vehicles. ``tests/kit/joint/agreement.py`` compares it with the real
+server, in each scenario.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -11,22 +11,22 @@ from mav_tasks.engine.vehicles.control import Effect, Event, Step, effects_of
 from mav_tasks.engine.vehicles.joint_state import NOTHING, Driver, Grip, Queue, State, Waits, Work
 
 E, F = Event, Effect
-#: by its make: what a PX4 is, and what an ArduPilot is
+#: properties of a PX4 and of an ArduPilot
 MAKES: dict[str, dict[str, bool]] = {
     "PX4": {"lingers": True, "has_failsafe": True, "heeds_stick": False},
     "ArduPilot": {"lingers": False, "has_failsafe": False, "heeds_stick": True},
 }
-#: what rows ask for, and the graph leaves open
+#: conditions of rows that the graph leaves open
 FREE = ("may_be_armed", "is_idle", "is_stopping", "is_late", "brakes")
 NO_TASK = (Work.NONE, Work.WAITS)
 
-#: words and events after which nothing moves or arms until a newer word lets it go
+#: requests and events after which nothing moves or arms until a newer request releases it
 HALTS = (
     *(E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.CLEAR, E.CLOSE),
     *(E.TAKEN, E.MODE, E.LAPSED, E.DISARMED, E.STICK, E.DRIVEN_BY_HAND),
     *(E.LATE, E.TOO_FAST, E.NOT_STANDING),
 )
-#: words that let it go; OPERATOR_LOST and the like let nothing go
+#: requests that release it; events such as OPERATOR_LOST release nothing
 GOES = (
     *(E.CONTINUE, E.GO_ON, E.RELEASE, E.RESTORE, E.RUN_NOW),
     *(E.ASK_OUR_MODE, E.ASK_OUR_MODE_STREAMING, E.ARM),
@@ -34,16 +34,16 @@ GOES = (
 
 
 class Deed(NamedTuple):
-    """What leads from one state to another."""
+    """A transition: its name and the states to which it leads."""
 
     name: str
     states: frozenset[State]
 
 
 def happens(event: Event, state: State) -> frozenset[State]:
-    """Return the states to which an event can lead, by the table and by what the event shows."""
+    """Return the states to which an event leads, by the table and by what the event implies."""
     states = {state}
-    if event in (E.MODE, E.MODE_IN_STOP, E.LATE_MODE):  # HOLD, or another one
+    if event in (E.MODE, E.MODE_IN_STOP, E.LATE_MODE):  # HOLD or another mode
         states = {state._replace(is_led=False), state._replace(is_led=True)}
     elif event in (E.LAPSED, E.PARKED):
         states = {state._replace(is_led=False)}
@@ -74,7 +74,7 @@ def _follow(event: Event, steps: Iterable[Step], state: State) -> set[State]:
 
 
 def _emptied(states: set[State]) -> set[State]:
-    """Nothing waits after CLEAR, and nothing begins."""
+    """Return the states after CLEAR: nothing waits, nothing starts."""
     return {
         state._replace(work=Work.NONE) if state.work is Work.WAITS else state
         for state in states
@@ -101,12 +101,12 @@ def _let_go(state: State) -> Iterator[State]:
 def _revoke(state: State) -> Iterator[State]:
     driver = Driver.NOBODY if state.driver is Driver.CLIENT else state.driver
     yield state._replace(waits=state.waits & ~Waits.GRANT, driver=driver)
-    if driver is not state.driver:  # somebody else was, too
+    if driver is not state.driver:  # another party may have driven, too
         yield state._replace(waits=state.waits & ~Waits.GRANT, driver=Driver.OTHERS)
 
 
 def _count(state: State) -> Iterator[State]:
-    """What was released or to run at once, and has not begun, is held, or waits, as before."""
+    """Yield the state without pending releases; an immediate task that has not started may wait."""
     is_urgent = state.is_urgent and state.work not in NO_TASK
     counted = state._replace(waits=state.waits & ~Waits.RELEASE, is_urgent=is_urgent)
     yield counted
@@ -117,7 +117,7 @@ def _count(state: State) -> Iterator[State]:
 def _pause(state: State) -> Iterator[State]:
     queue = Queue.PAUSED if state.queue is Queue.RUNS else state.queue
     for each in _count(state._replace(queue=queue)):
-        stands = each.work in (Work.RUNS, Work.LOST)  # one that is being cancelled ends
+        stands = each.work in (Work.RUNS, Work.LOST)  # a task that is being cancelled ends
         yield each._replace(work=Work.STANDS) if stands else each
 
 
@@ -127,7 +127,7 @@ def _pause_taken(state: State) -> Iterator[State]:
         if each.work in NO_TASK:
             yield each
             continue
-        if each.work is Work.ENDS:  # nobody waits for it to stand
+        if each.work is Work.ENDS:  # nothing waits for its standstill
             yield from _over(each)
         elif each.work is Work.RUNS:
             yield each._replace(work=Work.TAKEN)
@@ -168,14 +168,14 @@ def _note_others(state: State) -> Iterator[State]:
 
 
 def _over(state: State) -> Iterator[State]:
-    """The task that has the vehicle ends; others may wait."""
+    """Yield the states after the end of the active task; others may wait."""
     ended = state._replace(is_urgent=False)
     yield ended._replace(work=Work.NONE)
     yield ended._replace(work=Work.WAITS)
 
 
 def _stepped(state: State) -> Iterator[State]:
-    """A step of the tasks, in which nothing needs to change, and two things may."""
+    """Yield the states after a step of the tasks, in which up to two changes happen."""
     yield state
     for each in passes(state):
         yield each
@@ -183,7 +183,7 @@ def _stepped(state: State) -> Iterator[State]:
 
 
 def passes(state: State) -> Iterator[State]:
-    """Yield what may come of time alone: no word, nobody at the vehicle, nothing that fails us."""
+    """Yield the changes that time alone can cause: no request, no person, no failure."""
     work, grip = state.work, state.grip
     can_take = state.armed or state.may_arm
     if state.queue is Queue.STOPPED:
@@ -194,7 +194,7 @@ def passes(state: State) -> Iterator[State]:
     begins = state.queue is Queue.RUNS or state.is_urgent
     if work is Work.WAITS and begins and can_take and is_free(state):
         yield state._replace(work=Work.RUNS)
-        yield state._replace(work=Work.STANDS)  # its frame is lost, or it was led off its line
+        yield state._replace(work=Work.STANDS)  # its position reference changed, or displaced
     if Waits.RELEASE in state.waits:
         released = state._replace(waits=state.waits & ~Waits.RELEASE)
         yield released
@@ -218,7 +218,7 @@ def passes(state: State) -> Iterator[State]:
     if work is Work.LOST:
         yield state._replace(work=Work.STANDS)
         yield from _over(state)
-        if is_free(state):  # also where the queue is paused, and this one runs all the same
+        if is_free(state):  # even if the queue is paused, this task resumes
             yield state._replace(work=Work.RUNS)
     if state.waits & (Waits.GO_TO | Waits.START):
         yield state._replace(waits=state.waits & ~(Waits.GO_TO | Waits.START))
@@ -229,24 +229,24 @@ def passes(state: State) -> Iterator[State]:
 
 
 def client_moves(state: State) -> bool:
-    """Whether a client's set-points pass: a stream that goes on is nothing new."""
+    """Return whether a client's setpoints pass; a continuing stream is nothing new."""
     is_free = state.grip is Grip.FREE and state.work in NO_TASK
     runs = state.queue is not Queue.STOPPED
     return Waits.GRANT in state.waits and state.armed and is_free and runs
 
 
 def others_do(state: State) -> Iterator[State]:
-    """Yield what people do that no event tells of: a task is submitted, the vehicle armed."""
+    """Yield people's actions that are no events: a task is submitted, the vehicle is armed."""
     if state.work is Work.NONE:
         yield state._replace(work=Work.WAITS)
-    if state.is_led:  # HOLD is set by somebody, who did not drive
+    if state.is_led:  # a person who did not drive sets HOLD
         yield state._replace(is_led=False)
     if not state.armed:
         yield state._replace(armed=True)
         if Waits.START in state.waits:
             started = state._replace(armed=True, waits=state.waits & ~Waits.START)
             yield started._replace(work=Work.WAITS if state.work is Work.NONE else state.work)
-    else:  # by us, or by a client; by others an event tells
+    else:  # by us or by a client; for others there is an event
         yield state._replace(armed=False)
     if not state.armed and state.lingers and not state.waits & Waits.START:
         yield state._replace(waits=state.waits | Waits.START)
@@ -257,18 +257,18 @@ def _goes_on(state: State) -> Iterator[State]:
     if state.work not in (Work.STANDS, Work.TAKEN):
         yield going
         return
-    yield going._replace(work=Work.STANDS)  # one that is held, or its frame is lost
+    yield going._replace(work=Work.STANDS)  # it is held, or its position reference changed
     if is_free(state):
         yield going._replace(work=Work.RUNS)
 
 
 def is_free(state: State) -> bool:
-    """Whether a task can take the vehicle."""
+    """Return whether a task can take the vehicle."""
     return state.driver is Driver.NOBODY and not (state.is_led and state.armed)
 
 
 def _released(state: State) -> Iterator[State]:
-    if state.driver is Driver.NOBODY:  # one that boots may be in any mode
+    if state.driver is Driver.NOBODY:  # a booting vehicle may be in any mode
         yield state._replace(work=Work.RUNS)
     yield state._replace(work=Work.STANDS, waits=state.waits | Waits.RELEASE)
 
@@ -317,7 +317,7 @@ def _skipped(state: State) -> Iterator[State]:
 def _restarted(state: State) -> Iterator[State]:
     active = () if state.work in NO_TASK else (Work.STANDS, Work.RUNS)
     for may_arm in {False, state.may_arm}:
-        for work in {state.work, *active}:  # it begins again if nothing of it was driven
+        for work in {state.work, *active}:  # it starts again if it has not driven yet
             each = state._replace(may_arm=may_arm, work=work, waits=state.waits & ~Waits.RELEASE)
             yield each
             if work not in NO_TASK and each.queue in (Queue.RUNS, Queue.TAKEN):
@@ -329,7 +329,7 @@ def _restarted(state: State) -> Iterator[State]:
 def _granted(state: State) -> Iterator[State]:
     granted = state._replace(waits=state.waits | Waits.GRANT)
     yield granted
-    yield granted._replace(is_led=False)  # it is in that mode already
+    yield granted._replace(is_led=False)  # it is already in that mode
 
 
 RESULTS: dict[Effect, Callable[[State], Iterator[State]]] = {

@@ -1,4 +1,4 @@
-"""Breadth first through the states of a vehicle's control: every deed from each."""
+"""Breadth-first search through the states of a vehicle's control: every deed from each."""
 
 import tempfile
 from collections import deque
@@ -14,14 +14,14 @@ from tests.kit.world import World
 
 @dataclass
 class Found:
-    """What a search has come to."""
+    """The result of a search."""
 
-    #: each state, and the deeds that lead to it
+    #: each state, with the deeds that lead to it
     states: dict[State, tuple[str, ...]] = field(default_factory=dict)
     attempts: int = 0
-    #: deeds from the beginning, and what was wrong at their end
+    #: deeds from the start, with the problem at their end
     wrong: list[tuple[tuple[str, ...], str]] = field(default_factory=list)
-    #: states from which not every deed was tried, because the search ended
+    #: states from which not every deed was tried when the search ended
     left: int = 0
 
     def __str__(self) -> str:
@@ -35,7 +35,7 @@ class Found:
 def search(
     make: Callable[[], World], *, most: int, start: Sequence[str] = (), way_out: bool = True
 ) -> Found:
-    """Try every deed from every state that can be reached, from ``most`` of them.
+    """Try every deed from up to ``most`` reachable states.
 
     ``start`` are the names of deeds that lead to the first state.
     """

@@ -23,7 +23,7 @@ class Qgc:
         self.screen = Screen()
         self.wire = Wire(profile)
         self.vehicles: dict[int, Session] = {}
-        #: every message sent, by name
+        #: (time, name, message) of every sent message
         self.sent: list[tuple[float, str, Message]] = []
         self._timers = Timers(now=now)
         self._outgoing: list[bytes] = []
@@ -41,7 +41,7 @@ class Qgc:
             self._take(heard)
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` is due."""
         return self._timers.next_deadline()
 
     def handle_deadline(self, *, now: float) -> None:
@@ -50,21 +50,21 @@ class Qgc:
 
     @property
     def has_packets(self) -> bool:
-        """Whether there is something to send."""
+        """Whether there are packets to send."""
         return bool(self._outgoing)
 
     def take_packets(self) -> list[bytes]:
-        """Hand over what is to be sent, in order."""
+        """Return the packets to send, in order."""
         taken, self._outgoing = self._outgoing, []
         return taken
 
     @property
     def lost(self) -> Counter[Source]:
-        """By source, how many packets seem to have been lost [1.1]."""
+        """Number of packets that seem lost, by source [1.1]."""
         return Counter({source: count for source, count in self.wire.lost.items() if count})
 
     def count_sent(self, name: str) -> int:
-        """How many messages of a name were sent."""
+        """Return the number of sent messages with a name."""
         return sum(1 for _, each, _ in self.sent if each == name)
 
     def _take(self, heard: Heard) -> None:
@@ -79,7 +79,7 @@ class Qgc:
         core = Core(self.profile, self._timers, self.screen, self._send, system)
         session = self.vehicles[system] = Session(core, message, self.wire.fall_back)
         if self._is_beating:
-            self._send(_heartbeat())  # at once on a new vehicle [1.1]
+            self._send(_heartbeat())  # at once for a new vehicle [1.1]
         else:
             self._beat()
         session.begin()

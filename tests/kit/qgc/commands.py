@@ -1,4 +1,4 @@
-"""Commands to one vehicle: one of a number at a time to a component, its ack, its popup."""
+"""Commands to one vehicle: queueing, retries, acks and popups."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from tests.kit.qgc.wire import Message
 
 CHECK_EACH = 0.5  # s [2.2]
 REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, DO_MOTOR_TEST = 512, 511, 209
-#: [2.2]; all others are sent once: REQUEST_AUTOPILOT_CAPABILITIES, PREFLIGHT_STORAGE,
+#: [2.2]; all others are sent once. REQUEST_AUTOPILOT_CAPABILITIES, PREFLIGHT_STORAGE and
 #: RUN_PREARM_CHECKS are not used here
 REPEATED = frozenset({REQUEST_MESSAGE, 520, 245, 401})
 TRIES = 3
@@ -25,13 +25,13 @@ WORDS = {
     FAILED: "command failed",
 }
 
-#: called with the result, None if there was none
+#: called with the result, or None without an answer
 Handler = Callable[[int | None], None]
 
 
 @dataclass(slots=True)
 class Command:
-    """One command under way, or over."""
+    """One command, under way or over."""
 
     message: Message
     component: int
@@ -44,11 +44,11 @@ class Command:
     result: int | None = None
     ack: Message = None
     acked_at: float | None = None
-    is_refused_here: bool = False  # never sent: another one of its number waits
+    is_refused_here: bool = False  # never sent: another one with its number is pending
 
     @property
     def task_id(self) -> int:
-        """What the station itself does not look at: the id in ``result_param2``."""
+        """``result_param2``, which the station itself ignores."""
         assert self.ack is not None, f"no ack: {self.message}"
         return int(self.ack.result_param2)
 
@@ -67,7 +67,7 @@ class CommandQueue:
         self._pending: list[Command] = []
         self._is_checking = False
         self.sent: list[Command] = []
-        #: acks that belong to nothing that waits; an empty list is what a server owes
+        #: acks without a pending command; a correct server causes none
         self.strays: list[Message] = []
         self._silent_modes_until = 0.0
 
@@ -79,7 +79,7 @@ class CommandQueue:
         shows_errors: bool = True,
         handler: Handler | None = None,
     ) -> Command:
-        """Send a COMMAND_LONG; params that are not named are 0."""
+        """Send a COMMAND_LONG; missing params are 0."""
         filled = (*params, *(0.0,) * (7 - len(params)))
         message = mavlink.MAVLink_command_long_message(
             self._core.system, component, number, 0, *filled
@@ -106,11 +106,11 @@ class CommandQueue:
         return self._send(message, component, number, shows_errors, handler)
 
     def expect_mode_ack(self) -> None:
-        """SET_MODE was sent: it has no ack, but an autopilot's is passed over in silence [11.9]."""
+        """Note that SET_MODE was sent: for 2 s, an autopilot's ack of it is ignored [11.9]."""
         self._silent_modes_until = self._core.timers.now + 2.0
 
     def receive(self, ack: Message, component: int) -> None:
-        """Take a COMMAND_ACK: matched by component and number, by nothing else [2.2], [11.6]."""
+        """Take a COMMAND_ACK: matched by component and number only [2.2], [11.6]."""
         found = next(
             (c for c in self._pending if (c.component, c.number) == (component, ack.command)), None
         )
@@ -150,7 +150,7 @@ class CommandQueue:
         return command
 
     def _check_later(self) -> None:
-        """Look at times that are multiples of the half second, as one timer for all does."""
+        """Schedule a check at the next multiple of half a second, as one common timer does."""
         if self._is_checking or not self._pending:
             return
         self._is_checking = True

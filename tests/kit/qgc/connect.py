@@ -1,4 +1,4 @@
-"""What the station asks of a new vehicle, in this order, before it is content [1.3], [11.1]."""
+"""The requests to a new vehicle, in this order, until it is connected [1.3], [11.1]."""
 
 from collections.abc import Callable, Iterator
 from itertools import cycle
@@ -24,7 +24,7 @@ Next = Callable[[], None]
 
 
 class Connecting:
-    """The initial connection to one vehicle, and what goes on beside it."""
+    """The initial connection to one vehicle, and the requests that run beside it."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class Connecting:
         self._states = iter(self._order())
 
     def begin(self) -> None:
-        """Begin with the first state."""
+        """Start with the first state."""
         if self._firmware == APM and self._core.profile.streams_at_once:
             self._ask_streams()
             self._ask_intervals()
@@ -62,7 +62,7 @@ class Connecting:
             self._core.timers.live(self._ask_streams_slowly())
 
     def heard(self, name: str) -> None:
-        """Note that a message of the vehicle came."""
+        """Note that the vehicle sent a message."""
         if name in self._seen:
             self._seen[name] = self._core.timers.now
 
@@ -84,7 +84,7 @@ class Connecting:
         self.seconds = self.completed_at - self._began
 
     def _ask(self, name: str, number: int, then: Callable[[Message], None]) -> None:
-        """Ask once, and on silence once more in those versions that do."""
+        """Request once, and again without an answer in versions that do so."""
         is_again = not self._core.profile.tries_states_again
 
         def done(message: Message, is_answered: bool) -> None:
@@ -116,7 +116,7 @@ class Connecting:
 
     def _protocol(self, then: Next) -> None:
         def done(message: Message) -> None:
-            if message is None:  # [11.1]: no popup, but fence and rally points are never seen
+            if message is None:  # [11.1]: no popup, but no fence and rally points from then on
                 self._fall_back()
                 self._plans.capabilities &= ~(FENCE | RALLY)
                 self._core.violation("the whole link fell back to MAVLink 1")
@@ -125,7 +125,7 @@ class Connecting:
         self._ask("PROTOCOL_VERSION", 300, done)
 
     def _modes(self, then: Next) -> None:
-        """One by one, as many as the first one says there are [1.3]."""
+        """Request the modes one by one, up to the number in the first answer [1.3]."""
 
         def ask(index: int) -> None:
             self._requests.ask("AVAILABLE_MODES", 435, done, index=index)

@@ -1,4 +1,4 @@
-"""What every part of the station has in common: its time, its screen, its way out."""
+"""The shared objects of the station's parts: time, screen, output."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ AUTOPILOT = 1  # component
 
 @dataclass(frozen=True, slots=True)
 class Core:
-    """Handed to each part. ``system`` is the vehicle that the part is about."""
+    """Passed to each part; ``system`` is the part's vehicle."""
 
     profile: Profile
     timers: Timers
@@ -26,5 +26,5 @@ class Core:
         self.screen.popups.append(Shown(self.timers.now, text))
 
     def violation(self, text: str) -> None:
-        """Note what the person does not see, and what must not be all the same."""
+        """Record a problem that the person does not see."""
         self.screen.violations.append(Shown(self.timers.now, text))

@@ -1,4 +1,4 @@
-"""What the person presses, and what is sent then; a button that is not shown cannot be pressed."""
+"""The person's buttons, and what each sends; a hidden button cannot be pressed."""
 
 from collections.abc import Generator, Iterator
 from math import nan
@@ -46,12 +46,12 @@ class Operator:
         self._commands = commands
         self._plans = plans
         self._parameters = parameters
-        self._repositions: bool | None = None  # not known until the first ack
+        self._repositions: bool | None = None  # unknown until the first ack
         self._sticks: Timer | None = None
 
     @property
     def offers(self) -> set[str]:
-        """The buttons that are there now [2.6], [1.5], [11.4]."""
+        """The buttons that are shown now [2.6], [1.5], [11.4]."""
         vehicle, firmware = self._vehicle, self._vehicle.firmware
         shown = {"disarm" if vehicle.armed else "arm", "force arm", "actions", "set home"}
         if firmware != GENERIC:
@@ -82,27 +82,27 @@ class Operator:
         return self._commands.send_long(ARM, 0)
 
     def emergency_stop(self) -> Command:
-        """Disarm whatever it does."""
+        """Disarm, in any state."""
         self._need("emergency stop")
         return self._commands.send_long(ARM, 0, FORCE_DISARM)
 
     def action(self, number: int, *params: float, component: int = AUTOPILOT) -> Command:
-        """Press a MAVLink action: any command with seven numbers [5.2], [11.7]."""
+        """Press a MAVLink action: any command with seven params [5.2], [11.7]."""
         return self._commands.send_long(number, *params, component=component)
 
     def set_home(self, latitude: float, longitude: float, altitude: float) -> Command:
-        """Set home here; degrees, metres."""
+        """Set home to a place; degrees, metres."""
         self._need("set home")
         return self._commands.send_long(SET_HOME, 0, 0, 0, nan, latitude, longitude, altitude)
 
     def change_speed(self, speed: float, *, is_offered: bool = True) -> Command:
-        """Change the speed, m/s. ``is_offered`` False: also where the button is not shown."""
+        """Change the speed, m/s. ``is_offered`` False: even if the button is hidden."""
         if is_offered:
             self._need("change speed")
         return self._commands.send_long(CHANGE_SPEED, 1, speed, -1, 0)
 
     def set_item(self, seq: int) -> None:
-        """Go on with another item of the plan [2.5]; 4.x by message [11.4]."""
+        """Continue with another item of the plan [2.5]; 4.x by message [11.4]."""
         message = mavlink.MAVLink_mission_set_current_message(self._core.system, AUTOPILOT, seq)
         if not self._core.profile.sets_item_by_command:
             self._core.send(message)
@@ -115,7 +115,7 @@ class Operator:
         self._commands.send_long(SET_ITEM, seq, handler=answered)
 
     def sticks(self, x: int, y: int, z: int, r: int) -> None:
-        """Hold a joystick so, from now on."""
+        """Hold a joystick in this position, from now on."""
         self.let_go()
         self._core.send(mavlink.MAVLink_manual_control_message(self._core.system, x, y, z, r, 0))
         self._sticks = self._core.timers.after(STICKS_EACH, lambda: self.sticks(x, y, z, r))
@@ -125,7 +125,7 @@ class Operator:
         if self._sticks is not None:
             self._sticks.cancel()
 
-    # what is done differently for each make
+    # differs between makes
 
     def set_mode(self, mode: int) -> None:
         """Choose a mode in the menu."""
@@ -181,7 +181,7 @@ class Operator:
         else:
             self._core.timers.live(self._start())
 
-    # how
+    # internals
 
     @property
     def _modes(self) -> Modes:
@@ -201,7 +201,7 @@ class Operator:
         self._core.send(mavlink.MAVLink_set_mode_message(self._core.system, base, mode))
 
     def _change_mode(self, mode: int) -> Waiting:
-        """Ask up to three times and look for the heartbeat, 13 times a tenth of a second each."""
+        """Request up to three times, each followed by 13 checks of the heartbeat, every 0.1 s."""
         if self._vehicle.mode == mode:
             return True
         for _ in range(MODE_TRIES):
@@ -238,7 +238,7 @@ class Operator:
             self._core.popup(NOT_ARMED)
 
     def _go_to_apm(self, latitude: float, longitude: float) -> Iterator[float]:
-        """Up to three messages, as long as it is not known what the vehicle takes [2.5], [11.3]."""
+        """Send up to three messages, until the vehicle's support is known [2.5], [11.3]."""
         assert self._vehicle.place is not None
         knows = self._repositions if self._core.profile.repositions else False
         if knows is not False:

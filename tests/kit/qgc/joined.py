@@ -1,4 +1,4 @@
-"""A station in a whole world: server, rover and station, as an operator finds them."""
+"""A station in a complete world of server, rover and station."""
 
 from math import inf
 
@@ -18,14 +18,14 @@ each_make = pytest.mark.parametrize(
 #: makes that the station can guide [1.5]
 each_guided = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
 each_version = pytest.mark.parametrize("profile", [V4, MASTER], ids=lambda p: p.name)
-#: for what is the same in both versions
+#: for behaviour that both versions share
 each_pair = pytest.mark.parametrize(
     ("persona", "profile"), [(PROMPT, V4), (PROMPT_PX4, MASTER)], ids=lambda p: p.name
 )
 
 
 def join(world: World, profile: Profile, name: str = "qgc") -> QgcParty:
-    """Let a station dial in, connect, and see where the rover is."""
+    """Let a station dial in, connect, and receive the rover's place and home."""
     party = QgcParty(world.net, name, profile)
     world.join(party)
     world.until(lambda: party.is_connected, within=CONNECTED_WITHIN)
@@ -46,7 +46,7 @@ def degrees(north: float, east: float) -> tuple[float, float]:
 
 
 def slowest_ack(party: QgcParty) -> float:
-    """Return how long the slowest ack took, s; inf if one never came."""
+    """Return the time of the slowest ack, s; inf if one never came."""
     return max(
         (inf if sent.acked_at is None else sent.took for sent in party.vehicle.commands.sent),
         default=0.0,

@@ -11,7 +11,7 @@ from tests.kit.qgc.stub import APM_AUTOPILOT, APM_SET, Stub
 
 
 class Pair(VirtualWorld):
-    """A station and a stub."""
+    """A world with a station and a stub."""
 
     def __init__(self, profile: Profile = V4, **how: Any) -> None:
         super().__init__(MemoryNet())

@@ -1,4 +1,4 @@
-"""The parameters of every component of one vehicle: how they are read, and what is missed."""
+"""The parameters of every component of one vehicle: reading, and popups if some are missing."""
 
 import struct
 from collections.abc import Callable
@@ -33,7 +33,7 @@ MISSING = (
     " fully supported or your firmware has a bug in it. Missing params: {}"
 )
 
-#: what must be there at connect [11.2], [11.3]
+#: required at connect [11.2], [11.3]
 NEEDED = {
     PX4: ("SYS_AUTOSTART", "COM_RC_IN_MODE", "CAL_GYRO0_ID", "CAL_ACC0_ID"),
     APM: (
@@ -48,7 +48,7 @@ NEEDED = {
 
 @dataclass(slots=True)
 class Component:
-    """What is known of one component's parameters."""
+    """The known parameters of one component."""
 
     count: int
     values: dict[str, float] = field(default_factory=dict)
@@ -76,7 +76,7 @@ class Parameters:
         self._sets: dict[tuple[int, str], Timer] = {}
 
     def load(self) -> None:
-        """Begin: by file from ArduPilot, by the digest from PX4, else by the list [1.4]."""
+        """Start: by file from ArduPilot, by the hash from PX4, else by the list [1.4]."""
         if self._firmware == APM:
             self._asks_file = True
             self._ask_file(1)
@@ -92,12 +92,12 @@ class Parameters:
             self._ask_list()
 
     def value(self, name: str, component: int = AUTOPILOT) -> float | None:
-        """Return a parameter, None if there is none of that name."""
+        """Return a parameter's value, or None if it is unknown."""
         known = self.components.get(component)
         return None if known is None else known.values.get(name)
 
     def set(self, name: str, value: float, type_: int, *, component: int = AUTOPILOT) -> None:
-        """Edit one; the echo is what ends it [11.5]."""
+        """Edit a parameter; the echo confirms it [11.5]."""
         wire = value if self._firmware == APM or type_ == 9 else _as_float(value, type_)
         self._core.send(
             mavlink.MAVLink_param_set_message(
@@ -115,7 +115,7 @@ class Parameters:
             return  # [1.4]
         if name == HASH:
             if self._asks_hash:
-                self._ask_list()  # nothing is kept from another day: it never matches
+                self._ask_list()  # there is no cache, so it never matches
             return
         if message.param_index == UNNUMBERED and not self._has_asked:
             return  # [1.4]
@@ -137,7 +137,7 @@ class Parameters:
                 self._wait(MISSING_WAIT, self._ask_missing)
 
     def receive_file(self, message: Message) -> None:
-        """Take an answer about the packed file: whatever it says, the list is asked for [11.3]."""
+        """Take an answer about the packed file; after a NAK, request the list [11.3]."""
         if not self._asks_file or message.payload[5] != OPEN_FILE:
             return
         if message.payload[3] == NAK:
@@ -199,7 +199,7 @@ class Parameters:
         self._ready()
 
     def _check_setup(self) -> None:
-        """Two popups, the second one a second later [11.2]; none for generic [11.4]."""
+        """Show two popups, the second one a second later [11.2]; none for generic [11.4]."""
         needed = NEEDED.get(self._firmware, ())
         missing = [name for name in needed if self.value(name) is None]
         either = self.value("CAL_MAG0_ID"), self.value("SYS_HAS_MAG")
@@ -229,7 +229,7 @@ class Parameters:
         return True
 
     def _value(self, message: Message) -> float:
-        """ArduPilot casts, the others put the bytes of an integer into the float [1.4]."""
+        """Return the value: ArduPilot casts, others put an integer's bytes into the float [1.4]."""
         if self._firmware == APM or message.param_type == 9:
             return float(message.param_value)
         layout = {5: "<I", 6: "<i"}.get(message.param_type)

@@ -10,7 +10,7 @@ from tests.kit.qgc.session import Session
 
 
 class QgcParty:
-    """One station with an endpoint of its own."""
+    """One station with its own endpoint."""
 
     def __init__(
         self,
@@ -33,14 +33,14 @@ class QgcParty:
 
     @property
     def vehicle(self) -> Session:
-        """The only vehicle; what is done to it now is done at the time that it is now."""
+        """The only vehicle, brought up to the present time."""
         self.qgc.handle_deadline(now=self._net.now)
         (session,) = self.qgc.vehicles.values()
         return session
 
     @property
     def operator(self) -> Operator:
-        """The buttons for the only vehicle; what they send leaves with the next step of time."""
+        """The buttons for the only vehicle; their messages leave with the next step of time."""
         return self.vehicle.operator
 
     @property
@@ -59,18 +59,18 @@ class QgcParty:
         return bool(self.qgc.vehicles) and self.vehicle.connecting.is_complete
 
     def check(self) -> None:
-        """Raise if anything was shown that must not be, or a loss that was none."""
+        """Raise AssertionError for complaints, false losses and bad bytes."""
         complaints = self.qgc.screen.complaints
         assert not complaints, f"{self.name}: {complaints}"
         assert not self.qgc.lost, f"{self.name}: seems to have lost {self.qgc.lost}"
         assert self.qgc.wire.bad == 0, f"{self.name}: {self.qgc.wire.bad} times no packet"
 
     def next_deadline(self) -> float | None:
-        """Return when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` is due, unless something arrives before."""
         return self._net.now if self.qgc.has_packets else self.qgc.next_deadline()
 
     def turn(self, *, now: float) -> None:
-        """Read what has arrived, do what is due, send what follows."""
+        """Read what arrived, do what is due, send the results."""
         for _, data in self._link.receive(len(self._link.arrived)):
             self.qgc.receive(data, now=now)
         self.qgc.handle_deadline(now=now)

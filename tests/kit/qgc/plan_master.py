@@ -1,4 +1,4 @@
-"""The plan view: mission, fence and rally points together, one after the other."""
+"""The plan view: mission, fence and rally points, transferred one after another."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -28,7 +28,7 @@ class Plan(NamedTuple):
     def mission(self, firmware: str) -> list[Item]:
         """Return the items; only ArduPilot's begin with home [3.4], [11.3], [11.8]."""
         items = [Item(WAYPOINT, x, y) for x, y in self.waypoints]
-        if self.speed is not None:  # [3.6]: airspeed, also of a rover
+        if self.speed is not None:  # [3.6]: airspeed, even for a rover
             items.insert(0, Item(178, 0, 0, 0.0, NO_FRAME, 0.0, self.speed, -1.0, 0.0))
         if firmware == APM:
             items.insert(0, Item(WAYPOINT, *self.home, 0.0, GLOBAL, param4=0.0))
@@ -46,7 +46,7 @@ class Plan(NamedTuple):
 
 
 class PlanMaster:
-    """Upload, download and removal of all three types that the vehicle has."""
+    """Upload, download and removal of all plan types that the vehicle supports."""
 
     def __init__(self, core: Core, vehicle: VehicleState) -> None:
         self._core = core
@@ -55,13 +55,13 @@ class PlanMaster:
         self.managers = {
             kind: PlanManager(core, kind, vehicle.firmware) for kind in (MISSION, FENCE, RALLY)
         }
-        #: of the last upload, download or removal: by type, whether it went well
+        #: success of the last upload, download or removal, by type
         self.outcome: dict[int, bool] = {}
         self.is_done = True
 
     @property
     def kinds(self) -> list[int]:
-        """The plan types that the vehicle says it has [1.3]."""
+        """The plan types that the vehicle's capabilities include [1.3]."""
         bits = {FENCE: HAS_FENCE, RALLY: HAS_RALLY}
         return [kind for kind in self.managers if self.capabilities & bits.get(kind, ~0)] or [0]
 
@@ -71,7 +71,7 @@ class PlanMaster:
         return bool(self.managers[MISSION].known)
 
     def upload(self, plan: Plan) -> None:
-        """Send all three, also the empty ones, also when one was refused [3.1], [11.8]."""
+        """Send all three, even empty ones, and even after a refusal [3.1], [11.8]."""
         if self._vehicle.armed and self._vehicle.is_in_mission_mode:  # [3.5]
             self._core.popup(RUNS)
             return
@@ -84,11 +84,11 @@ class PlanMaster:
         self._each(lambda kind, done: self.managers[kind].write(items[kind], done))
 
     def download(self, then: Callable[[], None] = lambda: None) -> None:
-        """Read all three, one after the other."""
+        """Read all three, one after another."""
         self._each(lambda kind, done: self.managers[kind].read(done), then)
 
     def remove(self) -> None:
-        """Three messages, not one for all [11.8]."""
+        """Send three messages, not one for all types [11.8]."""
         self._each(lambda kind, done: self.managers[kind].clear(done))
 
     def receive(self, name: str, message: Message) -> None:

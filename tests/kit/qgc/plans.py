@@ -1,4 +1,4 @@
-"""One of a vehicle's three plans: mission, fence or rally points, to it and from it."""
+"""One of a vehicle's three plans (mission, fence or rally points): upload and download."""
 
 from collections.abc import Callable, Sequence
 from math import nan
@@ -46,7 +46,7 @@ class Item(NamedTuple):
 
     @property
     def key(self) -> tuple[int, int, int, int]:
-        """What must come back as it went: command, frame and place."""
+        """The fields that a download must return unchanged: command, frame and place."""
         return self.command, self.frame, self.x, self.y
 
 
@@ -66,7 +66,7 @@ class PlanManager:
         self._count = 0
         self._read: dict[int, Item] = {}
         self._done: Callable[[bool], None] = lambda _: None
-        #: the plan as it was last read or written, None if it never was
+        #: the plan as last read or written; None if never
         self.known: tuple[Item, ...] | None = None
 
     @property
@@ -75,18 +75,18 @@ class PlanManager:
         return self._state != "idle"
 
     def read(self, done: Callable[[bool], None]) -> None:
-        """Ask for the plan [3.2]."""
+        """Download the plan [3.2]."""
         self._begin("list", done)
         self._send_list()
 
     def write(self, items: Sequence[Item], done: Callable[[bool], None]) -> None:
-        """Send the plan, also an empty one [3.1]."""
+        """Upload the plan, even an empty one [3.1]."""
         self._begin("count", done)
         self._items, self._asked, self._last_asked = items, set(), None
         self._send_count()
 
     def clear(self, done: Callable[[bool], None]) -> None:
-        """Take the plan away [11.8]."""
+        """Clear the plan [11.8]."""
         self._begin("clear", done)
         self._send_clear()
 
@@ -102,7 +102,7 @@ class PlanManager:
         self._wait(ANSWER_WAIT, lambda: self._fail(words))
 
     def receive(self, name: str, message: Message) -> None:
-        """Take a message of the mission protocol; only its type is looked at [3.2]."""
+        """Take a message of the mission protocol; only its type is checked [3.2]."""
         if getattr(message, "mission_type", MISSION) != self._kind:
             return
         if self._state == "idle":
@@ -201,7 +201,7 @@ class PlanManager:
         self._core.send(message(self._core.system, AUTOPILOT, self._kind))
         self._wait(ANSWER_WAIT, self._send_clear)
 
-    # all of them
+    # common
 
     def _take_ack(self, result: int) -> None:
         if result == INVALID_SEQUENCE and self._firmware == APM:

@@ -1,4 +1,4 @@
-"""What the person at the screen sees, and what must never be: all of it kept with its time."""
+"""What the person at the screen sees, plus violations, each with its time."""
 
 from collections import defaultdict
 from typing import Any, NamedTuple
@@ -8,7 +8,7 @@ TAB = "\t"
 
 
 class Shown(NamedTuple):
-    """One thing shown."""
+    """One shown text with its time."""
 
     at: float
     text: str
@@ -19,13 +19,13 @@ class Screen:
 
     def __init__(self) -> None:
         self.popups: list[Shown] = []
-        #: texts of the vehicle that are not worse than a warning, and their severity
+        #: texts of the vehicle up to a warning, with their severity
         self.texts: list[tuple[Shown, int]] = []
-        #: asked of the person, as is right: "Flight Plan complete"
+        #: legitimate questions to the person: "Flight Plan complete"
         self.dialogs: list[Shown] = []
-        #: in the bar, and spoken: the link is lost or back
+        #: in the bar, and spoken: link lost or regained
         self.notices: list[Shown] = []
-        #: nothing shows these: what no ground station should get, or have to do
+        #: not shown: what no ground station should receive, or have to do
         self.violations: list[Shown] = []
 
     def __repr__(self) -> str:
@@ -33,12 +33,12 @@ class Screen:
 
     @property
     def complaints(self) -> list[str]:
-        """What was shown or noticed that must not be, in words."""
+        """Popups and violations, in words."""
         return [f"{each.at:.2f} {each.text}" for each in self.popups + self.violations]
 
 
 class Texts:
-    """STATUSTEXT to what is shown: pieces joined, doubles of events dropped."""
+    """Turns STATUSTEXTs into shown texts: joins chunks, drops duplicates of events."""
 
     def __init__(self, screen: Screen, *, drops_tabs: bool) -> None:
         self._screen = screen
@@ -47,7 +47,7 @@ class Texts:
         self._open: dict[int, tuple[int, int]] = {}  # by component: id, severity
 
     def receive(self, message: Any, component: int, *, now: float) -> None:
-        """Take one piece; the piece that is not full ends a text [4]."""
+        """Take one chunk; a chunk that is not full ends a text [4]."""
         text: str = message.text
         if self._open.get(component, (message.id, 0))[0] != message.id:
             self._finish(component, now)
@@ -60,7 +60,7 @@ class Texts:
             self._finish(component, now)
 
     def give_up(self, component: int, message_id: int, *, now: float) -> None:
-        """Show what has come of a text whose end did not come."""
+        """Show a text whose last chunk did not arrive."""
         if self._open.get(component, (0, 0))[0] == message_id:
             self._finish(component, now)
 
@@ -74,7 +74,7 @@ class Texts:
 
     def _show(self, text: str, severity: int, now: float) -> None:
         if self._drops_tabs and text.endswith(TAB):
-            return  # [4], [11.5]: PX4 tells it as an event, too
+            return  # [4], [11.5]: PX4 also sends it as an event
         if severity <= CRITICAL:
             self._screen.popups.append(Shown(now, text))
         else:

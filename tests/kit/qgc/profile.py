@@ -1,4 +1,4 @@
-"""What differs between the versions of QGroundControl that people run."""
+"""The differences between QGroundControl versions in use."""
 
 from dataclasses import dataclass, replace
 
@@ -10,19 +10,19 @@ class Profile:
     """One version; times in seconds."""
 
     name: str
-    ack_timeout: float  # [2.2]; looked at each half second
-    restarts_timer: bool  # a repeated command has the whole time again; [11.1]: 4.x does not
-    in_progress: str  # [2.4]: "restarts" the time, is "kept" without, or is "final"
-    asks_protocol_version: bool  # [1.3]: of PX4 and generic; without an answer all is MAVLink 1
+    ack_timeout: float  # [2.2]; checked each half second
+    restarts_timer: bool  # a repeated command gets the whole time again; [11.1]: 4.x does not
+    in_progress: str  # [2.4]: "restarts" the time, is "kept" pending, or is "final"
+    asks_protocol_version: bool  # [1.3]: of PX4 and generic; no answer: MAVLink 1
     asks_modes: bool  # [1.3] AVAILABLE_MODES
     asks_gimbals: bool  # [1.3] of each component; [11.1]: 4.x does not
     checks_hash: bool  # [1.4] PX4's _HASH_CHECK before the list; [11.1]: 4.x does not
-    hears_mavlink1: bool  # [1.1]: master hears nothing but heartbeats in it
-    tries_states_again: bool  # [1.3]: a silent state of the connection is tried a second time
-    parameters_given_up: float | None  # [1.4]: s until it goes on without; None: never
-    streams_at_once: bool  # [1.2] the data streams of ArduPilot; [11.3]: 4.x one each half second
-    intervals: tuple[int, ...]  # [1.2], [11.3]: asked of ArduPilot once a second
-    repositions: bool  # [2.5]: sends ArduPilot DO_REPOSITION for "go to"; 4.2 an item only
+    hears_mavlink1: bool  # [1.1]: master ignores MAVLink 1 except heartbeats
+    tries_states_again: bool  # [1.3]: a connection state without an answer is tried a second time
+    parameters_given_up: float | None  # [1.4]: s until it continues without them; None: never
+    streams_at_once: bool  # [1.2] ArduPilot's data streams; [11.3]: 4.x one each half second
+    intervals: tuple[int, ...]  # [1.2], [11.3]: requested from ArduPilot at 1 Hz
+    repositions: bool  # [2.5]: DO_REPOSITION to ArduPilot for "go to"; 4.2 sends an item only
     sets_item_by_command: bool  # [2.5], [11.4]
 
 

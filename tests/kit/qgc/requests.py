@@ -1,4 +1,4 @@
-"""REQUEST_MESSAGE with what comes of it: one at a time to each component [1.3]."""
+"""REQUEST_MESSAGE with its results: one at a time per component [1.3]."""
 
 from collections import defaultdict, deque
 from collections.abc import Callable
@@ -23,7 +23,7 @@ class _Request(NamedTuple):
 
 
 class MessageRequests:
-    """Asks one vehicle for messages."""
+    """Requests messages from one vehicle."""
 
     def __init__(self, core: Core, commands: CommandQueue) -> None:
         self._core = core
@@ -37,12 +37,12 @@ class MessageRequests:
     def ask(
         self, name: str, number: int, done: Done, *, component: int = AUTOPILOT, index: float = 0
     ) -> None:
-        """Ask for a message when those asked for before are through."""
+        """Request a message after the pending requests."""
         self._waiting[component].append(_Request(name, number, index, done))
         self._next(component)
 
     def receive(self, name: str, message: Message, component: int) -> None:
-        """Take a message; before the ack is as good as after it [1.3]."""
+        """Take a message; it may come before or after the ack [1.3]."""
         request = self._current.get(component)
         if request is None or request.name != name:
             return

@@ -14,13 +14,13 @@ from tests.kit.qgc.vehicle import PX4, VehicleState
 from tests.kit.qgc.wire import Heard, Message
 
 SILENT_AFTER = 3.5  # s [1.1]
-TEXT_WAIT = 1.0  # s for the rest of a text; assumed
+TEXT_WAIT = 1.0  # s for the remaining chunks of a text; assumed
 GIMBAL_MANAGER, GIMBAL_TRIES = 280, 6  # [1.3]
 LOST, BACK = "Communication lost", "Communication regained"
 
 
 class Session:
-    """All that the station knows of one vehicle and does with it."""
+    """The station's state of one vehicle, and its parts for it."""
 
     def __init__(self, core: Core, heartbeat: Message, fall_back: Callable[[], None]) -> None:
         self._core = core
@@ -39,7 +39,7 @@ class Session:
         self.is_lost = False
 
     def begin(self) -> None:
-        """Begin to ask."""
+        """Start the requests."""
         self.connecting.begin()
         self._heard()
 
@@ -87,7 +87,7 @@ class Session:
     def _heard(self) -> None:
         now = self._core.timers.now
         self.state.heard_at = now
-        if self.is_lost:  # [11.10]: nothing is asked for again
+        if self.is_lost:  # [11.10]: it requests nothing again
             self.is_lost = False
             self._core.screen.notices.append(Shown(now, BACK))
         if self._silence is None:
@@ -104,7 +104,7 @@ class Session:
         self._core.screen.notices.append(Shown(now, LOST))
 
     def _ask_for_gimbals(self, component: int) -> None:
-        """With each heartbeat of each component, some times [1.3]; how often is assumed."""
+        """Request it with each component's heartbeats, a few times [1.3]; the number is assumed."""
         if not self._core.profile.asks_gimbals:
             return
         asked = self._gimbals_asked.get(component, 0)

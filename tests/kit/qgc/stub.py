@@ -1,4 +1,4 @@
-"""A vehicle that answers a station as told, also wrongly: for testing the station itself."""
+"""A vehicle with configurable, even wrong, answers, to test the station itself."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ VERSION, REQUEST = 148, 512
 ACCEPTED, UNSUPPORTED = 0, 3
 INT32 = 6
 
-#: the five with which nothing is complained of at connect [11.2]
+#: the five that prevent complaints at connect [11.2]
 PX4_SET = {
     "SYS_AUTOSTART": 50000,
     "COM_RC_IN_MODE": 1,
@@ -41,7 +41,7 @@ APM_SET = {
 
 @dataclass
 class Stub:
-    """System 1 at the name that stations dial. Times in seconds, results as numbers."""
+    """System 1 at the endpoint that stations dial. Times in seconds, results as numbers."""
 
     net: MemoryNet
     name: str
@@ -52,19 +52,19 @@ class Stub:
     mode: int = 0x03040000
     armed: bool = False
     landed_state: int = 1
-    #: names of messages that are not answered
+    #: names of messages to ignore
     silent: set[str] = field(default_factory=set)
-    #: ids of REQUEST_MESSAGE that are not answered
+    #: ids of REQUEST_MESSAGE to ignore
     silent_requests: set[int] = field(default_factory=set)
-    #: what a command is answered with: (delay, result, component) each; others are accepted
+    #: answers to a command: (delay, result, component) each; other commands are accepted
     answers: dict[int, list[tuple[float, int, int]]] = field(default_factory=dict)
-    #: modes are taken, and shown at once
+    #: modes are accepted, and shown at once
     takes_modes: bool = True
-    #: item of an upload -> result sent instead of what comes next; -1 is the count, None silence
+    #: item of an upload: result sent instead of the next message; -1 is the count, None silence
     upload_results: dict[int, int | None] = field(default_factory=dict)
-    #: of its packets, each n-th number is left out
+    #: skips every n-th sequence number
     leaves_out_each: int | None = None
-    #: components 1 and 191 count together
+    #: components 1 and 191 share a sequence counter
     counts_together: bool = False
 
     def __post_init__(self) -> None:
@@ -81,11 +81,11 @@ class Stub:
     # Party
 
     def next_deadline(self) -> float | None:
-        """Return when ``turn`` has something to do, unless something arrives before."""
+        """Return when ``turn`` is due, unless something arrives before."""
         return self._timers.next_deadline()
 
     def turn(self, *, now: float) -> None:
-        """Read what has arrived, answer, send what is due."""
+        """Read what arrived, answer, send what is due."""
         self._timers.handle_deadline(now=now)
         for peer, data in self._link.receive(len(self._link.arrived)):
             self._peers[str(peer)] = None
@@ -94,7 +94,7 @@ class Stub:
                 if message.get_type() not in self.silent and self.talks:
                     self._take(message)
 
-    # what it says by itself
+    # periodic messages
 
     def heartbeat(self) -> None:
         """Send the heartbeat now."""
@@ -102,7 +102,7 @@ class Stub:
         self.send(mavlink.MAVLink_heartbeat_message(10, self.autopilot, base, self.mode, status, 3))
 
     def send(self, message: Message, *, component: int = 1) -> None:
-        """Send a message to everybody heard so far."""
+        """Send a message to all peers so far."""
         mav = mavlink.MAVLink(None, 1, component)
         mav.seq = self._next_seq(component)
         raw: bytes = message.pack(mav)
@@ -110,7 +110,7 @@ class Stub:
             self._link.send(peer, raw)
 
     def say(self, severity: int, text: str, *, component: int = 1) -> None:
-        """Send a text, in pieces if need be."""
+        """Send a text, in chunks if necessary."""
         pieces = [text[i : i + 50] for i in range(0, max(len(text), 1), 50)]
         for number, piece in enumerate(pieces):
             message = mavlink.MAVLink_statustext_message(
@@ -119,7 +119,7 @@ class Stub:
             self.send(message, component=component)
 
     def telemetry(self) -> None:
-        """Send where it is, its home, and whether it has landed."""
+        """Send its place, its home, and its landed state."""
         self.send(mavlink.MAVLink_extended_sys_state_message(0, self.landed_state))
         self.send(
             mavlink.MAVLink_global_position_int_message(
@@ -148,7 +148,7 @@ class Stub:
         self._seqs[counter] = (seq + step) % 256
         return seq
 
-    # what it answers
+    # answers
 
     def _take(self, message: Message) -> None:
         match message.get_type():
@@ -202,7 +202,7 @@ class Stub:
             call()
 
     def _ack(self, number: int, result: int, component: int) -> None:
-        ack = mavlink.MAVLink_command_ack_message(number, result, 0, 0, 254, 7)  # for no one here
+        ack = mavlink.MAVLink_command_ack_message(number, result, 0, 0, 254, 7)  # to nobody here
         self.send(ack, component=component)
 
     def _change_mode(self, mode: int) -> None:

@@ -1,4 +1,4 @@
-"""Calls at a time, in whatever time the owner lives."""
+"""Timed calls, in the owner's time."""
 
 import heapq
 from collections.abc import Callable, Iterator
@@ -6,18 +6,18 @@ from itertools import count
 
 
 class Timer:
-    """One call that is to come; ``cancel`` takes it back."""
+    """One pending call; ``cancel`` revokes it."""
 
     def __init__(self, call: Callable[[], None]) -> None:
         self.call: Callable[[], None] | None = call
 
     def cancel(self) -> None:
-        """Never make the call; after it nothing changes."""
+        """Revoke the call; no effect after it was made."""
         self.call = None
 
 
 class Timers:
-    """The calls that are to come, in seconds of the owner's time."""
+    """The pending calls, in seconds of the owner's time."""
 
     def __init__(self, *, now: float) -> None:
         self.now = now
@@ -25,19 +25,19 @@ class Timers:
         self._order = count()
 
     def after(self, seconds: float, call: Callable[[], None]) -> Timer:
-        """Call later."""
+        """Schedule a call."""
         timer = Timer(call)
         heapq.heappush(self._due, (self.now + seconds, next(self._order), timer))
         return timer
 
     def live(self, doing: Iterator[float]) -> None:
-        """Run what says how many seconds it waits, until it is through."""
+        """Run an iterator that yields its waiting times in seconds, to its end."""
         seconds = next(doing, None)
         if seconds is not None:
             self.after(seconds, lambda: self.live(doing))
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
+        """Return when ``handle_deadline`` is due."""
         while self._due and self._due[0][2].call is None:
             heapq.heappop(self._due)
         return self._due[0][0] if self._due else None

@@ -1,4 +1,4 @@
-"""The vehicle as the station sees it: what its telemetry from component 1 says."""
+"""The vehicle as the station sees it, from the telemetry of component 1."""
 
 from math import nan
 from typing import NamedTuple
@@ -14,7 +14,7 @@ NOT_LANDED = frozenset({2, 3, 4})  # MAV_LANDED_STATE IN_AIR, TAKEOFF, LANDING
 
 
 class Modes(NamedTuple):
-    """The custom_mode numbers that the buttons ask for [1.5]."""
+    """The custom_mode numbers of the buttons [1.5]."""
 
     hold: int
     mission: int
@@ -29,7 +29,7 @@ MODES = {
 
 
 class Place(NamedTuple):
-    """Degrees, and metres above the sea."""
+    """Degrees, and metres above sea level."""
 
     latitude: float
     longitude: float
@@ -37,7 +37,7 @@ class Place(NamedTuple):
 
 
 class VehicleState:
-    """What was last heard; the make is that of the first heartbeat, for good [1.1]."""
+    """The last received state; the first heartbeat determines the make for good [1.1]."""
 
     def __init__(self, heartbeat: Message, *, now: float) -> None:
         self.firmware = FIRMWARE.get(heartbeat.autopilot, GENERIC)
@@ -61,12 +61,12 @@ class VehicleState:
 
     @property
     def is_in_mission_mode(self) -> bool:
-        """Whether it shows the mode in which no other plan is uploaded while armed."""
+        """Whether it is in mission mode, in which no plan is uploaded while armed."""
         return self.modes is not None and self.mode == self.modes.mission
 
     @property
     def is_flying(self) -> bool:
-        """What shows most buttons of the fly view [2.6]."""
+        """Whether it counts as flying, which shows most buttons of the fly view [2.6]."""
         if self.firmware == APM:
             return self.armed and self.status in (ACTIVE, CRITICAL, EMERGENCY)
         return self.landed_state in NOT_LANDED

@@ -1,4 +1,4 @@
-"""Bytes: pymavlink's own packer and parser, the protocol's version, and what seems to be lost."""
+"""Bytes: pymavlink's own packer and parser, the protocol version, and apparent losses."""
 
 import struct
 from collections import Counter
@@ -17,7 +17,7 @@ PROTOCOL_VERSION_EXTRA = 217
 
 
 class Heard(NamedTuple):
-    """One packet that came in, of an id that the station has a definition of."""
+    """One received packet whose id the station knows."""
 
     message: Message
     name: str
@@ -25,11 +25,11 @@ class Heard(NamedTuple):
 
 
 class Wire:
-    """One end of a link. It begins in MAVLink 1 and goes on in what it hears [11.10]."""
+    """One end of a link. It starts in MAVLink 1 and switches to the heard version [11.10]."""
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile
-        self._packer = mavlink.MAVLink(None, 255, 190)  # [1.1]: as every one of them
+        self._packer = mavlink.MAVLink(None, 255, 190)  # [1.1]: the same for every station
         self._parser = mavlink.MAVLink(None)
         self._parser.robust_parsing = True
         self.sends_mavlink1 = True
@@ -40,24 +40,24 @@ class Wire:
         self._last_seq: dict[Source, int] = {}
 
     def pack(self, message: Message) -> bytes:
-        """Return a message's bytes in the version that is spoken now."""
+        """Return a message's bytes in the present version."""
         raw: bytes = message.pack(self._packer, force_mavlink1=self.sends_mavlink1)
         self._packer.seq = (self._packer.seq + 1) % 256
         return raw
 
     def fall_back(self) -> None:
-        """Speak MAVLink 1 from now on, for good [11.1]."""
+        """Send MAVLink 1 from now on, for good [11.1]."""
         self.sends_mavlink1, self.may_send_mavlink2 = True, False
 
     def unpack(self, data: bytes) -> list[Heard]:
-        """Return the packets of a datagram that this version takes."""
+        """Return the packets of a datagram that this version accepts."""
         heard = []
         for message in self._parser.parse_buffer(data) or ():
             if message.get_type() == "BAD_DATA":
                 self.bad += 1
                 continue
             packet = _read(message)
-            if packet is None:  # the C parser drops what it has no definition of: a gap
+            if packet is None:  # the C parser drops unknown ids, which leaves a gap
                 continue
             if message.get_msgbuf()[0] == mavlink.PROTOCOL_MARKER_V2:
                 self.sends_mavlink1 = not self.may_send_mavlink2
@@ -76,7 +76,7 @@ class Wire:
 
 
 class ProtocolVersion(NamedTuple):
-    """PROTOCOL_VERSION, by hand."""
+    """PROTOCOL_VERSION, decoded manually."""
 
     version: int
     min_version: int

@@ -1,5 +1,5 @@
-"""Random lives of whole worlds, packets that are not as they should be, and any text at all.
+"""Random lives of whole worlds, mutated packets, and fuzzed text.
 
-The suite and ``tools/soak.py`` run the same code; only how long differs. Whatever goes wrong says
-the seed that brings it back.
+The suite and ``tools/soak.py`` run the same code for different times. Every failure reports the
+seed that reproduces it.
 """

@@ -1,6 +1,6 @@
-"""Moves of attackers and of bad luck: late copies, overtaken words, freezes, full disks at the end.
+"""Attacks and bad luck: late copies, overtaken requests, freezes, full disks at the end.
 
-Each succeeded once; ``tests/kit/halts.py`` says what must not come of them.
+Each of them succeeded once; ``tests/kit/halts.py`` has the rule that they must not break.
 """
 
 from random import Random
@@ -15,25 +15,25 @@ from tests.kit.soak.deeds import Deed, Stage
 from tests.kit.soak.words import MISSION_START, RELEASE, Kind, Said
 from tests.kit.soak.world import SoakWorld
 
-REPEATED = 2.0  # s, within which a stock client sends again, unmarked, what is not answered
-LATE = 20.0  # s, the oldest word that comes once more
+REPEATED = 2.0  # s, within which a stock client repeats, unmarked, an unanswered request
+LATE = 20.0  # s, the oldest request that is copied
 FREEZES = (0.6, 0.6, 2.0, 5.0, 20.0)  # s
 SUSPENSIONS = (2.0, 5.0, 20.0)  # s
-APART = (0.005, 0.02, 0.2)  # s, between two words of which the second overtakes the first
+APART = (0.005, 0.02, 0.2)  # s, between two requests, the second of which overtakes the first
 AFTER = (0.3, 1.0, 3.0, 8.0)  # s, until a copy comes
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 COPIED = (Kind.GO, Kind.WISH, Kind.MOTION)
 
 
 def radio(world: SoakWorld, *, bytes_per_second: float, buffer: int) -> None:
-    """Put a radio with a buffer between the server and each rover, each way."""
+    """Put a radio with a buffer between the server and each rover, in both directions."""
     for number in range(1, len(world.rovers) + 1):
         for way in ((f"rover{number}", VEHICLE_LINK), (VEHICLE_LINK, f"rover{number}")):
             world.net.buffers[way] = Radio(bytes_per_second=bytes_per_second, buffer=buffer)
 
 
 class Attacks:
-    """What may be done to a world beside all that its people do."""
+    """The attacks on a world, besides its people's actions."""
 
     def __init__(self, world: SoakWorld, stage: Stage) -> None:
         self._world = world
@@ -43,7 +43,7 @@ class Attacks:
         self._auto = px4.MISSION if self._ways.sub_modes else AUTO
 
     def deeds(self) -> list[Deed]:
-        """Return them; the more often one is named, the more often it happens."""
+        """Return the attacks; repeated ones are more frequent."""
         return [
             *[self.copy] * 6,
             *[self.late_copy_of_a_go] * 3,
@@ -55,7 +55,7 @@ class Attacks:
         ]
 
     def copy(self) -> None:
-        """Something that a client has said comes once more."""
+        """Repeat a client's earlier request."""
         now = self._world.now
         told = [
             s for s in self._world.words.recent if s.kind in COPIED and now - s.first.at <= LATE
@@ -64,7 +64,7 @@ class Attacks:
             self._again(self._random.choice(told))
 
     def late_copy_of_a_go(self) -> None:
-        """A word lets the rover go, a newer one halts it, then a copy of the older one comes."""
+        """Send a go request, then a newer halt, then a copy of the older go request."""
         world, random = self._world, self._random
         client, number = self._stage.client(), self._stage.rover()
         self._go(client, number)
@@ -75,7 +75,7 @@ class Attacks:
         self._again(word)
 
     def overtaken(self) -> None:
-        """Two words of one client, the second of which arrives first."""
+        """Send two requests of one client; the second arrives first."""
         client, number = self._stage.client(), self._stage.rover()
         self._note("overtaken words")
         self._world.swap_next_two(client)
@@ -84,17 +84,17 @@ class Attacks:
         self._halt(client, number)
 
     def freeze(self) -> None:
-        """The server's process stands still; what was sent meanwhile waits in its sockets."""
+        """Freeze the server's process; packets sent meanwhile wait in its sockets."""
         self._note("server frozen")
         self._world.freeze(self._random.choice(FREEZES), self._meanwhile)
 
     def suspend(self) -> None:
-        """The server's machine is suspended, and with it the clock that counts its uptime."""
+        """Suspend the server's machine, and with it the clock of its uptime."""
         self._note("machine suspended")
         self._world.suspend_machine(self._random.choice(SUSPENSIONS), self._meanwhile)
 
     def lay_radio(self) -> None:
-        """A slow radio with a large buffer stands between server and rovers, or no more."""
+        """Put a slow radio with a large buffer between server and rovers, or remove it."""
         if self._world.net.buffers:
             self._world.net.buffers.clear()
         else:
@@ -102,7 +102,7 @@ class Attacks:
             self._note("radio with a buffer")
 
     def end_on_full_disk(self) -> None:
-        """The disk is full, somebody halts the rover, the server is ended by SIGTERM."""
+        """Fill the disk, halt the rover, and end the server by SIGTERM."""
         self._note("ended on a full disk")
         world, number = self._world, self._stage.rover()
         world.disk_store.break_for(5.0)
@@ -112,7 +112,7 @@ class Attacks:
         self._stage.store = world.disk_store
 
     def _meanwhile(self) -> None:
-        """Let a client do something while the server stands still."""
+        """Let a client act while the server is stopped."""
         client, number = self._stage.client(), self._stage.rover()
         self._random.choice(
             (
@@ -130,10 +130,10 @@ class Attacks:
         self._world.deeds[name] += 1
 
     def _again(self, said: Said) -> None:
-        """Let a word come once more: the same packet, or as its sender would repeat it."""
+        """Repeat a request: the same packet, or as its sender would repeat it."""
         ways = ["the same packet", "confirmed higher"]
         if self._world.now - said.first.at <= REPEATED and not self._is_over(said):
-            ways.append("with a new number")  # later, nobody sends it by itself
+            ways.append("with a new number")  # later, no client sends it by itself
         how = self._random.choice(ways)
         name = f"copy of {said.name}: {how}"
         if how == "the same packet" or said.message.get_type() not in COMMANDS:
@@ -141,7 +141,7 @@ class Attacks:
             self._world.net.send(said.client.name, said.client.server, said.data)
             return
         if how == "confirmed higher" and said.message.get_type() == "COMMAND_INT":
-            self._world.net.send(said.client.name, said.client.server, said.data)  # it has no count
+            self._world.net.send(said.client.name, said.client.server, said.data)  # no confirmation
             return
         if how == "confirmed higher":
             higher = common.MAVLink_command_long_message(
@@ -153,7 +153,7 @@ class Attacks:
         self._world.repeat(said, higher)
 
     def _is_over(self, said: Said) -> bool:
-        """Say whether its client has sent a halt by the same command since: it repeats no more."""
+        """Return whether its client has sent a halt by the same command since: no repeats."""
         return any(
             later.kind is Kind.HALT
             and later.client is said.client

@@ -1,7 +1,7 @@
-"""An engine that packets of every kind come down upon, and what they may do to it.
+"""An engine that receives packets of every kind, and checks on its reactions.
 
-What is no valid packet changes nothing but counters. What is one may ask for anything, and no rover
-is told nonsense for it.
+Bytes without a valid packet change nothing but counters. A valid packet may request anything, but
+never makes the engine send nonsense to a rover.
 """
 
 import gc
@@ -41,24 +41,24 @@ ENDS = (
     *((ROVERS, "rover1"), (ROVERS, "rover1"), (LINES, "rover2")),
 )
 OF_PEER: dict[Hashable, int] = {"rover1": 1, "rover2": 2}
-UTC = 1.8e9  # s, when it begins, where signatures are looked at
+UTC = 1.8e9  # s, start time if signatures are checked
 STATION = 1  # link id
 STRANGERS = 1_000
 MOST_CLIENTS = 16
-BURST = 50  # packets that come at one time
+BURST = 50  # packets at one time
 STEP = 0.02  # s, between two bursts
-BEAT = 0.5  # s, between two signs of life of the rovers and of the station
-WALK = 10_000  # packets, between two walks through all that the engine remembers
+BEAT = 0.5  # s, between two rounds of telemetry and station packets
+WALK = 10_000  # packets, between two size checks of the engine's memory
 SETPOINTS = (82, 84, 86)
 TASKS = (
     "_registry",
     "_fleet",
     "_deduplicator",
-)  # where tasks are kept, which are bounded by number
+)  # where tasks are kept, whose number is bounded
 
 
 class Battered:
-    """An engine with two rovers and three clients on links of both kinds."""
+    """An engine with two rovers and three clients, on datagram and stream links."""
 
     def __init__(
         self,
@@ -68,9 +68,9 @@ class Battered:
         is_valid: Callable[[str, bytes], bool] = lambda _link, data: has_whole_packet(data),
         key: Key | None = None,
     ) -> None:
-        """``is_valid``: whether there is anything in a link's bytes that may change something.
+        """``is_valid`` returns whether a link's bytes may change anything.
 
-        With a ``key`` clients are heard only if they sign with it, as the station does.
+        With a ``key``, clients must sign with it, as the station does.
         """
         self.seed = seed
         self.now = 0.0
@@ -78,7 +78,7 @@ class Battered:
         self.index = 0
         settings = Settings(
             queueing=Queueing(capacity=20, quota=20),
-            clients=Clients(max_clients=MOST_CLIENTS, packet_rate=1e9),  # all is to be looked at
+            clients=Clients(max_clients=MOST_CLIENTS, packet_rate=1e9),  # no packet is dropped
         )
         self.engine = Engine(settings, now=0.0)
         self._random = Random(seed)
@@ -111,18 +111,18 @@ class Battered:
         for link, peer in ENDS:
             if link in STREAMS:
                 self.engine.handle(PeerChanged(link, peer, up=True), now=0.0)
-        self._before: Snapshot | None = None  # None: something valid came since it was looked at
+        self._before: Snapshot | None = None  # None: a valid packet came after the last snapshot
         self._live()
 
     def run(self, count: int) -> None:
-        """Let so many packets come; Violation says which one did what it must not."""
+        """Send ``count`` packets to the engine. Raise Violation for a wrong reaction."""
         for _ in range(count):
             self._take(self._mutants.any())
         gc.collect()
         self._raise_if_too_large()
 
     def entries(self) -> int:
-        """Return how many entries all containers hold that are not there for tasks."""
+        """Return the total number of entries in all containers, except those for tasks."""
         return sum(
             len(container)
             for path, container in containers(self.engine)
@@ -158,7 +158,7 @@ class Battered:
             self._raise_if_too_large()
 
     def _end(self) -> tuple[str, Hashable]:
-        """Return where the next packet comes from; now and then from somebody new."""
+        """Return the source of the next packet, sometimes a new one."""
         if self._random.random() < 0.8:
             return self._random.choice(ENDS)
         return self._random.choice((CLIENTS, ROVERS)), self._random.randrange(STRANGERS)
@@ -175,9 +175,9 @@ class Battered:
         self._before = None
 
     def _live(self) -> None:
-        """Let rovers say that they are there and where, and the station that it goes on."""
+        """Send telemetry of the rovers, and a new continue of the station."""
         for system in (1, 2):
-            self._numbers += 1  # in param7, so that each is a new one
+            self._numbers += 1  # in param7, so that each command is new
             on = command_long(193, 1, 0, 0, 0, 0, 0, self._numbers, target=(system, 191))
             message = Packets(CLIENTS, [("station", on.pack(self._station))])
             self.engine.handle(message, now=self.now)
@@ -199,7 +199,7 @@ class Battered:
         self._turn()
 
     def _turn(self) -> bool:
-        """Look at what goes out, and let everything be durable; whether there were events."""
+        """Check the packets that go out, and commit all events; return whether there were any."""
         has_events = False
         while True:
             packets, events = self.engine.take_packets(), self.engine.take_events()
@@ -219,7 +219,7 @@ class Battered:
         try:
             message = self._decoder.decode(bytearray(data))
         except common.MAVError:
-            return  # passed on as it came: the rover sees that it is broken, too
+            return  # forwarded unchanged; the rover detects the damage, too
         if data[7] == SETPOINTS[0]:
             values = [message.thrust, message.body_yaw_rate]
         else:

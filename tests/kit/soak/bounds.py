@@ -1,26 +1,26 @@
-"""How large what a server remembers may become: every container in it, found by walking it."""
+"""Bounds on a server's memory: the size of every container, found by walking its objects."""
 
 from collections import deque
 from collections.abc import Iterator, Sized
 from typing import Any
 
-#: entries; what is bounded by something else is named below
+#: entries; other bounds are below
 MOST = 1_000
-#: by the name of the attribute that holds it; each has a constant of its own
+#: by the name of the attribute; each bound has its own constant
 LARGER = {
     "_finished": 10_000,
     "_tasks": 12_000,
     "_last_event": 12_000,
     "_next": 1_100,  # sources of packets, see SequenceKeeper
     "_offset": 1_100,
-    "_last": 8_000,  # streams: some 30 messages of each component that there can be of a vehicle
+    "_last": 8_000,  # streams: about 30 messages for each possible component of a vehicle
 }
 LEAVES = (str, bytes, int, float, bool, type(None))
 CONTAINERS = (list, dict, set, frozenset, deque, tuple)
 
 
 def too_large(root: object) -> Iterator[str]:
-    """Yield the containers that hold more than they may, by the way to them."""
+    """Yield the containers that exceed their bounds, with their paths."""
     for path, container in containers(root):
         name = path.rpartition(".")[2]
         if len(container) > LARGER.get(name, MOST):
@@ -28,12 +28,12 @@ def too_large(root: object) -> Iterator[str]:
 
 
 def containers(root: object) -> Iterator[tuple[str, Sized]]:
-    """Return every container that can be reached from an object of ours, and where it is."""
+    """Return every container that our objects hold, with its path."""
     return ((path, each) for path, each in reachable(root) if isinstance(each, CONTAINERS))
 
 
 def reachable(root: object) -> Iterator[tuple[str, Any]]:
-    """Yield everything that objects of ours and containers in them hold, each once, and where."""
+    """Yield every object that our objects and their containers hold, once each, with its path."""
     seen: set[int] = set()
     waiting: list[tuple[str, Any]] = [(type(root).__name__, root)]
     while waiting:

@@ -1,6 +1,6 @@
-"""What can happen to a world: what clients do, what a person at the rover does, what breaks.
+"""Events of a world: clients' actions, actions of a person at the rover, failures.
 
-The more often a deed is named, the more often it happens.
+An event that is listed more often happens more often.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,7 +34,7 @@ Deed = Callable[[], object]
 
 MODES = (MANUAL, HOLD, AUTO, RTL, GUIDED)
 PX4_MODES = (px4.MANUAL, px4.HOLD, px4.MISSION, px4.RETURN, px4.OFFBOARD)
-#: a fault of a rover, and what it is called
+#: name and value of each rover fault
 FAULTS = (
     ("rover silent", Faults(silent=True)),
     ("rover deaf", Faults(deaf=True)),
@@ -50,13 +50,13 @@ FAULTS = (
 
 @dataclass
 class Stage:
-    """A world, and who may do something in it; chance is the only thing that decides."""
+    """A world with its actors; only the random source decides."""
 
     world: World
     random: Random
     store: LateStore
     clients: Sequence[FakeClient]
-    #: told of each fault, by what it is called
+    #: called with the name of each fault
     note: Callable[[str], None] = lambda _: None
 
     def client(self) -> FakeClient:
@@ -77,12 +77,12 @@ class Stage:
         self.world.rovers[number - 1].autopilot.operator_arm(armed, now=self.world.now)
 
     def place(self) -> dict[str, Any]:
-        """Return a place within a few metres of where the first rover began."""
+        """Return a random place within a few metres of the first rover's start."""
         return at(self.random.uniform(-3, 3), self.random.uniform(-3, 3))
 
 
 def deeds(stage: Stage) -> list[Deed]:
-    """Return what can happen to a rover of ArduPilot's kind, and to any other."""
+    """Return the events for an ArduPilot rover, which apply to any other, too."""
     random, client, rover = stage.random, stage.client, stage.rover
 
     def submit() -> None:
@@ -113,7 +113,7 @@ def deeds(stage: Stage) -> list[Deed]:
 
 
 def at_the_rover(stage: Stage) -> list[Deed]:
-    """Return what a person at a rover does."""
+    """Return the actions of a person at a rover."""
     random = stage.random
 
     def turn_switch() -> None:
@@ -128,7 +128,7 @@ def at_the_rover(stage: Stage) -> list[Deed]:
 
 
 def breaks(stage: Stage) -> list[Deed]:
-    """Return what goes wrong by itself: rover, server's machine, disk."""
+    """Return the failures of rover, server machine and disk."""
     world, random = stage.world, stage.random
 
     def break_rover() -> None:
@@ -156,7 +156,7 @@ def breaks(stage: Stage) -> list[Deed]:
 
 
 def px4_deeds(stage: Stage) -> list[Deed]:
-    """Return the same and more for a rover that speaks as PX4 does."""
+    """Return the events for a rover that speaks like PX4: the common ones and more."""
     world, random, client, rover = stage.world, stage.random, stage.client, stage.rover
     other = world.net.link("other station")
 

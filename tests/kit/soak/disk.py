@@ -1,7 +1,7 @@
-"""A disk that outlives servers, and the store of each: slow, failing, and killed with its server.
+"""A disk that outlives servers, and the store of each server: slow, failing, killed with it.
 
-What a killed server had committed is on the disk, and nothing else. It is written by the code that
-writes the real file, when the next server asks for it, so that virtual time costs no real disk.
+A killed server's committed events are on the disk, and nothing else. The code for the real file
+writes them when the next server loads, so that virtual time needs no real disk.
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,7 +22,7 @@ HALTS = (QueuePaused, QueueContinued, VehicleHalted)
 
 
 class Disk:
-    """One store file. Times are the world's; ``wall_offset`` is UTC less these, s."""
+    """One store file. Times are the world's; ``wall_offset`` is UTC minus world time, s."""
 
     def __init__(self, path: Path, *, wall_offset: float) -> None:
         self.path = path
@@ -43,36 +43,36 @@ class Disk:
             self._database.write(batch, utc=now + self.wall_offset)
 
     def forget(self, retention: Retention, *, now: float) -> None:
-        """Forget all that may be forgotten."""
+        """Trim everything that the retention permits."""
         trimmer = Trimmer(retention)
         while self._database.trim(trimmer, utc=now + self.wall_offset):
             pass
 
     def load(self, *, ended_well: bool, idle: float) -> Restored:
-        """Return what the next server finds."""
+        """Return the state that the next server restores."""
         return read_restored(self.path, offset=self.wall_offset, ended_well=ended_well, idle=idle)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._database.close(utc=None)
 
 
 class UncertainStore(LateStore):
-    """Implements ``Store`` for one server; may fail for a while."""
+    """Implements ``Store`` for one server; can fail for a while."""
 
     def __init__(self) -> None:
         super().__init__()
         self.broken_until = 0.0
-        self.kept = 0  # events that the server was told are durable
+        self.kept = 0  # events that the server knows to be durable
         self._says_so = False
 
     def break_for(self, seconds: float) -> None:
-        """Let the disk refuse everything for so long."""
+        """Refuse all writes for ``seconds``."""
         self.broken_until = self.clock() + seconds
         self._says_so = True
 
     def take_outcomes(self) -> list[Outcome]:
-        """Return what became of events; while it is broken, that once."""
+        """Return the outcomes of events; during a failure, one NotKept."""
         if self.clock() < self.broken_until:
             said, self._says_so = self._says_so, False
             return [NotKept("the disk is full")] if said else []
@@ -81,9 +81,9 @@ class UncertainStore(LateStore):
         return outcomes
 
     def committed(self) -> list[Event]:
-        """Return what would survive if the machine stopped now: perhaps more than was told.
+        """Return the events that would survive a stop now, possibly more than reported.
 
-        Halts have a record of their own, which takes them on a full disk, too.
+        Halts have their own record, which accepts them even on a full disk.
         """
         due: Iterable[int] = ()
         if self.clock() >= self.broken_until:

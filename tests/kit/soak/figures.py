@@ -1,4 +1,4 @@
-"""What a life was made of, added up."""
+"""Figures of a life, for adding up."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -19,12 +19,12 @@ class Figures:
     faults: Counter[str] = field(default_factory=Counter)
     deeds: Counter[str] = field(default_factory=Counter)  # of attackers
     halts: Counter[str] = field(default_factory=Counter)  # acknowledged, or at the rover
-    refused: Counter[str] = field(default_factory=Counter)  # go words
-    in_flight: int = 0  # go words that passed a halt on their way
-    broken: Counter[str] = field(default_factory=Counter)  # the rule of halts
+    refused: Counter[str] = field(default_factory=Counter)  # go requests
+    in_flight: int = 0  # go requests that crossed a halt in transit
+    broken: Counter[str] = field(default_factory=Counter)  # breaches of the halt rule
 
     def add(self, other: "Figures") -> None:
-        """Add another life's."""
+        """Add the figures of another life."""
         self.lives += other.lives
         self.virtual += other.virtual
         self.cpu += other.cpu
@@ -36,7 +36,7 @@ class Figures:
             getattr(self, name).update(getattr(other, name))
 
     def lines(self) -> list[str]:
-        """Return them in words, one line each."""
+        """Return the figures as lines of text."""
         return [
             f"lives        {self.lives}",
             f"virtual      {self.virtual:.0f} s",

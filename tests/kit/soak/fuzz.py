@@ -1,7 +1,7 @@
-"""Bytes for the targets: the corpus as it is, the corpus changed, and anything at all.
+"""Inputs for the fuzz targets: the corpus, edited corpus files, and random bytes.
 
-Hypothesis makes them, and makes what fails small. What failed once is a file of the corpus, and is
-tried first from then on.
+Hypothesis generates and shrinks them. A failing input becomes a file of the corpus, which is tried
+first from then on.
 """
 
 import time
@@ -15,17 +15,17 @@ from hypothesis import strategies as st
 from tests.kit.soak.targets import TARGETS, Target
 
 CORPUS = Path(__file__).resolve().parents[2] / "vectors" / "fuzz"
-EXAMPLES = 400  # of one target, between two looks at the clock
+EXAMPLES = 400  # of one target, between two checks of the clock
 LONGEST = 2_000  # bytes
 
 
 def corpus_of(name: str) -> list[bytes]:
-    """Return the files of a target, by their names."""
+    """Return the files of a target, sorted by name."""
     return [path.read_bytes() for path in sorted((CORPUS / name).iterdir())]
 
 
 def inputs(samples: list[bytes]) -> st.SearchStrategy[bytes]:
-    """Return what to try: bytes, and samples with pieces cut, doubled, moved or replaced."""
+    """Return a strategy: bytes, and samples with pieces cut, duplicated, moved or replaced."""
     pieces = st.one_of(
         st.binary(max_size=12),
         st.text(max_size=8).map(lambda text: text.encode("utf-8", "replace")),
@@ -49,7 +49,7 @@ def inputs(samples: list[bytes]) -> st.SearchStrategy[bytes]:
 
 
 def fuzz(name: str, *, examples: int, number: int) -> None:
-    """Try the corpus of a target, then so many changed; raises what the target raises."""
+    """Try the corpus of a target, then ``examples`` inputs. Raise what the target raises."""
     target = TARGETS[name]
     samples = corpus_of(name)
     for sample in samples:
@@ -58,7 +58,7 @@ def fuzz(name: str, *, examples: int, number: int) -> None:
 
 
 def fuzz_for(seconds: float, *, seed: int, say: Callable[[str], None]) -> list[str]:
-    """Fuzz all targets in turn for so long; gives each failure, which is in the corpus then."""
+    """Fuzz all targets in turn for ``seconds``; return failures, and add them to the corpus."""
     end = time.monotonic() + seconds
     crashes: dict[str, str] = {}
     tried = dict.fromkeys(TARGETS, 0)
@@ -72,7 +72,7 @@ def fuzz_for(seconds: float, *, seed: int, say: Callable[[str], None]) -> list[s
                 continue
             try:
                 fuzz(name, examples=EXAMPLES, number=number)
-            except Exception as error:  # noqa: BLE001 - whatever it is, it is what is looked for
+            except Exception as error:  # noqa: BLE001 - any exception is a finding
                 crashes[name] = f"{name}, seed {number}: {type(error).__name__}: {error}"
                 say(crashes[name])
             tried[name] += EXAMPLES
@@ -104,13 +104,13 @@ def _try(target: Target, samples: list[bytes], *, examples: int, number: int) ->
     try:
         once()
     except Exception:
-        if failed:  # the last, and so the smallest
+        if failed:  # the last one is the smallest
             keep(target.__name__, failed[0])
         raise
 
 
 def keep(name: str, data: bytes) -> Path:
-    """Put an input that failed into the corpus."""
+    """Write a failing input to the corpus; return its path."""
     path = CORPUS / name / f"crash-{crc32(data):08x}"
     path.write_bytes(data)
     return path

@@ -1,9 +1,9 @@
-"""A fleet at work for long, and what its server has in memory meanwhile.
+"""A fleet at work for a long time, and its server's memory.
 
-What counts is the size of every object that the server's own objects hold, added up: that is exact,
-and the same in each run. Resident memory is coarser than a leak is, and counts the simulated
-rovers; tracemalloc takes three times as long. What is kept outside of the server's objects is not
-seen: there are only tables of constants.
+Memory is the total size of all objects that the server's own objects hold: this is exact, and the
+same in each run. Resident memory is coarser than a leak, and includes the simulated rovers;
+tracemalloc takes three times as long. Memory outside the server's objects is not measured: it has
+only tables of constants.
 """
 
 import sys
@@ -25,16 +25,16 @@ from tests.kit.soak.disk import Disk
 from tests.kit.soak.world import GRAIN, UTC
 from tests.kit.world import World
 
-KEPT_TASKS = 40  # finished ones, in memory and on the disk: as many as end in a quarter
-GROWTH = 1.10  # of the memory in the end to that after the first quarter
-PERIOD = 1.0  # s, between two things that somebody does
+KEPT_TASKS = 40  # finished tasks, in memory and on the disk: as many as end in a quarter
+GROWTH = 1.10  # limit on memory at the end, relative to the first quarter
+PERIOD = 1.0  # s, between two actions
 FORGET = 10.0  # s
-FULL = 260  # commands of a client, of which the server remembers 256
+FULL = 260  # commands of a client; the server remembers 256
 
 
 @dataclass(frozen=True)
 class HourSettings:
-    """How long, and how many take part."""
+    """Duration, and number of rovers and clients."""
 
     seconds: float = 3600.0
     rovers: int = 5
@@ -43,7 +43,7 @@ class HourSettings:
 
 
 class Drain:
-    """Implements ``Store``: everything goes on to the disk at once, and nothing is kept here."""
+    """Implements ``Store``: writes everything to the disk at once, and keeps nothing."""
 
     def __init__(self, disk: Disk) -> None:
         self._disk = disk
@@ -56,21 +56,21 @@ class Drain:
         self._count += len(events)
 
     def take_outcomes(self) -> list[Outcome]:
-        """Return how many are durable, if there are new ones."""
+        """Return the number of durable events, if it has changed."""
         if self._told == self._count:
             return []
         self._told = self._count
         return [Kept(self._count)]
 
     def fileno(self) -> None:
-        """The world asks at every step."""
+        """Return None: the world polls at every step."""
 
     def close(self) -> None:
-        """The disk is its owner's."""
+        """Do nothing: the disk belongs to the caller."""
 
 
 class Hour:
-    """Rovers that are given small tasks by many clients, again and again."""
+    """Rovers that receive small tasks from many clients, again and again."""
 
     def __init__(self, settings: HourSettings, *, seed: int) -> None:
         self._settings = settings
@@ -78,9 +78,9 @@ class Hour:
         self._random = Random(seed)
 
     def run(self, *, leak: Callable[[World], object] = lambda _: None) -> Iterator[str]:
-        """Live through it; gives lines of progress. AssertionError if memory has grown.
+        """Run; yield lines of progress. Raise AssertionError if memory has grown.
 
-        ``leak`` is called at each thing that somebody does: for the proof that it is noticed.
+        ``leak`` is called at each action, to prove that the check detects a leak.
         """
         began = process_time()
         with TemporaryDirectory(prefix="hour-") as folder, ExitStack() as stack:
@@ -118,7 +118,7 @@ class Hour:
             for number in range(1, self._settings.clients)
         ]
         world.ready()
-        for number in range(FULL):  # what is remembered of commands is as long as it may be
+        for number in range(FULL):  # fill the server's memory of commands to its limit
             for client in clients:
                 client.request_status(number + 1)
             world.run(0.02)
@@ -162,16 +162,16 @@ class Hour:
 
 
 class GrainyWorld(World):
-    """What is due within a grain is done together."""
+    """A world that handles all events within a grain together."""
 
     def next_due(self) -> float | None:
-        """Return when the next thing is due, in whole grains."""
+        """Return the time of the next event, in whole grains."""
         due = super().next_due()
         return None if due is None else max(due, -(-due // GRAIN) * GRAIN)
 
 
 def forget(world: World, clients: list[FakeClient]) -> None:
-    """Forget what nobody but a test would keep."""
+    """Clear the records that only the test keeps."""
     for client in clients:
         client.received.clear()
         client.acks.clear()
@@ -182,5 +182,5 @@ def forget(world: World, clients: list[FakeClient]) -> None:
 
 
 def held_by(server: object) -> int:
-    """Return the bytes of all that a server's objects hold, and of these."""
+    """Return the total size of a server's objects and of everything that they hold, bytes."""
     return sum(sys.getsizeof(value) for _, value in reachable(server))

@@ -1,6 +1,6 @@
-"""Tasks as clients and the disk know them: none is lost or there twice, what is over stays so.
+"""Tasks as clients and the disk know them: none is lost or duplicated, final states stay.
 
-It follows the journal of every server in turn, and the acks and TASK_STATUS that clients got.
+It follows the journals of all servers in turn, and the acks and TASK_STATUS of clients.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,34 +17,34 @@ from mav_tasks.tasks.lifecycle import TERMINAL, TRANSITIONS, TaskReason, TaskSta
 from mav_tasks.tasks.task import Submitter, Task
 from tests.kit.client import TaskStatus
 
-#: who submitted, its nonce and the command: the same three are the same task
+#: submitter, vehicle, command and nonce: equal marks mean the same task
 Mark = tuple[str, str, int, int, int]
-COMMIT = 0.35  # s that an end waits for the disk at least, less a few grains, before it is told
-NOT_STORED = 1.0  # s in which a submission that does not become durable is refused
+COMMIT = 0.35  # s, least wait of a final status for the disk, less a few grains
+NOT_STORED = 1.0  # s after which a submission that is not durable is refused
 
 
 @dataclass
 class Ledger:
-    """What must be true of tasks over all servers of one life."""
+    """Checks tasks over all servers of one life."""
 
-    #: state by id, as the journal of the present server has it
+    #: state by id, from the present server's journal
     states: dict[int, TaskState] = field(default_factory=dict)
-    #: ids that a client was told are accepted
+    #: ids whose acceptance a client was told
     accepted: set[int] = field(default_factory=set)
-    #: every id that was ever given, with the mark of its submission
+    #: every id, with the mark of its submission
     given: dict[int, Mark] = field(default_factory=dict)
-    #: the last state that a client was told, with its version
+    #: the last state and version that a client was told
     told: dict[tuple[str, int], tuple[int, TaskState]] = field(default_factory=dict)
     withdrawn: set[int] = field(default_factory=set)
-    #: ids of tasks that have been begun
+    #: ids of tasks that have started
     active: set[int] = field(default_factory=set)
-    taken_back: int = 0  # ends that were told and lost with the server that told them
+    taken_back: int = 0  # final states that were told and lost with their server
     _of_mark: dict[Mark, int] = field(default_factory=dict)
     _ended_at: dict[int, float] = field(default_factory=dict)
-    _asked: dict[int, tuple[str, float]] = field(default_factory=dict)  # by whom, and when
+    _asked: dict[int, tuple[str, float]] = field(default_factory=dict)  # submitter and time
 
     def follow(self, events: Iterable[Event]) -> Iterator[str]:
-        """Take events of the present server; gives what is wrong with them."""
+        """Take events of the present server; yield errors in them."""
         for event in events:
             match event:
                 case TaskSubmitted(task=task):
@@ -63,18 +63,18 @@ class Ledger:
                     self._refuse(event)
 
     def restart(self, restored: Iterable[Task], *, killed_at: float) -> Iterator[str]:
-        """Go on with what another server has found; gives what is wrong with it."""
+        """Continue with another server's restored tasks; yield errors in them."""
         found = {int(task.id): task.state for task in restored}
         for task_id in sorted(self.accepted - found.keys()):
             yield f"task {task_id} was accepted, and is lost by the restart"
         for task_id in self.given.keys() - found.keys():
             self._forget_mark(task_id)  # it never became durable: nobody was told
         yield from self._forget_what_was_lost(found, killed_at)
-        self.withdrawn.difference_update(found)  # stored in time, and the withdrawal was not
+        self.withdrawn.difference_update(found)  # stored in time, unlike its withdrawal
         self.states = found
 
     def accept(self, task_id: int, client: str) -> Iterator[str]:
-        """A client hears that its submission is this task."""
+        """Note that a client was told the task of its submission; yield errors."""
         self.accepted.add(task_id)
         if task_id in self.withdrawn:
             yield f"{client} was told that task {task_id} is accepted, and it is withdrawn"
@@ -82,7 +82,7 @@ class Ledger:
             yield f"{client} was told of task {task_id}, and there is none"
 
     def tell(self, status: TaskStatus, client: str) -> Iterator[str]:
-        """A client hears of a task's state; late ones, by their version, it passes over."""
+        """Note a status that a client received; ignore old versions; yield errors."""
         version, before = self.told.get((client, status.task_id), (0, TaskState.UNKNOWN))
         if status.version < version or not status.state:
             return
@@ -92,7 +92,7 @@ class Ledger:
             yield f"{client} was told {before.name}, then {state.name} of task {status.task_id}"
 
     def compare(self, tasks: Iterable[Task]) -> Iterator[str]:
-        """Hold the server's own tasks against all this."""
+        """Compare the server's tasks with the ledger; yield errors."""
         found = {int(task.id): task.state for task in tasks}
         for task_id in sorted(self.accepted - found.keys()):
             yield f"task {task_id} was accepted, and is lost"
@@ -110,15 +110,15 @@ class Ledger:
             twin = self._of_mark[mark]
             yield f"one submission of nonce {task.nonce} is task {twin} and {task.id}"
         self._of_mark[mark] = task.id
-        self.withdrawn.discard(task.id)  # by a server before, of which the disk had nothing
+        self.withdrawn.discard(task.id)  # by an earlier server, and the disk had nothing of it
         self.given[task.id] = mark
         self._asked[task.id] = str(task.submitter), task.submitted_at
         self.states[task.id] = task.state
 
     def _refuse(self, event: SubmissionRefused) -> None:
-        """What was called off before it was durable is over, not withdrawn, and refused as well.
+        """Handle a task that was cancelled before it was durable: it is over, and refused as well.
 
-        It has not begun and nobody was told of it as accepted: it may be asked for again.
+        It has not started and no client was told of its acceptance, so it may be submitted again.
         """
         for (_, _, vehicle, command, _), task_id in list(self._of_mark.items()):
             actor, at = self._asked[task_id]
@@ -140,10 +140,10 @@ class Ledger:
             self.active.add(task_id)
 
     def _forget_what_was_lost(self, found: dict[int, TaskState], killed_at: float) -> Iterator[str]:
-        """What a client was told and the disk did not have yet is not true any more.
+        """Forget final states that clients were told but the disk lost; yield those told too early.
 
-        An end is told when the disk has it, or has not had it in time: killed then, a server comes
-        back without it. Told before, it was told too early.
+        A final state is told once the disk has it, or if the disk does not have it in time. A
+        server that is killed in the second case comes back without it.
         """
         for (client, task_id), (_, state) in list(self.told.items()):
             if state in TERMINAL and found.get(task_id) is not state:

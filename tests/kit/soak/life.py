@@ -1,4 +1,4 @@
-"""One life: a seed says who takes part, what goes wrong and what anybody does, and when."""
+"""One life: a seed decides who takes part, what fails, and all actions with their times."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -31,13 +31,13 @@ NETS = (
     Conditions(delay=0.01, jitter=0.05, loss=0.05, duplication=0.1),
     Conditions(delay=0.02, loss=0.2),
 )
-PAUSES = (0.01, 0.1, 0.5, 2.0)  # s, between two deeds
+PAUSES = (0.01, 0.1, 0.5, 2.0)  # s, between two actions
 CANCEL, CLEAR, MODIFY, RELEASE = 54010, 54011, 54012, 54013
 SPEEDS = ("TSK_SPEED", "TSK_TURN", "TSK_ACCEL", "TSK_ACC_RAD", "no such one")
 
 
 class SoakStage(Stage):
-    """A stage whose world is told what people at the rovers do."""
+    """A stage that reports actions of people at the rovers to its world."""
 
     def person_turns(self, number: int, mode: Mode) -> None:
         """Let a person turn the mode switch at a rover."""
@@ -51,7 +51,7 @@ class SoakStage(Stage):
 
 
 class Life:
-    """A world that is lived in until its time is up; the same seed is the same life."""
+    """A world with random actions until its time is over; the same seed gives the same life."""
 
     def __init__(self, seed: int, folder: Path) -> None:
         self.seed = seed
@@ -94,7 +94,7 @@ class Life:
         return f"Life(seed {self.seed}, {self.world.now:.1f} s)"
 
     def run(self, seconds: float) -> None:
-        """Live for so long, then be stopped; Violation says what was wrong."""
+        """Run for ``seconds``, then end. Raise Violation on an error."""
         end = self.world.now + seconds
         while self.world.now < end:
             self._random.choice(self._deeds)()
@@ -102,7 +102,7 @@ class Life:
         self._end()
 
     def figures(self) -> Figures:
-        """Return what it was made of; the processor's time is not known here."""
+        """Return the figures, without CPU time."""
         world = self.world
         return Figures(
             lives=1,
@@ -119,7 +119,7 @@ class Life:
         )
 
     def _end(self) -> None:
-        """Mend everything, stop everybody: all tasks are over, all rovers stand, none is lost."""
+        """Clear faults and stop all rovers; check that all tasks are over and all rovers stand."""
         world = self.world
         for vehicle in world.rovers:
             vehicle.autopilot.set_faults(Faults())
@@ -143,7 +143,7 @@ class Life:
         self.world.faults[fault] += 1
         self.world.disturb(0)
 
-    # what clients do beyond what any scenario's chaos does
+    # clients' actions besides those of every stage
 
     def _wishes(self) -> list[Deed]:
         random, stage = self._random, self._stage
@@ -176,7 +176,7 @@ class Life:
             set_parameter,
         ]
 
-    # what goes wrong around the server
+    # failures around the server
 
     def _surroundings(self) -> list[Deed]:
         random, world = self._random, self.world
@@ -200,7 +200,7 @@ class Life:
             self._change_net(random.choice(NETS))
 
         def hold_all() -> None:
-            """So that rovers come to be driven again, whatever people did before."""
+            """Hold and continue all rovers, so that tasks drive again."""
             for number in range(1, len(world.rovers) + 1):
                 client: FakeClient = self._stage.client()
                 client.mode(HOLD, target=(number, 1))
@@ -213,7 +213,7 @@ class Life:
         self.world.disturb(0)
 
     def _bad_input(self) -> None:
-        """Packets that are not as they should be, from strangers and from those that are known."""
+        """Send broken packets, from strangers and from known senders."""
         self._note("bad packets")
         for _ in range(20):
             mutant = self._mutants.broken()
@@ -224,7 +224,7 @@ class Life:
 
 
 def live(seed: int, *, seconds: float, then: Callable[[Life], None] = lambda _: None) -> Figures:
-    """Live one life; Violation, or whatever was raised in it, when something was wrong."""
+    """Run one life; return its figures. Raise Violation, or any exception of the life."""
     began = process_time()
     with TemporaryDirectory(prefix="soak-") as folder:
         life = Life(seed, Path(folder))

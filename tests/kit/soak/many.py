@@ -1,4 +1,4 @@
-"""Many lives, each in a process of its own: what one leaves behind is not the next one's."""
+"""Many lives, each in its own process, so that they do not affect each other."""
 
 import json
 import subprocess
@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 from tests.kit.soak.figures import COUNTED, Figures
 
-BROKEN = 3  # exit code of a life that was lived to its end, in which the rule of halts was broken
+BROKEN = 3  # exit code of a complete life with a breach of the halt rule
 
 
 @dataclass(frozen=True)
 class Ended:
-    """A life that is over: its figures, or in words what went wrong."""
+    """A finished life: its figures, or its failure as text."""
 
     seed: int
     figures: Figures | None
@@ -23,12 +23,12 @@ class Ended:
 
 
 def printed(figures: Figures) -> str:
-    """Return figures as one line for whoever started this process."""
+    """Return figures as one line for the parent process."""
     return json.dumps(vars(figures))
 
 
 def many_lives(command: Sequence[str], seeds: range, *, jobs: int) -> Iterator[Ended]:
-    """Run ``command SEED`` for each seed, so many side by side; gives each when it is over."""
+    """Run ``command SEED`` for each seed, up to ``jobs`` in parallel; yield each result."""
     run: Callable[[int], Ended] = lambda seed: _run([*command, str(seed)], seed)  # noqa: E731
     with ThreadPoolExecutor(jobs) as pool:
         for done in as_completed([pool.submit(run, seed) for seed in seeds]):
@@ -36,7 +36,7 @@ def many_lives(command: Sequence[str], seeds: range, *, jobs: int) -> Iterator[E
 
 
 def python(script: str) -> list[str]:
-    """Return how this interpreter runs a script."""
+    """Return the command that runs a script with this interpreter."""
     return [sys.executable, script]
 
 

@@ -1,7 +1,7 @@
-"""Packets of every kind, as anybody may send them, and what becomes of them on the way.
+"""Packets of every kind, as any sender may send them, and damaged ones.
 
-Made by stock pymavlink. ``broken`` ones have a wrong CRC, length or end; ``absurd`` ones are whole,
-with whatever number a field can hold.
+Built with stock pymavlink. ``broken`` packets have a wrong CRC, length or end; ``absurd`` ones are
+complete, with extreme field values.
 """
 
 import struct
@@ -31,26 +31,26 @@ ODD_BYTES = (b"\x00", b"\xff", b"\x7f", b"\x80", b"\x01")
 SYSTEMS = (1, 1, 1, 2, 0, 255, 250, 9)
 COMPONENTS = (1, 1, 191, 190, 0)
 
-#: gives a packet a signature; today nobody could know a right one
+#: adds a signature to a packet
 Sign = Callable[[bytes, Random], bytes]
 
 
 class Mutant(NamedTuple):
-    """Bytes to send, and in a word what was done to them."""
+    """Bytes to send, with the name of their mutation."""
 
     how: str
     data: bytes
 
 
 def badly_signed(packet: bytes, random: Random) -> bytes:
-    """Return a packet of MAVLink 2 with the flag, a good CRC and a signature of nobody's key."""
+    """Return a MAVLink 2 packet with the signed flag, a valid CRC and a random signature."""
     flagged = bytearray(packet)
     flagged[2] |= SIGNED
     return mended(bytes(flagged)) + random.randbytes(SIGNATURE)
 
 
 def mended(packet: bytes) -> bytes:
-    """Return a packet of MAVLink 2 with the CRC that its bytes ask for."""
+    """Return a MAVLink 2 packet with the correct CRC for its bytes."""
     end = HEADER + packet[1]
     extra = CRC_EXTRA[int.from_bytes(packet[7:10], "little")]
     crc = mcrf4xx(packet[1:end] + bytes((extra,)))
@@ -58,17 +58,17 @@ def mended(packet: bytes) -> bytes:
 
 
 class Mutants:
-    """An endless source of them; what comes is decided by ``random`` alone."""
+    """An endless source of mutants; only ``random`` decides."""
 
     def __init__(self, random: Random, *, sign: Sign = badly_signed) -> None:
         self._random = random
         self._sign = sign
-        self._sent: list[bytes] = []  # lately, to be sent again
+        self._sent: list[bytes] = []  # recent mutants, to be replayed
         self._kinds = list(common.mavlink_map.values())
         self._mav = common.MAVLink(None, 255, 190)
 
     def good(self) -> bytes:
-        """Return a packet as it should be."""
+        """Return a valid packet."""
         random = self._random
         self._mav.srcSystem = random.choice(SYSTEMS)
         self._mav.srcComponent = random.choice(COMPONENTS)
@@ -77,7 +77,7 @@ class Mutants:
         return packet
 
     def any(self) -> Mutant:
-        """Return a packet that something was done to; whole or not."""
+        """Return any mutant, broken or complete."""
         random = self._random
         if random.random() < 0.8:
             return self.broken()
@@ -88,7 +88,7 @@ class Mutants:
         return self.absurd()
 
     def broken(self) -> Mutant:
-        """Return one whose CRC, length or end is wrong; one of 65,536 is whole by chance."""
+        """Return one with a wrong CRC, length or end; 1 of 65,536 is valid by chance."""
         random, packet = self._random, bytearray(self.good())
         match random.randrange(7):
             case 0:
@@ -117,7 +117,7 @@ class Mutants:
                 return Mutant("noise", random.randbytes(random.randrange(1, 300)))
 
     def absurd(self) -> Mutant:
-        """Return a whole packet with fields that hold what no sender means."""
+        """Return a complete packet with absurd field values."""
         random, packet = self._random, bytearray(self.good())
         size = len(packet) - HEADER - 2
         for _ in range(random.randrange(1, 5)):
@@ -212,14 +212,14 @@ def _beat() -> Any:
 
 
 class _Raw:
-    """A message whose fields are bytes: what pymavlink cannot be given as numbers."""
+    """A message with raw bytes as payload, for values that pymavlink cannot pack from numbers."""
 
     def __init__(self, kind: Any, payload: bytes) -> None:
         self._kind = kind
         self._payload = payload
 
     def pack(self, mav: Any) -> bytes:
-        """Return its packet, as pymavlink's own messages do."""
+        """Return its packet, like pymavlink's own messages."""
         payload = self._payload.rstrip(b"\0") or self._payload[:1]
         number = self._kind.id
         head = struct.pack(

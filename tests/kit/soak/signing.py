@@ -1,4 +1,4 @@
-"""Packets signed well, badly and again; which of them count is found without the server's code."""
+"""Packets with good, bad and repeated signatures, checked without the server's code."""
 
 from functools import partial
 from hashlib import sha256
@@ -18,14 +18,14 @@ Stream = tuple[int, int, int]
 
 
 class Signatures:
-    """Makes signatures, and remembers what was heard last of each stream."""
+    """Creates signatures, and tracks the latest timestamp of each stream."""
 
     def __init__(self) -> None:
         self._time = int((UTC - EPOCH) * 1e5)
         self._latest: dict[Stream, int] = {}
 
     def sign(self, packet: bytes, random: Random) -> bytes:
-        """Return a packet signed well, late, or with nobody's key."""
+        """Return a packet with a good signature, a late one, or one of an unknown key."""
         chance = random.random()
         if chance < 0.3:
             return badly_signed(packet, random)
@@ -36,15 +36,15 @@ class Signatures:
         return told + sha256(KEY.secret + told).digest()[:6]
 
     def is_valid(self, link: str, data: bytes) -> bool:
-        """Whether these bytes of a link may change something.
+        """Return whether these bytes of a link may change anything.
 
-        On a stream what came before may be held back until now: there nothing is known to be old.
+        On a stream link, earlier bytes may be processed only now, so no timestamp counts as old.
         """
         if link not in (CLIENTS, CALLERS):
             return has_whole_packet(data)
         starts = [at for at, byte in enumerate(data) if byte == MAGIC_2]
         news = list(map(partial(self._is_news, data, is_stream=link == CALLERS), starts))
-        return any(news)  # each was to be remembered
+        return any(news)  # every one must update the timestamps
 
     def _is_news(self, data: bytes, start: int, *, is_stream: bool) -> bool:
         if start + HEADER > len(data) or not data[start + 2] & SIGNED:
@@ -61,6 +61,6 @@ class Signatures:
 
 
 def signed_only(seed: int) -> Battered:
-    """Return an engine that accepts signed packets only, and packets of all sorts for it."""
+    """Return an engine that accepts only signed packets, with a source of all kinds of packets."""
     signatures = Signatures()
     return Battered(seed, sign=signatures.sign, is_valid=signatures.is_valid, key=KEY)

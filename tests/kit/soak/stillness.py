@@ -1,4 +1,4 @@
-"""Whether a rover moves that nobody drives, judged by where it really is."""
+"""Checks that an undriven rover stands, by its true motion."""
 
 from collections.abc import Iterator
 from math import hypot
@@ -8,29 +8,29 @@ from rover_sim.vehicle import Vehicle
 from tests.kit.observer import Observer
 
 STANDS = 0.02  # m/s and rad/s
-BRAKING = 1.5  # s, from the highest speed that is driven here to a stand
-ROLLING = 2.5  # s, the same of one that is disarmed on the way: 0.5 m/s² from 1 m/s
-STOP_BOUND = 1.5  # s from when the server reads a STOP, where the rover hears it
-STOP_BOUND_UNHEARD = 3.0 + BRAKING  # s, where it does not: by its own time-out
-#: s that it must have moved: a mode of its own that is turned to and away from between two looks
+BRAKING = 1.5  # s, from the highest speed here to standstill
+ROLLING = 2.5  # s, if disarmed on the way: 0.5 m/s² from 1 m/s
+STOP_BOUND = 1.5  # s from the server's reading of a STOP, if the rover hears it
+STOP_BOUND_UNHEARD = 3.0 + BRAKING  # s, if it does not: by its own time-out
+#: s of motion until it counts: a mode may be entered and left between two checks
 FLASH = 0.1
-UNHEARD = 6.0  # s after something was wrong with the way to the rover
+UNHEARD = 6.0  # s after a fault on the way to the rover
 BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL})
 
 
 class Stillness:
-    """Watches one rover's true motion."""
+    """Checks one rover's true motion."""
 
     def __init__(self, vehicle: Vehicle, observer: Observer) -> None:
         self.vehicle = vehicle
         self.observer = observer
-        #: when the way from the server to the rover, or the rover itself, was last not as it should
+        #: time of the last fault of the rover, or of the way to it
         self.disturbed_at = -1e9
         self._by_itself_at = -1e9
         self._stood_at = -1e9
 
     def look(self, now: float) -> Iterator[str]:
-        """Yield what is wrong now."""
+        """Yield the present violations."""
         autopilot = self.vehicle.autopilot
         if autopilot.armed and autopilot.mode in BY_ITSELF:
             self._by_itself_at = now
@@ -50,5 +50,5 @@ class Stillness:
             yield f"rover {number} moves, {speed:.2f}, {now - observer.stopped_at:.2f} s after STOP"
 
     def _is_pushed(self, now: float) -> bool:
-        """Whether another station, past the server, has sent it somewhere."""
+        """Return whether another station has sent the rover somewhere, bypassing the server."""
         return self.observer.may_move_until > now + BRAKING + 3.0

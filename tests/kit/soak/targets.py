@@ -1,6 +1,6 @@
-"""What reads bytes or text from outside, each as a function that must not raise for any of them.
+"""Functions that read bytes or text from outside, as fuzz targets that must never raise.
 
-What it gives back is held against what must be true of it; of the decoder, against pymavlink's.
+Their results must satisfy invariants; the decoder's must match pymavlink's.
 """
 
 from collections.abc import Callable, Mapping
@@ -31,7 +31,7 @@ SENDERS = [Sender(name, Address(255, 190), Address(1, 1)) for name in ("alice", 
 
 
 def datagram(data: bytes) -> None:
-    """A datagram is cut into packets that are pieces of it, in order."""
+    """Split a datagram: its packets are pieces of it, in order."""
     packets = split_datagram(data)
     at = 0
     for packet in packets:
@@ -44,7 +44,7 @@ def datagram(data: bytes) -> None:
 
 
 def stream(data: bytes) -> None:
-    """However a stream is cut, the same packets come out, and every byte is accounted for."""
+    """Split a stream: any fragmentation gives the same packets, and every byte is accounted for."""
     cuts, rest = data[:4], data[4:]
     edges = [0, *sorted(cut * len(rest) // 255 for cut in cuts), len(rest)]
     whole, pieces = StreamSplitter(), StreamSplitter()
@@ -61,7 +61,7 @@ def stream(data: bytes) -> None:
 
 
 def decoder(data: bytes) -> None:
-    """A payload of any bytes is decoded as pymavlink does; the message is packed as it packs it."""
+    """Decode any payload like pymavlink, and pack the message like pymavlink."""
     kind = m.ALL[KINDS[int.from_bytes(data[:2], "little") % len(KINDS)]]
     payload = data[2 : 2 + 255]
     head = bytes([len(payload), 0, 0, 9, 1, 2]) + kind.id.to_bytes(3, "little")
@@ -80,7 +80,7 @@ def decoder(data: bytes) -> None:
 
 
 def mission_receiver(data: bytes) -> None:
-    """Uploads come only whole, of one sender each; whatever is said in whatever order."""
+    """Feed a receiver any sequence of messages: uploads are complete, and of one sender each."""
     receiver = MissionReceiver(check=_check, form=m.MissionRequest)
     now = 0.0
     for step, what in zip(data[::2], data[1::2], strict=False):
@@ -112,7 +112,7 @@ def mission_receiver(data: bytes) -> None:
 
 
 def config(data: bytes) -> None:
-    """Any file gives settings, or faults of one line each that say where they are."""
+    """Parse any file into settings, or into one-line faults that start with the file's name."""
     try:
         layer = layer_of(decoded(data, name="mine.toml"), name="mine.toml")
         merged([layer])
@@ -124,7 +124,7 @@ def config(data: bytes) -> None:
 
 
 def plan(data: bytes) -> None:
-    """Any file is a plan, which can be written and read again, or is refused in one line."""
+    """Parse any file into a plan that can be formatted, or refuse it in one line."""
     try:
         found = parse_plan_bytes(data)
     except PlanFileError as error:
@@ -134,7 +134,7 @@ def plan(data: bytes) -> None:
 
 
 def link_url(data: bytes) -> None:
-    """Any text is a link with a host, or is refused in one line."""
+    """Parse any text into a link with a host or device, or refuse it in one line."""
     text = data.decode("utf-8", "replace")
     try:
         found = parse_url(text)
@@ -161,5 +161,5 @@ def _check(kind: int, seq: int, item: Item, count: int) -> MavMissionResult | No
 
 
 def _fields(message: m.Message) -> tuple[str, str]:
-    """Kind and all fields; as text, where NaN is equal to NaN and 0 is not -0."""
+    """Return type and fields as text, in which NaN equals NaN and 0 differs from -0."""
     return message.get_type(), repr([getattr(message, name) for name in message.fieldnames])

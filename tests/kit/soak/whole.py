@@ -1,11 +1,11 @@
-"""Which bytes are packets, found without the server's own code: every place where one may begin."""
+"""Finds packets in bytes without the server's code, at every possible start."""
 
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink import messages
 
-#: of the dialect that comes with pymavlink, and of the messages that only ours has
+#: of pymavlink's own dialect, and of messages that only ours has
 CRC_EXTRA = {
     **{number: kind.crc_extra for number, kind in messages.ALL.items()},
     **{number: kind.crc_extra for number, kind in common.mavlink_map.items()},
@@ -15,14 +15,14 @@ LONGEST = 280  # bytes
 
 
 def has_whole_packet(data: bytes) -> bool:
-    """Whether a packet of a known id with a good CRC is anywhere in these bytes."""
+    """Return whether the bytes contain a packet with a known id and a valid CRC."""
     return any(
         _is_whole(data, start) for start, byte in enumerate(data) if byte in (MAGIC_1, MAGIC_2)
     )
 
 
 def has_unknown_packet(data: bytes) -> bool:
-    """Whether a packet of an unknown id may be anywhere in it: nobody can verify that."""
+    """Return whether the bytes may contain a packet with an unknown id (unverifiable)."""
     return any(
         _id_at(data, start) not in (None, *CRC_EXTRA)
         for start, byte in enumerate(data)

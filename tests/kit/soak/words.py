@@ -1,7 +1,7 @@
-"""What clients say, by what it does to a rover, and when each word was said first.
+"""Clients' requests, classified by their effect on a rover, with the time of their first sending.
 
-A word that is repeated by its sender, or that the net delivers once more, stays the word that it
-was: it counts from when it was first sent.
+A request that its sender repeats, or that the net delivers again, is the same request: its first
+sending counts.
 """
 
 from collections import deque
@@ -33,12 +33,12 @@ MOTION = {
     "SET_POSITION_TARGET_LOCAL_NED": "setpoint",
     "SET_POSITION_TARGET_GLOBAL_INT": "setpoint",
 }
-REMEMBERED = 4_000  # words; of each some dozens of bytes
-RECENT = 400  # that may be delivered once more
+REMEMBERED = 4_000  # requests, some dozens of bytes each
+RECENT = 400  # requests that may be delivered again
 
 
 class Kind(Enum):
-    """What a word does to a rover."""
+    """The effect of a request on a rover."""
 
     HALT = auto()
     GO = auto()
@@ -47,7 +47,7 @@ class Kind(Enum):
     OTHER = auto()
 
 
-#: commands that mean the same whatever their parameters are
+#: commands whose meaning does not depend on parameters
 PLAIN = {
     STOP: (Kind.HALT, "STOP"),
     CANCEL: (Kind.HALT, "cancel"),
@@ -61,22 +61,22 @@ PLAIN = {
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A packet of a client as it reaches the server."""
+    """A client's packet that reaches the server."""
 
     kind: Kind
     name: str
-    command: int  # 0: it is no command, and nobody answers
-    system_id: int  # for whom; 0: for everybody
+    command: int  # 0: not a command, not answered
+    system_id: int  # target; 0: broadcast
     param1: float
     peer: str
     first_sent: float
-    order: int  # of all that its sender has said first, in its own order
-    is_copy: bool  # delivered once more, by the net or by a repetition of its sender
+    order: int  # rank among first sendings
+    is_copy: bool  # a repetition by the net or by its sender
 
 
 @dataclass(frozen=True, slots=True)
 class First:
-    """When something was said first, and as which of all that was said."""
+    """Time and rank of a first sending."""
 
     at: float
     order: int
@@ -84,7 +84,7 @@ class First:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What a client has sent, to be sent once more."""
+    """A client's sent request, which can be sent again."""
 
     client: FakeClient
     message: Message
@@ -95,13 +95,13 @@ class Said:
 
 
 class WordLog:
-    """When each packet was first sent, of all clients."""
+    """Records the first sending of each packet, for all clients."""
 
     def __init__(self, ways: Ways) -> None:
         self._ways = ways
         self._decoder = common.MAVLink(None)
         self._first: dict[tuple[str, bytes], First] = {}
-        self._of_message: dict[int, tuple[Message, First]] = {}  # kept, so that no id comes back
+        self._of_message: dict[int, tuple[Message, First]] = {}  # so that no id() is reused
         self._order = 0
         self._arrived: dict[tuple[str, bytes], None] = {}
         self.recent: deque[Said] = deque(maxlen=RECENT)
@@ -110,9 +110,9 @@ class WordLog:
         return f"WordLog({len(self._first)} words)"
 
     def said(self, client: FakeClient, message: Message, data: bytes, *, now: float) -> None:
-        """Note what a client sends by itself; the same message again is a repetition.
+        """Record a client's sending; the same message object again is a repetition.
 
-        Not so of a stream of setpoints or sticks: each of them is said anew.
+        Setpoints and stick messages of a stream are each new.
         """
         self._order += 1
         new = First(now, self._order)
@@ -122,20 +122,20 @@ class WordLog:
         else:
             _, first = self._of_message.setdefault(id(message), (message, new))
         self.note(client, data, first=first)
-        self._arrived.pop((client.name, data), None)  # its numbers have begun anew
+        self._arrived.pop((client.name, data), None)  # its sequence numbers have wrapped
         if kind is not Kind.OTHER and name != "upload":
             self.recent.append(Said(client, message, data, first, kind, name))
         while len(self._of_message) > REMEMBERED:
             del self._of_message[next(iter(self._of_message))]
 
     def note(self, client: FakeClient, data: bytes, *, first: First) -> None:
-        """Note a packet whose word was first sent then."""
+        """Record a packet with the first sending of its request."""
         self._first[client.name, data] = first
         while len(self._first) > REMEMBERED:
             del self._first[next(iter(self._first))]
 
     def word(self, peer: str, data: bytes) -> Word | None:
-        """Return what reaches the server; None if it is no word of a known client."""
+        """Return the request in a packet at the server; None if it is none of a known client."""
         first = self._first.get((peer, data))
         if first is None:
             return None

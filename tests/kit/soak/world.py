@@ -1,4 +1,4 @@
-"""A world that lives long: links go down, servers end and come back, rules hold at each step."""
+"""A long-lived world: links go down, servers end and restart, rules hold at each step."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -36,10 +36,10 @@ from tests.kit.soak.words import Said, WordLog
 from tests.kit.world import MODE_COMMAND, World
 
 UTC = 1.8e9  # s, when the worlds begin
-GRAIN = 0.01  # s; what is due within it is done together, as by a machine with other things to do
-CONTROL_STEP = 0.025  # s, between two looks at where the rovers are
-FORGET = 5.0  # s, after which nobody looks back at what clients heard
-LOOK_THROUGH = 20.0  # s, between two walks through all that the server remembers
+GRAIN = 0.01  # s; events within it are handled together, as on a busy machine
+CONTROL_STEP = 0.025  # s, between two checks of the rovers' true motion
+FORGET = 5.0  # s, after which received packets are discarded
+LOOK_THROUGH = 20.0  # s, between two size checks of the server's memory
 TASK_COMMANDS = (MOVE, ROTATE, DRIVE)
 COMMAND_OF_ACK = slice(10, 12)  # of a whole COMMAND_ACK packet
 RESULT_OF_ACK = 12
@@ -47,12 +47,12 @@ COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG
 SET_MODE_MESSAGE = 11
 COMMANDS = (75, 76)  # COMMAND_INT, COMMAND_LONG
 SERVER = 250  # system
-ENDS_WITHIN = 2.0  # s, of a server that is ended in order
-MEANWHILE = (0.1, 0.5, 2.0)  # s, between two deeds of clients while the server stands still
+ENDS_WITHIN = 2.0  # s, for an orderly end of the server
+MEANWHILE = (0.1, 0.5, 2.0)  # s, between two actions of clients while the server is stopped
 
 
 class Violation(AssertionError):
-    """A rule was broken; the text says which, when, and of what seed."""
+    """A rule was broken; the text has rule, time and seed."""
 
 
 class SoakWorld(World):
@@ -82,7 +82,7 @@ class SoakWorld(World):
         self.clients: list[FakeClient] = [self.client]
         self.faults: Counter[str] = Counter()
         self.packets = 0
-        self.digest = 0  # of every packet that was sent, in order
+        self.digest = 0  # of all sent packets, in order
         self.restarts = 0
         self._down_until: dict[str, float] = {}
         self._stillness = [
@@ -96,10 +96,10 @@ class SoakWorld(World):
         ]
         self.deeds: Counter[str] = Counter()  # of attackers, by name
         self.broken: list[Broken] = []
-        self._luck = Random(seed)  # of what happens while the server stands still
-        self._held: tuple[str, bytes | None] | None = None  # whose word is to be overtaken
+        self._luck = Random(seed)  # for actions while the server is stopped
+        self._held: tuple[str, bytes | None] | None = None  # to be overtaken
         self._followed = 0  # events of the present server
-        self._read: dict[str, int] = {}  # packets of each client
+        self._read: dict[str, int] = {}  # number of events of the present server
         self._look_at = self._compare_at = self._forget_at = self._walk_at = 0.0
         for observer in self.observers:
             observer.expects_gaps = observer.batches = observer.expects_late_modes = True
@@ -110,20 +110,20 @@ class SoakWorld(World):
         self.watch(self._judge)
 
     def next_due(self) -> float | None:
-        """Return when the next thing is due, in whole grains."""
+        """Return the time of the next event, in whole grains."""
         due = super().next_due()
         return None if due is None else max(due, ceil(due / GRAIN - 1e-6) * GRAIN)
 
-    # what breaks
+    # faults
 
     def link_down(self, number: int, seconds: float) -> None:
-        """Let nothing pass between the server and a rover for so long."""
+        """Take the link between the server and a rover down for ``seconds``."""
         self.faults["link down"] += 1
         self._down_until[f"rover{number}"] = self.now + seconds
         self.disturb(number, seconds)
 
     def disturb(self, number: int, seconds: float = 0.0) -> None:
-        """Note that a rover may not hear the server until so many seconds from now."""
+        """Note that a rover may not hear the server for ``seconds`` from now."""
         for still in self._stillness:
             if number in (0, still.observer.system_id):
                 still.disturbed_at = max(still.disturbed_at, self.now + seconds)
@@ -132,19 +132,19 @@ class SoakWorld(World):
                 halts.disturb(self.now + seconds)
 
     def step_wall_clock(self, seconds: float) -> None:
-        """Let the clock on the wall of the server's machine jump."""
+        """Make the wall clock of the server's machine jump."""
         self.faults["wall clock jumps"] += 1
         self.disk.wall_offset += seconds
         self.server.pump.handle(WallClock(self.disk.wall_offset), now=self.now)
         self.server.pump.turn(now=self.now)
 
     def restart(self, *, away: float) -> None:
-        """Let the server be killed, and another go on with what the disk has."""
+        """Kill the server, and start another on the disk's contents."""
         self.faults["server killed"] += 1
         self._restart(away=away)
 
     def restart_in_order(self, *, away: float) -> None:
-        """Let the server be ended by SIGTERM, and another go on with what the disk has."""
+        """End the server by SIGTERM, and start another on the disk's contents."""
         self.faults["server ended"] += 1
         server = self.server
         server.shut_down(now=self.now)
@@ -152,7 +152,7 @@ class SoakWorld(World):
         self._restart(away=away)
 
     def freeze(self, seconds: float, meanwhile: Callable[[], object]) -> None:
-        """Let the server's process stand still, and clients go on: what they say waits for it."""
+        """Stop the server's process while clients continue; their packets wait for it."""
         end = self.now + seconds
         self.leave(self.server)
         self.watched.is_server_away = True
@@ -163,21 +163,21 @@ class SoakWorld(World):
         self.join(self.server)
 
     def suspend_machine(self, seconds: float, meanwhile: Callable[[], object]) -> None:
-        """Let the server's machine be suspended: its clock goes on (CLOCK_BOOTTIME)."""
+        """Suspend the server's machine; its clock continues (CLOCK_BOOTTIME)."""
         self.freeze(seconds, meanwhile)
 
     def swap_next_two(self, client: FakeClient) -> None:
-        """Let the packet after the next one of a client overtake that."""
+        """Let a client's packet after the next one overtake the next one."""
         self._held = client.name, None
 
     def repeat(self, said: Said, message: Message) -> None:
-        """Let a client send a word once more, as a library does that had no answer."""
+        """Send a client's request again, like a library without an answer."""
         data = said.client.send_repeated(message)
         self.words.note(said.client, data, first=said.first)
         self.net.send(said.client.name, said.client.server, data)
 
     def person_turns(self, number: int, mode: Mode) -> None:
-        """Let a person turn the mode switch at a rover; what changes nothing nobody can see."""
+        """Let a person turn the mode switch at a rover; report it only if the mode changes."""
         autopilot = self.rovers[number - 1].autopilot
         was_mode = autopilot.mode
         autopilot.operator_mode(mode, now=self.now)
@@ -187,7 +187,7 @@ class SoakWorld(World):
         self.halts[number - 1].person("HOLD at the rover", drives=drives, now=self.now)
 
     def person_arms(self, number: int, *, armed: bool) -> None:
-        """Let a person arm or disarm a rover; what changes nothing nobody can see."""
+        """Let a person arm or disarm a rover; report it only if the arming changes."""
         autopilot = self.rovers[number - 1].autopilot
         was_armed = autopilot.armed
         autopilot.operator_arm(armed, now=self.now)
@@ -213,13 +213,13 @@ class SoakWorld(World):
         for observer in self.observers:
             paused = restored.paused.get(observer.system_id)
             observer.stopped = paused is TaskReason.STOPPED
-            # of a takeover that did not reach the disk the next server knows nothing
+            # the next server does not know of a takeover that did not reach the disk
             observer.taken_over &= paused is TaskReason.TAKEOVER
 
-    # who takes part
+    # participants
 
     def add_soaked_client(self, name: str, *, system_id: int) -> FakeClient:
-        """Let a client take part whose acks count."""
+        """Add a client whose acks are checked."""
         client = self.add_client(name, system_id=system_id)
         self._listen_to(client)
         self.clients.append(client)
@@ -228,7 +228,7 @@ class SoakWorld(World):
     # rules
 
     def judge_all(self) -> None:
-        """Judge everything now, also what is looked at now and then only."""
+        """Judge everything now, including the periodic checks."""
         self._look_at = self._compare_at = self._walk_at = -inf
         self._judge(self.now)
 
@@ -254,7 +254,7 @@ class SoakWorld(World):
             self._forget()
 
     def _follow(self) -> None:
-        """Take what the server has written down and what clients have heard since the last step."""
+        """Check the server's events and clients' received packets since the last step."""
         events = self.disk_store.events
         if self._followed < len(events):
             self._raise(self.ledger.follow(events[self._followed :]))
@@ -294,7 +294,7 @@ class SoakWorld(World):
         rover = target if source == VEHICLE_LINK else source
         return self._down_until.get(rover, -inf) > self.now
 
-    # for the rule of halts
+    # for the halt rule
 
     def _listen_to(self, client: FakeClient) -> None:
         client.on_sent = lambda message, data: self.words.said(client, message, data, now=self.now)
@@ -338,7 +338,7 @@ class SoakWorld(World):
                         halts.began_task()
 
     def _is_overtaken(self, source: str, data: bytes) -> bool:
-        """Hold a packet back until the next one of its sender is under way."""
+        """Hold a packet back until its sender's next one; return True: the net drops it."""
         assert self._held is not None
         _, first = self._held
         if first is None:

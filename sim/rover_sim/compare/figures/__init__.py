@@ -26,5 +26,5 @@ PARTS = (
 
 
 def figures_of(trace: Trace) -> list[Figure]:
-    """Return every figure of the trace; a manoeuvre that was not driven gives none."""
+    """Return every figure of the trace, except for manoeuvres that were not driven."""
     return [figure for part in PARTS for figure in part(trace)]

@@ -1,4 +1,4 @@
-"""Steps of speed: how it speeds up, how fast it then drives, how it stops."""
+"""Steps of speed: acceleration, steady speed, stop."""
 
 import math
 import statistics
@@ -21,12 +21,12 @@ from rover_sim.compare.figures.motion import rest_of
 from rover_sim.compare.manoeuvres import SPEED_STEPS, THEN_ZEROS
 from rover_sim.compare.trace import Trace, TruePose, path_length
 
-STEADY_FROM = 0.6  # of the step's time: overshoot is over by then
+STEADY_FROM = 0.6  # of the step's time: the overshoot is over
 CREEPING = 0.2  # m/s and below
 
 
 def figures(trace: Trace) -> list[Figure]:
-    """Return the figures of every step of speed that was driven."""
+    """Return the figures of every step of speed in the trace."""
     return [figure for step in SPEED_STEPS for figure in _step(trace, step)]
 
 
@@ -54,7 +54,7 @@ def _step(trace: Trace, step: Step) -> list[Figure]:
 
 
 def _along_course(poses: Sequence[TruePose]) -> list[TruePose]:
-    """Return the poses with the speed along the first heading: PX4 is asked for a velocity."""
+    """Return the poses with the speed along the first heading: PX4 follows a velocity vector."""
     first = poses[0].yaw
     return [replace(pose, speed=pose.speed * math.cos(pose.yaw - first)) for pose in poses]
 

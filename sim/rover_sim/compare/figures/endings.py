@@ -1,4 +1,4 @@
-"""Ways to end a drive at 1 m/s: HOLD, no more set-points, disarming."""
+"""Ways to end a drive at 1 m/s: HOLD, end of the setpoints, disarming."""
 
 import re
 
@@ -18,7 +18,7 @@ from rover_sim.compare.trace import Span, Trace
 
 NUMBERS = re.compile(r"\d+")
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-HEARTBEAT_PERIOD = 1.0  # s: the mode at the start is in the last HEARTBEAT before it
+HEARTBEAT_PERIOD = 1.0  # s: the last HEARTBEAT before the start has the first mode
 ARDUPILOT_MODES = {0: "MANUAL", 4: "HOLD", 11: "RTL", 15: "GUIDED", 16: "INITIALISING"}
 PX4_MODES = {(4, 3): "HOLD", (4, 5): "RTL", (4, 6): "LAND", (6, 0): "OFFBOARD"}
 
@@ -60,7 +60,7 @@ def _last_setpoint(trace: Trace, span: Span) -> float:
 
 
 def _modes(trace: Trace, span: Span) -> list[tuple[str, float]]:
-    """Return the modes that HEARTBEAT told, and how long after the start it first did."""
+    """Return the modes in HEARTBEAT, with the seconds from the start to the first of each."""
     early = Span(span.begin - 1.5 * HEARTBEAT_PERIOD, span.end)
     changes: list[tuple[str, float]] = []
     for each in trace.messages("HEARTBEAT", early):

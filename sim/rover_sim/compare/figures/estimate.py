@@ -1,4 +1,4 @@
-"""The reported motion against the true one, over all manoeuvres."""
+"""Reported motion against true motion, over all manoeuvres."""
 
 import itertools
 import math
@@ -18,7 +18,7 @@ from rover_sim.compare.figure import (
 from rover_sim.compare.manoeuvres import STANDING_ARMED, THEN_ZEROS
 from rover_sim.compare.trace import Span, Trace, TruePose
 
-EVERY = 3  # of the reported samples, as they come much faster than anything changes
+EVERY = 3  # of the reported samples, which come faster than anything changes
 TRULY_STANDS = 0.005  # m/s
 SET_MODE, ARM = 176, 400  # MAV_CMD
 
@@ -63,7 +63,7 @@ def _at_rest(trace: Trace) -> list[float]:
 
 
 def _course(poses: Sequence[TruePose], value: Callable[[TruePose], float]) -> Truth:
-    """Return the value as a function of time, straight between two poses."""
+    """Return the value as a function of time, linear between two poses."""
     times, values = [pose.time for pose in poses], [value(pose) for pose in poses]
 
     def at(time: float) -> float | None:
@@ -104,7 +104,7 @@ def _add_yaw(group: Group, trace: Trace, span: Span, poses: Sequence[TruePose]) 
 
 
 def _add_position(group: Group, trace: Trace, span: Span, poses: Sequence[TruePose]) -> None:
-    """Add how far the position has strayed from where the drive began."""
+    """Add the position's drift since the start of the drive."""
     north, east = _course(poses, lambda pose: pose.north), _course(poses, lambda pose: pose.east)
     off = []
     for each in trace.messages("LOCAL_POSITION_NED", span)[::EVERY]:

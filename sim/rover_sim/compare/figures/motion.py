@@ -1,4 +1,4 @@
-"""What several figures ask of true poses: when it stands, how far it drove until then."""
+"""Helpers for true poses: the time and the distance until the rover stands."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,18 +6,18 @@ from typing import NamedTuple
 from rover_sim.compare.trace import TruePose, path_length
 
 STANDS = 0.03  # m/s, true speed
-STANDS_FOR = 0.4  # s that it must last, or up to the end of what is looked at
+STANDS_FOR = 0.4  # s of standing, or up to the end of the poses
 
 
 class Rest(NamedTuple):
-    """When it stood, and how far it had come by then."""
+    """Time and distance to standstill."""
 
     after: float  # s
     way: float  # m
 
 
 def rest_of(poses: Sequence[TruePose], start: float) -> Rest | None:
-    """Return when it first stood for good, counted from ``start``; None: not at all."""
+    """Return when the rover first stood for ``STANDS_FOR``, counted from ``start``, or None."""
     since = None  # index of the first pose of the present standing
     for i, pose in enumerate(poses):
         if abs(pose.speed) >= STANDS:

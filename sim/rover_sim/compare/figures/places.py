@@ -1,4 +1,4 @@
-"""The origin and home: how often they are something else, and when home moves."""
+"""Origin and home: how often they change, and when home moves."""
 
 import itertools
 import math
@@ -10,8 +10,8 @@ from rover_sim.compare.manoeuvres import DISARM, DISARMED_AGAIN, DRIVEN, READYIN
 from rover_sim.compare.trace import Heard, Span, Trace
 
 EARTH_RADIUS = 6378137.0  # m, WGS 84
-ARMS_WITHIN = 2.4  # s, as long as arming and taking control takes
-MOVED = 0.3  # m; less is the estimate's wander
+ARMS_WITHIN = 2.4  # s, the duration of arming and taking control
+MOVED = 0.3  # m; less is the estimate's noise
 
 Place = tuple[float, float]  # latitude and longitude, 1e-7 degrees
 
@@ -52,7 +52,7 @@ def _leaps(places: Sequence[Place], heights: Sequence[float]) -> list[float]:
 
 
 def _add_moves(group: Group, trace: Trace) -> None:
-    """Add in which situations home follows the rover, and how often."""
+    """Add the situations in which home follows the rover."""
     rows = trace.messages("HOME_POSITION")
     rolling = _moves_within(rows, trace, DISARM)
     group.add("home's moves when disarmed at 1 m/s", rolling, COUNT)
@@ -73,7 +73,7 @@ def _moves_within(rows: Sequence[Heard], trace: Trace, mark: str) -> int:
 
 
 def _moves(rows: Sequence[Heard], span: Span) -> int:
-    """Return how often home moved, the last value before the span included."""
+    """Return how often home moved, including a move from the last value before the span."""
     before = [each for each in rows if each.time < span.begin][-1:]
     within = [each for each in rows if span.begin <= each.time <= span.end]
     places = [_place(each.message) for each in (*before, *within)]

@@ -22,12 +22,12 @@ from rover_sim.compare.figure import (
 from rover_sim.compare.manoeuvres import READYING, STANDING_ARMED, STANDING_DISARMED
 from rover_sim.compare.trace import Heard, Span, Trace, TruePose
 
-LOOKED_AT = 20.0  # s, the last of it
+LOOKED_AT = 20.0  # s, the last part of it
 STANDS = 0.03  # m/s
 
 
 def figures(trace: Trace) -> list[Figure]:
-    """Return the figures of both times that it stands."""
+    """Return the figures of both times at rest."""
     return [
         *_standing(trace, STANDING_DISARMED, "Standing disarmed"),
         *_standing(trace, STANDING_ARMED, "Standing armed"),
@@ -60,7 +60,7 @@ def _standing(trace: Trace, mark: str, title: str) -> list[Figure]:
 
 
 def _alike(rows: Sequence[Heard], lag: float) -> float | None:
-    """Return the autocorrelation of the reported velocity's north part; None: it is constant."""
+    """Return the autocorrelation of the north velocity, or None if it is constant."""
     values = [each.message.vx for each in rows]
     mean, variance = statistics.fmean(values), statistics.pvariance(values)
     if variance == 0.0:

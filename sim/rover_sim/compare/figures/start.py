@@ -1,4 +1,4 @@
-"""From the first message to the first arming."""
+"""Figures from the first message to the first arming."""
 
 import itertools
 import math
@@ -46,7 +46,7 @@ def figures(trace: Trace) -> list[Figure]:
 
 
 def _first(trace: Trace, name: str, wanted: Callable[[Any], object] | None = None) -> float | None:
-    """Return when the first such message came, counted from the first of all."""
+    """Return the seconds from the first of all messages to the first matching one, or None."""
     for each in trace.messages(name):
         if wanted is None or wanted(each.message):
             return each.time - trace.first_heard
@@ -59,7 +59,7 @@ def _before_armed(trace: Trace) -> Span:
 
 
 def answer_to(trace: Trace, request: Heard) -> Heard | None:
-    """Return the acknowledgement of a command, within 2 s."""
+    """Return the COMMAND_ACK of a command within 2 s, or None."""
     within = Span(request.time, request.time + 2.0)
     answers = trace.messages("COMMAND_ACK", within)
     return next((a for a in answers if a.message.command == request.message.command), None)
@@ -95,7 +95,7 @@ def _guided(trace: Trace) -> float | None:
 
 
 def _guided_lost(trace: Trace) -> str | None:
-    """Say whether a mode that was accepted in the first seconds was MANUAL soon after."""
+    """Return "yes" if the rover was in MANUAL 1 to 6 s after its first message, else "no"."""
     within = Span(trace.first_heard + 1.0, trace.first_heard + 6.0)
     modes = {int(each.message.custom_mode) for each in trace.messages("HEARTBEAT", within)}
     return "yes" if 0 in modes else "no"

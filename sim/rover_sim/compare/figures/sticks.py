@@ -1,4 +1,4 @@
-"""The throttle stick while a program drives."""
+"""The throttle stick during offboard control."""
 
 import statistics
 
@@ -6,7 +6,7 @@ from rover_sim.compare.figure import COUNT, SPEED, Figure, Group
 from rover_sim.compare.manoeuvres import FREE, PUSHED, RELEASED, STICK_SPEEDS
 from rover_sim.compare.trace import Span, Trace
 
-LOOKED_AT = 1.0  # s, the last of each phase
+LOOKED_AT = 1.0  # s, the end of each phase
 
 
 def figures(trace: Trace) -> list[Figure]:

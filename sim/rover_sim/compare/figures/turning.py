@@ -1,4 +1,4 @@
-"""Turns: on the spot, towards a velocity aside, and along a bend."""
+"""Turns: on the spot, towards a sideways velocity, and along a curve."""
 
 import math
 import statistics
@@ -20,7 +20,7 @@ from rover_sim.compare.trace import Span, Trace, TruePose, path_length
 
 
 def figures(trace: Trace) -> list[Figure]:
-    """Return the figures of every turn that was driven."""
+    """Return the figures of every turn in the trace."""
     steps = (*SPOT_TURNS, *SIDEWAYS, BEND)
     return [figure for step in steps for figure in _turn(trace, step)]
 
