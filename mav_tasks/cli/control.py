@@ -82,7 +82,7 @@ async def modify(
         bool | None, typer.Option("--preemptive/--no-preemptive", help="It may interrupt others.")
     ] = None,
     label: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="A name for it: 24 letters; '': none.")
+        str | None, typer.Option(metavar="TEXT", help="A name for it: 24 bytes; '': none.")
     ] = None,
 ) -> None:
     """Change a task that has not ended.

@@ -83,7 +83,7 @@ class TaskOptions:
         int,
         typer.Option(metavar="NUMBER", help="The task's own mark, for a second try; 0: random."),
     ] = 0
-    label: Annotated[str, typer.Option(metavar="TEXT", help="A name for it: 24 letters.")] = ""
+    label: Annotated[str, typer.Option(metavar="TEXT", help="A name for it: 24 bytes.")] = ""
     wait: Wait = False
 
 

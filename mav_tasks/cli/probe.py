@@ -69,8 +69,8 @@ Keys = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 QUESTION = """\
-The rover will be armed and driven, at up to {speed:g} m/s, within a box of 2 m about its place,
-of 8 m or more if its parameters say that it steers as a car.
+The rover will be armed and driven, at up to {speed:g} m/s, within a square of 2 m around it,
+or of 8 m and more if its parameters say that it steers like a car.
 Is there room, is nobody near it, and can you stop it by hand? If this program is killed, only the
 rover's own time-out stops it. Type "yes" to drive: """
 SIGNALLED = 128  # as a shell reports a signal

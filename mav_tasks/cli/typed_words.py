@@ -28,10 +28,10 @@ class Typed(NamedTuple):
 TYPED = {
     "distance": Typed("METRES", "m", "driving.max_distance"),
     "speed": Typed("--speed", "m/s", "driving.max_speed"),
-    "angle": Typed("DEGREES", "deg", "driving.max_turn"),
-    "rate": Typed("--rate", "deg/s", "driving.max_turn_rate"),
+    "angle": Typed("DEGREES", "deg", "driving.max_turn_deg"),
+    "rate": Typed("--rate", "deg/s", "driving.max_turn_rate_deg"),
     "forward speed": Typed("M/S", "m/s", "driving.max_speed"),
-    "yaw rate": Typed("DEG/S", "deg/s", "driving.max_turn_rate"),
+    "yaw rate": Typed("DEG/S", "deg/s", "driving.max_turn_rate_deg"),
     "duration": Typed("DURATION", "s", "driving.max_duration"),
     "hold": Typed("DURATION", "s"),
     "acceptance radius": Typed("--radius", "m"),

@@ -28,7 +28,7 @@ class DriveEnded(Exception):
 
 
 class DriveController:
-    """Our hold on the rover, in a area about the place where it stands now."""
+    """Our hold on the rover, in an area about the place where it stands now."""
 
     def __init__(
         self, talk: Conversation, persona: Persona, drive: Drive, area: DrivingArea

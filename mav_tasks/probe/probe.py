@@ -177,7 +177,7 @@ class Probe:
         area = DrivingArea.about(motion.pose, turning=found.turning, radius=found.turning_radius)
         controller = DriveController(talk, persona, drive, area)
         with_loss = self._may_try_loss(drive)
-        self.stage = f"driving in a area of {2 * area.half:g} m: keep clear; Ctrl-C stops it"
+        self.stage = f"driving in an area of {2 * area.half:g} m: keep clear; Ctrl-C stops it"
         try:
             yield from controller.take()
             trials = Trials(

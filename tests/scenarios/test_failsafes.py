@@ -66,6 +66,23 @@ class TestOwnFence:
         )
         assert any("is outside its own fence" in text for text in world.client.texts())
 
+    def test_a_task_that_comes_while_it_is_outside_waits_and_says_why(
+        self, make_world: MakeWorld
+    ) -> None:
+        world = make_world(persona=ARDUPILOT)
+        world.fault(OUTSIDE)
+        world.run(3)
+        world.client.move(2)
+        world.run(3)
+        world.client.request_status(1)
+        world.run(0.1)
+        status = world.client.statuses(1)[-1]
+        assert (status.state, status.reason) == (S.QUEUED, R.OUTSIDE_OWN_FENCE)
+        words = "Task 1 waits: outside its own fence; drive it back by hand"
+        assert words in world.client.texts()
+        world.fault(Faults())
+        world.until_state(1, S.COMPLETED, within=40)
+
     def test_back_inside_the_task_is_driven_to_its_end(self, outside: World) -> None:
         world = outside
         world.run(3)

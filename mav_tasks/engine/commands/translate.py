@@ -64,6 +64,7 @@ WAITS_FOR = {
     R.NO_POSITION: "no position",
     R.DISARMED: "disarmed; arm, or continue",
     R.NOT_READY: "the rover is not ready to arm",
+    R.OUTSIDE_OWN_FENCE: "outside its own fence; drive it back by hand",
     R.LOSS_FAILSAFE: f"it would not stand without us; {SET_FAILSAFE}",
 }
 
@@ -223,7 +224,7 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
             return event.vehicle, _severity(event.reason), text
         case TaskWaits(task_id=task_id, reason=reason):
             words = f": {event.words}" if event.words else ""
-            text = f"Task {task_id} waits: {WAITS_FOR[reason]}{words}"
+            text = f"Task {task_id} waits: {WAITS_FOR.get(reason) or words_of(reason)}{words}"
             return event.vehicle, _severity(reason), text
         case QueuePaused(reason=TaskReason.STOPPED):
             return event.vehicle, MavSeverity.WARNING, "STOP: nothing runs until continued"

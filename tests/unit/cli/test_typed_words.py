@@ -2,11 +2,12 @@
 
 import pytest
 
-from mav_tasks.cli.typed_words import in_typed_words, typed_words
+from mav_tasks.cli.typed_words import TYPED, in_typed_words, typed_words
 from mav_tasks.errors import Refused
+from mav_tasks.setting_keys.table import KEYS
 
 SPEED, DISTANCE = "driving.max_speed", "driving.max_distance"
-RATE = "driving.max_turn_rate"
+RATE = "driving.max_turn_rate_deg"
 
 
 @pytest.mark.parametrize(
@@ -29,6 +30,10 @@ RATE = "driving.max_turn_rate"
 )
 def test_a_number_out_of_range(refusal: str, said: str | None) -> None:
     assert typed_words(refusal) == said
+
+
+def test_each_setting_that_is_named_is_one() -> None:
+    assert {typed.setting for typed in TYPED.values() if typed.setting} <= KEYS.keys()
 
 
 def test_the_reason_stays() -> None:

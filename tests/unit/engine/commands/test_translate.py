@@ -8,7 +8,9 @@ from mav_tasks.engine.commands import translate
 from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.messages import CommandLong
 from mav_tasks.services.command_receiver import Command, command_of
+from mav_tasks.tasks.events import TaskWaits
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
 
@@ -16,6 +18,13 @@ R = TaskReason
 def command(number: int, *params: float) -> Command:
     filled = (*params, *(0.0,) * (6 - len(params)), 5.0)[:7]
     return command_of(CommandLong(1, 191, number, 0, *filled))
+
+
+@pytest.mark.parametrize("reason", [r for r in TaskReason if 0 < r < 30])
+def test_every_reason_to_wait_has_words_for_people(reason: TaskReason) -> None:
+    told = translate.text_of(TaskWaits(TaskId(3), 1, reason, at=1.0))
+    assert told is not None
+    assert told[2].removeprefix("Task 3 waits: ")
 
 
 @pytest.mark.parametrize("reason", [r for r in TaskReason if r >= 100])
