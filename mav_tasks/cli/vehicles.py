@@ -16,6 +16,8 @@ async def vehicles(common: Common) -> None:
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     async with opened(common) as client:
+        if not common.json:  # the slow import of Rich, while the first telemetry is on its way
+            from mav_tasks.cli.tables import vehicle_table  # noqa: PLC0415
         for _ in range(LOOKS):
             heard = [each for each in client.vehicles() if each.is_heard]
             if all(each.north is not None and each.yaw is not None for each in heard):
@@ -26,6 +28,4 @@ async def vehicles(common: Common) -> None:
         for each in found:
             output.say_json(words.vehicle_json(each))
         return
-    from mav_tasks.cli.tables import vehicle_table  # noqa: PLC0415
-
     output.show(vehicle_table(found, width=output.console().width))

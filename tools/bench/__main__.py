@@ -13,6 +13,7 @@ from dataclasses import asdict
 
 from . import (
     against,
+    calls,
     commands,
     floods,
     forwarding,
@@ -38,6 +39,7 @@ MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "forwarding": forwarding.measure,
     "simulation": simulation.measure,
     "start": start.measure,
+    "calls": calls.measure,
     "uploads": uploads.measure,
 }
 PROFILED: dict[str, Callable[[str], list[Row]]] = {
