@@ -178,7 +178,8 @@ class LossFailsafe:
     def _missing(self) -> list[str]:
         """What is not known yet; what few firmwares have is asked for only where it matters."""
         names = [AFTER, ACTION, NO_STICKS, NO_STATION]
-        if OF_ABSENCE.get(int(self._values.get(NO_STATION, 0.0))) not in (None, *STANDS):
+        without_station = OF_ABSENCE.get(int(self._values.get(NO_STATION, 0.0)))
+        if without_station is not None and without_station not in STANDS:
             names.append(EXCEPT)
         return [name for name in names if name not in self._values]
 

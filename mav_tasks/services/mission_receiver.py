@@ -136,7 +136,7 @@ class MissionReceiver:
         uploads, self._uploads = self._uploads, []
         return outgoing, uploads
 
-    def count(self, message: m.MissionCount, sender: Sender, *, rank: int = 0, now: float) -> None:
+    def count(self, message: m.MissionCount, sender: Sender, *, now: float, rank: int = 0) -> None:
         """A client begins an upload, or begins it again; of a higher rank also instead of another.
 
         One that begins again gets no more time by that.
@@ -307,9 +307,9 @@ class MissionReceiver:
         result: MavMissionResult,
         last: Item | None,
         *,
+        now: float,
         opaque_id: int = 0,
         why: str = "",
-        now: float,
     ) -> None:
         session = self._session
         assert session is not None, "an upload is under way"

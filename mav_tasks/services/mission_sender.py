@@ -52,8 +52,8 @@ class MissionSender:
         seq: int,
         present: Callable[[], tuple[Item, ...]],
         *,
-        form: RequestForm = m.MissionRequestInt,
         now: float,
+        form: RequestForm = m.MissionRequestInt,
     ) -> ToClient:
         """A client asks for an item: of its download, or of the ``present`` plan without one.
 

@@ -22,7 +22,7 @@ class TokenBucket:
         """Take another rate, from the last time on."""
         self._rate = rate
 
-    def take(self, *, tokens: float = 1.0, now: float) -> bool:
+    def take(self, *, now: float, tokens: float = 1.0) -> bool:
         """Whether one more may pass now, or what is worth several."""
         self._tokens = min(self._burst, self._tokens + self._rate * (now - self._at))
         self._at = now

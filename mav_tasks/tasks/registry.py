@@ -82,7 +82,7 @@ class TaskRegistry:
             if task.state not in TERMINAL:
                 self._note_live(task)
 
-    def submit(self, draft: Draft, *, state: TaskState = TaskState.QUEUED, now: float) -> Task:
+    def submit(self, draft: Draft, *, now: float, state: TaskState = TaskState.QUEUED) -> Task:
         """Create a task from a draft, with the next free id.
 
         Ids begin at 1 again after MAX_TASK_ID. The earlier tasks with these ids are long forgotten;

@@ -56,9 +56,9 @@ class VehicleTasks(Lineup):
         paused: TaskReason,
         speed: float | None,
         uid: str,
+        now: float,
         halt_epoch: int = 1,
         may_be_armed: bool = True,
-        now: float,
     ) -> None:
         """Load the active and suspended tasks of an earlier run."""
         self.halts = Halts(epoch=halt_epoch)
@@ -217,7 +217,7 @@ class VehicleTasks(Lineup):
         return None if active is None else active.id
 
     def proceed(
-        self, seen: VehicleView, *, allows: bool = False, actor: str, now: float
+        self, seen: VehicleView, *, actor: str, now: float, allows: bool = False
     ) -> TaskId | None:
         """Release the STOP latch or any other pause. Return the id of the resumed task, or None.
 

@@ -138,7 +138,7 @@ class GcsSide:
         return (link, peer) in self._clients
 
     def receive(
-        self, link: str, peer: Peer, packet: Packet, *, waited: float = 0.0, now: float
+        self, link: str, peer: Peer, packet: Packet, *, now: float, waited: float = 0.0
     ) -> Received | None:
         """Return a client's packet, decoded; None if it is to be ignored."""
         message = None
@@ -285,7 +285,7 @@ class GcsSide:
     def _is_crowd(self, clients: int) -> bool:
         return clients > self._settings.clients.max_clients // CROWDED
 
-    def _has_room(self, *, is_signed: bool = False, now: float) -> bool:
+    def _has_room(self, *, now: float, is_signed: bool = False) -> bool:
         """Whether there is room for one more client; make room by forgetting a silent one."""
         if len(self._clients) < self._settings.clients.max_clients:
             return True

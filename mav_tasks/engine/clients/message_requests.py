@@ -147,8 +147,8 @@ class MessageRequests:
         task: Task,
         *,
         reader: Address,
-        is_full: bool = True,
         now: float,
+        is_full: bool = True,
     ) -> None:
         """Send a task's TASK_STATUS, from the task server of its vehicle.
 

@@ -37,8 +37,8 @@ class Sender:
         packet: Packet,
         *,
         is_counted: bool,
-        is_anothers: bool = False,
         now: float,
+        is_anothers: bool = False,
     ) -> int | None:
         """Return the halt epoch at which a command's first copy came, None if this is no copy.
 

@@ -92,7 +92,7 @@ class CommandRequest:
         self.client.answer(self.pending.answer, self.packet.source)
 
     def refuse(
-        self, refusal: Rejection, *, result: MavResult | None = None, now: float
+        self, refusal: Rejection, *, now: float, result: MavResult | None = None
     ) -> SubmissionRefused:
         """Answer with the reason's code and send its text; return the event for the audit log.
 

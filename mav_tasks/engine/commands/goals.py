@@ -158,7 +158,7 @@ def number(
 
 
 def whole(
-    command: Command, index: int, name: str, *, low: int = 0, high: int, default: int | None = 0
+    command: Command, index: int, name: str, *, high: int, low: int = 0, default: int | None = 0
 ) -> int:
     """Return a whole-number parameter, or raise Rejection that names it.
 

@@ -86,7 +86,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     return f"{halts.words} came since: {AGAIN}"
 
 
-def has_left_before_halt(asked: CommandRequest, *, anybodys: bool = False, now: float) -> bool:
+def has_left_before_halt(asked: CommandRequest, *, now: float, anybodys: bool = False) -> bool:
     """Return whether this command's sender sent it before its own last halt.
 
     With ``anybodys`` also whether it may have been sent before the last halt of any sender.

@@ -159,10 +159,10 @@ class Submissions:
         vehicle: Vehicle,
         draft: Draft,
         *,
+        now: float,
         runs_now: bool = False,
         why_not: str = "",
         ends_driving_of: Hashable | None = None,
-        now: float,
     ) -> Task:
         """Submit a new task of any origin. Raise Rejection if it is refused.
 

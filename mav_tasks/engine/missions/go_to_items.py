@@ -39,7 +39,7 @@ class GuidedItemRequest(CommandRequest):
         self._ack(MavMissionResult.ACCEPTED, opaque_id=result_param2)
 
     def refuse(
-        self, refusal: Rejection, *, result: MavResult | None = None, now: float
+        self, refusal: Rejection, *, now: float, result: MavResult | None = None
     ) -> SubmissionRefused:
         """Answer with the result and a text; return the event for the audit log."""
         del result

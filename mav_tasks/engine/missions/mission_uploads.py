@@ -112,8 +112,8 @@ class MissionUploads:
         desk: UploadSession,
         vehicle: Vehicle,
         *,
-        refusal: Rejection | None = None,
         now: float,
+        refusal: Rejection | None = None,
     ) -> None:
         """Send a session's messages, and decide about its complete uploads.
 

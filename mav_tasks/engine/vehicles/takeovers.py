@@ -151,7 +151,7 @@ class Takeovers:
             self._joint.on(Event.EXPLAINED, Word(R.FAILSAFE, parts.actor, words), now=now)
 
     def _taken(
-        self, event: Event, what: str, *, reason: TaskReason = R.TAKEOVER, now: float
+        self, event: Event, what: str, *, now: float, reason: TaskReason = R.TAKEOVER
     ) -> None:
         self._joint.on(event, Word(reason, self._parts.actor, what), now=now)
 
