@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.services.parameter_table import PARAMETERS
 from tests.kit.commands import mav_tasks
 from tests.kit.mavproxy import mavproxy
 from tests.kit.plugin_example import EXAMPLE
@@ -248,6 +249,19 @@ def test_every_path_and_link_leads_somewhere(name: str) -> None:
         assert target.exists(), path
         if anchor:
             assert anchor in anchors(target.read_text(encoding="utf-8")), f"{path}#{anchor}"
+
+
+def test_the_table_of_parameters_is_that_of_the_code() -> None:
+    rows = re.findall(r"^\| (TSK_\w+) \| `(.+?)` \| (\S+) \| (.*?) ?\|", CONTRACT, re.MULTILINE)
+    assert rows == [
+        (
+            each.name,
+            each.key.name,
+            f"{each.low:.7g}..{each.high:.7g}",
+            each.key.shape.unit.replace("m/s2", "m/s²"),
+        )
+        for each in PARAMETERS.values()
+    ]
 
 
 INSIDE = DOCUMENTS["mav_tasks/README.md"]

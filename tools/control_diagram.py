@@ -1,6 +1,6 @@
-"""Draw the states of a rover's queue, from the table of joint control, into mav_tasks/README.md.
+"""Draw the states of a rover's queue, from the control table, into mav_tasks/README.md.
 
-`--check` reports whether the drawing is old.
+`--check` reports whether the diagram is outdated.
 """
 
 import sys
@@ -24,28 +24,33 @@ NAMES = {
     Queue.STOPPED: "stopped",
 }
 NOTES = {
-    Queue.RUNS: "tasks take the rover, one after the other",
-    Queue.PAUSED: "nothing begins; continue goes on",
-    Queue.TAKEN: "somebody else has it; set HOLD, then continue",
-    Queue.STOPPED: "it stands, in HOLD; continue goes on",
+    Queue.RUNS: "tasks run one after another",
+    Queue.PAUSED: "no task starts before a resume",
+    Queue.TAKEN: "somebody else controls the rover; set HOLD, then resume",
+    Queue.STOPPED: "STOP is in force until a resume",
 }
 WORDS = {
     Event.STOP: "STOP",
     Event.HOLD: "HOLD",
     Event.MODE: "another mode",
-    Event.LAPSED: "HOLD while it is driven",
-    Event.DISARM: "disarm",
-    Event.STICK: "stick off its centre",
+    Event.LAPSED: "HOLD while a task drives",
+    Event.LATE_MODE: "late mode request",
+    Event.LATE_ARMING: "late arming request",
+    Event.DISARM: "disarm request",
+    Event.DISARMED: "seen disarmed",
+    Event.STICK: "stick off centre",
+    Event.DRIVEN_BY_HAND: "manual control by a client",
     Event.SECOND: "second controller",
-    Event.REBOOTED: "restart of the rover",
+    Event.REBOOTED: "rover restarted",
     Event.PAUSE_TASKS: "key revoked",
     Event.OPERATOR_LOST: "no ground station",
-    Event.EXPLAINED: "its failsafe",
-    Event.ASK_OTHER_MODE: "other mode asked for",
-    Event.CLOSE: "end of the server",
-    Event.TAKEN: "armed to be driven by hand",
-    Event.GO_ON: "go-to after HOLD, start of the mission",
-    Event.RUN_NOW: "go-to that runs at once",
+    Event.EXPLAINED: "failsafe of the rover",
+    Event.ASK_OTHER_MODE: "client requests another mode",
+    Event.CLOSE: "server shuts down",
+    Event.TAKEN: "armed for manual control",
+    Event.CONTINUE: "resume",
+    Event.GO_ON: "go-to right after HOLD, mission start",
+    Event.RUN_NOW: "immediate go-to",
 }
 
 
@@ -67,7 +72,7 @@ def edges() -> dict[tuple[Queue, Queue], list[Event]]:
 
 
 def diagram() -> str:
-    """Return the table as a Mermaid state diagram."""
+    """Return the states and transitions as a Mermaid state diagram."""
     lines = ["```mermaid", "stateDiagram-v2", "    [*] --> runs"]
     lines += [f"    {NAMES[queue]}: {NAMES[queue]}, {note}" for queue, note in NOTES.items()]
     for (old, new), events in edges().items():

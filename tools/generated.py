@@ -1,4 +1,4 @@
-"""Generated parts of documents, between two marker lines."""
+"""Keep the generated parts of documents current; each stands between two marker lines."""
 
 import sys
 from pathlib import Path
@@ -9,8 +9,8 @@ ROOT = Path(__file__).resolve().parent.parent
 def keep_current(document: str, what: str, tool: str, made: str) -> int:
     """Put the generated text into a document; return the exit code.
 
-    With ``--check`` on the command line, only report whether the document is old, and return 1 if
-    so.
+    With ``--check`` on the command line, only report whether the document is outdated, and return 1
+    if so.
     """
     path = ROOT / document
     begin, end = f"<!-- {what}: made by tools/{tool} -->\n", f"<!-- end of {what} -->\n"
@@ -18,13 +18,13 @@ def keep_current(document: str, what: str, tool: str, made: str) -> int:
     before, has_begin, rest = text.partition(begin)
     _, has_end, after = rest.partition(end)
     if not has_begin or not has_end:
-        print(f"{document} lacks the lines {begin.strip()} and {end.strip()}")
+        print(f"{document} lacks the line {begin.strip()} or {end.strip()}")
         return 1
     current = before + begin + made + end + after
     if current == text:
         return 0
     if "--check" in sys.argv[1:]:
-        print(f"{document}: the {what} is not what it is made of; run tools/{tool}")
+        print(f"{document}: the {what} is outdated; run tools/{tool}")
         return 1
     path.write_text(current, encoding="utf-8")
     return 0

@@ -1,4 +1,4 @@
-"""Prints the policy table into dialects/README.md; `--check` reports whether it is old."""
+"""Print the policy table into dialects/README.md; `--check` reports whether it is outdated."""
 
 import sys
 from collections.abc import Iterable, Iterator
@@ -12,18 +12,20 @@ from mav_tasks.engine.policy.row import UNKNOWN
 from mav_tasks.settings import ROLES
 
 KINDS = list(Kind)
-HEAD = "| kind | from | what it is about | what becomes of it | which |\n|---|---|---|---|---|"
-NAMELESS = replace(UNKNOWN, name="every other one")
+HEAD = "| kind | lowest role | purpose | forwarded | commands or messages |\n|---|---|---|---|---|"
+NAMELESS = replace(UNKNOWN, name="all others")
+#: kinds that have a plainer name in the document
+NAMES = {Kind.STICKS: "manual", Kind.WISH: "setting", Kind.TELL: "report"}
 
 Group = tuple[Row, list[str]]
 
 
 def table() -> str:
-    """Return kinds, commands and messages in words, with equal rows joined in one line."""
-    kinds = [f"| {kind.name.lower()} | {kind.value} |" for kind in KINDS]
+    """Return the tables of kinds, commands and messages; equal rows share one line."""
+    kinds = [f"| {_name(kind)} | {kind.value} |" for kind in KINDS]
     commands = _lines(of_commands.COMMANDS.items(), (*of_commands.BY_WORDS, NAMELESS))
     messages = _lines(of_messages.MESSAGES.items(), (*of_messages.BY_WORDS, NAMELESS))
-    parts = ["| kind | what it does |\n|---|---|", *kinds]
+    parts = ["| kind | a message of this kind |\n|---|---|", *kinds]
     parts += ["", "Commands:", "", HEAD, *commands, "", "Messages:", "", HEAD, *messages, ""]
     return "\n".join(parts)
 
@@ -43,25 +45,29 @@ def _order(group: Group) -> tuple[bool, int, int, str]:
     return (NAMELESS.name in names, KINDS.index(row.kind), ROLES.index(row.role), names[0])
 
 
+def _name(kind: Kind) -> str:
+    return NAMES.get(kind, kind.name.lower())
+
+
 def _line(row: Row, names: list[str]) -> str:
     role = f"{row.role}, bound" if row.is_bound else row.role
     about = row.about if row.is_counted else f"{row.about}; not counted"
-    cells = (row.kind.name.lower(), role, about, _way(row), ", ".join(names))
+    cells = (_name(row.kind), role, about, _way(row), ", ".join(names))
     return f"| {' | '.join(cells)} |"
 
 
 def _way(row: Row) -> str:
-    """Return a row's treatment in words."""
+    """Return whether and when a row is forwarded, in words."""
     if row.is_claimed and row.elsewhere is None:
-        return "the server's; else as what is not named"
+        return "handled; else as not listed"
     if row.is_claimed:
         on = row.passed_on
-        return f"the server's; else {on.kind.name.lower()}, {on.role}, {_way(on)}"
+        return f"handled; else {_name(on.kind)}, {on.role}, {_way(on)}"
     if row.needs_grant:
-        return "passes for who has control"
+        return "only in control"
     if not row.passes_beside_task:
-        return "not under STOP, nor beside a task"
-    return "passes always" if row.passes_under_stop else "not under STOP"
+        return "not during STOP or a task"
+    return "always" if row.passes_under_stop else "not during STOP"
 
 
 if __name__ == "__main__":

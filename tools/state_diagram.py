@@ -1,4 +1,4 @@
-"""Draw the lifecycle table into mav_tasks/README.md; `--check` reports whether it is old."""
+"""Draw the lifecycle table into mav_tasks/README.md; `--check` reports whether it is outdated."""
 
 import sys
 

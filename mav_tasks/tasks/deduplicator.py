@@ -1,6 +1,6 @@
 """Recognises repeated submissions: driving twice is worse than refusing.
 
-The rules are those of ``dialects/README.md``, "The same task twice". The tasks hold all the data
+The rules are those of ``dialects/README.md``, "Duplicate detection". The tasks hold all the data
 that the rules need, so that a restart forgets nothing.
 """
 

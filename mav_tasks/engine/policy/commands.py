@@ -12,22 +12,24 @@ from mav_tasks.engine.policy.row import UNKNOWN, Kind, Row
 #: numbers reserved for tasks
 TASK_COMMANDS = range(54000, 54050)
 
-ACTS = Row("", Kind.ACTION, OPERATOR, "servos, relays, cameras, gimbals, home, steps of a plan")
-ASKS = Row("", Kind.QUESTION, OBSERVER, "questions")
-GOES = Row("", Kind.GO, OPERATOR, "arms, changes the mode, starts the rover's own mission")
+ACTS = Row("", Kind.ACTION, OPERATOR, "servos, relays, cameras, gimbals, home, commands of plans")
+ASKS = Row("", Kind.QUESTION, OBSERVER, "requests for information")
+GOES = Row("", Kind.GO, OPERATOR, "arms, changes the mode, starts the vehicle's own mission")
 MOVES = Row(
-    "", Kind.MOTION, OPERATOR, "drives to a place, at a speed, to a course", needs_grant=True
+    "", Kind.MOTION, OPERATOR, "drives to a place, at a speed, on a course", needs_grant=True
 )
 #: turns wheels, or stops the autopilot: never while it is driven, and only with role safety
 SERVICES = Row(
     "",
     Kind.MOTION,
     SAFETY,
-    "tests of motors, calibration, firmware, restart: also of a rover that is not armed",
+    "motor tests, calibration, firmware, restart; may move a disarmed vehicle, too",
     is_bound=True,
 )
-BOUNDS = Row("", Kind.ACTION, SAFETY, "fence, parameters, storage, estimates", is_bound=True)
-SUBMITS = Row("", Kind.WISH, SUBMITTER, "asks for a task", is_claimed=True)
+BOUNDS = Row(
+    "", Kind.ACTION, SAFETY, "fence, parameters, storage, position estimates", is_bound=True
+)
+SUBMITS = Row("", Kind.WISH, SUBMITTER, "creates a task", is_claimed=True)
 
 
 def named(row: Row, names: str) -> dict[int, Row]:
@@ -38,7 +40,7 @@ def named(row: Row, names: str) -> dict[int, Row]:
 
 #: rows of commands by content; the row of their number is that of the most dangerous content
 DISARM = Row(
-    "COMPONENT_ARM_DISARM with param1 = 0", Kind.HALT, OBSERVER, "disarms, urgently and always"
+    "COMPONENT_ARM_DISARM with param1 = 0", Kind.HALT, OBSERVER, "disarms; forwarded at once"
 )
 PAUSE = Row(
     "DO_PAUSE_CONTINUE with param1 = 0",
@@ -49,12 +51,12 @@ PAUSE = Row(
     elsewhere=GOES,
 )
 PAUSE_HERE = replace(PAUSE, name="DO_REPOSITION without a place", elsewhere=MOVES)
-HOLD = Row("DO_SET_MODE, SET_MODE: HOLD", Kind.HALT, OBSERVER, "holds", is_claimed=True)
+HOLD = Row("DO_SET_MODE, SET_MODE: HOLD", Kind.HALT, OBSERVER, "sets HOLD", is_claimed=True)
 START = Row(
     "DO_SET_MODE, SET_MODE: return, or the mission",
     Kind.GO,
     SUBMITTER,
-    "starts what the server drives itself",
+    "starts a return or the mission, which the server drives",
     is_claimed=True,
 )
 #: rows that have no number of their own
@@ -62,12 +64,12 @@ BY_WORDS = (DISARM, PAUSE, PAUSE_HERE, HOLD, START)
 
 OURS = {
     **named(SUBMITS, "54000 TASK_MOVE, 54001 TASK_ROTATE, 54002 TASK_DRIVE"),
-    **named(replace(SUBMITS, about="an item of a plan"), "54014 TASK_OPTIONS"),
-    **named(replace(SUBMITS, about="changes a task of one's own"), "54012 TASK_MODIFY"),
-    54003: Row("TASK_STOP", Kind.HALT, OBSERVER, "STOP, wherever it is sent", is_claimed=True),
-    54010: Row("TASK_CANCEL", Kind.HALT, SUBMITTER, "a task of one's own", is_claimed=True),
-    54011: Row("TASK_CLEAR", Kind.HALT, OPERATOR, "anybody's tasks", is_claimed=True),
-    54013: Row("TASK_RELEASE", Kind.GO, SUBMITTER, "a task of one's own", is_claimed=True),
+    **named(replace(SUBMITS, about="options of a plan, only as its item"), "54014 TASK_OPTIONS"),
+    **named(replace(SUBMITS, about="changes one's own task"), "54012 TASK_MODIFY"),
+    54003: Row("TASK_STOP", Kind.HALT, OBSERVER, "STOP, at any component", is_claimed=True),
+    54010: Row("TASK_CANCEL", Kind.HALT, SUBMITTER, "cancels one's own task", is_claimed=True),
+    54011: Row("TASK_CLEAR", Kind.HALT, OPERATOR, "cancels everybody's tasks", is_claimed=True),
+    54013: Row("TASK_RELEASE", Kind.GO, SUBMITTER, "releases one's own task", is_claimed=True),
 }
 
 #: standard commands that the server handles
@@ -83,23 +85,28 @@ CLAIMED = {
         "NAV_LAND",
         Kind.WISH,
         OBSERVER,
-        "disarms once nothing drives",
+        "disarms once no task is left",
         is_claimed=True,
         elsewhere=GOES,
     ),
     22: Row(
-        "NAV_TAKEOFF", Kind.WISH, OBSERVER, "accepted: nothing", is_claimed=True, elsewhere=MOVES
+        "NAV_TAKEOFF",
+        Kind.WISH,
+        OBSERVER,
+        "accepted without effect",
+        is_claimed=True,
+        elsewhere=MOVES,
     ),
     178: Row(
         "DO_CHANGE_SPEED",
         Kind.WISH,
         OPERATOR,
-        "speed of tasks",
+        "sets the speed of tasks",
         is_claimed=True,
         elsewhere=MOVES,
     ),
     **named(
-        replace(GOES, about="continues", is_claimed=True, elsewhere=GOES),
+        replace(GOES, about="resumes", is_claimed=True, elsewhere=GOES),
         "193 DO_PAUSE_CONTINUE",
     ),
     **named(
@@ -107,14 +114,14 @@ CLAIMED = {
         "176 DO_SET_MODE",
     ),
     **named(
-        Row("", Kind.GO, SUBMITTER, "a plan of one's own", is_claimed=True, elsewhere=GOES),
+        Row("", Kind.GO, SUBMITTER, "starts one's own plan", is_claimed=True, elsewhere=GOES),
         "224 DO_SET_MISSION_CURRENT, 300 MISSION_START",
     ),
     511: Row(
         "SET_MESSAGE_INTERVAL",
         Kind.QUESTION,
         OBSERVER,
-        "what one client is shown",
+        "message rates of one client",
         is_claimed=True,
         elsewhere=ACTS,
     ),
@@ -134,7 +141,7 @@ PASSED_ON = {
         528 REQUEST_FLIGHT_INFORMATION""",
     ),
     **named(
-        replace(ASKS, role=OPERATOR, about="questions that are some work to answer"),
+        replace(ASKS, role=OPERATOR, about="requests that are expensive to answer"),
         """401 RUN_PREARM_CHECKS, 2002 REQUEST_CAMERA_IMAGE_CAPTURE,
         2504 REQUEST_VIDEO_STREAM_INFORMATION, 2505 REQUEST_VIDEO_STREAM_STATUS,
         5200 UAVCAN_GET_NODE_INFO, 42428 DO_SEND_BANNER, 42502 GIMBAL_AXIS_CALIBRATION_STATUS""",
@@ -149,7 +156,7 @@ PASSED_ON = {
     ),
     **named(
         replace(
-            GOES, role=SAFETY, is_bound=True, about="does any of that, and takes the fence away"
+            GOES, role=SAFETY, is_bound=True, about="can do any of these, and disable the fence"
         ),
         "218 DO_AUX_FUNCTION, 5300 DO_SET_SAFETY_SWITCH_STATE",
     ),
@@ -166,7 +173,7 @@ PASSED_ON = {
         43000 GUIDED_CHANGE_SPEED, 43001 GUIDED_CHANGE_ALTITUDE, 43002 GUIDED_CHANGE_HEADING""",
     ),
     **named(
-        replace(UNKNOWN, about="what a script on board, or a user, makes of it"),
+        replace(UNKNOWN, about="meaning defined by an on-board script or a user"),
         """217 DO_SEND_SCRIPT_MESSAGE, 31000 WAYPOINT_USER_1, 31001 WAYPOINT_USER_2,
         31002 WAYPOINT_USER_3, 31003 WAYPOINT_USER_4, 31004 WAYPOINT_USER_5,
         31005 SPATIAL_USER_1, 31006 SPATIAL_USER_2, 31007 SPATIAL_USER_3, 31008 SPATIAL_USER_4,

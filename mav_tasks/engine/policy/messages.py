@@ -10,26 +10,28 @@ from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY, SUBMITTE
 from mav_tasks.engine.policy.commands import ACTS, ASKS, BOUNDS, GOES, MOVES, named
 from mav_tasks.engine.policy.row import Kind, Row
 
-SETS = Row("", Kind.WISH, SAFETY, "parameters, files, logs", is_bound=True)
-TELLS = Row("", Kind.TELL, OPERATOR, "what corrects, acknowledges or identifies")
-UPLOADS = Row("", Kind.WISH, SUBMITTER, "a mission", is_claimed=True, elsewhere=ACTS)
+SETS = Row("", Kind.WISH, SAFETY, "sets parameters, writes files, erases logs", is_bound=True)
+TELLS = Row("", Kind.TELL, OPERATOR, "corrections, acknowledgements, identification")
+UPLOADS = Row("", Kind.WISH, SUBMITTER, "uploads a mission", is_claimed=True, elsewhere=ACTS)
 #: a packet in a packet, whose content is not checked
-CARRIES = Row("", Kind.MOTION, SAFETY, "what may carry anything, firmware too", is_bound=True)
+CARRIES = Row("", Kind.MOTION, SAFETY, "carries arbitrary data, also firmware", is_bound=True)
 
 #: rows of messages by content; the row of their number is that of the most common content
 READ_FILE = replace(
-    ASKS, name="FILE_TRANSFER_PROTOCOL: list, read", about="opcodes that change no file"
+    ASKS,
+    name="FILE_TRANSFER_PROTOCOL with an opcode that changes no file",
+    about="lists and reads files",
 )
 GO_TO_ITEM = Row(
     "MISSION_ITEM, MISSION_ITEM_INT with current = 2 or 3",
     Kind.WISH,
     SUBMITTER,
-    "asks for a task",
+    "creates a task",
     is_claimed=True,
     elsewhere=MOVES,
 )
 BOUNDING_PLAN = Row(
-    "uploads and MISSION_CLEAR_ALL of another mission_type than 0",
+    "uploads and MISSION_CLEAR_ALL with a mission_type other than 0",
     Kind.WISH,
     SAFETY,
     "fence and rally points",
@@ -42,7 +44,7 @@ BY_WORDS = (READ_FILE, GO_TO_ITEM, BOUNDING_PLAN)
 
 MESSAGES: Mapping[int, Row] = {
     **named(
-        replace(TELLS, about="that somebody is there", is_counted=False),
+        replace(TELLS, about="presence and time", is_counted=False),
         "0 HEARTBEAT, 2 SYSTEM_TIME",
     ),
     **named(
@@ -56,28 +58,34 @@ MESSAGES: Mapping[int, Row] = {
     **named(replace(ASKS, is_counted=False), "4 PING, 111 TIMESYNC"),
     **named(ASKS, "20 PARAM_REQUEST_READ, 21 PARAM_REQUEST_LIST"),
     **named(
-        replace(ASKS, about="what one client is shown", is_claimed=True, elsewhere=ACTS),
+        replace(ASKS, about="message rates of one client", is_claimed=True, elsewhere=ACTS),
         "66 REQUEST_DATA_STREAM",
     ),
     **named(
-        replace(ASKS, about="for a plan", is_claimed=True, elsewhere=ASKS),
+        replace(ASKS, about="requests a plan", is_claimed=True, elsewhere=ASKS),
         "37 MISSION_REQUEST_PARTIAL_LIST, 43 MISSION_REQUEST_LIST",
     ),
     **named(
-        replace(ASKS, about="for an item", is_claimed=True, is_counted=False, elsewhere=ASKS),
+        replace(
+            ASKS,
+            about="requests an item of a plan",
+            is_claimed=True,
+            is_counted=False,
+            elsewhere=ASKS,
+        ),
         "40 MISSION_REQUEST, 51 MISSION_REQUEST_INT",
     ),
     47: Row(
         "MISSION_ACK",
         Kind.TELL,
         OBSERVER,
-        "that a plan has come",
+        "end of a plan transfer",
         is_claimed=True,
         is_counted=False,
         elsewhere=Row("", Kind.TELL, OBSERVER),
     ),
     **named(
-        replace(ASKS, role=OPERATOR, about="questions that are some work to answer"),
+        replace(ASKS, role=OPERATOR, about="requests that are expensive to answer"),
         """117 LOG_REQUEST_LIST, 119 LOG_REQUEST_DATA, 122 LOG_REQUEST_END, 135 TERRAIN_CHECK,
         161 FENCE_FETCH_POINT, 176 RALLY_FETCH_POINT, 183 AUTOPILOT_VERSION_REQUEST,
         216 GOPRO_GET_REQUEST, 320 PARAM_EXT_REQUEST_READ, 321 PARAM_EXT_REQUEST_LIST,
@@ -85,31 +93,41 @@ MESSAGES: Mapping[int, Row] = {
     ),
     **named(UPLOADS, "38 MISSION_WRITE_PARTIAL_LIST, 44 MISSION_COUNT"),
     **named(replace(UPLOADS, is_counted=False), "39 MISSION_ITEM, 73 MISSION_ITEM_INT"),
-    **named(replace(UPLOADS, role=OPERATOR, about="anybody's mission"), "45 MISSION_CLEAR_ALL"),
     **named(
-        Row("", Kind.GO, SUBMITTER, "a plan of one's own", is_claimed=True, elsewhere=GOES),
+        replace(UPLOADS, role=OPERATOR, about="clears anybody's mission"), "45 MISSION_CLEAR_ALL"
+    ),
+    **named(
+        Row(
+            "",
+            Kind.GO,
+            SUBMITTER,
+            "chooses an item of one's own plan",
+            is_claimed=True,
+            elsewhere=GOES,
+        ),
         "41 MISSION_SET_CURRENT",
     ),
     **named(replace(GOES, about="any other mode"), "11 SET_MODE"),
     **named(
-        Row("", Kind.HALT, SUBMITTER, "a task of one's own", is_claimed=True), "80 COMMAND_CANCEL"
+        Row("", Kind.HALT, SUBMITTER, "cancels one's own task", is_claimed=True),
+        "80 COMMAND_CANCEL",
     ),
     **named(
-        Row("", Kind.WISH, OBSERVER, "how the server signs to this client", is_claimed=True),
+        Row("", Kind.WISH, OBSERVER, "asks the server to sign to this client", is_claimed=True),
         "256 SETUP_SIGNING",
     ),
     **named(SETS, "23 PARAM_SET, 110 FILE_TRANSFER_PROTOCOL, 121 LOG_ERASE, 323 PARAM_EXT_SET"),
     **named(
-        Row("", Kind.STICKS, OPERATOR, "sticks", is_counted=False),
+        Row("", Kind.STICKS, OPERATOR, "manual control", is_counted=False),
         "69 MANUAL_CONTROL, 70 RC_CHANNELS_OVERRIDE",
     ),
     **named(
-        replace(MOVES, about="set-points", is_counted=False),
+        replace(MOVES, about="setpoints", is_counted=False),
         """82 SET_ATTITUDE_TARGET, 84 SET_POSITION_TARGET_LOCAL_NED,
         86 SET_POSITION_TARGET_GLOBAL_INT, 139 SET_ACTUATOR_CONTROL_TARGET""",
     ),
     **named(
-        replace(MOVES, about="whom to follow, and inputs of a radio, a simulator or a planner"),
+        replace(MOVES, about="follow-me targets; inputs of a radio, a simulator or a planner"),
         """34 RC_CHANNELS_SCALED, 35 RC_CHANNELS_RAW, 65 RC_CHANNELS, 81 MANUAL_SETPOINT,
         91 HIL_CONTROLS, 92 HIL_RC_INPUTS_RAW, 93 HIL_ACTUATOR_CONTROLS, 144 FOLLOW_TARGET,
         332 TRAJECTORY_REPRESENTATION_WAYPOINTS, 333 TRAJECTORY_REPRESENTATION_BEZIER,
@@ -122,14 +140,14 @@ MESSAGES: Mapping[int, Row] = {
         50005 CUBEPILOT_FIRMWARE_UPDATE_RESP""",
     ),
     **named(
-        replace(BOUNDS, about="fence, the rover's shell, registers, keys, networks"),
+        replace(BOUNDS, about="fence, the vehicle's shell, registers, keys, networks"),
         """5 CHANGE_OPERATOR_CONTROL, 7 AUTH_KEY, 50 PARAM_MAP_RC, 54 SAFETY_SET_ALLOWED_AREA,
         126 SERIAL_CONTROL, 151 SET_MAG_OFFSETS, 160 FENCE_POINT, 175 RALLY_POINT,
         299 WIFI_CONFIG_AP, 388 CAN_FILTER_MODIFY, 11000 DEVICE_OP_READ, 11002 DEVICE_OP_WRITE,
         11004 SECURE_COMMAND, 11033 OSD_PARAM_CONFIG""",
     ),
     **named(
-        replace(BOUNDS, about="where the rover takes itself to be, and what it sees"),
+        replace(BOUNDS, about="position estimates and sensor data for the vehicle"),
         """48 SET_GPS_GLOBAL_ORIGIN, 89 LOCAL_POSITION_NED_SYSTEM_GLOBAL_OFFSET, 90 HIL_STATE,
         100 OPTICAL_FLOW, 101 GLOBAL_VISION_POSITION_ESTIMATE, 102 VISION_POSITION_ESTIMATE,
         103 VISION_SPEED_ESTIMATE, 104 VICON_POSITION_ESTIMATE, 106 OPTICAL_FLOW_RAD,
@@ -139,7 +157,7 @@ MESSAGES: Mapping[int, Row] = {
         9000 WHEEL_DISTANCE, 11011 VISION_POSITION_DELTA, 11037 OBSTACLE_DISTANCE_3D""",
     ),
     **named(
-        replace(ACTS, about="cameras, gimbals, lights, home, traffic"),
+        replace(ACTS, about="cameras, gimbals, lights, home, other traffic"),
         """123 GPS_INJECT_DATA, 130 DATA_TRANSMISSION_HANDSHAKE, 131 ENCAPSULATED_DATA,
         142 RESOURCE_REQUEST, 154 DIGICAM_CONFIGURE, 155 DIGICAM_CONTROL, 156 MOUNT_CONFIGURE,
         157 MOUNT_CONTROL, 186 LED_CONTROL, 201 GIMBAL_CONTROL, 218 GOPRO_SET_REQUEST,
@@ -151,9 +169,7 @@ MESSAGES: Mapping[int, Row] = {
         10007 UAVIONIX_ADSB_OUT_CONTROL""",
     ),
     **named(
-        replace(
-            ACTS, about="what rovers and their parts tell: who heeds that of others is unknown"
-        ),
+        replace(ACTS, about="sent by vehicles and components; another vehicle might act on it"),
         """1 SYS_STATUS, 6 CHANGE_OPERATOR_CONTROL_ACK, 22 PARAM_VALUE, 24 GPS_RAW_INT,
         25 GPS_STATUS, 26 SCALED_IMU, 27 RAW_IMU, 28 RAW_PRESSURE, 29 SCALED_PRESSURE,
         30 ATTITUDE, 31 ATTITUDE_QUATERNION, 32 LOCAL_POSITION_NED, 33 GLOBAL_POSITION_INT,

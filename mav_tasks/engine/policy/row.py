@@ -9,17 +9,17 @@ from mav_tasks.engine.clients.rights import OPERATOR
 class Kind(Enum):
     """What a client's message may do to a rover; the value is its text in the printed table."""
 
-    HALT = "lets the rover stand, or ends what it does"
-    GO = "lets it go on, start, arm or change its mode"
-    MOTION = "drives it, or keeps it from driving as it is told"
+    HALT = "stops the vehicle or its task"
+    GO = "resumes, starts, arms, or changes the mode"
+    MOTION = "moves the vehicle, or disturbs its motion"
     #: apart from MOTION, because by manual control a person takes a rover over from a task
-    STICKS = "drives it by hand: beside a task a takeover"
+    STICKS = "manual control; during a task a takeover"
     #: no drive command, but not known to be harmless: a servo, a camera, a position estimate
-    ACTION = "does something else, at once, that may end in motion"
-    WISH = "is recorded or set, and moves nothing by itself"
+    ACTION = "has another immediate effect, which may lead to motion"
+    WISH = "is stored or set; moves nothing by itself"
     #: apart from QUESTION, because it has no answer, and a dropped one is not reported
-    TELL = "tells something"
-    QUESTION = "asks something"
+    TELL = "informs; needs no answer"
+    QUESTION = "requests information"
 
 
 MOVES_NOTHING = frozenset({Kind.HALT, Kind.WISH, Kind.TELL, Kind.QUESTION})
@@ -31,7 +31,7 @@ class Row:
 
     name: str
     kind: Kind
-    #: the least role that may send it
+    #: the lowest role that may send it
     role: str
     #: what it is about, for the printed table
     about: str = ""
@@ -53,7 +53,7 @@ class Row:
 
     @property
     def passes_under_stop(self) -> bool:
-        """Whether it is forwarded to a rover while STOP is latched."""
+        """Whether it is forwarded to a rover while STOP is in force."""
         return self.kind in MOVES_NOTHING
 
     @property
@@ -62,5 +62,5 @@ class Row:
         return self.kind is not Kind.MOTION
 
 
-#: a number in no table counts as the most dangerous kind
-UNKNOWN = Row("", Kind.MOTION, OPERATOR, "whatever is not named here")
+#: a number that no table lists counts as the most dangerous kind
+UNKNOWN = Row("", Kind.MOTION, OPERATOR, "not listed")
