@@ -51,8 +51,8 @@ reordered · restarts while it is driven · restarts while a task waits
 restarts while a task is paused
 one system id · ground station fights · second server · 50 m · less than 2 m · position freezes
 180° · jumps (compass · another origin · no telemetry · no heartbeats · not a number
-clock is frozen · wrongly signed · replayed · revoked · role · floods · changing addresses · bits flipped
-wall clock · SIGSTOP · does not stop on HOLD · standard output or error
+clock is frozen · wrongly signed · replayed · revoked · role · floods · changing addresses
+bits flipped · wall clock · SIGSTOP · does not stop on HOLD · standard output or error
 """
 
 
