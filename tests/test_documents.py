@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.services.parameter_table import PARAMETERS
+from mav_tasks.tasks.lifecycle import TaskReason, words_of
 from tests.kit.commands import mav_tasks
 from tests.kit.mavproxy import mavproxy
 from tests.kit.plugin_example import EXAMPLE
@@ -46,7 +47,7 @@ BROKEN_AT = "### When something breaks"
 TOUR = README[README.index("## Ten minutes") : README.index(BROKEN_AT)]
 BROKEN = README[README.index(BROKEN_AT) : README.index("## From a script")]
 #: the parts that are run after a server has written records into the folder that they name
-FILES = GUIDE[GUIDE.index("## Configuration\n") : GUIDE.index("## What the server does while")]
+FILES = GUIDE[GUIDE.index("## Configuration\n") : GUIDE.index("## Shutdown, lost links")]
 KEYS = GUIDE[GUIDE.index("## Keys and roles\n") : GUIDE.index("## Log, journal, recordings\n")]
 
 
@@ -262,6 +263,18 @@ def test_the_table_of_parameters_is_that_of_the_code() -> None:
         )
         for each in PARAMETERS.values()
     ]
+
+
+def test_the_guide_explains_each_reason_to_wait_in_the_words_of_the_command_line() -> None:
+    start = GUIDE.index("## When a task does not run\n")
+    section = GUIDE[start : GUIDE.index("## Command line\n")]
+    words = {words_of(reason) for reason in TaskReason}
+    rows = [row for row in section.splitlines() if row.startswith("| ")][1:]
+    named = {name for row in rows for name in row.split(" | ")[0].removeprefix("| ").split(", ")}
+    assert named - words == {"or another failure"}
+    for reason in TaskReason:
+        if reason.NONE < reason < reason.STUCK:
+            assert words_of(reason) in section, reason.name
 
 
 INSIDE = DOCUMENTS["mav_tasks/README.md"]

@@ -49,10 +49,10 @@ MUST_BE_THERE = """
 SIGKILL · disk is full · slow or stuck · file is removed · client's link flaps · rover's link flaps
 reordered · restarts while it is driven · restarts while a task waits
 restarts while a task is paused
-one system id · ground station fights · second server · 50 m · less than 2 m · position stands
-180° · jumps (compass · another origin · no telemetry · no heartbeats · not a number · clock stands
-wrongly signed · replayed · revoked · role · floods · other places · bits flipped
-wall clock · SIGSTOP · does not stop on HOLD · standard output or error
+one system id · ground station fights · second server · 50 m · less than 2 m · position freezes
+180° · jumps (compass · another origin · no telemetry · no heartbeats · not a number
+clock is frozen · wrongly signed · replayed · revoked · role · floods · changing addresses
+bits flipped · wall clock · SIGSTOP · does not stop on HOLD · standard output or error
 """
 
 
