@@ -236,7 +236,7 @@ def test_a_full_disk_is_told(full: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--store", "/nowhere/at.all"), "there is no such file"),
+        (("--store", "/nowhere/at.all"), "does not exist"),
         (("--store", ":memory:"), "expected the path"),
         (("--json", "--csv"), "choose one"),
         (("--since", "yesterday"), "--since yesterday"),

@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--only knows {', '.join(GROUPS)}; not {', '.join(unknown)}")
     if (values.arm or values.drive) and not url.is_local and not values.insecure:
         parser.error(
-            f"{values.url} is beyond this machine: say --insecure if that vehicle is to be armed"
+            f"{values.url} is beyond this machine: use --insecure if that vehicle is to be armed"
         )
     for number in ENDING:
         signal.signal(number, _interrupt_once)
