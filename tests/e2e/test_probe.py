@@ -109,7 +109,7 @@ def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path)
             turned = (degrees(truth(tmp_path)[-1]["yaw"]) - yaw) % 360
             assert turned == pytest.approx(90, abs=3)
             beside = run("probe", f"udpout:127.0.0.1:{clients}")
-            assert_one_clear_last_line(beside, "a task server is there (1/191): probe the rover")
+            assert_one_clear_last_line(beside, "task server 1/191 is on this link: probe")
             stand.close()
 
 
@@ -151,7 +151,7 @@ def test_what_cannot_be_done_is_said_in_one_line() -> None:
     assert_one_clear_line(run("probe", "udpout:192.0.2.1:14550"), "192.0.2.1", "--insecure")
     assert_one_clear_line(run("probe", "pigeon:1"), "udpin:host:port")
     code, _, error = run("probe", url, "--timeout", "1")
-    assert (code, error.splitlines()[-1]) == (3, "mav-tasks: no heartbeat of a rover within 1 s")
+    assert (code, error.splitlines()[-1]) == (3, "mav-tasks: no heartbeat from a rover within 1 s")
 
 
 def test_nothing_is_driven_where_nobody_could_say_yes() -> None:
