@@ -43,7 +43,7 @@ def show(
     shown = report.Report(configuration, _parameters(configuration.settings))
     sys.stdout.write(shown.as_json(names) if as_json else shown.as_toml(names))
     for words in shown.not_in_force:
-        sys.stderr.write(f"mav-tasks: not in force, though set before: {words}\n")
+        sys.stderr.write(f"mav-tasks: parameter of an earlier run ignored: {words}\n")
 
 
 @app.command()

@@ -68,7 +68,14 @@ def test_a_key_is_made_shown_once_listed_and_revoked(ring: Path) -> None:
 
     shown = called("keys", "list", "--keys", str(ring))
     assert shown.lines[0] == f"key ring {ring}, 2 keys"
-    assert shown.lines[1].split() == ["key", "role", "fingerprint", "from", "made", "revoked"]
+    assert shown.lines[1].split() == [
+        "key",
+        "role",
+        "fingerprint",
+        "derivation",
+        "created",
+        "revoked",
+    ]
     assert secret not in shown.output
 
     assert called("keys", "revoke", "anna", "--keys", str(ring)).status == 0
@@ -203,7 +210,7 @@ def test_commands_sign_by_name_one_right_after_the_other(signed: Signed) -> None
     missing = signed.cli("queue", "--sign", "carl", "--keys", str(signed.ring))
     assert (missing.status, missing.error) == (
         2,
-        f"mav-tasks: --sign: no key 'carl': there is r1, anna, ben, in {signed.ring}\n",
+        f"mav-tasks: --sign: no key 'carl' (usable keys: r1, anna, ben), in {signed.ring}\n",
     )
     assert "--keys needs --sign NAME" in signed.cli("queue", "--keys", "x").error
 

@@ -86,7 +86,7 @@ def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path)
         ), out
         assert re.search(r"^left in +ok +Hold, disarmed$", out, re.MULTILINE), out
         assert out.endswith(f"profile written to {file}\n")
-        assert "driving in an area of 2 m: keep clear; Ctrl-C stops it" in error
+        assert "driving within 1 m of its place: keep clear; Ctrl-C stops it" in error
         poses = truth(tmp_path)
         assert all(abs(row["north"]) < 1.0 and abs(row["east"]) < 1.0 for row in poses)
         assert max(abs(row["north"]) for row in poses) > 0.1

@@ -116,8 +116,10 @@ def test_what_a_client_has_set_stays_and_is_said(
 ) -> None:
     server = Server({"TSK_SPEED": 0.7})
     assert read_again(tmp_path / "c.toml", ["", "driving.speed = 0.8"], caplog, server) == [
-        "WARNING driving.speed: 0.5 -> 0.8 m/s, "
-        "but parameter TSK_SPEED, set by a client, overrides it: 0.7"
+        (
+            "WARNING driving.speed: 0.5 -> 0.8 m/s, "
+            "but parameter TSK_SPEED, set by a client, overrides it: 0.7"
+        )
     ]
 
 
