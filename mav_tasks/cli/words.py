@@ -21,7 +21,7 @@ UNTIL_RESUMED = (
 
 #: reasons that block one task, and what a person can do; "{rover}": the option that names the rover
 REMEDIES = {
-    TaskReason.DISARMED: "arm it in HOLD, or, if the server may arm: mav-tasks resume{rover}",
+    TaskReason.DISARMED: "arm it in HOLD (or mav-tasks resume{rover}, if the server may arm)",
     TaskReason.WRONG_MODE: "set HOLD, then: mav-tasks resume{rover}",
     TaskReason.NOT_READY: "wait, or fix what the rover reports",
     TaskReason.LOSS_FAILSAFE: (

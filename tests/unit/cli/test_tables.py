@@ -358,7 +358,7 @@ NEW = replace(WAITING, reason=TaskReason.QUEUE_PAUSED, words="move 2 m: queued (
         (
             replace(NEW, reason=TaskReason.DISARMED, words="move 2 m: queued (disarmed)"),
             replace(QUEUE, current=None),
-            "disarmed; arm it in HOLD, or, if the server may arm: mav-tasks resume",
+            "disarmed; arm it in HOLD (or mav-tasks resume, if the server may arm)",
         ),
     ],
 )
@@ -378,7 +378,7 @@ DISARMED = replace(WAITING, reason=TaskReason.DISARMED, words="move 2 m: queued 
         (TaskReason.QUEUE_PAUSED, "to resume: mav-tasks resume --vehicle 1"),
         (
             TaskReason.DISARMED,
-            "arm it in HOLD, or, if the server may arm: mav-tasks resume --vehicle 1",
+            "arm it in HOLD (or mav-tasks resume --vehicle 1, if the server may arm)",
         ),
         (TaskReason.WRONG_MODE, "set HOLD, then: mav-tasks resume --vehicle 1"),
         (TaskReason.NOT_READY, "wait, or fix what the rover reports"),
@@ -423,7 +423,7 @@ def drawn_of_several(queue: QueueStatus) -> list[str]:
 
 def test_the_first_line_says_what_the_next_task_waits_for_and_what_to_do() -> None:
     idle = replace(QUEUE, current=None, running=None, waiting=(DISARMED,))
-    remedy = "arm it in HOLD, or, if the server may arm: mav-tasks resume"
+    remedy = "arm it in HOLD (or mav-tasks resume, if the server may arm)"
     assert words.headline_of(idle) == (
         f"rover 1: no task runs; task 13 waits: disarmed; {remedy}; 1 waiting"
     )
