@@ -99,7 +99,7 @@ class TaskOptions:
         int,
         typer.Option(
             metavar="NUMBER",
-            help="Number of this submission: repeated with it, it makes no second task; 0: random.",
+            help="Number of this submission: the same number twice makes one task; 0: random.",
         ),
     ] = 0
     label: Annotated[
