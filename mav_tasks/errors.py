@@ -3,7 +3,7 @@
 ::
 
     MavTasksError
-    ├── UsageError            the operator can fix it: one clear line, exit code 2
+    ├── UsageError            the operator can fix it: one clear line, exit status 2
     │   ├── LinkUrlError      a malformed link URL
     │   ├── LinkOpenError     the system refuses the link (port in use, no such host)
     │   ├── InsecureLinkError a link beyond loopback without a key

@@ -136,8 +136,8 @@ def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
     assert [done.status for done in ended] == [1, 0, 0]
     moved, queue, resumed = ended
     assert "failed (stuck)" in moved.output
-    assert "paused: stuck, to go on: mav-tasks resume" in queue.output
-    assert resumed.output == "rover 1: goes on\n"
+    assert "queue paused (stuck); to resume: mav-tasks resume" in queue.output
+    assert resumed.output == "rover 1: resumed\n"
 
 
 def rover_options(command: str) -> tuple[str, ...]:

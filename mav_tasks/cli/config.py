@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mav_tasks.settings import ServerSettings
 
 app = typer.Typer(
-    help="Show, check and begin the configuration of the server.",
+    help="Show, check and create the configuration of the server.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -23,14 +23,18 @@ STANDARD_INPUT = STANDARD_OUTPUT = "-"
 @app.command()
 def show(
     keys: Annotated[
-        list[str] | None, typer.Argument(metavar="[KEY]...", help="Only these, or whole tables.")
+        list[str] | None,
+        typer.Argument(metavar="[KEY]...", help="Keys or tables to print; default: all."),
     ] = None,
     config: Annotated[
-        str | None, typer.Option(metavar="FILE", help="Instead of the file that serve would read.")
+        str | None,
+        typer.Option(
+            metavar="FILE", help="Configuration file; default: the file that serve would read."
+        ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="As JSON, for scripts.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print each key with the value in force and its source."""
+    """Print each key with its value and the source of the value."""
     from mav_tasks.config import report  # noqa: PLC0415
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
 
@@ -39,14 +43,16 @@ def show(
     shown = report.Report(configuration, _parameters(configuration.settings))
     sys.stdout.write(shown.as_json(names) if as_json else shown.as_toml(names))
     for words in shown.not_in_force:
-        sys.stderr.write(f"mav-tasks: not in force, though set before: {words}\n")
+        sys.stderr.write(f"mav-tasks: parameter of an earlier run ignored: {words}\n")
 
 
 @app.command()
 def check(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="- for standard input.")],
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="Configuration file; '-': standard input.")
+    ],
 ) -> None:
-    """Check a file: print "ok", or each fault with its line and exit with 2."""
+    """Check a file: print "ok", or each error with its line and exit with 2."""
     from mav_tasks.config import configuration, toml_file  # noqa: PLC0415
 
     if file == STANDARD_INPUT:
@@ -62,12 +68,12 @@ def check(
 @app.command()
 def init(
     path: Annotated[
-        str | None, typer.Argument(help="A file that is not there yet; default, and -: print it.")
+        str | None, typer.Argument(help="New file; default, or '-': standard output.")
     ] = None,
 ) -> None:
     """Print or write a sample file.
 
-    The sample has each key with its meaning, range and default.
+    The sample lists each key with its meaning, range and default.
     """
     from mav_tasks.config.sample import sample  # noqa: PLC0415
 

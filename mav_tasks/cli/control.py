@@ -11,13 +11,14 @@ from mav_tasks.cli.options import Common, Deadline, StartAt, StartIn, TaskId, se
 from mav_tasks.errors import UsageError
 
 RELEASED = {
-    "again": "all of it is driven again, from here",
-    "remainder": "the remainder is driven",
-    "skip": "it is skipped",
+    "again": "released, restarts from here",
+    "remainder": "released, finishes the remainder",
+    "skip": "skipped",
 }
 
 MaybeTaskId = Annotated[
-    int | None, typer.Argument(metavar="[ID]", min=1, help="Of the task; without: the running one.")
+    int | None,
+    typer.Argument(metavar="[ID]", min=1, help="Id of the task; default: the running task."),
 ]
 
 
@@ -25,9 +26,7 @@ MaybeTaskId = Annotated[
 async def cancel(
     common: Common,
     task_id: MaybeTaskId = None,
-    kill: Annotated[
-        bool, typer.Option("--kill", help="Put the rover into HOLD at once, too.")
-    ] = False,
+    kill: Annotated[bool, typer.Option("--kill", help="Also set HOLD at once.")] = False,
 ) -> None:
     """Cancel a task: the named one, or the running one."""
     from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
@@ -40,26 +39,28 @@ async def cancel(
         else:
             rover = client.vehicle
             task_id = await (client.kill() if kill else client.cancel())
-    words = f"rover {rover}: task {task_id} is called off"
+    words = f"rover {rover}: task {task_id} {'killed' if kill else 'cancelled'}"
     output.say_done(common.json, "kill" if kill else "cancel", words, task=task_id, vehicle=rover)
 
 
 @command
 async def clear(
     common: Common,
-    everything: Annotated[bool, typer.Option("--all", help="The running one, too.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Also cancel the running task.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
 ) -> None:
     """Cancel all waiting tasks."""
     if everything and not yes:
-        _confirm("Call off all tasks, the running one, too?")
+        _confirm("Cancel all tasks, including the running one?")
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     async with opened(common) as client:
         rover = client.vehicle
         await client.clear(running_too=everything)
-    which = "all tasks are" if everything else "all waiting tasks are"
-    words = f"rover {rover}: {which} called off"
+    which = "all tasks" if everything else "all waiting tasks"
+    words = f"rover {rover}: {which} cancelled"
     output.say_done(common.json, "clear", words, running_too=everything, vehicle=rover)
 
 
@@ -67,33 +68,41 @@ async def clear(
 async def modify(
     task_id: TaskId,
     common: Common,
-    priority: Annotated[int | None, typer.Option(metavar="0..10", help="10 runs first.")] = None,
+    priority: Annotated[
+        int | None, typer.Option(metavar="0..10", help="Priority of the task; 10 is the highest.")
+    ] = None,
     start_in: StartIn = "",
     start_at: StartAt = "",
     deadline: Deadline = "",
     after: Annotated[
-        int | None, typer.Option(metavar="ID", help="A task that must complete first; 0: none.")
+        int | None, typer.Option(metavar="ID", help="Run after this task has completed; 0: none.")
     ] = None,
     preemptible: Annotated[
         bool | None,
-        typer.Option("--preemptible/--no-preemptible", help="Others may interrupt it."),
+        typer.Option(
+            "--preemptible/--no-preemptible", help="Whether other tasks may interrupt this one."
+        ),
     ] = None,
     preemptive: Annotated[
-        bool | None, typer.Option("--preemptive/--no-preemptive", help="It may interrupt others.")
+        bool | None,
+        typer.Option(
+            "--preemptive/--no-preemptive", help="Whether this task may interrupt others."
+        ),
     ] = None,
     label: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="A name for it: 24 bytes; '': none.")
+        str | None,
+        typer.Option(metavar="TEXT", help="Name of the task, at most 24 bytes of UTF-8; '': none."),
     ] = None,
 ) -> None:
     """Change a task that has not ended.
 
-    Options that are not given change nothing.
+    Options that you omit leave the task unchanged.
     """
     start = start_of(start_in, start_at)
     until = seconds_of("--deadline", deadline)
     wishes = (priority, start.delay, start.at, until, after, preemptible, preemptive, label)
     if all(wish is None for wish in wishes):
-        raise UsageError(f"modify {task_id}: say what is to be changed, --priority or another")
+        raise UsageError(f"modify {task_id}: nothing to change; give --priority or another option")
     from mav_tasks.cli.session import find_task, opened, values_checked  # noqa: PLC0415
     from mav_tasks.cli.typed_words import in_typed_words  # noqa: PLC0415
 
@@ -110,7 +119,7 @@ async def modify(
                 at=start.at,
                 label=label,
             )
-    words = f"rover {task.vehicle}: task {task_id} is changed"
+    words = f"rover {task.vehicle}: task {task_id} changed"
     output.say_done(common.json, "modify", words, task=task_id, vehicle=task.vehicle)
 
 
@@ -122,13 +131,13 @@ async def release(
         typer.Argument(
             metavar="[ID] again|remainder|skip",
             autocompletion=completions.releases,
-            help="Without an ID: the held one.",
+            help="Id of the task; default: the held task.",
         ),
     ],
 ) -> None:
-    """Release a held task.
+    """Restart, finish or skip a held task.
 
-    "again" restarts it here, "remainder" finishes it, "skip" drops it.
+    "again" restarts the task here, "remainder" finishes it, "skip" drops it.
     """
     from mav_tasks.client.handle import Release  # noqa: PLC0415
 
@@ -137,7 +146,7 @@ async def release(
     if how not in choices or len(named) > 1:
         raise UsageError(f"release {' '.join(wish)}: expected [ID] again, remainder or skip")
     if named and not (named[0].isascii() and named[0].isdigit()):
-        raise UsageError(f"release {named[0]}: expected the number of a task")
+        raise UsageError(f"release {named[0]}: expected the id of a task")
     chosen = choices[choices.index(how)]
     from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
 
@@ -155,6 +164,6 @@ async def release(
 
 def _confirm(question: str) -> None:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise UsageError("--all calls off the running task, too: say --yes")
+        raise UsageError("--all also cancels the running task: add --yes")
     if not typer.confirm(question):
-        raise UsageError("nothing was called off")
+        raise UsageError("nothing was cancelled")

@@ -7,6 +7,6 @@ import typer
 
 
 def demo(context: typer.Context) -> None:
-    """Run a demonstration: drive three tasks and measure them."""
+    """Run the demonstration: three tasks, driven and measured."""
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "rover_sim.demo", *context.args])

@@ -10,7 +10,7 @@ from mav_tasks.errors import UsageError
 
 def dialect(
     path: Annotated[
-        bool, typer.Option("--path", help="Say in which folder the XML files are.")
+        bool, typer.Option("--path", help="Print the folder of the XML files.")
     ] = False,
 ) -> None:
     """Print the MAVLink definitions of the task messages.

@@ -25,9 +25,10 @@ READER_GONE = 141  # the reader of the output has ended, as a shell reports SIGP
 TABLE = """\b
 Exit status:
   0  done
-  1  a task ended otherwise than completed, or a request was refused
+  1  a task did not complete, or the server refused a request
   2  usage error; the message says how to fix it
   3  no answer in time
+  70  internal error of the server (serve only)
   130  Ctrl-C"""
 
 #: expected errors of a command; any other one is a bug and shows its traceback
@@ -43,8 +44,8 @@ def tell(error: BaseException) -> int:
             _let_go_of_output()
             return READER_GONE
         case NoAnswer(nonce=nonce) if nonce:
-            again = f"repeat with --nonce {nonce}, and it is added only once"
-            _say(f"{error}; the task may exist: {again}")
+            again = f"repeat the command with --nonce {nonce} to avoid a second one"
+            _say(f"{error}. The task may exist: {again}")
         case NoSuchVehicle():
             _say(f"{error} (--vehicle N)")
         case _:

@@ -13,6 +13,8 @@ from rich.table import Table
 from rich.text import Text
 
 from mav_tasks.cli import output, words
+from mav_tasks.cli.options import Common
+from mav_tasks.cli.session import is_alone
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import TaskStatus
@@ -32,10 +34,10 @@ class View(Protocol):
         """Show whether the rover and its server are silent."""
 
 
-async def follow(client: Client, task: Task, *, as_json: bool) -> None:
+async def follow(client: Client, task: Task, common: Common) -> None:
     """Show a task until it has ended. Raise TaskFailed unless it completed."""
     try:
-        with _view(task.vehicle, as_json=as_json) as view:
+        with _view(client, task.vehicle, common) as view:
             looking = asyncio.create_task(_look(client, task, view))
             try:
                 async for status in task.updates():
@@ -44,7 +46,7 @@ async def follow(client: Client, task: Task, *, as_json: bool) -> None:
                 looking.cancel()
     except asyncio.CancelledError:
         name = f"rover {task.vehicle}: task {task.id}"
-        goes_on = f"{name} goes on; to call it off: mav-tasks cancel {task.id}"
+        goes_on = f"{name} keeps running; to cancel it: mav-tasks cancel {task.id}"
         sys.stderr.write(f"mav-tasks: {goes_on}\n")
         raise
     await task.done()
@@ -58,13 +60,14 @@ async def _look(client: Client, task: Task, view: View) -> None:
 
 
 @contextmanager
-def _view(rover: int, *, as_json: bool) -> Iterator[View]:
-    if as_json:
+def _view(client: Client, rover: int, common: Common) -> Iterator[View]:
+    alone = is_alone(client, common)
+    if common.json:
         yield Objects()
     elif not output.is_drawn_on():
-        yield Lines(rover)
+        yield Lines(rover, is_alone=alone)
     else:
-        bar = Bar()
+        bar = Bar(is_alone=alone)
         with Live(
             console=output.console(), auto_refresh=False, transient=True, get_renderable=bar.drawn
         ) as live:
@@ -77,14 +80,15 @@ def _view(rover: int, *, as_json: bool) -> Iterator[View]:
 class Lines:
     """Prints the status line when it changes, and when the rover falls silent or returns."""
 
-    def __init__(self, rover: int) -> None:
+    def __init__(self, rover: int, *, is_alone: bool) -> None:
         self._rover = rover
+        self._is_alone = is_alone
         self._told = ""
         self._is_silent = False
 
     def show(self, status: TaskStatus) -> None:
         """Print a status whose line has changed."""
-        line = words.line_of(status)
+        line = words.line_of(status, is_alone=self._is_alone)
         if line != self._told:
             self._told = line
             output.say(line)
@@ -116,8 +120,9 @@ class Objects:
 class Bar:
     """A progress line that is redrawn in place."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_alone: bool) -> None:
         self.status: TaskStatus | None = None
+        self._is_alone = is_alone
         self.live: Live | None = None
         self._is_silent = False
 
@@ -132,7 +137,7 @@ class Bar:
         self._draw()
 
     def drawn(self) -> Table | Group:
-        """Return the line, fitted to the window, and below it the command to go on."""
+        """Return the line, fitted to the window, and below it what a person can do."""
         width = 80 if self.live is None else self.live.console.width
         grid = Table.grid(padding=(0, 1), expand=False)
         if self.status is None:
@@ -149,7 +154,8 @@ class Bar:
         for _ in cells:
             grid.add_column(no_wrap=True, overflow="ellipsis")
         grid.add_row(*cells)
-        return Group(grid, Text(words.way_on_of(status))) if words.way_on_of(status) else grid
+        way_on = words.way_on_of(status, is_alone=self._is_alone)
+        return Group(grid, Text(way_on)) if way_on else grid
 
     def _draw(self) -> None:
         if self.live is not None:

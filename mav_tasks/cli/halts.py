@@ -14,18 +14,18 @@ from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
 if TYPE_CHECKING:
     from mav_tasks.client.aio import Client
 
-Everywhere = Annotated[bool, typer.Option("--all", help="Every rover of the server.")]
+Everywhere = Annotated[bool, typer.Option("--all", help="Apply to every rover of the server.")]
 
 
 @command
 async def stop(
     common: Common,
     everywhere: Everywhere = False,
-    clear: Annotated[bool, typer.Option("--clear", help="Cancel the waiting tasks, too.")] = False,
+    clear: Annotated[bool, typer.Option("--clear", help="Also cancel the waiting tasks.")] = False,
 ) -> None:
-    """Stop the rovers at once; nothing runs until you resume.
+    """Stop the rovers at once; no task runs until you resume.
 
-    Without --vehicle it stops every rover, as with --all.
+    Stops every rover unless you give --vehicle. --timeout limits the wait for confirmation.
     """
     from mav_tasks.cli.session import unfound  # noqa: PLC0415
     from mav_tasks.tasks.lifecycle import TaskReason  # noqa: PLC0415
@@ -36,7 +36,10 @@ async def stop(
             await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
         except Refused as error:
             if error.reason == TaskReason.VEHICLE_SILENT:
-                words = "STOP is in force, but a rover is silent: it stops when it is heard again"
+                words = (
+                    "STOP is in force, but a rover is silent and may still move;"
+                    " the server stops it when it is heard again"
+                )
                 raise Refused(words, result=error.result, reason=error.reason) from error
             raise
     which, way_on = "every rover", "mav-tasks resume --all"
@@ -45,7 +48,7 @@ async def stop(
     output.say_done(
         common.json,
         "stop",
-        f"STOP is in force for {which}: nothing runs until '{way_on}'",
+        f"STOP is in force for {which}: no task runs until '{way_on}'",
         vehicle=common.vehicle,
         cleared=clear,
     )
@@ -53,15 +56,17 @@ async def stop(
 
 @command
 async def pause(common: Common, everywhere: Everywhere = False) -> None:
-    """Stop a rover; its task can continue from there."""
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    """Stop a rover, and pause its task and queue until you resume."""
+    from mav_tasks.cli.session import is_alone, opened  # noqa: PLC0415
+    from mav_tasks.cli.words import resume_command  # noqa: PLC0415
 
     async with opened(common) as client:
         rovers = _chosen(client, common, everywhere=everywhere)
+        alone = is_alone(client, common)
 
         async def pause_one(rover: int) -> str:
             await client.pause(vehicle=rover)
-            return f"paused. To go on: {_way_on(client, rover)}"
+            return f"paused. To resume: {resume_command(rover, is_alone=alone)}"
 
         await _each(rovers, pause_one, common, "pause")
 
@@ -73,27 +78,31 @@ async def resume(
     epoch: Annotated[
         int | None,
         typer.Option(
-            metavar="N", min=1, help="Only if nothing came since: halt_epoch of 'queue --json'."
+            metavar="N",
+            min=1,
+            help="Resume only if no halt came after this halt_epoch of 'queue --json'.",
         ),
     ] = None,
 ) -> None:
-    """Resume after a pause, a STOP or a takeover."""
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    """Resume tasks after a pause, a STOP or a takeover."""
+    from mav_tasks.cli.session import is_alone, opened  # noqa: PLC0415
     from mav_tasks.cli.words import line_of  # noqa: PLC0415
     from mav_tasks.tasks.lifecycle import TaskState  # noqa: PLC0415
 
     if everywhere and epoch is not None:
-        raise UsageError("--all and --epoch: each rover has an epoch of its own, name one rover")
+        raise UsageError("--epoch needs one rover: use --vehicle N instead of --all")
     async with opened(common) as client:
         rovers = _chosen(client, common, everywhere=everywhere)
+        alone = is_alone(client, common)
 
         async def resume_one(rover: int) -> str:
             await client.resume(epoch=epoch, vehicle=rover)
             with suppress(ClientError):  # the resume has been accepted
                 first = (await client.queue(limit=0, vehicle=rover)).current
                 if first is not None and first.state is TaskState.HELD:
-                    return f"goes on after {line_of(first).removeprefix(f'rover {rover}: ')}"
-            return "goes on"
+                    line = line_of(first, is_alone=alone).removeprefix(f"rover {rover}: ")
+                    return f"resumed, but blocked by {line}"
+            return "resumed"
 
         await _each(rovers, resume_one, common, "resume")
 
@@ -111,13 +120,8 @@ def _chosen(client: "Client", common: Common, *, everywhere: bool) -> list[int]:
     rovers = [each.id for each in client.vehicles()]
     if len(rovers) > 1 and not everywhere:
         ids = ", ".join(map(str, rovers))
-        raise UsageError(f"there are rovers {ids}: choose with --vehicle N or --all")
+        raise UsageError(f"the server has rovers {ids}: choose with --vehicle N or --all")
     return rovers
-
-
-def _way_on(client: "Client", rover: int) -> str:
-    is_alone = len(client.vehicles()) == 1
-    return "mav-tasks resume" if is_alone else f"mav-tasks resume --vehicle {rover}"
 
 
 async def _each(

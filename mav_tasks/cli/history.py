@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 async def history(
     common: Common,
     limit: Annotated[
-        int, typer.Option(min=1, metavar="NUMBER", help="Show so many tasks of each rover.")
+        int, typer.Option(min=1, metavar="NUMBER", help="Show at most this many tasks per rover.")
     ] = 20,
 ) -> None:
     """List finished tasks, newest first.
 
-    Without --vehicle, list those of every rover. 'mav-tasks log' prints all events.
+    Lists the tasks of all rovers unless you give --vehicle; times are local. 'mav-tasks log' prints
+    all events.
     """
     from datetime import datetime  # noqa: PLC0415
 

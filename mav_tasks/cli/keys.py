@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from mav_tasks.key_ring.ring import Entry
 
 app = typer.Typer(
-    help="Add, list and revoke the keys that packets are signed with.",
+    help="Add, list and revoke signing keys.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 LONGEST = 4096  # characters of a passphrase that are read
 
-Name = Annotated[str, typer.Argument(metavar="NAME", help="Of the key.")]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key.")]
 File = Annotated[
     str,
     typer.Option(
-        "--keys", metavar="FILE", help="The key ring; default: as the configuration says."
+        "--keys", metavar="FILE", help="Key ring file; default: signing.keys of the configuration."
     ),
 ]
 
@@ -39,31 +39,29 @@ def add(
         typer.Option(
             metavar="ROLE",
             autocompletion=completions.roles,
-            help="What its holder may do: observer, submitter, operator or safety; "
-            "or vehicle: it is for the link to a rover.",
+            help="Role of the client: observer, submitter, operator or safety; "
+            "or vehicle, for the link to a rover.",
         ),
     ],
-    passphrase: Annotated[
-        bool, typer.Option("--passphrase", help="Ask for a passphrase, as ground stations do.")
-    ] = False,
+    passphrase: Annotated[bool, typer.Option("--passphrase", help="Ask for a passphrase.")] = False,
     hex_: Annotated[bool, typer.Option("--hex", help="Ask for 64 hexadecimal digits.")] = False,
     generate: Annotated[
-        bool, typer.Option("--generate", help="Make a new one, and print it once; the default.")
+        bool, typer.Option("--generate", help="Generate a random key and print it once (default).")
     ] = False,
     derivation: Annotated[
         str | None,
         typer.Option(
             metavar="HOW",
             autocompletion=completions.derivations,
-            help="What a passphrase becomes a key by: sha256 (QGroundControl 5.0, MAVProxy; "
-            "the default) or pbkdf2 (later QGroundControl).",
+            help="How the key is derived from the passphrase: sha256 (default; QGroundControl 5.0, "
+            "MAVProxy) or pbkdf2 (later QGroundControl).",
         ),
     ] = None,
     keys: File = "",
 ) -> None:
     """Add a key; a running server accepts it at once.
 
-    If standard input is not a terminal, its first line is the passphrase or the digits.
+    If standard input is not a terminal, the passphrase or the digits are read from its first line.
     """
     from datetime import UTC, datetime  # noqa: PLC0415
 
@@ -95,17 +93,19 @@ def add(
     if derivation == how.GENERATED:
         output.say(secret.hex())
         sys.stderr.write(
-            "mav-tasks: this is the secret, for the other end; it is not shown again\n"
+            "mav-tasks: this is the secret; enter it at the other end. It is not shown again\n"
         )
-    sys.stderr.write(f"mav-tasks: key {name} ({key.fingerprint}), {role}, is in {path}\n")
+    sys.stderr.write(f"mav-tasks: added key {name} ({key.fingerprint}), role {role}, to {path}\n")
 
 
 @app.command("list")
 def list_(
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, one object a line.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON, one object per line.")
+    ] = False,
     keys: File = "",
 ) -> None:
-    """List the keys with their fingerprints; never a secret."""
+    """List the keys with their fingerprints, without the secrets."""
     from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
     from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
 
@@ -126,14 +126,15 @@ def revoke(
     forget: Annotated[
         bool,
         typer.Option(
-            "--forget", help="Delete its secret: records that it signed cannot be replayed then."
+            "--forget",
+            help="Also delete the secret; records that need the key can no longer be replayed.",
         ),
     ] = False,
     keys: File = "",
 ) -> None:
-    """Revoke a key; a running server refuses it at once.
+    """Revoke a key; a running server rejects it at once.
 
-    The ring keeps the secret only to replay records of runs in which the key was valid.
+    The key ring keeps the secret only to replay old records.
     """
     from datetime import UTC, datetime  # noqa: PLC0415
 
@@ -150,7 +151,7 @@ def revoke(
         return revoked.with_forgotten(name) if forget else revoked
 
     change(path, without_it)
-    output.say(f"key {name} is revoked in {path}{', and its secret is deleted' if forget else ''}")
+    output.say(f"revoked key {name} in {path}{', and deleted its secret' if forget else ''}")
 
 
 def _asked(what: str, *, is_new: bool = False) -> str:
@@ -163,10 +164,10 @@ def _asked(what: str, *, is_new: bool = False) -> str:
 
     try:
         text = getpass(f"{what}: ")
-        if is_new and getpass("The same again: ") != text:
-            raise KeyRingError("the two are not the same")
+        if is_new and getpass("Repeat it: ") != text:
+            raise KeyRingError("the entries differ")
     except EOFError:
-        raise UsageError(f"{what.lower()}: nothing was given") from None
+        raise UsageError(f"{what.lower()}: nothing was entered") from None
     return text
 
 
@@ -187,7 +188,7 @@ def _show(entries: "tuple[Entry, ...]") -> None:
     from rich.text import Text  # noqa: PLC0415
 
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
-    for name in ("key", "role", "fingerprint", "from", "made", "revoked"):
+    for name in ("key", "role", "fingerprint", "derivation", "created", "revoked"):
         table.add_column(name)
     for entry in entries:
         made, revoked = (

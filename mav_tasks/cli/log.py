@@ -22,28 +22,34 @@ def log(
         str | None,
         typer.Option(
             metavar="PATH",
-            help="The store's file; default: that of the server that was started last.",
+            help="Store file; default: store.path of the configuration, else the store of the "
+            "server that was started last.",
         ),
     ] = None,
-    task: Annotated[int | None, typer.Option(metavar="ID", help="Of this task only.")] = None,
+    task: Annotated[
+        int | None, typer.Option(metavar="ID", help="Print only events of this task.")
+    ] = None,
     vehicle: Annotated[
-        int | None, typer.Option(metavar="N", help="Of this vehicle only, by its system id.")
+        int | None, typer.Option(metavar="N", help="Print only events of this rover (system id).")
     ] = None,
     since: Annotated[
         str | None,
         typer.Option(
-            metavar="2h|2026-11-20T10:00", help="Not older than this, or since then, UTC."
+            metavar="2h|2026-11-20T10:00",
+            help="Print only events of this last period, or since this time (UTC).",
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="A table, comma separated.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON, one object per line.")
+    ] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
     follow: Annotated[
-        bool, typer.Option("--follow", "-f", help="Go on with what happens, until Ctrl-C.")
+        bool, typer.Option("--follow", "-f", help="Keep printing new events until Ctrl-C.")
     ] = False,
 ) -> None:
-    """Print what happened, one line per event.
+    """Print the journal, one event per line; times are UTC.
 
-    It reads the store; the server may be running.
+    Reads the store, whether or not the server runs.
     """
     import time  # noqa: PLC0415
     from contextlib import closing  # noqa: PLC0415
@@ -56,14 +62,14 @@ def log(
         raise UsageError("--json and --csv: choose one of them")
     for flag, number in (("--task", task), ("--vehicle", vehicle)):
         if number is not None and not 0 <= number < MOST:
-            raise UsageError(f"{flag} {number}: there is no such number")
+            raise UsageError(f"{flag} {number}: not a valid id")
     begin = None if since is None else export.parse_since(since, now=time.time())
     path = path_of_store(_store_of_server() if store is None else store)
     if path is None and store is None:
         words = "the server that was started last keeps its tasks in memory, so it has no journal"
-        raise StoreError(f"{words}; --store names another store")
+        raise StoreError(f"{words}; choose another store with --store")
     if path is None or store == "":
-        raise StoreError("--store: expected the path of a store that is kept")
+        raise StoreError("--store: expected the path of a store file")
     which = Which(task=task, vehicle=vehicle, since=begin)
     entry_of = export.json_entry if as_json else export.csv_entry if as_csv else export.text_entry
     with closing(Journal(path, which)) as journal:

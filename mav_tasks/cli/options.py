@@ -15,19 +15,29 @@ DEFAULT_SERVER = "udpout:127.0.0.1:14560"
 PRIORITY = 5
 
 StartIn = Annotated[
-    str, typer.Option("--in", metavar="DURATION", help="Start no earlier: 30s, 5m, 1h30m.")
+    str, typer.Option("--in", metavar="DURATION", help="Start after this delay: 30s, 5m, 1h30m.")
 ]
 StartAt = Annotated[
     str,
     typer.Option(
-        "--at", metavar="TIME", help="Start at 14:30 or 2026-11-20T14:30, local unless it says so."
+        "--at",
+        metavar="TIME",
+        help="Start at 14:30 or 2026-11-20T14:30; local time unless it names a zone.",
     ),
 ]
 Deadline = Annotated[
-    str, typer.Option(metavar="DURATION", help="It must have begun by then, else it expires.")
+    str,
+    typer.Option(
+        metavar="DURATION", help="The task expires if it has not started within this time."
+    ),
 ]
-Wait = Annotated[bool, typer.Option("--wait", "-w", help="Wait until it is over, and show it.")]
-TaskId = Annotated[int, typer.Argument(metavar="ID", min=1, help="Of the task.")]
+Wait = Annotated[
+    bool,
+    typer.Option(
+        "--wait", "-w", help="Show the task until it ends; exit with 1 unless it completes."
+    ),
+]
+TaskId = Annotated[int, typer.Argument(metavar="ID", min=1, help="Id of the task.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,18 +51,20 @@ class Common:
             "-s",
             metavar="URL",
             envvar="MAV_TASKS_SERVER",
-            help="Of the task server: udpout:host:port, tcp:host:port, serial:device:baud.",
+            help="URL of the task server: udpout:host:port, tcp:host:port, serial:device:baud.",
         ),
     ] = DEFAULT_SERVER
     vehicle: Annotated[
         int | None,
-        typer.Option(min=1, max=255, metavar="N", help="Which rover, where there are several."),
+        typer.Option(
+            min=1, max=255, metavar="N", help="System id of the rover, if the server has several."
+        ),
     ] = None
     timeout: Annotated[
         float,
-        typer.Option(min=0.1, metavar="SECONDS", help="Until a server must have been found."),
+        typer.Option(min=0.1, metavar="SECONDS", help="How long to look for the server."),
     ] = 5.0
-    json: Annotated[bool, typer.Option("--json", help="Print JSON, one object a line.")] = False
+    json: Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")] = False
     sign: Annotated[
         str,
         typer.Option(
@@ -64,7 +76,9 @@ class Common:
     ] = ""
     keys: Annotated[
         str,
-        typer.Option(metavar="FILE", help="The key ring; default: as the configuration says."),
+        typer.Option(
+            metavar="FILE", help="Key ring file; default: signing.keys of the configuration."
+        ),
     ] = ""
 
 
@@ -72,18 +86,25 @@ class Common:
 class TaskOptions:
     """Options for when a new task runs, and whether the command waits for it."""
 
-    priority: Annotated[int, typer.Option(metavar="0..10", help="10 runs first.")] = PRIORITY
+    priority: Annotated[
+        int, typer.Option(metavar="0..10", help="Priority of the task; 10 is the highest.")
+    ] = PRIORITY
     after: Annotated[
-        int, typer.Option(metavar="ID", help="A task that must complete first; 0: none.")
+        int, typer.Option(metavar="ID", help="Run after this task has completed; 0: none.")
     ] = 0
     start_in: StartIn = ""
     start_at: StartAt = ""
     deadline: Deadline = ""
     nonce: Annotated[
         int,
-        typer.Option(metavar="NUMBER", help="The task's own mark, for a second try; 0: random."),
+        typer.Option(
+            metavar="NUMBER",
+            help="Number of this submission: the same number twice makes one task; 0: random.",
+        ),
     ] = 0
-    label: Annotated[str, typer.Option(metavar="TEXT", help="A name for it: 24 bytes.")] = ""
+    label: Annotated[
+        str, typer.Option(metavar="TEXT", help="Name of the task, at most 24 bytes of UTF-8.")
+    ] = ""
     wait: Wait = False
 
 

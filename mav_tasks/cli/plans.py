@@ -19,23 +19,29 @@ if TYPE_CHECKING:
 STANDARD_OUTPUT = "-"
 
 FileIn = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A .plan, or QGC WPL 110 (.waypoints).")
+    Path, typer.Argument(metavar="FILE", help="Mission file: .plan or QGC WPL 110 (.waypoints).")
 ]
-PlanIn = Annotated[Path, typer.Argument(metavar="FILE", help="A .plan of QGroundControl.")]
+PlanIn = Annotated[Path, typer.Argument(metavar="FILE", help="File: a .plan of QGroundControl.")]
 FileOut = Annotated[
-    str, typer.Argument(metavar="FILE", help="A .plan, or .waypoints for QGC WPL 110; - prints.")
+    str,
+    typer.Argument(
+        metavar="FILE",
+        help="Output file: .plan, or .waypoints for QGC WPL 110; '-': standard output.",
+    ),
 ]
-PlanOut = Annotated[str, typer.Argument(metavar="FILE", help="A .plan; - prints.")]
-Force = Annotated[bool, typer.Option("--force", help="Write over a file that is there.")]
-Empty = Annotated[bool, typer.Option("--empty", help="Also where the file has none: remove it.")]
+PlanOut = Annotated[
+    str, typer.Argument(metavar="FILE", help="Output file: .plan; '-': standard output.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
+Empty = Annotated[bool, typer.Option("--empty", help="If the file has none, remove the rover's.")]
 
 mission = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Missions to and from files."
+    no_args_is_help=True, rich_markup_mode=None, help="Upload, start and download missions."
 )
 fence = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="The fence to and from files."
+    no_args_is_help=True, rich_markup_mode=None, help="Upload and download the fence."
 )
-rally = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Rally points from files.")
+rally = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Upload rally points.")
 
 
 @mission.command("upload")
@@ -45,16 +51,18 @@ async def upload_mission(
     terms: TaskOptions,
     common: Common,
     stage: Annotated[
-        bool, typer.Option("--stage", help="Do not queue it: it waits for 'mission start'.")
+        bool, typer.Option("--stage", help="Do not queue it; start it later with 'mission start'.")
     ] = False,
 ) -> None:
-    """Queue a mission as one task."""
+    """Upload a mission and queue it as one task."""
     from mav_tasks.cli.session import opened, read, values_checked  # noqa: PLC0415
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 
     wished = read(terms)
     if stage and terms != TaskOptions(wait=terms.wait):
-        raise UsageError("--stage: a mission that waits for its start has no terms")
+        raise UsageError(
+            "--stage: only --wait goes with it; a staged mission takes no other task option"
+        )
     plan = read_plan(file)
     async with opened(common) as client:
         with values_checked():
@@ -69,7 +77,7 @@ async def upload_mission(
 @mission.command("start")
 @command
 async def start_mission(common: Common, wait: Wait = False) -> None:
-    """Start the staged mission, or start the last one again.
+    """Start the staged mission, or restart the last one.
 
     A ground station's upload or 'mission upload --stage' stages a mission.
     """
@@ -83,17 +91,17 @@ async def start_mission(common: Common, wait: Wait = False) -> None:
 @mission.command("download")
 @command
 async def download_mission(file: FileOut, common: Common, force: Force = False) -> None:
-    """Write the staged mission of a rover into a file.
+    """Save the staged mission of a rover to a file.
 
-    A ground station's upload or 'mission upload --stage' stages a mission; 'mission upload'
-    without --stage queues a task.
+    A ground station's upload or 'mission upload --stage' stages a mission. What 'mission upload'
+    queued is a task and cannot be downloaded.
     """
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     _check_place(file, force=force)
     async with opened(common) as client:
         plan = await client.mission_file()
-    _check_there(plan.items, "mission", hint="; one that was queued is a task")
+    _check_there(plan.items, "staged mission", note=" (queued missions are tasks)")
     _write(plan, file, f"{len(plan.items)} items", common)
 
 
@@ -106,7 +114,7 @@ async def upload_fence(file: PlanIn, common: Common, empty: Empty = False) -> No
 
     plan = read_plan(file)
     if not plan.fence and not empty:
-        raise UsageError(f"{file} has no fence: --empty takes the rover's away")
+        raise UsageError(f"{file} has no fence; use --empty to remove the rover's fence")
     async with opened(common) as client:
         count = await client.set_fence(plan)
     _uploaded(common, "fence", count)
@@ -115,7 +123,7 @@ async def upload_fence(file: PlanIn, common: Common, empty: Empty = False) -> No
 @fence.command("download")
 @command
 async def download_fence(file: PlanOut, common: Common, force: Force = False) -> None:
-    """Write the rover's fence into a file."""
+    """Save the rover's fence to a file."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
     _check_place(file, force=force)
@@ -134,7 +142,7 @@ async def upload_rally_points(file: PlanIn, common: Common, empty: Empty = False
 
     plan = read_plan(file)
     if not plan.rally and not empty:
-        raise UsageError(f"{file} has no rally points: --empty takes the rover's away")
+        raise UsageError(f"{file} has no rally points; use --empty to remove the rover's")
     async with opened(common) as client:
         count = await client.set_rally_points(plan)
     _uploaded(common, "rally", count)
@@ -142,15 +150,15 @@ async def upload_rally_points(file: PlanIn, common: Common, empty: Empty = False
 
 def _check_place(file: str, *, force: bool) -> None:
     if file != STANDARD_OUTPUT and not force and Path(file).exists():
-        raise UsageError(f"{file} is there: --force writes over it")
+        raise UsageError(f"{file} exists; use --force to overwrite it")
 
 
-def _check_there(parts: Sized, kind: str, *, hint: str = "") -> None:
+def _check_there(parts: Sized, kind: str, *, note: str = "") -> None:
     """Raise Refused if there is nothing to write: an empty file would be misleading."""
     if not parts:
         from mav_tasks.errors import Refused  # noqa: PLC0415
 
-        words = f"the rover has no {kind}{hint}: nothing is written"
+        words = f"the rover has no {kind}{note}; nothing written"
         raise Refused(words, result=0, reason=0)
 
 

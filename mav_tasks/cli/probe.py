@@ -14,37 +14,39 @@ Url = Annotated[
     str | None,
     typer.Argument(
         metavar="URL",
-        help="Of the rover: udpout:host:port, udpin: or tcp: alike, serial:/dev/ttyUSB0:57600.",
+        help="URL of the rover: udpout:host:port, udpin:host:port, tcp:host:port, "
+        "serial:/dev/ttyUSB0:57600.",
     ),
 ]
 SetFailsafe = Annotated[
     bool,
     typer.Option(
         "--set-failsafe",
-        help="Set its parameters so that it stands when setpoints stop, and do nothing else. "
-        "URL may be that of a task server; default: the one on this machine.",
+        help="Only set the rover's parameters so that it stops when setpoints stop. "
+        "URL may be that of a task server (default: the server on this machine).",
     ),
 ]
 DriveFlag = Annotated[
     bool,
     typer.Option(
         "--drive",
-        help="Arm it and drive it, slowly, within 1 m of where it stands (a car: 4 m).",
+        help="Arm the rover and drive it slowly, within 1 m of its place (a car: 4 m or more).",
     ),
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="With --drive: do not ask first.")]
 Speed = Annotated[
     float,
-    typer.Option(min=0.1, max=0.5, metavar="M/S", help="At which stopping is measured."),
+    typer.Option(
+        min=0.1, max=0.5, metavar="M/S", help="Speed at which the stopping distance is measured."
+    ),
 ]
 Number = Annotated[
-    int | None, typer.Option(min=1, max=255, metavar="N", help="Which rover, if several are heard.")
+    int | None,
+    typer.Option(min=1, max=255, metavar="N", help="System id of the rover, if several are heard."),
 ]
 Timeout = Annotated[
     float,
-    typer.Option(
-        "--timeout", min=1.0, metavar="SECONDS", help="Until a rover must have been heard."
-    ),
+    typer.Option("--timeout", min=1.0, metavar="SECONDS", help="How long to wait for a rover."),
 ]
 Output = Annotated[
     str | None,
@@ -52,27 +54,30 @@ Output = Annotated[
         "--output",
         "-o",
         metavar="FILE",
-        help="Where its profile is written; default: the folder vehicles in your configuration.",
+        help="File for the profile; default: in the folder vehicles of your configuration folder.",
     ),
 ]
 Insecure = Annotated[
-    bool, typer.Option("--insecure", help="Allow a link that other machines can reach.")
+    bool, typer.Option("--insecure", help="Allow an unsigned link that other machines can reach.")
 ]
 Sign = Annotated[
     str,
     typer.Option(
-        metavar="NAME", envvar="MAV_TASKS_SIGN", help="Sign with this key, and hear only it."
+        metavar="NAME",
+        envvar="MAV_TASKS_SIGN",
+        help="Sign with this key, and accept only packets signed with it.",
     ),
 ]
 Keys = Annotated[
-    str, typer.Option(metavar="FILE", help="The key ring; default: that of the configuration.")
+    str,
+    typer.Option(metavar="FILE", help="Key ring file; default: signing.keys of the configuration."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 QUESTION = """\
-The rover will be armed and driven, at up to {speed:g} m/s, within a square of 2 m around it,
-or of 8 m and more if its parameters say that it steers like a car.
-Is there room, is nobody near it, and can you stop it by hand? If this program is killed, only the
-rover's own time-out stops it. Type "yes" to drive: """
+This arms the rover and drives it at up to {speed:g} m/s, within 1 m of its place, or 4 m and more
+if its parameters say that it steers like a car. Is there room, is nobody near it, and can you stop
+it manually? If this program is killed, only the rover's own time-out stops it.
+Type "yes" to drive: """
 SIGNALLED = 128  # as a shell reports a signal
 
 
@@ -93,7 +98,7 @@ async def probe(
 ) -> None:
     """Test what a rover can do, directly, without a server.
 
-    Without --set-failsafe or --drive it moves nothing and changes nothing permanently.
+    Nothing moves and nothing stays changed unless you give --set-failsafe or --drive.
     """
     from mav_tasks.cli.options import DEFAULT_SERVER  # noqa: PLC0415
     from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415
@@ -103,9 +108,9 @@ async def probe(
     from mav_tasks.probing import run_probe  # noqa: PLC0415
 
     if set_failsafe and drive:
-        raise UsageError("--set-failsafe and --drive: one after the other")
+        raise UsageError("--set-failsafe and --drive: use one, then the other")
     if url is None and not set_failsafe:
-        raise UsageError("say where the rover is: mav-tasks probe URL")
+        raise UsageError("the URL of the rover is missing: mav-tasks probe URL")
     if drive and not yes:
         _confirm(speed)
     key = key_to_sign_with(sign, keys) if sign else None
@@ -138,7 +143,7 @@ def _confirm(speed: float) -> None:
     from mav_tasks.errors import UsageError  # noqa: PLC0415
 
     if not sys.stdin.isatty():
-        raise UsageError("--drive moves the rover: say --yes where nobody can be asked")
+        raise UsageError("--drive moves the rover: without a terminal, add --yes")
     sys.stderr.write(QUESTION.format(speed=speed))
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() != "yes":

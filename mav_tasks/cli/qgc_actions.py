@@ -11,28 +11,31 @@ from mav_tasks.errors import UsageError
 
 def qgc_actions(
     custom: Annotated[
-        bool, typer.Option("--custom", help="The older format, of QGroundControl 4.3 and 4.4.")
+        bool, typer.Option("--custom", help="Use the older format of QGroundControl 4.3 and 4.4.")
     ] = False,
     action: Annotated[
         list[str] | None,
-        typer.Option(metavar="LABEL=COMMAND,P1,...", help="One more button; repeatable."),
+        typer.Option(metavar="LABEL=COMMAND,P1,...", help="Add a button; repeatable."),
     ] = None,
     only: Annotated[
-        bool, typer.Option("--only", help="The buttons of --action, and no others.")
+        bool, typer.Option("--only", help="Print only the buttons of --action.")
     ] = False,
     component: Annotated[
-        int, typer.Option(min=1, max=255, help="Of the task server, if it is another.")
+        int, typer.Option(min=1, max=255, metavar="N", help="Component id of the task server.")
     ] = 191,
     install: Annotated[
         bool,
-        typer.Option("--install", help="Write both formats to where QGroundControl looks."),
+        typer.Option("--install", help="Write files in both formats to QGroundControl's folders."),
     ] = False,
     documents: Annotated[
         str | None,
-        typer.Option(metavar="FOLDER", help="For --install: instead of your documents folder."),
+        typer.Option(
+            metavar="FOLDER",
+            help="With --install: use this folder instead of your documents folder.",
+        ),
     ] = None,
 ) -> None:
-    """Print buttons for QGroundControl."""
+    """Print or install action buttons for QGroundControl."""
     from mav_tasks import qgc_actions as files  # noqa: PLC0415
 
     actions = [] if only else list(files.ACTIONS)
@@ -45,7 +48,7 @@ def qgc_actions(
         return
     for path in files.install(_documents(documents), actions, component=component):
         sys.stdout.write(f"wrote {path}\n")
-    sys.stdout.write("Choose it in QGroundControl: Application Settings, Fly View\n")
+    sys.stdout.write("Now select the file in QGroundControl: Application Settings, Fly View\n")
 
 
 def _documents(folder: str | None) -> Path:

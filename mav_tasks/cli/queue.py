@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 async def queue(
     common: Common,
     watch: Annotated[
-        bool, typer.Option("--watch", help="Keep it up to date, until Ctrl-C.")
+        bool, typer.Option("--watch", help="Update the display until Ctrl-C.")
     ] = False,
     limit: Annotated[
-        int, typer.Option(min=1, metavar="NUMBER", help="Show so many waiting tasks.")
+        int, typer.Option(min=1, metavar="NUMBER", help="Show at most this many waiting tasks.")
     ] = 100,
 ) -> None:
     """Show the running and the waiting tasks, and why they wait.
 
-    Without --vehicle, show the queue of every rover.
+    Shows the queues of all rovers unless you give --vehicle.
     """
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    from mav_tasks.cli.session import is_alone, opened  # noqa: PLC0415
 
     async with opened(common) as client:
         if watch:
@@ -34,7 +34,8 @@ async def queue(
 
             await watch_queues(client, common, limit=limit)
             return
-        show(await fetch(client, common, limit=limit), common)
+        queues = await fetch(client, common, limit=limit)
+        show(queues, common, is_alone=is_alone(client, common))
 
 
 async def fetch(client: "Client", common: Common, *, limit: int) -> list["QueueStatus"]:
@@ -43,7 +44,7 @@ async def fetch(client: "Client", common: Common, *, limit: int) -> list["QueueS
     return [await client.queue(vehicle=vehicle, limit=limit) for vehicle in meant]
 
 
-def show(queues: list["QueueStatus"], common: Common) -> None:
+def show(queues: list["QueueStatus"], common: Common, *, is_alone: bool) -> None:
     """Print queues as tables, or as JSON."""
     from mav_tasks.cli import output, words  # noqa: PLC0415
 
@@ -55,4 +56,4 @@ def show(queues: list["QueueStatus"], common: Common) -> None:
 
     width = output.console().width
     for each in queues:
-        output.show(queue_table(each, width=width))
+        output.show(queue_table(each, width=width, is_alone=is_alone))

@@ -18,12 +18,15 @@ WITHIN = 2.0  # s to wait for an answer
 async def ready(
     common: Common,
     wait_for: Annotated[
-        float, typer.Option("--within", min=0.1, metavar="SECONDS", help="For the answer.")
+        float,
+        typer.Option(
+            "--within", min=0.1, metavar="SECONDS", help="How long to wait for the answer."
+        ),
     ] = WITHIN,
 ) -> None:
     """Check that the server answers and that it hears its rovers.
 
-    Exit status 0: ready; 1: a rover is silent; 3: no server answers.
+    Exit status 0: ready; 1: a rover is silent; 3: no server answered, or it has no rover.
     """
     from mav_tasks.cli import output, words  # noqa: PLC0415
     from mav_tasks.cli.session import opened  # noqa: PLC0415

@@ -10,22 +10,22 @@ from mav_tasks.cli import exit_codes
 
 
 def replay(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A record of decisions.")],
-    json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="The verdict only.")] = False,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Record made by serve --record.")],
+    json: Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print only the result.")] = False,
     keys: Annotated[
         str,
         typer.Option(
-            metavar="FILE", help="The key ring of a run with signatures; default: the user's own."
+            metavar="FILE",
+            help="Key ring of the recorded server, if it used signatures; default: your own.",
         ),
     ] = "",
 ) -> None:
-    """Run a record through the server's code again.
+    """Replay a record and compare the results.
 
-    Print what happened in it.
+    Runs the server's code on the recorded inputs, and prints what happens.
 
-    Exit code 0: the output equals the record, bit for bit; 1: it differs; 2: the file cannot be
-    read.
+    Exit status 0: identical, bit for bit; 1: different; 2: the file cannot be read.
     """
     from mav_tasks.key_ring.ring_file import load, path_of_ring  # noqa: PLC0415
     from mav_tasks.recording.reading import read  # noqa: PLC0415

@@ -33,7 +33,7 @@ def _show_version(is_asked: bool) -> None:
 def root(
     version: Annotated[  # its callback uses it
         bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Say which this is."),
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
-    """A MAVLink task server: commands become queued tasks that a rover drives."""
+    """A MAVLink task server: it queues commands as tasks and drives rovers."""

@@ -9,9 +9,9 @@ import typer
 from mav_tasks.cli import completions
 
 LINKS = (
-    "udpin:host:port and tcpin:host:port listen, udpout: and tcp: dial, "
-    "serial:/dev/ttyUSB0:57600 is a line; ?unsigned=allow, ?unsigned=refuse and ?key=NAME behind "
-    "it say what is asked of signatures."
+    "udpin:host:port and tcpin:host:port listen, udpout: and tcp: connect, "
+    "serial:/dev/ttyUSB0:57600 opens a serial port. Append ?unsigned=allow, ?unsigned=refuse or "
+    "?key=NAME to set its signing rules."
 )
 
 
@@ -27,16 +27,16 @@ def serve(
         list[str] | None,
         typer.Option(
             metavar="HOST:PORT",
-            help="Where a client listens on UDP, unasked; repeatable. "
+            help="Where a client listens on UDP; the server sends to it unasked; repeatable. "
             "Default: 127.0.0.1:14550 and 127.0.0.1:14540.",
         ),
     ] = None,
-    no_push: Annotated[bool, typer.Option("--no-push", help="Push to nobody.")] = False,
+    no_push: Annotated[bool, typer.Option("--no-push", help="Send to no client unasked.")] = False,
     vehicle: Annotated[
         list[str] | None,
         typer.Option(
             metavar="URL",
-            help="Link to vehicles, of the same kinds; repeatable. "
+            help="Link to rovers, a URL as for --client; repeatable. "
             "Default: udpout:127.0.0.1:14580.",
         ),
     ] = None,
@@ -45,56 +45,58 @@ def serve(
         typer.Option(
             metavar="WHO",
             autocompletion=completions.arming,
-            help="Who arms: server, operator, or (default) auto: server on loopback links only.",
+            help="Who arms the rovers: server, operator, or auto (default): the server on loopback "
+            "links, else the operator.",
         ),
     ] = None,
     store: Annotated[
         str | None,
         typer.Option(
             metavar="PATH|:memory:",
-            help="Where tasks are kept; default: mav-tasks.sqlite3 in the user's data folder.",
+            help="SQLite file of the tasks; default: mav-tasks.sqlite3 in your data folder.",
         ),
     ] = None,
     keep_days: Annotated[
         str | None,
         typer.Option(
             metavar="DAYS",
-            help="Forget finished tasks after so many days, or forever; default: 30.",
+            help="Delete finished tasks after this many days; 'forever': never; default: 30.",
         ),
     ] = None,
     keep_tasks: Annotated[
         str | None,
         typer.Option(
             metavar="COUNT",
-            help="Keep so many finished tasks at the most, or forever; default: 10000.",
+            help="Keep at most this many finished tasks; 'forever': all; default: 10000.",
         ),
     ] = None,
     tlog: Annotated[
         str | None,
-        typer.Option(metavar="FOLDER", help="Keep telemetry logs that ground stations open."),
+        typer.Option(
+            metavar="FOLDER", help="Write telemetry logs (tlog) for ground stations to this folder."
+        ),
     ] = None,
     record: Annotated[
-        str | None, typer.Option(metavar="FOLDER", help="Keep a record for mav-tasks replay.")
+        str | None,
+        typer.Option(metavar="FOLDER", help="Write a record for mav-tasks replay to this folder."),
     ] = None,
     insecure: Annotated[
-        bool, typer.Option("--insecure", help="Allow links that other machines can reach.")
+        bool, typer.Option("--insecure", help="Allow unsigned links that other machines can reach.")
     ] = False,
     keys: Annotated[
         str | None,
         typer.Option(
-            metavar="FILE", help="The key ring; default: keys.toml in the user's config folder."
+            metavar="FILE", help="Key ring file; default: keys.toml in your configuration folder."
         ),
     ] = None,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Say more in the log, for the field.")
-    ] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log more details.")] = False,
     log_json: Annotated[
-        bool, typer.Option("--log-json", help="Log one JSON object a line.")
+        bool, typer.Option("--log-json", help="Log JSON, one object per line.")
     ] = False,
     config: Annotated[
         str | None,
         typer.Option(
-            metavar="FILE", help='Configuration, see "mav-tasks config"; "" for no file at all.'
+            metavar="FILE", help='Configuration file, see "mav-tasks config"; "": no file.'
         ),
     ] = None,
     set_: Annotated[
@@ -103,13 +105,13 @@ def serve(
             "--set",
             metavar="KEY=VALUE",
             autocompletion=completions.settings,
-            help="Any key of the configuration; repeatable.",
+            help="Set any key of the configuration; repeatable.",
         ),
     ] = None,
 ) -> None:
     """Run the task server.
 
-    By default clients use UDP 14560 and the rover uses 14580.
+    By default clients connect to UDP 14560, and the server connects to the rover on UDP 14580.
     """
     # Ignore SIGHUP until the configuration is read; by default it would end the process.
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)

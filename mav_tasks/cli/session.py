@@ -44,7 +44,7 @@ async def opened(common: Common) -> AsyncIterator[Client]:
 async def unfound(common: Common) -> AsyncIterator[Client]:
     """Yield a client whose link is open, without waiting for the server."""
     if common.keys and not common.sign:
-        raise UsageError("--keys: say with which key, --sign NAME")
+        raise UsageError("--keys needs --sign NAME")
     client = Client(
         common.server,
         vehicle=common.vehicle,
@@ -58,7 +58,7 @@ async def unfound(common: Common) -> AsyncIterator[Client]:
         if common.sign or client.vehicles():  # else the server may answer only signed packets
             raise
         raise NoAnswer(
-            f"{error} (does it want a signature? --sign NAME)", nonce=error.nonce
+            f"{error} (if the server requires signatures, use --sign NAME)", nonce=error.nonce
         ) from None
     finally:
         await client.close()
@@ -71,6 +71,11 @@ def values_checked() -> Iterator[None]:
         yield
     except ValueError as error:
         raise UsageError(str(error)) from error
+
+
+def is_alone(client: Client, common: Common) -> bool:
+    """Return whether the server has one rover, so that a command need not name it."""
+    return common.vehicle is None and len(client.vehicles()) == 1
 
 
 async def find_task(client: Client, common: Common, task_id: int) -> Task:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @command
 async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
-    """Show the status of a task."""
+    """Show a task, and what to do if it waits for you."""
     from mav_tasks.cli import output, words  # noqa: PLC0415
     from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
 
@@ -22,16 +22,29 @@ async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
         if wait:
             from mav_tasks.cli.follow import follow  # noqa: PLC0415
 
-            await follow(client, task, as_json=common.json)
+            await follow(client, task, common)
             return
         answer, timing = await task.refresh(), await _timing_of(task)
         if common.json:
             output.say_json(words.task_json(answer) | {"setpoints": words.timing_json(timing)})
             return
         silence = words.silence_of(_heartbeat_age(client, answer.vehicle))
-        for name, value in _fields(answer, timing, silence):
+        to_do = await _to_do(client, common, answer)
+        for name, value in _fields(answer, timing, silence, to_do):
             if value:
-                output.say(f"{name:<12}{value}")
+                output.say(f"{name:<14}{value}")
+
+
+async def _to_do(client: "Client", common: Common, status: "TaskStatus") -> str:
+    """Return what a person can do so that the task runs; "" if nothing."""
+    from mav_tasks.cli import words  # noqa: PLC0415
+    from mav_tasks.cli.session import is_alone  # noqa: PLC0415
+
+    alone = is_alone(client, common)
+    if words.starts_by_itself(status):
+        return words.way_on_of(status, is_alone=alone)
+    queue = await client.queue(vehicle=status.vehicle, limit=0)
+    return words.obstacle_of(status, queue, is_alone=alone)[1]
 
 
 async def _timing_of(task: "Task") -> "TaskTiming | None":
@@ -48,7 +61,7 @@ def _heartbeat_age(client: "Client", vehicle: int) -> float | None:
 
 
 def _fields(
-    status: "TaskStatus", timing: "TaskTiming | None", silence: str
+    status: "TaskStatus", timing: "TaskTiming | None", silence: str, to_do: str
 ) -> list[tuple[str, str]]:
     from mav_tasks.cli import words  # noqa: PLC0415
 
@@ -57,21 +70,22 @@ def _fields(
         ("task", str(status.id)),
         ("rover", f"{status.vehicle} ({silence})" if silence else str(status.vehicle)),
         ("label", status.label),
-        ("what", words.what_of(status)),
+        ("goal", words.what_of(status)),
         ("state", words.state_of(status)),
-        ("why", words.end_of(status)),
+        ("reason", words.end_of(status)),
+        ("what to do", to_do),
         ("priority", str(status.priority)),
         ("after task", str(status.after or "")),
-        ("ahead of it", ahead),
-        ("done", words.percent_of(status)),
-        ("left", words.left_of(status)),
+        ("tasks ahead", ahead),
+        ("progress", words.percent_of(status)),
+        ("remaining", words.left_of(status)),
         ("item", f"{status.item} of {status.items}" if status.items > 1 else ""),
         ("starts in", words.starts_of(status)),
         ("ends in", words.ends_of(status)),
-        ("has run for", words.took_of(status)),
+        ("run time", words.took_of(status)),
         ("ended", _ended(status)),
         ("setpoints", words.timing_of(timing)),
-        ("from", status.submitter),
+        ("submitted by", status.submitter),
     ]
 
 

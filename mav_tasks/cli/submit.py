@@ -19,18 +19,23 @@ Examples:
   mav-tasks submit rotate -90 --after 12
   mav-tasks submit goto 47.3977 8.5456 --global --at 14:30"""
 
-Speed = Annotated[float | None, typer.Option(metavar="M/S", help="Default: the server's.")]
-Rate = Annotated[float | None, typer.Option(metavar="DEG/S", help="Default: the server's.")]
+Speed = Annotated[
+    float | None, typer.Option(metavar="M/S", help="Speed; default: driving.speed of the server.")
+]
+Rate = Annotated[
+    float | None,
+    typer.Option(metavar="DEG/S", help="Turn rate; default: driving.turn_rate_deg of the server."),
+]
 
-app = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, epilog=EPILOG, help="Give a rover something to do."
-)
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, epilog=EPILOG, help="Submit a task.")
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def move(
-    distance: Annotated[float, typer.Argument(metavar="METRES", help="Negative: backwards.")],
+    distance: Annotated[
+        float, typer.Argument(metavar="METRES", help="Distance; negative: backwards.")
+    ],
     terms: TaskOptions,
     common: Common,
     speed: Speed = None,
@@ -44,7 +49,7 @@ async def move(
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def rotate(
-    angle: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise.")],
+    angle: Annotated[float, typer.Argument(metavar="DEGREES", help="Angle; positive: clockwise.")],
     terms: TaskOptions,
     common: Common,
     rate: Rate = None,
@@ -58,13 +63,15 @@ async def rotate(
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def drive(
-    forward: Annotated[float, typer.Argument(metavar="M/S", help="Negative: backwards.")],
-    yaw_rate: Annotated[float, typer.Argument(metavar="DEG/S", help="Clockwise.")],
-    duration: Annotated[str, typer.Argument(metavar="DURATION", help="Such as 5s.")],
+    forward: Annotated[float, typer.Argument(metavar="M/S", help="Speed; negative: backwards.")],
+    yaw_rate: Annotated[
+        float, typer.Argument(metavar="DEG/S", help="Yaw rate; positive: clockwise.")
+    ],
+    duration: Annotated[str, typer.Argument(metavar="DURATION", help="How long, for example 5s.")],
     terms: TaskOptions,
     common: Common,
 ) -> None:
-    """Drive at a velocity for a time."""
+    """Drive at a constant velocity for some time."""
     from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
     from mav_tasks.tasks.goal import Drive  # noqa: PLC0415
 
@@ -78,27 +85,29 @@ async def goto(
     north: Annotated[
         str, typer.Argument(metavar="NORTH|LAT", help="Metres, or degrees with --global.")
     ],
-    east: Annotated[str, typer.Argument(metavar="EAST|LON", help="The same.")],
+    east: Annotated[
+        str, typer.Argument(metavar="EAST|LON", help="Metres, or degrees with --global.")
+    ],
     terms: TaskOptions,
     common: Common,
     is_global: Annotated[
         bool, typer.Option("--global", help="The numbers are latitude and longitude.")
     ] = False,
     is_local: Annotated[
-        bool, typer.Option("--local", help="The numbers are metres, also if they are large.")
+        bool, typer.Option("--local", help="The numbers are metres north and east.")
     ] = False,
     speed: Speed = None,
     radius: Annotated[
         float | None,
-        typer.Option(metavar="METRES", help="Near enough; default: as near as can be."),
+        typer.Option(metavar="METRES", help="Acceptance radius; default: as close as possible."),
     ] = None,
     heading: Annotated[
-        float | None, typer.Option(metavar="DEGREES", help="Turn to it in the end.")
+        float | None, typer.Option(metavar="DEGREES", help="Final heading, clockwise from north.")
     ] = None,
 ) -> None:
     """Drive to a place: metres from the rover's origin, or latitude and longitude.
 
-    If the numbers may be a latitude and a longitude, add --local or --global.
+    If the numbers could be a latitude and a longitude, you must add --local or --global.
     """
     from mav_tasks.cli.places import parse_place  # noqa: PLC0415
     from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
@@ -111,7 +120,9 @@ async def goto(
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def face(
-    heading: Annotated[float, typer.Argument(metavar="DEGREES", help="Clockwise from north.")],
+    heading: Annotated[
+        float, typer.Argument(metavar="DEGREES", help="Heading, clockwise from north.")
+    ],
     terms: TaskOptions,
     common: Common,
     rate: Rate = None,
@@ -125,11 +136,13 @@ async def face(
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
 @command
 async def wait(
-    duration: Annotated[str, typer.Argument(metavar="DURATION", help="Such as 30s or 5m.")],
+    duration: Annotated[
+        str, typer.Argument(metavar="DURATION", help="How long, for example 30s or 5m.")
+    ],
     terms: TaskOptions,
     common: Common,
 ) -> None:
-    """Stand still for a time."""
+    """Stand still for some time."""
     from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
     from mav_tasks.tasks.goal import Wait  # noqa: PLC0415
 
@@ -165,11 +178,11 @@ async def tell_submitted(
     if not common.json:
         output.say(f"rover {task.vehicle}: task {task.id}{hint}")
         if not is_awaited:  # ``follow`` shows each reason
-            output.warn(await _why_it_waits(client, task))
+            output.warn(await _why_it_waits(client, task, common))
     if is_awaited:
         from mav_tasks.cli.follow import follow  # noqa: PLC0415
 
-        await follow(client, task, as_json=common.json)
+        await follow(client, task, common)
     elif common.json:
         from mav_tasks.cli.words import task_json  # noqa: PLC0415
         from mav_tasks.errors import ClientError  # noqa: PLC0415
@@ -180,9 +193,10 @@ async def tell_submitted(
             output.say_json({"id": task.id, "vehicle": task.vehicle})
 
 
-async def _why_it_waits(client: "Client", task: "Task") -> str:
+async def _why_it_waits(client: "Client", task: "Task", common: Common) -> str:
     """Return why the task does not start, and what to do; "" if it starts by itself."""
     from mav_tasks.cli import words  # noqa: PLC0415
+    from mav_tasks.cli.session import is_alone  # noqa: PLC0415
     from mav_tasks.errors import ClientError  # noqa: PLC0415
 
     try:
@@ -190,7 +204,7 @@ async def _why_it_waits(client: "Client", task: "Task") -> str:
         queue = await client.queue(vehicle=task.vehicle, limit=0)
     except ClientError:  # the task exists
         return ""
-    return words.why_it_waits(status, queue)
+    return words.why_it_waits(status, queue, is_alone=is_alone(client, common))
 
 
 def _radians(angle: float) -> float:

@@ -55,21 +55,26 @@ TASK_COLUMNS: tuple[Column[Row], ...] = (
     Column("prio", lambda row: str(row.status.priority), worth=6, is_right=True),
     Column("state", lambda row: words.state_of(row.status)),
     Column("label", lambda row: row.status.label, worth=1, is_words=True),
-    Column("what", lambda row: words.what_of(row.status), is_words=True),
-    Column("why", lambda row: row.why, worth=1, is_words=True),
+    Column("goal", lambda row: words.what_of(row.status), is_words=True),
+    Column("reason", lambda row: row.why, worth=1, is_words=True),
     Column("starts in", lambda row: words.starts_of(row.status), worth=2, is_right=True),
     Column("ends in", lambda row: words.ends_of(row.status), worth=3, is_right=True),
     Column("done", lambda row: words.percent_of(row.status), worth=4, is_right=True),
     Column("left", lambda row: words.left_of(row.status), worth=5, is_right=True),
-    Column("from", lambda row: row.status.submitter, worth=7, is_right=True),
+    Column("by", lambda row: row.status.submitter, worth=7, is_right=True),
 )
 
 
-def queue_table(queue: QueueStatus, *, width: int, rows: int | None = None) -> Group:
-    """Return a queue within ``width`` columns and ``rows`` lines; None: no limit."""
+def queue_table(
+    queue: QueueStatus, *, width: int, rows: int | None = None, is_alone: bool = True
+) -> Group:
+    """Return a queue within ``width`` columns and ``rows`` lines; None: no limit.
+
+    ``is_alone``: the server has one rover, which commands need not name.
+    """
     tasks = ([queue.current] if queue.current is not None else []) + list(queue.waiting)
     count = queue.waiting_count + (queue.current is not None)
-    above = [words.headline_of(queue)]
+    above = [words.headline_of(queue, is_alone=is_alone)]
     if queue.counts and (rows is None or rows >= len(above) + LEAST_ROWS):
         above.append(words.counts_of(queue))
     if rows is not None:
@@ -100,12 +105,12 @@ def history_table(tasks: Sequence[TaskStatus], *, now: datetime, width: int) -> 
         Column("id", lambda status: str(status.id), is_right=True),
         Column("state", words.state_of),
         Column("label", lambda status: status.label, worth=1, is_words=True),
-        Column("what", words.what_of, is_words=True),
-        Column("why", words.end_of, worth=1, is_words=True),
+        Column("goal", words.what_of, is_words=True),
+        Column("reason", words.end_of, worth=1, is_words=True),
         Column(f"ended ({now:%Z})", ended, worth=2, is_right=True),
-        Column("took", words.took_of, worth=3, is_right=True),
+        Column("run time", words.took_of, worth=3, is_right=True),
         Column("done", words.percent_of, worth=4, is_right=True),
-        Column("from", lambda status: status.submitter, worth=5, is_right=True),
+        Column("by", lambda status: status.submitter, worth=5, is_right=True),
     )
     return _table(columns, tasks, width, styles={"state": lambda s: STYLES.get(s.state, "")})
 
@@ -167,7 +172,7 @@ def fitting(
 def _heard(vehicle: VehicleStatus) -> str:
     age = vehicle.heartbeat_age
     if vehicle.is_heard or age is None:
-        return "yes" if vehicle.is_heard else "NO"
+        return "yes" if vehicle.is_heard else "no"
     return "never" if age == inf else f"{format_duration(age)} ago"
 
 

@@ -34,7 +34,7 @@ def parse_moment(name: str, text: str, *, now: datetime, zone: tzinfo | None = N
     if moment is None:
         raise UsageError(f"{name} {text}: expected a time such as 14:30 or 2026-11-20T14:30")
     if moment <= now:
-        raise UsageError(f"{name} {text}: that is over")
+        raise UsageError(f"{name} {text}: that time is in the past")
     if (moment - now).total_seconds() > LONGEST:
         raise UsageError(f"{name} {text}: more than a year ahead")
     return moment

@@ -12,6 +12,7 @@ from rich.text import Text
 from mav_tasks.cli import output, words
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.queue import fetch, show
+from mav_tasks.cli.session import is_alone
 from mav_tasks.cli.tables import queue_table
 from mav_tasks.client.aio import Client
 from mav_tasks.client.values import QueueStatus
@@ -36,7 +37,7 @@ async def _print_changes(client: Client, common: Common, *, limit: int) -> None:
             queues = await fetch(client, common, limit=limit)
             if (seen := [_essence(queue) for queue in queues]) != told:
                 told = seen
-                show(queues, common)
+                show(queues, common, is_alone=is_alone(client, common))
         await asyncio.sleep(PERIOD)
 
 
@@ -54,7 +55,8 @@ async def _draw(client: Client, common: Common, *, limit: int) -> None:
             while True:
                 with suppress(NoAnswer):
                     most = min(limit, live.console.height)
-                    window.take(await fetch(client, common, limit=most))
+                    queues = await fetch(client, common, limit=most)
+                    window.take(queues, is_alone=is_alone(client, common))
                 live.refresh()
                 await asyncio.sleep(PERIOD)
         finally:
@@ -75,6 +77,7 @@ class Window:
     def __init__(self) -> None:
         self.live: Live | None = None
         self._queues: list[QueueStatus] = []
+        self._is_alone = True
         self._loop = asyncio.get_running_loop()
         self._at = self._loop.time()
 
@@ -83,9 +86,9 @@ class Window:
         """Seconds since the last answer."""
         return self._loop.time() - self._at
 
-    def take(self, queues: list[QueueStatus]) -> None:
-        """Store the latest queues."""
-        self._queues = queues
+    def take(self, queues: list[QueueStatus], *, is_alone: bool) -> None:
+        """Store the latest queues; ``is_alone``: the server has one rover."""
+        self._queues, self._is_alone = queues, is_alone
         self._at = self._loop.time()
 
     def drawn(self) -> Group:
@@ -95,7 +98,10 @@ class Window:
         width, height = self.live.console.size
         parts = [] if self.age <= OLD else [_line(f"no answer for {self.age:.0f} s")]
         rows = (height - len(parts)) // max(len(self._queues), 1)
-        tables = [queue_table(queue, width=width, rows=rows) for queue in self._queues]
+        tables = [
+            queue_table(queue, width=width, rows=rows, is_alone=self._is_alone)
+            for queue in self._queues
+        ]
         return Group(*parts, *tables)
 
 

@@ -19,6 +19,17 @@ UNTIL_RESUMED = (
     TaskReason.RESTARTED,
 )
 
+#: reasons that block one task, and what a person can do; "{rover}": the option that names the rover
+REMEDIES = {
+    TaskReason.DISARMED: "arm it in HOLD (or mav-tasks resume{rover}, if the server may arm)",
+    TaskReason.WRONG_MODE: "set HOLD, then: mav-tasks resume{rover}",
+    TaskReason.NOT_READY: "wait, or fix what the rover reports",
+    TaskReason.LOSS_FAILSAFE: (
+        "to make it stop without setpoints: mav-tasks probe --set-failsafe{rover}"
+    ),
+    TaskReason.OUTSIDE_OWN_FENCE: "drive it back manually, or switch that fence off",
+}
+
 #: reasons of waiting tasks that start without an operator's action
 COMES_BY_ITSELF = (
     TaskReason.NONE,
@@ -86,19 +97,33 @@ def took_of(status: TaskStatus) -> str:
     return format_duration(status.execution_time) if status.execution_time else ""
 
 
-def way_on_of(status: TaskStatus) -> str:
-    """Return the operator's command that continues a task; "" if there is none."""
+def resume_command(rover: int, *, is_alone: bool) -> str:
+    """Return the command that resumes a rover; it names the rover unless ``is_alone``."""
+    return f"mav-tasks resume{_option_of(rover, is_alone=is_alone)}"
+
+
+def way_on_of(status: TaskStatus, *, is_alone: bool = True) -> str:
+    """Return what a person can do about a task that waits, with the command; "" if nothing.
+
+    ``is_alone``: the server has one rover, which commands need not name.
+    """
     is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released already, waits to start
     if status.state is TaskState.HELD and not is_decided:
-        return f"decide: mav-tasks release {status.id} again|remainder|skip"
-    return "to go on: mav-tasks resume" if status.reason in UNTIL_RESUMED else ""
+        return f"release it: mav-tasks release {status.id} again|remainder|skip"
+    if status.is_over:
+        return ""
+    if status.reason in UNTIL_RESUMED:
+        return f"to resume: {resume_command(status.vehicle, is_alone=is_alone)}"
+    option = _option_of(status.vehicle, is_alone=is_alone)
+    return REMEDIES.get(status.reason, "").format(rover=option)
 
 
-def line_of(status: TaskStatus) -> str:
+def line_of(status: TaskStatus, *, is_alone: bool = True) -> str:
     """Return a task in one line."""
     why = f" ({end_of(status)})" if end_of(status) else ""
     took = f", in {took_of(status)}" if status.is_over and took_of(status) else ""
-    way_on = f"; {way_on_of(status)}" if way_on_of(status) and not status.is_over else ""
+    way_on = way_on_of(status, is_alone=is_alone)
+    way_on = f"; {way_on}" if way_on else ""
     label = f" '{status.label}'" if status.label else ""
     what = f"{name_of(status)}: {what_of(status)}{label}"
     return f"{what}: {state_of(status)}{why}{took}{way_on}"
@@ -115,19 +140,30 @@ def end_of(status: TaskStatus) -> str:
     return "" if why == state_of(status) else why
 
 
-def why_it_waits(status: TaskStatus, queue: QueueStatus) -> str:
+def starts_by_itself(status: TaskStatus) -> bool:
+    """Return whether a task has started, or starts without a person's action."""
+    return not status.is_waiting or status.reason in COMES_BY_ITSELF
+
+
+def why_it_waits(status: TaskStatus, queue: QueueStatus, *, is_alone: bool = True) -> str:
     """Return why a new task does not start, and what to do; "" if it starts by itself."""
-    if not status.is_waiting or status.reason in COMES_BY_ITSELF:
+    if starts_by_itself(status):
         return ""
-    why, way_on = why_of(status), way_on_of(status)
-    current = queue.current
-    if current is not None and current.state is TaskState.HELD:
-        why, way_on = f"task {current.id} is held ({why_of(current)})", way_on_of(current)
-    elif queue.paused is not None:
-        why = f"the queue is paused ({words_of(queue.paused)})"
-        way_on = "to go on: mav-tasks resume"
+    why, way_on = obstacle_of(status, queue, is_alone=is_alone)
     text = f"{name_of(status)} waits: {why}"
     return f"{text}; {way_on}" if way_on else text
+
+
+def obstacle_of(status: TaskStatus, queue: QueueStatus, *, is_alone: bool) -> tuple[str, str]:
+    """Return what a waiting task waits for, and what a person can do about it."""
+    current = queue.current
+    if current is not None and current.state is TaskState.HELD:
+        way_on = way_on_of(current, is_alone=is_alone)
+        return f"task {current.id} is held ({why_of(current)})", way_on
+    if queue.paused is not None:
+        resume = resume_command(queue.vehicle, is_alone=is_alone)
+        return f"the queue is paused ({words_of(queue.paused)})", f"to resume: {resume}"
+    return why_of(status), way_on_of(status, is_alone=is_alone)
 
 
 def percent_of(status: TaskStatus) -> str:
@@ -170,22 +206,41 @@ def silence_of(heartbeat_age: float | None) -> str:
     return f"silent for {format_duration(heartbeat_age)}"
 
 
-def headline_of(queue: QueueStatus) -> str:
-    """Return what a rover does, and what blocks its queue."""
+def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
+    """Return what a rover does, what blocks its queue, and what a person can do about it."""
     if queue.current is not None:
         does = f"task {queue.current.id} {state_of(queue.current)}"
         does += f" ({why_of(queue.current)})" if queue.current.reason else ""
     elif queue.running is not None:
         does = f"task {queue.running}"
     else:
-        does = "nothing runs"
-    if queue.current is not None and queue.current.state is TaskState.HELD:
-        does += f"; {way_on_of(queue.current)}"
+        does = "no task runs"
+    blocked = _blocked(queue)
+    if blocked is not None and blocked is not queue.current:
+        does += f"; task {blocked.id} waits: {why_of(blocked)}"
+    if blocked is not None:
+        does += f"; {way_on_of(blocked, is_alone=is_alone)}"
     if queue.paused is not None:
-        does += f"; paused: {words_of(queue.paused)}, to go on: mav-tasks resume"
+        does += f"; queue paused ({words_of(queue.paused)})"
+        does += f"; to resume: {resume_command(queue.vehicle, is_alone=is_alone)}"
     silence = silence_of(queue.heartbeat_age)
     rover = f"rover {queue.vehicle} ({silence})" if silence else f"rover {queue.vehicle}"
     return f"{rover}: {does}; {queue.waiting_count} waiting"
+
+
+def _blocked(queue: QueueStatus) -> TaskStatus | None:
+    """Return the held task, else a task with a reason of REMEDIES, unless the queue is paused."""
+    current = queue.current
+    if current is not None and current.state is TaskState.HELD and way_on_of(current):
+        return current
+    if queue.paused is not None:
+        return None
+    first = queue.waiting[:1] if current is None else (current,)
+    return next((each for each in first if each.reason in REMEDIES), None)
+
+
+def _option_of(rover: int, *, is_alone: bool) -> str:
+    return "" if is_alone else f" --vehicle {rover}"
 
 
 def counts_of(queue: QueueStatus) -> str:

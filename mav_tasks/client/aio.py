@@ -63,7 +63,7 @@ RESUME = 1.0  # param1 of DO_PAUSE_CONTINUE
 EPOCHS = 1 << 24  # integers that a float32 holds exactly
 PAGE = 16  # tasks that one request returns
 NO_HISTORY = "the server does not list finished tasks: it is older than this client"
-OVERTAKEN = "a STOP has overtaken this: ask for it again if it is still meant"
+OVERTAKEN = "a later STOP or pause overtook this request: repeat it if you still mean it"
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
 
 
@@ -531,7 +531,7 @@ class Client:
         """Return whether a rover's missions begin with home. Raise NoAnswer if not known."""
         view = self._open.session.fleet.get(vehicle)
         if view is None or not view.is_known:
-            words = f"rover {vehicle} is silent: whether its missions begin with home is not known"
+            words = f"rover {vehicle} is silent: unknown whether its missions begin with home"
             raise NoAnswer(words)
         return view.has_home_item
 

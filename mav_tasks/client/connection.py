@@ -132,5 +132,5 @@ class Connection:
 def _open(link: str) -> Link:
     url = parse_url(link)
     if url.key or url.unsigned is not None:
-        raise LinkUrlError(f"link {link!r}: what stands behind the question mark is for a server")
+        raise LinkUrlError(f"link {link!r}: options after ? are for servers only")
     return open_link(url, limits=TO_CLIENTS)

@@ -138,12 +138,12 @@ class FleetView:
         """Return the reason as text; "{where}" is a placeholder for the link and the time-out."""
         served = self.served()
         if not self._views and self.is_listed:
-            return "a task server is there, but no rover was heard {where}: is it on, and linked?"
+            return "the task server has heard no rover {where}: is the rover on and connected?"
         if not self._views:
             return "no task server answered {where}: is it running?"
         if not served:
             return f"rover {min(self._views)} is heard {{where}}, but no task server answered"
-        return f"rover {wished} was not found {{where}}: {_there_are(served)}"
+        return f"rover {wished} was not found {{where}}; {_there_are(served)}"
 
     def which(self, wished: int | None) -> int:
         """Return ``wished``, None: the only vehicle.
@@ -152,11 +152,11 @@ class FleetView:
         """
         served = self.served()
         if wished is not None and wished not in served:
-            raise NoSuchVehicle(f"rover {wished} is not there: {_there_are(served)}")
+            raise NoSuchVehicle(f"no rover {wished}; {_there_are(served)}")
         if wished is not None:
             return wished
         if len(served) != 1:
-            raise NoSuchVehicle(f"{_there_are(served)}: name the one that is meant")
+            raise NoSuchVehicle(f"{_there_are(served)}: choose one")
         return served[0]
 
     def heartbeat(self, packet: Packet, message: m.Heartbeat, *, now: float) -> bool:
@@ -210,5 +210,5 @@ def _there_are(ids: Sequence[int]) -> str:
     if not ids:
         return "the server has no rover"
     if len(ids) == 1:
-        return f"there is rover {ids[0]}"
-    return f"there are rovers {', '.join(map(str, ids))}"
+        return f"the server has rover {ids[0]}"
+    return f"the server has rovers {', '.join(map(str, ids))}"

@@ -54,7 +54,7 @@ class Task:
             await self._news()
         status = self.status
         if status is None or self._followed.is_lost:
-            words = f"task {self.id}: the server does not know it any more"
+            words = f"task {self.id}: the server no longer knows it"
             raise TaskFailed(words, task_id=self.id, state=0, reason=0)
         if status.state is not TaskState.COMPLETED:
             state, why = status.state.name.lower(), words_of(status.reason)

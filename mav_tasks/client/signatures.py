@@ -80,15 +80,15 @@ class ClientSignatures:
         """Return the likely reason, as text, why no packet was accepted."""
         heard = self.not_believed
         if heard.unknown:
-            return f"what is heard is signed with another key than {self._named()}"
+            return f"the received packets are signed with another key than {self._named()}"
         if heard.old:
-            return "what is heard is signed for another time: are both clocks right?"
+            return "the received packets are signed for another time: are both clocks right?"
         if heard.unsigned:
             return (
-                f"what is heard is not signed: does the server know key {self._named()}, "
+                f"the received packets are not signed: does the server have key {self._named()}, "
                 "and are both clocks right?"
             )
-        return f"does the server know key {self._named()}, and are both clocks right?"
+        return f"does the server have key {self._named()}, and are both clocks right?"
 
     def _named(self) -> str:
         return f"{self.key.name} ({self.key.fingerprint})".lstrip()

@@ -66,5 +66,5 @@ class Submissions:
 def utc_of(at: datetime) -> float:
     """Return UTC seconds. Raise ValueError if ``at`` has no time zone."""
     if at.tzinfo is None:
-        raise ValueError(f"at {at}: a time of day without a time zone is nobody's")
+        raise ValueError(f"at {at}: a datetime needs a time zone")
     return at.timestamp()

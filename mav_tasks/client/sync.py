@@ -126,7 +126,7 @@ class SyncTask:
                     return await self._task.done()
             except TimeoutError:
                 now = "not heard of" if self.status is None else self.status.words
-                words = f"task {self.id} is not over after {timeout:g} s: {now}"
+                words = f"task {self.id} has not ended after {timeout:g} s: {now}"
                 raise TimeoutError(words) from None
 
         return self._portal.call(within())

@@ -187,7 +187,9 @@ def _way(goal: GoTo) -> tuple[Item, ...]:
         yaw = NORTH if yaw < LEAST_YAW else yaw
     if goal.place is None:
         if goal.wait or goal.yaw is not None or goal.radius:
-            raise ValueError(f"{goal}: a return takes a speed alone; let a Wait or Face follow it")
+            raise ValueError(
+                f"{goal}: a return home takes only a speed; add a Wait or Face after it"
+            )
         way = _item(MavCmd.NAV_RETURN_TO_LAUNCH, 0.0, 0.0, 0.0, 0.0)
     else:
         frame, x, y = _at(goal.place)
@@ -204,7 +206,7 @@ def _at(place: Place) -> tuple[int, int, int]:
     _numbers(place, north=place.north, east=place.east)
     x, y = round(place.north * LOCAL_SCALE), round(place.east * LOCAL_SCALE)
     if max(abs(x), abs(y)) > LARGEST:
-        raise ValueError(f"{place}: further away than a mission item can name")
+        raise ValueError(f"{place}: too far away for a mission item")
     return MavFrame.LOCAL_NED, x, y
 
 
@@ -219,7 +221,7 @@ def _item(command: int, p1: float, p2: float, p3: float, p4: float) -> Item:
 def _numbers(goal: Goal | LocalPlace, **values: float) -> None:
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise ValueError(f"{goal}: {name} is no number")
+            raise ValueError(f"{goal}: {name} is not a number")
 
 
 def _whole(name: str, value: int, low: int, high: int) -> None:

@@ -45,18 +45,18 @@ _SHAPES: Mapping[str, Shape] = {
 }
 _NEEDED = ("system_id", "autopilot", "firmware", "probed")
 _MEANINGS = {
-    "uid": "the profile is used for this rover and no other",
-    "firmware": "and with this firmware only",
-    "yaw_rate": "whether it turns at a yaw rate, also on the spot",
+    "uid": "the profile is used only for this rover",
+    "firmware": "and only with this firmware",
+    "yaw_rate": "whether it follows yaw rates, also on the spot",
     "reverse": "whether it drives backwards",
-    "turning": "whether it turns on the spot, or steers as a car",
-    "turning_radius": "m, the least, of one that steers as a car",
+    "turning": "whether it turns on the spot, or steers like a car",
+    "turning_radius": "m, minimum, if it steers like a car",
     "setpoints": "velocity setpoints that it followed: frame and mask",
     "loss_stop": "whether it stopped by itself when setpoints stopped",
     "setpoint_timeout": "s, from the last setpoint until it slowed down",
     "speed": "m/s, at which the stop was measured",
     "stopping_distance": "m, from the first zero until it stood",
-    "stopping_time": "s, the same",
+    "stopping_time": "s, from the first zero until it stood",
 }
 
 
@@ -110,7 +110,7 @@ def profile_of(text: str, *, name: str) -> VehicleProfile:
     faults = [f"{name}: {key} is missing" for key in _NEEDED if key not in table]
     for key, value in table.items():
         if key not in _SHAPES:
-            faults.append(f"{name}: {key!a}: no such key of a profile")
+            faults.append(f"{name}: {key!a}: a profile has no such key")
             continue
         try:
             kept[key] = _SHAPES[key].kept(value)
@@ -123,7 +123,7 @@ def profile_of(text: str, *, name: str) -> VehicleProfile:
 
 def text_of(profile: VehicleProfile) -> str:
     """Return a profile as TOML, without unknown values."""
-    lines = ["# What mav-tasks probe has measured of a rover. Key vehicles.profiles names it."]
+    lines = ["# Profile of a rover, measured by mav-tasks probe; see the key vehicles.profiles."]
     for field in fields(profile):
         value = getattr(profile, field.name)
         if value in ("", None, ()) and field.name not in _NEEDED:

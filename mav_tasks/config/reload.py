@@ -64,7 +64,7 @@ class Reload:
     def begin(self, put: Put) -> None:
         """Start to read; then apply live keys with ``put``. Called in the loop."""
         if self._is_reading:
-            log.warning("configuration: still being read")
+            log.warning("configuration: the last reload still runs")
             self._is_asked_again = True
             return
         self._is_reading = True
@@ -89,7 +89,7 @@ class Reload:
         if isinstance(outcome, ConfigError):
             for fault in outcome.faults:
                 log.error("configuration: %s", fault)
-            log.error("configuration: nothing changes")
+            log.error("configuration: not applied")
         else:
             self._take(outcome, put)
         if self._is_asked_again:
@@ -102,7 +102,7 @@ class Reload:
         has_changed = self._in_force.engine != before.engine
         if self._in_force.engine.profiles != before.engine.profiles:
             count = len(self._in_force.engine.profiles)
-            log.info("vehicles.profiles: read again, %d in force", count)
+            log.info("vehicles.profiles: reloaded, %d in force", count)
         parameters = put(self._in_force.engine) if has_changed else {}
         changes = list(changes_of(before, wanted, in_force=self._in_force))
         for change in changes:
@@ -111,11 +111,12 @@ class Reload:
                 log.warning("%s", change)
             elif parameter in parameters:
                 set_to = f"{parameters[parameter]:g}"
-                log.warning("%s, but %s stays as a client set it: %s", change, parameter, set_to)
+                words = "%s, but parameter %s, set by a client, overrides it: %s"
+                log.warning(words, change, parameter, set_to)
             else:
                 log.info("%s, in force", change)
         if not changes and not has_changed:
-            log.info("configuration: read again, nothing has changed")
+            log.info("configuration: reloaded, no changes")
 
 
 def taken(before: ServerSettings, wanted: ServerSettings) -> ServerSettings:

@@ -10,11 +10,12 @@ from mav_tasks.settings import ServerSettings
 
 WIDTH = 100
 OPENING = f"""\
-#: Configuration of mav-tasks. Each key stands here with its default: take away the "# " before one
-#: to change it. An environment variable comes before this file ({variable_of("driving.speed")} for
-#: driving.speed), a flag before both. `mav-tasks config check FILE` looks through a file, and
-#: `mav-tasks config show` tells what is in force, and who says so.
-#: Keys marked * can change while the server runs, by SIGHUP; the others when it starts.
+#: Configuration of mav-tasks. Each key is listed with its default; remove the "# " before a key to
+#: change it. Environment variables override this file ({variable_of("driving.speed")} is
+#: driving.speed), options of the command line override both, and parameters set by clients override
+#: all. `mav-tasks config check FILE` checks a file; `mav-tasks config show` prints the values in
+#: force and their sources.
+#: On SIGHUP the server applies changes of the keys marked *; the others need a restart.
 """
 
 

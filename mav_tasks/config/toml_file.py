@@ -60,11 +60,11 @@ def parsed(text: str, *, name: str) -> Parsed:
     """
     if deep := _DEEP.search(text):
         line = text.count("\n", 0, deep.start()) + 1
-        raise ConfigError(f"{name}:{line}: a key of too many parts")
+        raise ConfigError(f"{name}:{line}: a key with too many parts")
     try:
         return Parsed(tomllib.loads(text), toml_lines.lines_of(text.replace("\r\n", "\n")))
     except RecursionError:
-        raise ConfigError(f"{name}: tables or lists too deep") from None
+        raise ConfigError(f"{name}: tables or lists are nested too deep") from None
     except ValueError as error:  # also from int(): a number of thousands of digits
         last = len(text.rstrip().splitlines()) or 1
         raise ConfigError(_fault_of(str(error), name, last=last)) from None
@@ -91,7 +91,7 @@ def _walk(
 ) -> None:
     for last, value in table.items():
         if len(layer.faults) == MOST_FAULTS:
-            layer.faults.append(f"{name}: there is more that is wrong")
+            layer.faults.append(f"{name}: there are more errors")
         if len(layer.faults) > MOST_FAULTS:
             return
         path = (*before, last)

@@ -58,7 +58,7 @@ def of_flags(flags: Sequence[Flag]) -> Layer:
             layer.faults.append(f"{shown(flag.where)}: no such key{near}")
         elif key.name in layer.given:
             before = layer.given[key.name].where
-            layer.refuse(key, f"{flag.where}: {key.name} is said by {before}, too")
+            layer.refuse(key, f"{flag.where}: {key.name} is already set by {before}")
         elif flag.value is None:
             layer.refuse(key, f"{flag.where}: expected {key.name}=VALUE")
         elif isinstance(flag.value, str):

@@ -36,7 +36,7 @@ def from_hex(text: str) -> bytes:
         raise KeyRingError(f"expected {2 * KEY_LENGTH} hexadecimal digits")
     secret = bytes.fromhex(text)
     if not any(secret):  # in SETUP_SIGNING it means "no key"
-        raise KeyRingError("all digits are zero: that is no key")
+        raise KeyRingError("all digits are zero: not a valid key")
     return secret
 
 

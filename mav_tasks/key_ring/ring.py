@@ -19,7 +19,7 @@ KINDS = (*ROLES, VEHICLE)
 MOST_KEYS = 64  # usable keys; each is tried on a packet from an unknown sender
 #: names that TOML, a link URL and a command line accept without quotes
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
-NAMES = "expected 1 to 32 letters, digits, - and _, a letter or digit first"
+NAMES = "expected 1 to 32 letters, digits, - and _, beginning with a letter or digit"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +75,13 @@ class KeyRing:
         """Return the ring with one more entry; raise KeyRingError if known, or the ring is full."""
         for each in self.entries:
             if each.name == entry.name:
-                was = f"was revoked{_on(each.revoked)}" if each.revoked else "is there already"
+                was = f"was revoked{_on(each.revoked)}" if each.revoked else "exists already"
                 raise KeyRingError(f"key {entry.name} {was}: choose another name")
             if each.key.fingerprint == entry.key.fingerprint:
-                was = "was revoked" if each.revoked else "is there already"
+                was = "was revoked" if each.revoked else "exists already"
                 raise KeyRingError(f"key {entry.name}: this secret {was}, as key {each.name}")
         if entry.is_usable and len(self.usable) >= MOST_KEYS:
-            raise KeyRingError(f"key {entry.name}: there are {MOST_KEYS} keys already")
+            raise KeyRingError(f"key {entry.name}: the key ring is full, {MOST_KEYS} keys")
         return KeyRing((*self.entries, entry))
 
     def with_revoked(self, name: str, *, at: datetime) -> "KeyRing":
@@ -105,7 +105,7 @@ class KeyRing:
             if entry.name == name:
                 return entry
         there = ", ".join(entry.name for entry in self.entries if entry.is_usable)
-        raise KeyRingError(f"no key {name!a}: there is {there or 'none'}")
+        raise KeyRingError(f"no key {name!a} (usable keys: {there or 'none'})")
 
 
 def key_of(name: str, kind: str, secret: bytes) -> Key:
@@ -114,7 +114,7 @@ def key_of(name: str, kind: str, secret: bytes) -> Key:
     Raise KeyRingError for an invalid name or kind.
     """
     if not NAME.fullmatch(name):
-        raise KeyRingError(f"{name[:40]!a}: no name of a key: {NAMES}")
+        raise KeyRingError(f"{name[:40]!a} is not a key name: {NAMES}")
     if kind not in KINDS:
         raise KeyRingError(f"key {name}: expected a role, one of {', '.join(KINDS)}")
     return Key(name, secret, role="" if kind == VEHICLE else kind)

@@ -58,7 +58,9 @@ def load(path: Path) -> Loaded:
         finally:
             os.close(number)
     except FileNotFoundError:
-        raise KeyRingError(f"key ring {path}: not there; mav-tasks keys add makes one") from None
+        raise KeyRingError(
+            f"key ring {path} does not exist; mav-tasks keys add creates one"
+        ) from None
     except OSError as error:
         raise KeyRingError(f"key ring {path}: {error.strerror}") from error
     try:
@@ -88,12 +90,14 @@ def _check(path: Path, found: os.stat_result) -> None:
     if not stat.S_ISREG(found.st_mode):
         raise KeyRingError(f"key ring {path}: not a file")
     if found.st_uid != os.geteuid():
-        raise KeyRingError(f"key ring {path}: it is another user's: it must belong to who reads it")
+        raise KeyRingError(
+            f"key ring {path} belongs to another user; it must belong to the user who reads it"
+        )
     if found.st_mode & OTHERS:
         mode = stat.S_IMODE(found.st_mode)
         raise KeyRingError(
-            f"key ring {path}: others can get at it (mode {mode:04o}): chmod 600 {path}, "
-            "and if they could read it, make new keys"
+            f"key ring {path}: other users can access it (mode {mode:04o}): chmod 600 {path}, "
+            "and if they could read it, replace the keys"
         )
 
 

@@ -18,7 +18,7 @@ FIELDS = (
 )
 HEADER = """\
 # The key ring of mav-tasks: secrets. Nobody else may read this file.
-# "mav-tasks keys" writes it anew at each change: comments are lost then.
+# "mav-tasks keys" rewrites this file at each change; comments are lost.
 """
 _FINGERPRINT = re.compile(r"[0-9a-f]{16}")
 _DIGITS = re.compile(r"[0-9A-Fa-f]{33,}")  # longer than any name: perhaps a misplaced secret
@@ -39,7 +39,7 @@ def ring_of(text: str, *, name: str) -> KeyRing:
 
     tables = values.get(TABLE, {})
     if set(values) - {TABLE} or not isinstance(tables, dict):
-        faults.append(f"{name}: expected tables [{TABLE}.NAME], and nothing else")
+        faults.append(f"{name}: expected only tables [{TABLE}.NAME]")
     for key_name, table in tables.items() if isinstance(tables, dict) else ():
         here = where(TABLE, key_name)
         try:
@@ -81,20 +81,20 @@ def _retired(name: str, table: Mapping[str, Any], fingerprint: str) -> bytes:
     except KeyRingError as error:
         raise KeyRingError(f"key {name}: retired_secret: {error}") from None
     if Key(name, secret).fingerprint != fingerprint:
-        raise KeyRingError(f"key {name}: retired_secret is not of fingerprint {fingerprint}")
+        raise KeyRingError(f"key {name}: retired_secret does not match fingerprint {fingerprint}")
     return secret
 
 
 def _faults(name: str, table: Mapping[str, Any], *, is_revoked: bool) -> Iterator[str]:
     if "passphrase" in table:
         yield (
-            f"key {name}: a passphrase is not kept here, but what is derived from it: "
-            "mav-tasks keys add --passphrase"
+            f"key {name}: the key ring has the derived key, not the passphrase: "
+            "use mav-tasks keys add --passphrase"
         )
     elif set(table) - set(FIELDS):
-        yield f"key {name}: there is something else than {', '.join(FIELDS)}"
+        yield f"key {name}: only {', '.join(FIELDS)} are allowed"
     elif is_revoked and "secret" in table:
-        yield f"key {name}: it was revoked, and still has a secret: take that away"
+        yield f"key {name}: it was revoked, but still has a secret: remove that"
     elif not is_revoked and "retired_secret" in table:
         yield f"key {name}: retired_secret: the key is not revoked"
     elif not isinstance(table.get("retired_secret", ""), str):

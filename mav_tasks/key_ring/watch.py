@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from mav_tasks.errors import KeyRingError
+from mav_tasks.key_ring.ring import VEHICLE
 from mav_tasks.key_ring.ring_file import Loaded, Mark, load, mark_of
 from mav_tasks.mavlink.signing import Key
 
@@ -65,12 +66,12 @@ class RingWatch:
         if self._is_over.is_set():
             return
         if isinstance(news, str):
-            still = "there is no ring" if self.keys is None else "the keys in force stay"
+            still = "the server has no keys" if self.keys is None else "the keys in force stay"
             log.error("%s: %s", news, still)
             return
         before, self.keys = self.keys, news
         if news == before:
-            log.info("key ring %s: in order, nothing has changed", self.path)
+            log.info("key ring %s: valid, no changes", self.path)
             return
         put(news)
         for words in changes(before or (), news):
@@ -95,7 +96,7 @@ class _Looker:
         try:
             mark = mark_of(self._path.stat())
         except FileNotFoundError:
-            return self._failed(f"key ring {self._path}: it is gone") if self._was_there else None
+            return self._failed(f"key ring {self._path} was removed") if self._was_there else None
         except OSError as error:
             return self._failed(f"key ring {self._path}: {error.strerror}")
         is_due = bool(self._fault) and self._looks >= AGAIN
@@ -112,7 +113,7 @@ class _Looker:
             return self._failed("; ".join(error.faults))
         except Exception:  # a bug of ours must not end the watch
             log.exception("key ring: internal error")
-            return self._failed(f"key ring {self._path}: it could not be read")
+            return self._failed(f"key ring {self._path} could not be read")
         was_faulty, self._fault = bool(self._fault), ""
         if is_same and keys == self._keys and not was_faulty:
             return None
@@ -134,12 +135,12 @@ def changes(before: tuple[Key, ...], after: tuple[Key, ...]) -> Iterator[str]:
         if was == now:
             continue
         if now is None:
-            yield f"key {name} is gone"
+            yield f"key {name} was removed"
         elif not now.secret:
-            yield f"key {name} is revoked"
+            yield f"key {name} was revoked"
         elif was is None:
-            yield f"key {name} is added, {now.role or 'of vehicles'}"
+            yield f"key {name} was added, role {now.role or VEHICLE}"
         elif was.fingerprint != now.fingerprint or not was.secret:
-            yield f"key {name} has another secret, {now.role or 'of vehicles'}"
+            yield f"key {name} has a new secret, role {now.role or VEHICLE}"
         else:
-            yield f"key {name} is {now.role or 'of vehicles'} now"
+            yield f"key {name} has role {now.role or VEHICLE} now"

@@ -29,5 +29,5 @@ class Attempts:
         if self._failed:
             return None
         self._failed = True
-        state = "lost" if self._was_up else "is not there yet"
+        state = "lost" if self._was_up else "is not available yet"
         return f"{state}: {reason}; trying again every second"

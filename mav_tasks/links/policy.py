@@ -9,7 +9,7 @@ from mav_tasks.links.url import LinkUrl, SerialUrl
 Side = Literal["clients", "vehicles"]
 
 NEARBY = "loopback"  # value of ``unsigned``: on links that other machines cannot reach
-MEANT = "say --insecure, or links.insecure = true, if that is meant"
+MEANT = "use --insecure, or links.insecure = true, to allow that"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +63,12 @@ def check(url: LinkUrl | SerialUrl, side: Side, policy: LinkPolicy, rules: Rules
     if side == "vehicles" and not policy.key and not is_open:
         raise InsecureLinkError(
             f"link {url} reaches beyond this machine and has no signing key: "
-            f"anybody there could drive the vehicle; ?key=NAME gives it one; or {MEANT}"
+            f"anybody there could drive the rover; add ?key=NAME; or {MEANT}"
         )
     if side == "vehicles" and not policy.key and not policy.takes_unsigned:
         raise UsageError(
-            f"link {url} takes nothing unsigned, and has no key: ?key=NAME gives it one, "
-            "?unsigned=allow does without"
+            f"link {url} accepts no unsigned packets, but has no key: add ?key=NAME, "
+            "or ?unsigned=allow"
         )
     if policy.takes_unsigned and not is_open:
         raise unsigned_beyond(f"link {url}")
@@ -78,5 +78,5 @@ def unsigned_beyond(what: str) -> InsecureLinkError:
     """Return the error for a link that other machines reach and that accepts unsigned packets."""
     return InsecureLinkError(
         f"{what} reaches beyond this machine and needs no signing key: "
-        f"anybody there could drive the vehicle; {MEANT}"
+        f"anybody there could drive the rover; {MEANT}"
     )

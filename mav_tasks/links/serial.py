@@ -207,7 +207,7 @@ def _reason_of(error: Exception) -> str:
     """
     if isinstance(error, SerialException):
         if error.errno is None:
-            return "it is no serial device"
+            return "it is not a serial device"
         if "exclusively lock" in str(error):
             return "it is in use"
     number = _number_of(error)

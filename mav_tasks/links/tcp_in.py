@@ -58,7 +58,7 @@ class TcpInLink(TcpLink):
             # A peer whose old connection from the same address has not ended yet will retry.
             if len(self._connections) >= self._most or peer in self._connections:
                 raise ConnectionRefusedError
-            self._connections.add(sock, peer, f"{peer[0]}:{peer[1]} has come")
+            self._connections.add(sock, peer, f"{peer[0]}:{peer[1]} connected")
         except OSError:
             self.refused += 1
             sock.close()
@@ -69,7 +69,7 @@ class TcpInLink(TcpLink):
             self._is_accepting = True
 
     def _end(self, connection: Connection, reason: str) -> None:
-        self._connections.end(connection, f"{connection.name} is gone: {reason}")
+        self._connections.end(connection, f"{connection.name} disconnected: {reason}")
 
 
 def _listen(family: socket.AddressFamily, address: tuple[str, int]) -> socket.socket:

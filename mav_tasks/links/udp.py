@@ -57,8 +57,8 @@ class UdpLink:
             return _open(family, (host, preferred))
         except OSError:
             self.note = (
-                f"local port {preferred} is taken, another one is used: "
-                "a rover that answers its first sender only stays silent until it restarts"
+                f"local port {preferred} is in use, so another one is used: "
+                "a rover that answers only its first sender stays silent until it restarts"
             )
             return _open(family, (host, 0))
 

@@ -65,7 +65,7 @@ def parse_url(text: str) -> LinkUrl | SerialUrl:
     unsigned, key, local = _parse_options(options, what=f"link {text!r}")
     kind, _, rest = where.partition(":")
     if local is not None and kind != "udpout":
-        raise LinkUrlError(f"link {text!r}: local: only udpout dials from a port of its own")
+        raise LinkUrlError(f"link {text!r}: local: only udpout has a local port")
     if kind == SERIAL:
         device, baud = _parse_serial(rest, what=f"link {text!r}")
         return SerialUrl(device, baud, unsigned, key)
@@ -89,9 +89,9 @@ def _parse_options(text: str, *, what: str) -> tuple[bool | None, str, int | Non
     for each in text.split("&") if text else ():
         name, _, value = each.partition("=")
         if name in options:
-            raise LinkUrlError(f"{what}: {name} is said twice")
+            raise LinkUrlError(f"{what}: {name} is given twice")
         if name not in ("unsigned", "key", "local"):
-            raise LinkUrlError(f"{what}: no such option {name!r}: there are {OPTIONS}")
+            raise LinkUrlError(f"{what}: unknown option {name!r}: expected {OPTIONS}")
         if not value or (name == "unsigned" and value not in UNSIGNED):
             raise LinkUrlError(f"{what}: {name}: expected one of {OPTIONS}")
         options[name] = value

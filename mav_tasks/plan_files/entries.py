@@ -57,9 +57,9 @@ def item(
     command_id = whole(where, "command", command, 65535)
     axes = AXES.get(whole(where, "frame", frame, 255))
     if axes is None:
-        raise PlanFileError(f"{where}: frame {shown(frame)} is not known")
+        raise PlanFileError(f"{where}: frame {shown(frame)} is unknown")
     if command_id in PLACED and (axes is PLAIN or math.isnan(x) or math.isnan(y)):
-        raise PlanFileError(f"{where}: command {command_id} needs a place and has none")
+        raise PlanFileError(f"{where}: command {command_id} needs a place, but has none")
     x, y = scaled(where, x, axes[0]), scaled(where, y, axes[1])
     return PlanItem(command_id, int(frame), (p1, p2, p3, p4), x, y, z, autocontinue)
 
@@ -68,7 +68,7 @@ def point(where: str, value: object, size: int) -> GeoPoint:
     """Return a place from [latitude, longitude] (``size`` 2) or [latitude, longitude, altitude]."""
     numbers = typed(where, "a point", value, list)
     if len(numbers) != size:
-        raise PlanFileError(f"{where}: a point of {len(numbers)} numbers, {size} are needed")
+        raise PlanFileError(f"{where}: a point needs {size} numbers, not {len(numbers)}")
     latitude = typed(where, LATITUDE.name, numbers[0], float)
     longitude = typed(where, LONGITUDE.name, numbers[1], float)
     altitude = number(where, "altitude", numbers[2]) if size == 3 else 0.0
@@ -105,6 +105,6 @@ def _with_target(entry: Entry, indices: dict[float, list[int]]) -> PlanItem:
         case [index]:
             return replace(entry.item, params=(float(index), repeat, p3, p4))
         case []:
-            raise PlanFileError(f"{entry.where}: jumps to {shown(target)}, where no item is")
+            raise PlanFileError(f"{entry.where}: jumps to {shown(target)}, which is not an item")
         case _:
-            raise PlanFileError(f"{entry.where}: jumps to {shown(target)}, which is not one item")
+            raise PlanFileError(f"{entry.where}: jumps to {shown(target)}, which is several items")

@@ -31,7 +31,7 @@ def fence_of(items: Sequence[PlanItem]) -> PlanFile:
     while rest:
         first = rest[0]
         if first.params[1]:
-            raise PlanFileError("the fence has inclusion groups, and a file has no place for them")
+            raise PlanFileError("the fence has inclusion groups, which a .plan cannot hold")
         size = 1
         if first.command in VERTICES:
             size = max(int(first.params[0]), 1)
@@ -41,7 +41,7 @@ def fence_of(items: Sequence[PlanItem]) -> PlanFile:
             inclusion = CIRCLES[MavCmd(first.command)]
             parts.append(FenceCircle(inclusion, (first.x, first.y), first.params[0]))
         else:
-            raise PlanFileError(f"the fence has an item {first.command}, which is no part of one")
+            raise PlanFileError(f"the fence has an item {first.command}, which is not a fence item")
         rest = rest[size:]
     return PlanFile((), None, tuple(parts), ())
 

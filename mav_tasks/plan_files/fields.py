@@ -21,14 +21,16 @@ def get(where: str, holder: dict[str, Any], key: str, kind: type[T]) -> T:
 def typed(where: str, name: str, value: object, kind: type[T]) -> T:
     """Return ``value`` if it is of ``kind``, one of NEEDED."""
     if not isinstance(value, kind):
-        raise PlanFileError(f"{where}: {name} is {shown(value)}, {NEEDED[kind]} is needed")
+        raise PlanFileError(f"{where}: {name} is {shown(value)}, expected {NEEDED[kind]}")
     return value
 
 
 def check_version(where: str, holder: dict[str, Any], needed: int) -> None:
     """Refuse what is of another version: the same words could mean something else there."""
     if (version := get(where, holder, "version", float)) != needed:
-        raise PlanFileError(f"{where}: version {shown(version)} is not read, {needed} is needed")
+        raise PlanFileError(
+            f"{where}: version {shown(version)} is not supported, expected {needed}"
+        )
 
 
 def number(where: str, name: str, value: object) -> float:
@@ -46,7 +48,7 @@ def whole(where: str, name: str, value: object, most: int) -> int:
     found = typed(where, name, value, float)
     if not (0 <= found <= most and found.is_integer()):
         raise PlanFileError(
-            f"{where}: {name} is {shown(found)}, a whole number from 0 to {most} is needed"
+            f"{where}: {name} is {shown(found)}, expected a whole number from 0 to {most}"
         )
     return int(found)
 

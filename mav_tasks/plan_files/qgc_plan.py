@@ -44,7 +44,7 @@ def from_json(text: str) -> PlanFile:
 
 
 def _refuse_constant(name: str) -> NoReturn:
-    raise PlanFileError(f"not a plan file: {name} is no number in JSON")
+    raise PlanFileError(f"not a plan file: {name} is not a JSON number")
 
 
 def _entries(value: object, first: int) -> list[Entry]:
@@ -57,7 +57,7 @@ def _entries(value: object, first: int) -> list[Entry]:
     transects = fields.get("TransectStyleComplexItem")
     inner = transects.get("Items") if isinstance(transects, dict) else None
     if not isinstance(inner, list) or not inner:
-        raise PlanFileError(f"{where}: the complex item {name} does not carry its items")
+        raise PlanFileError(f"{where}: complex item {name} does not contain its items")
     # not known to a DO_JUMP: in QGroundControl one leads to the list's own simple items only
     return [
         _simple(f"item {index} (in {name})", part)._replace(known_as=None)
@@ -68,10 +68,10 @@ def _entries(value: object, first: int) -> list[Entry]:
 def _simple(where: str, value: object) -> Entry:
     fields = typed(where, "it", value, dict)
     if (kind := get(where, fields, "type", str)) != "SimpleItem":
-        raise PlanFileError(f"{where}: type {shown(kind)} is not known")
+        raise PlanFileError(f"{where}: type {shown(kind)} is unknown")
     params = get(where, fields, "params", list)
     if len(params) != 7:
-        raise PlanFileError(f"{where}: {len(params)} params, 7 are needed")
+        raise PlanFileError(f"{where}: {len(params)} params, expected 7")
     frame, command = (get(where, fields, key, float) for key in ("frame", "command"))
     autocontinue = get(where, fields, "autoContinue", bool)
     jump_id = fields.get("doJumpId")
@@ -110,7 +110,7 @@ def _polygon(where: str, value: object) -> FencePolygon:
     check_version(where, fields, 1)
     vertices = [point(where, vertex, 2)[:2] for vertex in get(where, fields, "polygon", list)]
     if len(vertices) < 3:
-        raise PlanFileError(f"{where}: {len(vertices)} points, 3 are needed")
+        raise PlanFileError(f"{where}: {len(vertices)} points, at least 3 are needed")
     return FencePolygon(get(where, fields, "inclusion", bool), tuple(vertices))
 
 

@@ -32,7 +32,7 @@ def _check_header(words: list[str]) -> None:
     if words[:2] != ["QGC", "WPL"]:
         raise PlanFileError("not a plan file: neither JSON nor QGC WPL 110")
     if words[2:] != ["110"]:
-        raise PlanFileError(f"{' '.join(words)[:40]!r} is not read, 'QGC WPL 110' is needed")
+        raise PlanFileError(f"{' '.join(words)[:40]!r} is not supported, expected 'QGC WPL 110'")
 
 
 def _is_home(entry: Entry) -> bool:
@@ -42,10 +42,10 @@ def _is_home(entry: Entry) -> bool:
 def _entry(where: str, words: list[str], seq: int) -> Entry:
     """Fields: seq, current, frame, command, seven parameters, autocontinue."""
     if len(words) != 12:
-        raise PlanFileError(f"{where}: {len(words)} fields, 12 are needed")
+        raise PlanFileError(f"{where}: {len(words)} fields, expected 12")
     values = [_number(where, index, word) for index, word in enumerate(words, 1)]
     if values[0] != seq:
-        raise PlanFileError(f"{where}: numbered {shown(values[0])}, {seq} is expected")
+        raise PlanFileError(f"{where}: numbered {shown(values[0])}, expected {seq}")
     autocontinue = whole(where, "autocontinue", values[11], 1) == 1
     frame, command = values[2:4]
     return Entry(
@@ -57,6 +57,4 @@ def _number(where: str, index: int, word: str) -> float:
     try:
         return float(word.replace("_", "?"))  # float() would read 1_0 as 10
     except ValueError:
-        raise PlanFileError(
-            f"{where}: field {index} is {word[:40]!r}, a number is needed"
-        ) from None
+        raise PlanFileError(f"{where}: field {index} is {word[:40]!r}, expected a number") from None

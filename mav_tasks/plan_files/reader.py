@@ -31,7 +31,7 @@ def parse_plan_bytes(data: bytes) -> PlanFile:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
-        raise PlanFileError("not a plan file: no UTF-8 text") from None
+        raise PlanFileError("not a plan file: not UTF-8 text") from None
     return parse_plan(text)
 
 

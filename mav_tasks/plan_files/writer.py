@@ -79,7 +79,7 @@ def format_wpl(plan: PlanFile) -> str:
     Home is line 0, so that each item, and where a jump leads, counts from 1.
     """
     if fence_items(plan) or plan.rally:
-        raise PlanFileError("QGC WPL 110 holds a mission alone: choose a name that ends in .plan")
+        raise PlanFileError("QGC WPL 110 can hold only a mission: choose a name that ends in .plan")
     home = home_of(plan)
     first = PlanItem(
         MavCmd.NAV_WAYPOINT,

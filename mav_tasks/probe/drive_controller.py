@@ -85,7 +85,7 @@ class DriveController:
                     self._drive.arming = words
                 raise DriveEnded(words)
             if self.now >= end:
-                words = _with_texts("not in control in time", self._talk.texts[mark:])
+                words = _with_texts("no control in time", self._talk.texts[mark:])
                 raise DriveEnded(words)
             yield from self._tick()
         self._drive.arming = "accepted"
@@ -167,18 +167,18 @@ class DriveController:
         talk, watch = self._talk, self._talk.watch
         assert talk.monitor is not None
         if self.now - self._tick_at > watch.late_tick:
-            return f"a tick came {self.now - self._tick_at:.1f} s late"
+            return f"a setpoint was {self.now - self._tick_at:.1f} s late"
         if self.now - self.motion.at > watch.motion_fresh:
             return f"no position for {self.now - self.motion.at:.1f} s"
         if not talk.monitor.is_heard(now=self.now):
-            return "no heartbeat any more"
+            return "heartbeats stopped"
         if not self.area.holds(self.motion):
             ahead, right = self.area.place_of(self.motion.pose)
-            return f"at the side of the area: {ahead:.2f} m ahead, {right:.2f} m to the right"
+            return f"at the edge of the area: {ahead:.2f} m ahead, {right:.2f} m to the right"
         if not talk.armed and not self._may_leave_mode:
-            return "somebody disarmed it"
+            return "the rover was disarmed"
         if talk.mode != self._persona.control_mode and not self._left_by_itself():
-            return f"its mode is {self._persona.mode_name(talk.mode)}, and not by us"
+            return f"its mode changed to {self._persona.mode_name(talk.mode)}"
         return talk.others.why_leave()
 
     def _left_by_itself(self) -> bool:
@@ -186,7 +186,7 @@ class DriveController:
         return self._may_leave_mode and self._talk.mode not in self._persona.manual_modes
 
 
-_REFUSED = {Refused.MODE: "the mode was", Refused.ARM: "arming was"}
+_REFUSED = {Refused.MODE: "mode", Refused.ARM: "arming"}
 
 
 def is_fresh(motion: MotionMonitor, *, now: float, within: float) -> bool:

@@ -37,7 +37,7 @@ def set_failsafe(talk: Conversation, findings: Findings) -> Steps[None]:
         done.append(f"{name} {before:g}, now {wanted:g}")
     findings.loss_by_parameters = loss_failsafe_of(talk).what_it_does
     if not findings.loss_by_parameters:
-        raise NotSet("the rover does not say what it does when setpoints stop")
+        raise NotSet("the rover does not report what it does when setpoints stop")
     findings.failsafe_set = "; ".join(done) or "nothing to change"
 
 
@@ -58,4 +58,4 @@ def _set(talk: Conversation, findings: Findings, name: str, wanted: float) -> St
         if came:
             findings.parameters[name] = wanted
             return
-    raise NotSet(f"the rover does not take {name} {wanted:g}")
+    raise NotSet(f"the rover does not accept {name} {wanted:g}")

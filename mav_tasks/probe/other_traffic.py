@@ -59,14 +59,14 @@ class OtherTraffic:
     def why_leave(self) -> str:
         """Return in words why nothing at all may be asked here, "" if it may."""
         if self._ours in self.servers:
-            return f"a task server is there ({self._ours}): end it first"
+            return f"task server {self._ours} is on this link: end it first"
         if self.servers:
-            return f"a task server is there ({_listed(self.servers)}): probe the rover past it"
+            return f"task server {_listed(self.servers)} is on this link: probe on a direct link"
         if self.setpoints:
-            return f"{_listed(self.setpoints)} sends setpoints there: it is being driven"
+            return f"{_listed(self.setpoints)} sends setpoints: the rover is being driven"
         stations = [each for each in self.stations if _is_server_like(each)]
         if stations:
-            return f"a task server is there ({_listed(stations)}): end it first"
+            return f"task server {_listed(stations)} is on this link: end it first"
         return ""
 
     def why_not_drive(self) -> str:
@@ -74,9 +74,11 @@ class OtherTraffic:
         if self.why_leave():
             return self.why_leave()
         if self.commanding:
-            return f"{_listed(self.commanding)} commands it, too"
+            return f"{_listed(self.commanding)} also commands the rover"
         if self.own_computers:
-            return f"on-board computer {_listed(self.own_computers)} may drive it: end it first"
+            return (
+                f"on-board computer {_listed(self.own_computers)} may drive the rover: end it first"
+            )
         return ""
 
     def in_words(self) -> list[str]:

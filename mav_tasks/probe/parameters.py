@@ -33,7 +33,7 @@ PX4 = (
 )
 BY_PERSONA: Mapping[str, tuple[str, ...]] = {"ardupilot": ARDUPILOT, "px4": PX4, "generic": PX4}
 #: what an ArduPilot Rover does, whatever its parameters say
-FIXED = "stops by its make: 3 s after the last setpoint, a constant (as observed on 4.6.3)"
+FIXED = "stops 3 s after the last setpoint, as ArduPilot does (fixed; observed on 4.6.3)"
 
 
 def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
@@ -88,7 +88,7 @@ def _loss_of(talk: Conversation) -> str:
     if not persona.has_loss_failsafe:
         return FIXED
     failsafe = loss_failsafe_of(talk)
-    return failsafe.what_it_does or "does not say whether it stops when setpoints stop"
+    return failsafe.what_it_does or "does not report whether it stops when setpoints stop"
 
 
 def loss_time_of(findings: Findings) -> float:

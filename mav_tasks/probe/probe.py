@@ -138,12 +138,12 @@ class Probe:
         if talk.rover is None:
             which = self._options.system_id
             who = "a rover" if which is None else f"rover {which}"
-            raise NothingHeard(f"no heartbeat of {who} within {within:g} s")
+            raise NothingHeard(f"no heartbeat from {who} within {within:g} s")
 
     def _set_failsafe(self) -> Steps[None]:
         """It may be asked through a task server, and while somebody drives: nothing moves by it."""
         talk, findings = self.talk, self.findings
-        self.stage = f"looking at the loss failsafe of rover {talk.target.system_id}"
+        self.stage = f"reading the loss failsafe of rover {talk.target.system_id}"
         meet(talk, findings)
         findings.is_rover = findings.vehicle_type in DRIVEN_TYPES
         yield from identify(talk, findings)
@@ -151,7 +151,7 @@ class Probe:
 
     def _look(self) -> Steps[None]:
         talk, findings = self.talk, self.findings
-        self.stage = f"listening to rover {talk.target.system_id}, and asking it"
+        self.stage = f"listening to rover {talk.target.system_id} and querying it"
         yield from listen(talk, findings)
         findings.is_rover = findings.vehicle_type in DRIVEN_TYPES
         self._leave_if_occupied()
@@ -177,7 +177,7 @@ class Probe:
         area = DrivingArea.about(motion.pose, turning=found.turning, radius=found.turning_radius)
         controller = DriveController(talk, persona, drive, area)
         with_loss = self._may_try_loss(drive)
-        self.stage = f"driving in an area of {2 * area.half:g} m: keep clear; Ctrl-C stops it"
+        self.stage = f"driving within {area.half:g} m of its place: keep clear; Ctrl-C stops it"
         try:
             yield from controller.take()
             trials = Trials(
@@ -211,14 +211,14 @@ class Probe:
         if talk.others.why_not_drive():
             return talk.others.why_not_drive()
         if talk.persona is None or not findings.is_rover:
-            return "it is no rover that the server drives"
+            return "the server does not drive this type of rover"
         if talk.armed:
-            return "it is armed, and not by us"
+            return "it is armed already"
         if not is_fresh(talk.motion, now=talk.now, within=talk.watch.motion_fresh):
-            return "it does not say where it is"
+            return "its position is unknown or too old"
         if slow:
             each = ", ".join(f"{rate.name} at {rate.granted:.1f} Hz" for rate in slow)
-            return f"{each}: too seldom to drive by"
+            return f"{each}: too slow to drive by"
         if motion is None or motion.speed >= talk.watch.still_speed:
-            return "it moves"
+            return "it is moving"
         return ""

@@ -8,11 +8,11 @@ def why_none(findings: Findings) -> str:
     """Return in words why there is no profile to keep; "": there is one."""
     drive = findings.drive
     if drive is None:
-        return "without --drive nothing is measured"
+        return "only --drive measures one"
     if not findings.firmware:
-        return "the rover does not say which one it is"
+        return "the rover does not report its firmware"
     if drive.ended and drive.loss_stop != "no":  # that it drives on is worth keeping in any case
-        return "the driving was not carried through"
+        return "the drive was not completed"
     return ""
 
 

@@ -144,7 +144,7 @@ def give_rates_back(talk: Conversation, findings: Findings) -> Steps[None]:
             failed.append(rate.name)
     words = "as before"
     if unsaid:
-        words = f"by default, for it did not say what was before: {', '.join(unsaid)}"
+        words = f"to the default, because the rover did not report the rate: {', '.join(unsaid)}"
     findings.rates_given_back = f"no: {', '.join(failed)}" if failed else words
 
 

@@ -10,8 +10,8 @@ from mav_tasks.mavlink.enums import MavResult, MavType
 from mav_tasks.probe.findings import Drive, Findings, Rate
 from mav_tasks.settings import SET_FAILSAFE, Identity, Turning
 
-NOT_TRIED = "not tried: that needs --drive"
-UNKNOWN = "not known"
+NOT_TRIED = "not tried: needs --drive"
+UNKNOWN = "unknown"
 TYPES: Mapping[int, str] = {MavType.GROUND_ROVER: "ground rover", MavType.SURFACE_BOAT: "boat"}
 TURNS_STANDING = 5.0  # deg, more than the noise of a heading
 SETPOINT_BIT, COMMAND_INT_BIT = 128, 8  # MAV_PROTOCOL_CAPABILITY
@@ -51,8 +51,8 @@ def as_json(findings: Findings) -> dict[str, Any]:
 
 
 def _lines(findings: Findings) -> Iterator[Line]:
-    make = findings.autopilot or "not supported"
-    kind = TYPES.get(findings.vehicle_type, f"type {findings.vehicle_type}, no rover")
+    make = findings.autopilot or "unsupported autopilot"
+    kind = TYPES.get(findings.vehicle_type, f"type {findings.vehicle_type}, not a rover")
     is_known = bool(findings.autopilot) and findings.is_rover
     yield Line(
         "rover",
@@ -64,11 +64,11 @@ def _lines(findings: Findings) -> Iterator[Line]:
         findings.firmware or UNKNOWN,
         Mark.GOOD if findings.firmware else Mark.WARNING,
     )
-    yield Line("unique id", findings.uid or "it does not say")
+    yield Line("unique id", findings.uid or "not reported")
     yield from _capabilities(findings)
     yield Line("mode", f"{findings.mode or UNKNOWN}, {'ARMED' if findings.armed else 'disarmed'}")
     for other in findings.others:
-        yield Line("also there", other, Mark.WARNING)
+        yield Line("also connected", other, Mark.WARNING)
     yield Line(
         "HEARTBEAT", f"{findings.heartbeat_rate:.1f} Hz", _good(findings.heartbeat_rate > 0.5)
     )
@@ -77,27 +77,27 @@ def _lines(findings: Findings) -> Iterator[Line]:
     if findings.rates_given_back:
         is_bad = findings.rates_given_back.startswith("no")
         words = findings.rates_given_back
-        yield Line("rates given back", words, Mark.WARNING if is_bad else Mark.PLAIN)
+        yield Line("rates restored", words, Mark.WARNING if is_bad else Mark.PLAIN)
     yield from _arming(findings)
     yield from _mission(findings)
     yield _without_setpoints(findings.loss_by_parameters)
     if findings.turning:
         radius = findings.turning_radius
-        circle = "" if radius is None else f", least radius {radius:.1f} m"
-        words = "on the spot" if findings.turning == Turning.ON_SPOT.value else "as a car"
-        yield Line("turns", f"{words}, by its parameters{circle}")
+        circle = "" if radius is None else f", minimum radius {radius:.1f} m"
+        words = "on the spot" if findings.turning == Turning.ON_SPOT.value else "like a car"
+        yield Line("turns", f"{words}, according to its parameters{circle}")
     if findings.failsafe_set:
         yield Line("loss failsafe", findings.failsafe_set, Mark.GOOD)
     for name, value in findings.parameters.items():
         yield _parameter(name, value, findings)
     if findings.missing_parameters:
-        yield Line("not there", ", ".join(findings.missing_parameters))
+        yield Line("not reported", ", ".join(findings.missing_parameters))
     yield from _drive(findings.drive)
 
 
 def _without_setpoints(said: str) -> Line:
     if said.startswith("would"):
-        return Line("without setpoints", f"{said}. To make it stand: {SET_FAILSAFE} URL", Mark.BAD)
+        return Line("without setpoints", f"{said}. To make it stop: {SET_FAILSAFE} URL", Mark.BAD)
     mark = Mark.GOOD if said.startswith("stops") else Mark.WARNING
     return Line("without setpoints", said or UNKNOWN, mark)
 
@@ -106,10 +106,10 @@ def _parameter(name: str, value: float, findings: Findings) -> Line:
     operator = findings.parameters.get("SYSID_MYGCS")
     ours = Identity().system_id
     if name == "SYSID_ENFORCE" and value and operator != ours:
-        words = f"{value:g}: it obeys system {operator:g} only" if operator else f"{value:g}"
-        return Line(name, f"{words}, and the server is {ours}", Mark.WARNING)
+        words = f"{value:g}: the rover obeys only system {operator:g}" if operator else f"{value:g}"
+        return Line(name, f"{words}; the server is {ours}", Mark.WARNING)
     if name == "FS_GCS_ENABLE" and value:
-        words = f"{value:g}: without heartbeats of SYSID_MYGCS it does as FS_ACTION says"
+        words = f"{value:g}: without heartbeats of SYSID_MYGCS the rover does what FS_ACTION says"
         return Line(name, words, Mark.WARNING)
     return Line(name, f"{value:g}")
 
@@ -119,14 +119,14 @@ def _capabilities(findings: Findings) -> Iterator[Line]:
     if flags is None:
         return
     for words, bit in (("COMMAND_INT", COMMAND_INT_BIT), ("local setpoints", SETPOINT_BIT)):
-        yield Line(f"takes {words}", "so it says" if flags & bit else "it does not say so")
+        yield Line(f"takes {words}", "yes" if flags & bit else "not reported")
 
 
 def _rate(rate: Rate) -> Line:
     if rate.granted is None:
         return Line(rate.name, f"{rate.unasked:.1f} Hz unasked")
     is_enough = rate.granted >= 0.5 * rate.wanted
-    words = f"{rate.granted:.1f} Hz of {rate.wanted:.1f} asked for, {rate.unasked:.1f} unasked"
+    words = f"{rate.granted:.1f} Hz of {rate.wanted:.1f} requested, {rate.unasked:.1f} unasked"
     if rate.answer != MavResult.ACCEPTED.name:
         words += f"; answer: {rate.answer}"
     return Line(rate.name, words, _good(is_enough))
@@ -145,7 +145,7 @@ def _arming(findings: Findings) -> Iterator[Line]:
 def _mission(findings: Findings) -> Iterator[Line]:
     count = findings.mission_items
     if count:
-        words = f"{count} items: its mission mode would drive them, and nobody sees it"
+        words = f"{count} items: its mission mode would drive them, unseen by the server"
         yield Line("mission on board", words, Mark.WARNING)
     else:
         yield Line("mission on board", UNKNOWN if count is None else "none")
@@ -155,7 +155,7 @@ def _drive(drive: Drive | None) -> Iterator[Line]:
     if drive is None:
         yield Line("driving", NOT_TRIED)
         return
-    words = drive.ended or "carried through"
+    words = drive.ended or "completed"
     yield Line("driving", words, Mark.BAD if drive.ended else Mark.GOOD)
     if drive.left:
         yield Line("left in", drive.left, Mark.BAD if "ARMED" in drive.left else Mark.GOOD)
@@ -174,7 +174,7 @@ def _drive(drive: Drive | None) -> Iterator[Line]:
     turned_standing = drive.turned_standing_deg
     if turned_standing is not None:
         is_turning = abs(turned_standing) > TURNS_STANDING
-        words = f"it turned by {turned_standing:.0f} deg in 2 s of zeros"
+        words = f"turned by {turned_standing:.0f} deg in 2 s of zero setpoints"
         yield Line("standing", words, Mark.WARNING if is_turning else Mark.PLAIN)
     if drive.reverse:
         yield Line("reverse", drive.reverse)
@@ -182,17 +182,19 @@ def _drive(drive: Drive | None) -> Iterator[Line]:
         words = f"{drive.stopping_distance:.2f} m and {drive.stopping_time:.1f} s"
         yield Line("stop on zeros", f"{words} from {drive.speed:.2f} m/s")
     yield from _loss(drive)
-    yield Line("farthest", f"{drive.farthest:.2f} m from where it began")
+    yield Line("farthest", f"{drive.farthest:.2f} m from the start")
 
 
 def _loss(drive: Drive) -> Iterator[Line]:
     if drive.loss_stop == "yes" and drive.loss_distance is not None:
         after = drive.setpoint_timeout
-        words = f"stops by itself, {drive.loss_distance:.2f} m on from {drive.loss_speed:.2f} m/s"
+        words = (
+            f"stops by itself, {drive.loss_distance:.2f} m further, from {drive.loss_speed:.2f} m/s"
+        )
         words += "" if after is None else f", after {after:.1f} s"
         yield Line("setpoints stop", words, Mark.GOOD)
     elif drive.loss_stop == "no":
-        words = drive.loss_note or "it drives on"
+        words = drive.loss_note or "it keeps driving"
         yield Line("setpoints stop", f"does NOT stop by itself; {words}", Mark.BAD)
     elif drive.loss_note:
         yield Line("setpoints stop", drive.loss_note, Mark.WARNING)

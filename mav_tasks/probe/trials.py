@@ -120,7 +120,7 @@ class Trials:
         followed = _way(before, controller) >= FOLLOWED
         (self._drive.accepted if followed else self._drive.refused).append(kind.name)
         if not followed and kind.name == self._own.name:
-            raise DriveEnded(f"it does not follow {kind.name}")
+            raise DriveEnded(f"the rover does not follow {kind.name}")
 
     def _with(self, kind: Kind, wanted: Speeds, way: Callable[[], float]) -> Steps[None]:
         controller, limit = self._controller, TRIAL_TIME
@@ -134,7 +134,7 @@ class Trials:
     def _rest(self) -> Steps[None]:
         self._controller.speak(self._own.persona)
         if not (yield from self._controller.stand()):
-            raise DriveEnded("it does not stand on zeros")
+            raise DriveEnded("the rover does not stand on zero setpoints")
 
     @property
     def _rate_kind(self) -> Kind | None:
@@ -199,7 +199,7 @@ class Trials:
             if controller.motion.speed > controller.still_speed:
                 stood_at = controller.now
         if not controller.is_still:
-            raise DriveEnded(f"it does not stand within {STOP_TIME:g} s of zeros")
+            raise DriveEnded(f"the rover does not stand within {STOP_TIME:g} s of zero setpoints")
         drive.speed = round(speed, 3)
         drive.stopping_distance = round(_way(before, controller), 3)
         drive.stopping_time = round(stood_at - began, 2)
@@ -210,7 +210,9 @@ class Trials:
         course, room = self._roomiest()
         speed = min(TRIAL_SPEED, (room - 0.25) / (self._loss_time + 1.5))
         if speed < LEAST_SPEED:
-            drive.loss_note = f"no room: {room:.1f} m ahead, and {self._loss_time:g} s to wait"
+            drive.loss_note = (
+                f"not tried: only {room:.1f} m ahead for a wait of {self._loss_time:g} s"
+            )
             return
         speed = yield from self._run_up(speed, stop_time=self._loss_time, course=course)
         before, began = controller.motion.pose, controller.now
@@ -231,7 +233,9 @@ class Trials:
         if slowed_at is not None:
             drive.setpoint_timeout = round(slowed_at - began, 2)
         if drive.loss_stop == "no":
-            raise DriveEnded(f"it drives on {controller.now - began:.1f} s after the last setpoint")
+            raise DriveEnded(
+                f"the rover still drives {controller.now - began:.1f} s after the last setpoint"
+            )
 
     def _run_up(
         self, speed: float, *, stop_time: float, course: float | None = None
@@ -254,7 +258,7 @@ class Trials:
                 return motion.forward
             if not is_off and controller.area.room(motion.pose, course) < speed * (stop_time + 0.5):
                 break
-        raise DriveEnded(f"it does not come to {speed:.2f} m/s in the room that there is")
+        raise DriveEnded(f"the rover does not reach {speed:.2f} m/s within the area")
 
     def _roomiest(self) -> tuple[float, float]:
         """Return the direction, ahead or where it can turn to by itself, with the most room; m."""

@@ -141,13 +141,13 @@ class Decoder:
         except Unreadable:
             raise
         except KeyError as error:
-            raise Unreadable(f"{kind.__name__}: {error} is unknown to this version") from error
+            raise Unreadable(f"{kind.__name__}: this version does not know {error}") from error
         except (TypeError, ValueError, IndexError, AttributeError) as error:
             raise Unreadable(f"{kind.__name__}: {error}") from error
 
     def _decoder_of(self, kind: type) -> "_Decode":
         if kind.__name__ not in self._written:
-            raise Unreadable(f"{kind.__name__} is not in its format")
+            raise Unreadable(f"{kind.__name__} has another format")
         places = {path: index for index, path in enumerate(self._written[kind.__name__])}
         special = [
             (places[path], convert)

@@ -23,7 +23,7 @@ from mav_tasks.tasks.events import Event
 
 BUSY_TIMEOUT = 0.25  # s, SQLite's wait for another program's lock
 GONE = "the file was removed or replaced while it was in use"
-ANOTHER = "it is not the file that was opened: put that back, or end the server and look"
+ANOTHER = "it is not the file that was opened: restore that file, or end the server and check"
 MOST_ROWS = 128  # in one INSERT: with seven columns below SQLite's oldest limit, 999 values
 
 _PRAGMAS = (
@@ -240,7 +240,7 @@ def _connect(path: Path) -> sqlite3.Connection:
 def _set_up(connection: sqlite3.Connection) -> None:
     modes = [connection.execute(pragma).fetchone() for pragma in _PRAGMAS]
     if modes[0][0] != "wal":
-        raise sqlite3.OperationalError("this file system has no room for a write-ahead log")
+        raise sqlite3.OperationalError("this file system cannot hold a write-ahead log")
 
 
 def _check_whole(connection: sqlite3.Connection) -> None:

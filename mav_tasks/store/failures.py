@@ -8,11 +8,11 @@ _WORDS = {
     sqlite3.SQLITE_READONLY: "it is read-only",
     sqlite3.SQLITE_IOERR: "the disk cannot be read or written, or is full",
     sqlite3.SQLITE_CORRUPT: "it is damaged",
-    sqlite3.SQLITE_NOTADB: "it is damaged, or no database",
+    sqlite3.SQLITE_NOTADB: "it is damaged, or not a database",
     sqlite3.SQLITE_CANTOPEN: "it cannot be opened",
     sqlite3.SQLITE_BUSY: "another program has locked it",
     sqlite3.SQLITE_LOCKED: "another program has locked it",
-    sqlite3.SQLITE_PERM: "there is no permission",
+    sqlite3.SQLITE_PERM: "permission denied",
 }
 
 

@@ -130,7 +130,7 @@ class HaltRecord:
                 content = content.ljust(SIZE, b"\0")
             self._newest = dict(_words_in(content))
             if os.pwrite(self._fd, content, 0) < SIZE:  # a copied file may be sparse
-                raise OSError(0, "there is no room for it")
+                raise OSError(0, "the disk is full")
             os.fsync(self._fd)
         except (OSError, ValueError) as error:
             os.close(self._fd)
@@ -179,7 +179,7 @@ class HaltRecord:
         body = _BODY.pack(word.number, word.utc, word.value, word.reason, word.actor.encode()[:39])
         cell = _CRC.pack(crc32(body)) + body
         if os.pwrite(self._fd, cell, _place(slot, word.key)) < len(cell):
-            raise OSError(0, "it was not written as a whole")
+            raise OSError(0, "it was written only in part")
         self._newest[word.key] = slot, word
 
 
@@ -192,7 +192,7 @@ def _place(slot: int, key: int) -> int:
 def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:
     """Yield each register's newest word with its slot; raise ValueError if the file is damaged."""
     if len(content) != SIZE or not content.startswith(HEADER):
-        raise ValueError("it is damaged: look whether the rovers stand, then remove it")
+        raise ValueError("it is damaged: check that the rovers stand still, then remove it")
     for key in range(REGISTERS):
         found: list[tuple[int, Word]] = []
         is_cut_short = 0
@@ -204,7 +204,7 @@ def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:
                 found += [] if word is None else [(slot, word)]
                 is_cut_short += word is None
         if is_cut_short == SLOTS:
-            raise ValueError("it is damaged: look whether the rovers stand, then remove it")
+            raise ValueError("it is damaged: check that the rovers stand still, then remove it")
         if found:
             yield key, max(found, key=lambda each: each[1].number)
 

@@ -39,7 +39,7 @@ class Journal:
         self._path = path.expanduser().absolute()
         self._which = which or Which()
         if not self._path.is_file():
-            raise StoreError(f"store {path}: there is no such file; --store names another")
+            raise StoreError(f"store {path} does not exist; choose another with --store")
         with in_one_line(self._path):
             self._connection = _connect(self._path)
         self._number = 0  # of the last event returned
@@ -115,7 +115,7 @@ def _events(
         of_kind.setdefault(kind, []).append((number, body))
     for kind, some in of_kind.items():
         if kind not in _KINDS:
-            raise Unreadable(f"{kind} is unknown to this version")
+            raise Unreadable(f"this version does not know {kind}")
         values = rows.values(_KINDS[kind], [body for _, body in some], offset)
         yield from zip((number for number, _ in some), values, strict=True)
 
@@ -135,7 +135,7 @@ def _checked(path: Path, how: str) -> sqlite3.Connection:
     try:
         schema.check(connection)
         if schema.is_empty(connection):
-            raise StoreError("nothing was ever written to it")
+            raise StoreError("it is empty")
     except BaseException:
         connection.close()
         raise

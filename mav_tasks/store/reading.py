@@ -157,7 +157,7 @@ def in_one_line(path: Path) -> Iterator[None]:
     try:
         yield
     except Unreadable as error:
-        raise StoreError(f"store {path}: it cannot be understood: {error}") from error
+        raise StoreError(f"store {path}: its contents are invalid: {error}") from error
     except StoreError as error:
         raise StoreError(f"store {path}: {error}") from error
     except (ValueError, LookupError) as error:  # not JSON, or not what we write

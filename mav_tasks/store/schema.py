@@ -70,7 +70,7 @@ def check(connection: sqlite3.Connection, *, known: int = len(MIGRATIONS)) -> No
     if _number(connection, "application_id") != APPLICATION_ID and (
         version or connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     ):
-        raise StoreError("a database of another program")
+        raise StoreError("it is a database of another program")
     if version > known:
         raise StoreError(f"written by a newer version (schema {version}, this one knows {known})")
 

@@ -150,7 +150,7 @@ def _real_path(path: Path) -> Path:
         make_private(path.parent)
     except (OSError, RuntimeError, ValueError) as error:
         words = getattr(error, "strerror", None) or str(error)
-        raise StoreError(f"store {path}: its folder cannot be made: {words}") from error
+        raise StoreError(f"store {path}: its folder cannot be created: {words}") from error
     return path
 
 

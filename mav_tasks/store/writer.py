@@ -128,7 +128,7 @@ class Writer:
         )
         while not self._is_written(batch):
             if self._give_up_at is not None and time.monotonic() > self._give_up_at:
-                words = f"given up at the end: {len(events)} events or more are lost"
+                words = f"not written before the end: {len(events)} events or more are lost"
                 self._mail.put(NotKept(f"store {self._name}: {words}"))
                 return False
             time.sleep(RETRY)
@@ -180,4 +180,4 @@ class Writer:
         except Exception as error:
             if not is_failure(error):
                 raise
-            self._mail.put(NotKept(f"store {self._name}: not closed well: {words_for(error)}"))
+            self._mail.put(NotKept(f"store {self._name}: not closed cleanly: {words_for(error)}"))

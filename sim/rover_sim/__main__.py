@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write(f"rover_sim: {error}\n")
         return USAGE_ERROR
     except SimulatedCrash as error:
-        sys.stderr.write(f"rover_sim: aborted as the real one: {error}\n")
+        sys.stderr.write(f"rover_sim: aborted, as the real one does: {error}\n")
         return ABORTED
     return 0
 
@@ -97,13 +97,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def read_options(arguments: Sequence[str] | None) -> Options:
     """Parse the command line; exit with status 2 on a usage error."""
     parser = argparse.ArgumentParser(
-        prog="rover_sim", description="Simulated rovers that speak MAVLink over UDP."
+        prog="mav-tasks sim", description="Simulated rovers that speak MAVLink over UDP."
     )
     add = parser.add_argument
     add("--host", default="127.0.0.1", help="address to listen on (default %(default)s)")
-    add("--port", type=int, default=DEFAULT_PORT, help="0 for any (default %(default)s)")
+    add(
+        "--port",
+        type=int,
+        default=DEFAULT_PORT,
+        help="UDP port; 0: any free one (default %(default)s)",
+    )
     add("--insecure", action="store_true", help="allow an address other than loopback")
-    add("--count", type=int, default=1, help="number of rovers, with ids in a row")
+    add("--count", type=int, default=1, help="number of rovers, with consecutive system ids")
     add("--system-id", type=int, default=1, help="MAVLink system id of the first rover")
     bodies = ("auto", "bullet", "kinematic")
     add("--body", choices=bodies, default="auto", help="physics; auto is bullet if installed")
@@ -111,25 +116,40 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         "--persona",
         choices=tuple(PERSONAS),
         default=ARDUPILOT.name,
-        help="make of autopilot (default %(default)s)",
+        help="autopilot to simulate (default %(default)s)",
     )
     add(
         "--honours-yaw-rate",
         action="store_true",
-        help="a px4 or generic rover turns at a yaw rate, too",
+        help="let a px4 or generic rover follow yaw rates",
     )
-    add("--seed", type=int, help="draw each rover's differences from this number")
-    add("--friction", type=float, default=0.8, help="tyres on ground (default %(default)s)")
-    add("--friction-variation", type=float, default=0.0, help="0.3 for 30 %% (needs --seed)")
-    add("--gui", action="store_true", help="open pybullet's window, of the first rover")
-    add("--speed", default="real", help="'real', or simulated seconds per second")
+    add("--seed", type=int, help="seed of the random errors and friction of each rover")
+    add(
+        "--friction",
+        type=float,
+        default=0.8,
+        help="friction between tyres and ground (default %(default)s)",
+    )
+    add(
+        "--friction-variation",
+        type=float,
+        default=0.0,
+        help="random variation of the friction; 0.3: 30 %% (needs --seed)",
+    )
+    add("--gui", action="store_true", help="show the first rover in pybullet's window")
+    add("--speed", default="real", help="'real', or simulated seconds per real second")
     add("--truth", metavar="FILE", help="append the true poses at 10 Hz as CSV")
-    add("--sign", metavar="NAME", default="", help="sign with this key, hear nothing else")
-    add("--keys", metavar="FILE", default="", help="the key ring (default: the user's own)")
+    add(
+        "--sign",
+        metavar="NAME",
+        default="",
+        help="sign with this key, and accept only packets signed with it",
+    )
+    add("--keys", metavar="FILE", default="", help="key ring file (default: your own)")
     add(
         "--frame",
         choices=tuple(frame.value for frame in Frame),
-        help="how it steers: skid and differential are one (default: as its make's persona)",
+        help="how the rover steers; skid and differential are the same (default: as the persona)",
     )
     add("--fault", metavar="TEXT", action="append", default=[], help=HELP)
     add_realism_arguments(parser)
@@ -138,13 +158,13 @@ def read_options(arguments: Sequence[str] | None) -> Options:
     if values.count < 1:
         parser.error("--count must be 1 or more")
     if not 1 <= values.system_id <= 256 - values.count:
-        parser.error("--system-id, and of the last of --count rovers, must lie within 1..255")
+        parser.error("--system-id must leave the ids of all --count rovers within 1..255")
     if not 0.0 < values.friction <= MAX_FRICTION:
         parser.error(f"--friction must be above 0, at most {MAX_FRICTION:g}")
     if not 0.0 <= values.friction_variation < 1.0:
         parser.error("--friction-variation must be 0 or more, below 1")
     if values.friction_variation and values.seed is None:
-        parser.error("--friction-variation draws by chance: it needs --seed")
+        parser.error("--friction-variation needs --seed")
     if not 0 <= values.port <= 65535:
         parser.error("--port must lie within 0..65535")
     try:
@@ -277,7 +297,7 @@ def _open_socket(options: Options, stack: ExitStack) -> socket.socket:
     if not address.is_loopback and not (options.insecure or options.sign):
         raise StartError(
             f"{address} is not a loopback address and MAVLink here is not signed:"
-            " say --sign NAME, or --insecure if you mean it"
+            " use --sign NAME, or --insecure to allow that"
         )
     family = socket.AF_INET if address.version == 4 else socket.AF_INET6
     server = stack.enter_context(socket.socket(family, socket.SOCK_DGRAM))

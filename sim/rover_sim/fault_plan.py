@@ -120,9 +120,9 @@ ACTIONS: Mapping[str, tuple[str, Callable[[Words, Frame], Event]]] = {
     "disarm": ("disarm", _plain(Disarm())),
 }
 HELP = (
-    f"break something at a time, for example '{EXAMPLE}'; may be given often."
-    f" What there is: {'; '.join(form for form, _ in ACTIONS.values())}."
-    " Begin with 'rover 2' for one of many; without 'for' it lasts"
+    f"cause a fault at a time, for example '{EXAMPLE}'; repeatable."
+    f" Faults: {'; '.join(form for form, _ in ACTIONS.values())}."
+    " Prefix 'rover 2' selects one of several rovers; without 'for' the fault is permanent"
 )
 
 

@@ -38,34 +38,44 @@ def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
         type=read_place,
         metavar="LAT,LON,ALT,HEADING",
         default=Place(DEFAULT_ORIGIN, 0.0),
-        help="where it starts: degrees, m above sea, degrees from north",
+        help="start position: degrees, metres above sea level, heading in degrees",
     )
     add(
         "--noise",
         choices=("on", "off"),
         default="on",
-        help="off: exact, ready at once, does what it is told (default: as real ones are)",
+        help="off: no errors and no boot time (default on: as recorded from real autopilots)",
     )
     receivers = [each.value for each in Gps]
-    add("--gps", choices=receivers, default="fine", help="class of its receiver (%(default)s)")
+    add(
+        "--gps",
+        choices=receivers,
+        default="fine",
+        help="GPS accuracy: fine is centimetres, metre is 0.2 m of noise (default %(default)s)",
+    )
     add(
         "--boot",
         choices=("short", "real", "none"),
-        help="how long until it can be armed; real is 23 s for ardupilot (default: short, a"
-        " twentieth; none with --noise off)",
+        help="boot time until the rover can be armed; real: 23 s for ardupilot (default short, a"
+        " twentieth of it; none with --noise off)",
     )
-    add("--origin", choices=("told", "silent"), default="told", help="GPS_GLOBAL_ORIGIN, or never")
+    add(
+        "--origin",
+        choices=("told", "silent"),
+        default="told",
+        help="silent: never send GPS_GLOBAL_ORIGIN",
+    )
     add(
         "--peers",
         choices=[each.value for each in Peers],
-        help="whom it answers: px4 the first that it heard until it is started again, the others"
-        " all (and px4 with --noise off)",
+        help="clients to answer: all, or only the first until a restart (default: first for px4"
+        " with --noise on, else all)",
     )
     add(
         "--sticks",
         type=read_sticks,
         metavar="THROTTLE[,STEERING]",
-        help="a transmitter that is held so, in microseconds (1500 is neutral)",
+        help="RC transmitter with its sticks held so, in microseconds (1500 is neutral)",
     )
 
 

@@ -185,10 +185,10 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert 3500 < waiting["time_to_start"] <= 3620
 
     named = called("modify", str(waiting["id"]), "--label", "dock 3", server=server)
-    assert named.lines == [f"rover 1: task {waiting['id']} is changed"]
+    assert named.lines == [f"rover 1: task {waiting['id']} changed"]
 
     changed = called("modify", str(waiting["id"]), "--priority", "9", server=server)
-    assert changed.lines == [f"rover 1: task {waiting['id']} is changed"]
+    assert changed.lines == [f"rover 1: task {waiting['id']} changed"]
 
     (queue,) = called("queue", "--json", server=server).objects
     assert (queue["running"], queue["paused"], queue["waiting_count"]) == (first, None, 1)
@@ -213,7 +213,7 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     ]
     (gone,) = called("status", str(first), "--json", server=server).objects
     assert gone["state"] in ("cancelling", "cancelled")
-    assert called("clear", server=server).lines == ["rover 1: all waiting tasks are called off"]
+    assert called("clear", server=server).lines == ["rover 1: all waiting tasks cancelled"]
     assert_one_line(called("cancel", str(waiting["id"]), server=server), 1, "over")
 
 
@@ -309,8 +309,10 @@ def test_after_a_restart_of_the_rover_it_is_said_how_to_go_on_and_that_works(
             (queue,) = called("queue", "--json", server=server).objects
             assert queue["paused"] == "restarted"
             (said,) = called("resume", server=server).lines
-            assert said.startswith(f"rover 1: goes on after task {task.id}: move 1 m: held")
-            assert said.endswith(f"decide: mav-tasks release {task.id} again|remainder|skip")
+            assert said.startswith(
+                f"rover 1: resumed, but blocked by task {task.id}: move 1 m: held"
+            )
+            assert said.endswith(f"release it: mav-tasks release {task.id} again|remainder|skip")
             assert called("release", str(task.id), "remainder", server=server).status == 0
             assert task.done(timeout=30.0).state is TaskState.COMPLETED
 
@@ -325,7 +327,7 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
     why = {"pause": "operator", "stop": "stopped"}[halt]
     assert done.error == (
         f"mav-tasks: rover 1: task {number} waits: the queue is paused ({why});"
-        " to go on: mav-tasks resume\n"
+        " to resume: mav-tasks resume\n"
     )
     assert called("submit", "move", "1", "--json", server=server).error == ""
     assert called("clear", server=server).status == 0
@@ -334,8 +336,13 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
 def test_a_refused_number_is_told_as_it_was_typed(server: str) -> None:
     for typed, said in {
         ("move", "1", "--speed", "99"): "--speed 99: at most 2 m/s (driving.max_speed)",
-        ("rotate", "90", "--rate", "500"): "--rate 500: at most 90 deg/s (driving.max_turn_rate)",
-        ("face", "90", "--rate", "500"): "--rate 500: at most 90 deg/s (driving.max_turn_rate)",
+        (
+            "rotate",
+            "90",
+            "--rate",
+            "500",
+        ): "--rate 500: at most 90 deg/s (driving.max_turn_rate_deg)",
+        ("face", "90", "--rate", "500"): "--rate 500: at most 90 deg/s (driving.max_turn_rate_deg)",
     }.items():
         done = called("submit", *typed, server=server)
         assert (done.status, done.error) == (1, f"mav-tasks: {said}\n")
@@ -402,7 +409,7 @@ def test_a_task_that_fails_is_status_1(server: str, client: SyncClient) -> None:
     assert waiting.stdout is not None
     assert waiting.stdout.readline() == (
         f"rover 1: task {first.id}: plan of 2 items: queued (queue paused);"
-        " to go on: mav-tasks resume\n"
+        " to resume: mav-tasks resume\n"
     )
     client.cancel(first.id)
     output, error = waiting.communicate(timeout=20)
@@ -416,10 +423,10 @@ def read_way() -> PlanFile:
 
 
 def test_a_rover_is_paused_stopped_and_goes_on(server: str, client: SyncClient) -> None:
-    assert called("pause", server=server).lines == ["rover 1: paused. To go on: mav-tasks resume"]
+    assert called("pause", server=server).lines == ["rover 1: paused. To resume: mav-tasks resume"]
     (queue,) = called("queue", "--json", server=server).objects
     assert queue["paused"] == "operator"
-    assert called("resume", server=server).lines == ["rover 1: goes on"]
+    assert called("resume", server=server).lines == ["rover 1: resumed"]
     stopped = called("stop", "--clear", server=server)
     assert stopped.status == 0
     (line,) = stopped.lines

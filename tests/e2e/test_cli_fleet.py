@@ -30,9 +30,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 def test_what_can_mean_either_rover_is_asked_back(server: str) -> None:
     done = called("submit", "move", "1", server=server)
     assert done.status == 2
-    assert done.error == (
-        "mav-tasks: there are rovers 1, 2: name the one that is meant (--vehicle N)\n"
-    )
+    assert done.error == ("mav-tasks: the server has rovers 1, 2: choose one (--vehicle N)\n")
 
 
 def test_a_task_is_found_by_its_number_alone(server: str) -> None:
@@ -59,20 +57,20 @@ def test_stop_pause_and_resume_are_for_one_rover_or_for_all(server: str) -> None
     assert called("stop", server=server).status == 0
     assert paused(server) == ["stopped", "stopped"]
     all_go_on = called("resume", "--all", server=server)
-    assert all_go_on.lines == ["rover 1: goes on", "rover 2: goes on"]
+    assert all_go_on.lines == ["rover 1: resumed", "rover 2: resumed"]
     assert paused(server) == [None, None]
     assert called("pause", "--vehicle", "2", server=server).lines == [
-        "rover 2: paused. To go on: mav-tasks resume --vehicle 2"
+        "rover 2: paused. To resume: mav-tasks resume --vehicle 2"
     ]
     assert paused(server) == [None, "operator"]
     done = called("pause", "--all", "--json", server=server).objects
     assert done == [{"done": "pause", "vehicle": 1}, {"done": "pause", "vehicle": 2}]
     assert paused(server) == ["operator", "operator"]
-    assert called("resume", "--vehicle", "1", server=server).lines == ["rover 1: goes on"]
+    assert called("resume", "--vehicle", "1", server=server).lines == ["rover 1: resumed"]
     assert called("resume", "--all", server=server).status == 0
     one = called("stop", "--vehicle", "2", server=server)
     assert one.lines == [
-        "STOP is in force for rover 2: nothing runs until 'mav-tasks resume --vehicle 2'"
+        "STOP is in force for rover 2: no task runs until 'mav-tasks resume --vehicle 2'"
     ]
     assert paused(server) == [None, "stopped"]
     assert called("resume", "--all", server=server).status == 0
@@ -82,7 +80,9 @@ def test_stop_pause_and_resume_are_for_one_rover_or_for_all(server: str) -> None
 def test_a_pause_of_several_says_how_to_choose(server: str, action: str) -> None:
     done = called(action, server=server)
     assert (done.status, done.output) == (2, "")
-    assert done.error == ("mav-tasks: there are rovers 1, 2: choose with --vehicle N or --all\n")
+    assert done.error == (
+        "mav-tasks: the server has rovers 1, 2: choose with --vehicle N or --all\n"
+    )
     both = called(action, "--all", "--vehicle", "1", server=server)
     assert (both.status, both.error) == (
         *(2, "mav-tasks: --all and --vehicle 1: choose one of them\n"),
@@ -131,7 +131,7 @@ def test_a_silent_rover_keeps_no_other_from_being_paused(tmp_path: Path) -> None
             assert (one.status, one.lines) == (0, ["ready: the server hears rover 1"])
             done = called("pause", "--all", server=server)
             assert done.status == 1
-            assert done.lines == ["rover 1: paused. To go on: mav-tasks resume --vehicle 1"]
+            assert done.lines == ["rover 1: paused. To resume: mav-tasks resume --vehicle 1"]
             assert done.error.startswith("mav-tasks: rover 2: paused, but")
             headlines = [line for line in called("queue", server=server).lines if "rover" in line]
             assert "rover 2 (silent for" in headlines[1]

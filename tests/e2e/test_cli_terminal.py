@@ -105,7 +105,7 @@ def test_ctrl_c_leaves_the_task_and_says_how_to_call_it_off(
         assert screen.end() == 130
     number = int(screen.lines[0].removeprefix("rover 1: task "))
     assert screen.lines[-1] == (
-        f"mav-tasks: rover 1: task {number} goes on; to call it off: mav-tasks cancel {number}"
+        f"mav-tasks: rover 1: task {number} keeps running; to cancel it: mav-tasks cancel {number}"
     )
     assert "Traceback" not in screen.text
     assert screen.written.rstrip().endswith(str(number).encode())
@@ -118,12 +118,14 @@ def test_a_watched_queue_fits_its_window_and_follows_it(there: Stand, client: Sy
     with at(there, "queue", "--watch", size=(12, 80)) as screen:
         screen.wait_for(lambda text: "and 22 more" in text)
         assert len(screen.lines) == 12
-        assert screen.lines[0].startswith("rover 1: nothing runs; paused: operator, to go on:")
+        assert screen.lines[0].startswith(
+            "rover 1: no task runs; queue paused (operator); to resume:"
+        )
         assert screen.lines[1].startswith("30 scheduled")
         screen.resize(8, 40)
         screen.wait_for(lambda text: "and 26 more" in text)
         assert len(screen.lines) == 8
-        assert screen.lines[2].split()[:3] == ["id", "state", "what"]
+        assert screen.lines[2].split()[:3] == ["id", "state", "goal"]
         tasks[0].cancel()
         screen.wait_for(lambda text: "and 25 more" in text)
         screen.resize(40, 120)
@@ -137,10 +139,10 @@ def test_a_watched_queue_fits_its_window_and_follows_it(there: Stand, client: Sy
 
 def test_a_watched_queue_outlives_a_silence_of_the_server(there: Stand, client: SyncClient) -> None:
     with at(there, "queue", "--watch", size=(10, 60)) as screen:
-        screen.wait_for(lambda text: "nothing runs; 0 waiting" in text)
+        screen.wait_for(lambda text: "no task runs; 0 waiting" in text)
         with frozen(there.server):
-            screen.wait_for(lambda text: re.match(r"no answer for \d s\nrover 1: nothing", text))
-        screen.wait_for(lambda text: text.startswith("rover 1: nothing runs"))
+            screen.wait_for(lambda text: re.match(r"no answer for \d s\nrover 1: no task", text))
+        screen.wait_for(lambda text: text.startswith("rover 1: no task runs"))
         screen.type(CTRL_C)
         assert screen.end() == 130
 
@@ -160,10 +162,10 @@ def test_who_waits_is_told_of_a_silence(there: Stand, client: SyncClient) -> Non
 def test_to_call_off_everything_is_asked_about(there: Stand, client: SyncClient) -> None:
     task = client.submit(Wait(60.0))
     with at(there, "clear", "--all") as screen:
-        screen.wait_for(lambda text: "the running one, too? [y/N]:" in text)
+        screen.wait_for(lambda text: "including the running one? [y/N]:" in text)
         screen.type(b"n\n")
         assert screen.end() == 2
-    assert screen.lines[-1].strip() == "mav-tasks: nothing was called off"
+    assert screen.lines[-1].strip() == "mav-tasks: nothing was cancelled"
     assert not client.status(task.id).is_over
     with at(there, "clear", "--all") as screen:
         screen.wait_for(lambda text: "[y/N]:" in text)
@@ -179,7 +181,7 @@ def test_a_terminal_that_knows_ascii_only_is_none_the_worse(
     client.submit(Wait(1.0), delay=600.0)
     with at(there, "queue", size=(24, 30), PYTHONIOENCODING="ascii") as screen:
         assert screen.end() == 0
-    assert screen.lines[0].startswith("rover 1: nothing runs; paused")
+    assert screen.lines[0].startswith("rover 1: no task runs; queue paused")
     client.resume()
     submit = ("submit", "wait", "0.5s", "--wait")
     with at(there, *submit, PYTHONIOENCODING="ascii") as screen:

@@ -99,7 +99,7 @@ async def test_a_refusal_says_why_in_words(running: Stand) -> None:
             await tasks.submit([GoTo(LocalPlace(50_000.0, 0.0)), Wait(1.0)])
         with pytest.raises(Refused, match="no task is running"):
             await tasks.cancel()
-        with pytest.raises(NoSuchVehicle, match="rover 9 is not there: there is rover 1"):
+        with pytest.raises(NoSuchVehicle, match="no rover 9; the server has rover 1"):
             await tasks.submit(Move(1.0), vehicle=9)
 
 
@@ -202,7 +202,7 @@ def test_the_same_without_asyncio(running: Stand) -> None:
         assert progress[-1] == 1.0
         assert task.done(timeout=1.0).state is S.COMPLETED
         later = tasks.submit(Move(1.0), delay=600.0)
-        words = rf"task {later.id} is not over after 0.2 s: move 1 m: scheduled \(start time\)"
+        words = rf"task {later.id} has not ended after 0.2 s: move 1 m: scheduled \(start time\)"
         with pytest.raises(TimeoutError, match=words):
             later.done(timeout=0.2)
         assert tasks.queue().waiting_count == 1
@@ -310,5 +310,5 @@ async def test_a_server_that_knows_nothing_any_more_says_so(tmp_path: Path) -> N
             it.server.end(signal.SIGKILL)
             with serve(tmp_path, it.client_port, it.rover_port, "second") as again:
                 again.wait_for("rover 1: found")
-                with pytest.raises(TaskFailed, match="does not know it any more"):
+                with pytest.raises(TaskFailed, match="no longer knows it"):
                     await ending

@@ -46,7 +46,7 @@ def test_sighup_changes_what_can_change_while_a_rover_drives(tmp_path: Path) -> 
         path.write_text("[driving]\nspeed = 0.5\nsped = 1\n", encoding="utf-8")
         it.server.popen.send_signal(signal.SIGHUP)
         it.server.wait_for(r"ERROR configuration: .*c\.toml:3: driving\.sped: no such key")
-        it.server.wait_for("ERROR configuration: nothing changes")
+        it.server.wait_for("ERROR configuration: not applied")
         client.mav.param_set_send(1, 191, b"TSK_SPEED", 0.9, 9)
         it.server.wait_for("TSK_SPEED")
         shown = run("config", "show", "driving.speed", environment={"MAV_TASKS_STORE": str(store)})
@@ -62,7 +62,7 @@ def test_sighup_without_a_file_does_no_harm_at_whatever_time(tmp_path: Path) -> 
             server.popen.send_signal(signal.SIGHUP)
             assert server.popen.poll() is None, server.text
         server.popen.send_signal(signal.SIGHUP)  # those before the first reading may mean nothing
-        server.wait_for("configuration: read again, nothing has changed")
+        server.wait_for("configuration: reloaded, no changes")
         server.end()
     assert server.popen.returncode == 0
 
@@ -92,7 +92,7 @@ def test_a_server_whose_terminal_is_gone_ends_in_order(tmp_path: Path) -> None:
     try:
         server.wait_for("waiting for the first heartbeat")
         popen.send_signal(signal.SIGHUP)
-        server.wait_for("configuration: read again")  # it is there: only the configuration is meant
+        server.wait_for("configuration: reloaded")  # it is there: only the configuration is meant
         os.close(ours)
         popen.send_signal(signal.SIGHUP)
         assert popen.wait(10) == 0

@@ -94,7 +94,7 @@ def test_without_matplotlib_and_pybullet_it_runs_without_a_picture_and_says_so(
     kinematic, no_picture, last = lines
     assert "the rover is the kinematic one" in kinematic
     assert no_picture.endswith("not installed (pip install matplotlib)")
-    assert last == "demo: all as it should be"
+    assert last == "demo: all correct"
     assert not list(tmp_path.glob("*.png"))
 
 

@@ -68,7 +68,14 @@ def test_a_key_is_made_shown_once_listed_and_revoked(ring: Path) -> None:
 
     shown = called("keys", "list", "--keys", str(ring))
     assert shown.lines[0] == f"key ring {ring}, 2 keys"
-    assert shown.lines[1].split() == ["key", "role", "fingerprint", "from", "made", "revoked"]
+    assert shown.lines[1].split() == [
+        "key",
+        "role",
+        "fingerprint",
+        "derivation",
+        "created",
+        "revoked",
+    ]
     assert secret not in shown.output
 
     assert called("keys", "revoke", "anna", "--keys", str(ring)).status == 0
@@ -90,13 +97,13 @@ def test_digits_of_another_end_are_taken_from_a_pipe(ring: Path) -> None:
     ("arguments", "given", "words"),
     [
         (("add", "a", "--role", "boss"), "", "expected a role, one of observer"),
-        (("add", "a b", "--role", "safety"), "", "no name of a key"),
+        (("add", "a b", "--role", "safety"), "", "is not a key name"),
         (("add", "a", "--role", "safety", "--hex"), "geheim", "expected 64 hexadecimal digits"),
         (("add", "a", "--role", "safety", "--passphrase"), "geheim", "at least 8 characters"),
         (("add", "a", "--role", "safety", "--hex", "--generate"), "", "choose one of them"),
         (("add", "a", "--role", "safety", "--derivation", "sha256"), "", "and --passphrase"),
-        (("list",), "", "not there; mav-tasks keys add makes one"),
-        (("revoke", "a"), "", "not there"),
+        (("list",), "", "does not exist; mav-tasks keys add creates one"),
+        (("revoke", "a"), "", "does not exist"),
     ],
 )
 def test_a_mistake_is_one_clear_line(
@@ -185,10 +192,10 @@ def test_who_does_not_sign_is_told_that_this_may_be_why(signed: Signed) -> None:
     done = signed.cli("queue")
     assert done.status == 3
     assert COUNTED_BY_NOBODY in done.error
-    assert "(does it want a signature? --sign NAME)" in done.error
+    assert "(if the server requires signatures, use --sign NAME)" in done.error
     with (
         pytest.raises(
-            NoAnswer, match=r"no task server answered .* does the server know key stranger \("
+            NoAnswer, match=r"no task server answered .* does the server have key stranger \("
         ),
         SyncClient(signed.url, key=Key("stranger", b"s" * 32), timeout=1.0),
     ):
@@ -203,9 +210,9 @@ def test_commands_sign_by_name_one_right_after_the_other(signed: Signed) -> None
     missing = signed.cli("queue", "--sign", "carl", "--keys", str(signed.ring))
     assert (missing.status, missing.error) == (
         2,
-        f"mav-tasks: --sign: no key 'carl': there is r1, anna, ben, in {signed.ring}\n",
+        f"mav-tasks: --sign: no key 'carl' (usable keys: r1, anna, ben), in {signed.ring}\n",
     )
-    assert "say with which key" in signed.cli("queue", "--keys", "x").error
+    assert "--keys needs --sign NAME" in signed.cli("queue", "--keys", "x").error
 
 
 def test_the_environment_names_key_and_ring(
@@ -227,7 +234,7 @@ def test_a_revoked_key_sends_nothing_any_more_within_half_a_second(signed: Signe
         with pytest.raises(NoAnswer):  # sent again and again, ten times a second
             ben.stop(within=1.0)
         wait_until(
-            lambda: "key ring: key ben is revoked" in signed.stand.server.text,
+            lambda: "key ring: key ben was revoked" in signed.stand.server.text,
             within=1.0,
             what="the log",
         )
@@ -304,7 +311,10 @@ def test_who_signs_may_come_from_other_machines_without_a_further_word(
     (port,) = free_udp_ports(1)
     serve = ["-m", "mav_tasks.cli", "serve", "--no-push", "--client", f"udpin:0.0.0.0:{port}"]
     serve += ["--vehicle", "udpout:127.0.0.1:9", "--keys", str(ring)]
-    for words in ("not there; mav-tasks keys add makes one", "others can get at it (mode 0644)"):
+    for words in (
+        "does not exist; mav-tasks keys add creates one",
+        "other users can access it (mode 0644)",
+    ):
         with process(*serve, folder=tmp_path, name="refused") as server:
             assert server.popen.wait(3 * STOP_LIMIT) == 2
             assert words in server.text

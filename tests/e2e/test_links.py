@@ -59,7 +59,7 @@ def over_tcp_dialled(folder: Path) -> Iterator[tuple[tuple[str, ...], Callable[[
     url = f"tcpin:{HOST}:{port}"
 
     def connect(running: Stand) -> Any:
-        running.server.wait_for(f"link tcp:{HOST}:{port} is not there yet: Connection refused")
+        running.server.wait_for(f"link tcp:{HOST}:{port} is not available yet: Connection refused")
         return running.heard_by(url)
 
     yield ("--client", f"tcp:{HOST}:{port}"), connect
@@ -156,7 +156,7 @@ def test_a_client_comes_back_at_once_after_its_connection_broke(tmp_path: Path) 
         first = running.heard(f"tcp:{HOST}:{port}")
         task_id = submit(first, 54002, 0.0, 20.0, 3.0)  # turns for three seconds
         first.close()
-        running.server.wait_for(rf"link {url} {HOST}:\d+ is gone: ")
+        running.server.wait_for(rf"link {url} {HOST}:\d+ disconnected: ")
 
         again = running.heard(f"tcp:{HOST}:{port}")
 

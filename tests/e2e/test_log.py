@@ -236,12 +236,12 @@ def test_a_full_disk_is_told(full: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--store", "/nowhere/at.all"), "there is no such file"),
+        (("--store", "/nowhere/at.all"), "does not exist"),
         (("--store", ":memory:"), "expected the path"),
         (("--json", "--csv"), "choose one"),
         (("--since", "yesterday"), "--since yesterday"),
-        (("--task", "9" * 30), "there is no such number"),
-        (("--vehicle", "-" + "9" * 30), "there is no such number"),
+        (("--task", "9" * 30), "not a valid id"),
+        (("--vehicle", "-" + "9" * 30), "not a valid id"),
     ],
 )
 def test_what_cannot_be_printed_is_told_in_one_line(options: tuple[str, ...], words: str) -> None:

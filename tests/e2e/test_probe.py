@@ -86,7 +86,7 @@ def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path)
         ), out
         assert re.search(r"^left in +ok +Hold, disarmed$", out, re.MULTILINE), out
         assert out.endswith(f"profile written to {file}\n")
-        assert "driving in an area of 2 m: keep clear; Ctrl-C stops it" in error
+        assert "driving within 1 m of its place: keep clear; Ctrl-C stops it" in error
         poses = truth(tmp_path)
         assert all(abs(row["north"]) < 1.0 and abs(row["east"]) < 1.0 for row in poses)
         assert max(abs(row["north"]) for row in poses) > 0.1
@@ -101,7 +101,7 @@ def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path)
             client = stand.connect()
             (known / "rover.toml").write_bytes(Path(file).read_bytes())
             server.popen.send_signal(signal.SIGHUP)
-            server.wait_for("vehicles.profiles: read again, 1 in force")
+            server.wait_for("vehicles.profiles: reloaded, 1 in force")
             server.wait_for("rover 1: profile of .* is used")
             yaw = degrees(truth(tmp_path)[-1]["yaw"])
             submit(client, ROTATE, 90)
@@ -109,7 +109,7 @@ def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path)
             turned = (degrees(truth(tmp_path)[-1]["yaw"]) - yaw) % 360
             assert turned == pytest.approx(90, abs=3)
             beside = run("probe", f"udpout:127.0.0.1:{clients}")
-            assert_one_clear_last_line(beside, "a task server is there (1/191): probe the rover")
+            assert_one_clear_last_line(beside, "task server 1/191 is on this link: probe")
             stand.close()
 
 
@@ -151,7 +151,7 @@ def test_what_cannot_be_done_is_said_in_one_line() -> None:
     assert_one_clear_line(run("probe", "udpout:192.0.2.1:14550"), "192.0.2.1", "--insecure")
     assert_one_clear_line(run("probe", "pigeon:1"), "udpin:host:port")
     code, _, error = run("probe", url, "--timeout", "1")
-    assert (code, error.splitlines()[-1]) == (3, "mav-tasks: no heartbeat of a rover within 1 s")
+    assert (code, error.splitlines()[-1]) == (3, "mav-tasks: no heartbeat from a rover within 1 s")
 
 
 def test_nothing_is_driven_where_nobody_could_say_yes() -> None:

@@ -51,7 +51,7 @@ def test_a_port_in_use_is_named() -> None:
         ("udpin:127.0.0.1:99999", "65535"),
         ("udpin::14560", "host:port"),
         ("tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
-        ("serial:/dev/null:57600", "no serial device"),
+        ("serial:/dev/null:57600", "not a serial device"),
         ("udpin:no.such.host.invalid:14560", "no.such.host.invalid"),
         ("", "udpin:host:port"),
     ],
@@ -107,8 +107,8 @@ def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
         name="server",
     ) as server:
         server.wait_for("nobody is spoken to unasked: none of the links for clients is UDP")
-        server.wait_for(re.escape(f"link {serial} is not there yet: No such file"))
-        server.wait_for(re.escape(f"link {tcp} is not there yet: Connection refused"))
+        server.wait_for(re.escape(f"link {serial} is not available yet: No such file"))
+        server.wait_for(re.escape(f"link {tcp} is not available yet: Connection refused"))
         with socket.create_server(("127.0.0.1", port)) as rover:
             rover.settimeout(10)
             connection, _ = rover.accept()
@@ -116,7 +116,9 @@ def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
                 assert connection.recv(1) == b"\xfd"  # it is spoken to first
         assert server.end() < 1.0
     assert server.popen.returncode == 0
-    assert server.text.count("is not there yet") == 2  # once for each, however often it was tried
+    assert (
+        server.text.count("is not available yet") == 2
+    )  # once for each, however often it was tried
 
 
 def test_a_store_in_use_is_named_with_its_process(tmp_path: Path) -> None:

@@ -294,7 +294,7 @@ def test_a_stop_goes_out_at_once_and_no_earlier_resume_undoes_it(world: RoverWor
             assert rover.mode == "hold"
             await stopping
             assert world.now - began < 1.0
-            with pytest.raises(ClientError, match="STOP has overtaken"):
+            with pytest.raises(ClientError, match="a later STOP or pause overtook"):
                 await resuming
             await asyncio.sleep(5.0)
             assert rover.stands

@@ -127,5 +127,5 @@ def test_a_script_that_submits_just_after_the_server_came_back_is_not_refused(
 
 def test_a_server_without_a_rover_says_that_it_is_there(make_world: MakeWorld) -> None:
     world = make_world(is_silent=True)
-    with pytest.raises(NoAnswer, match="a task server is there, but no rover"), world.sync_client():
+    with pytest.raises(NoAnswer, match="the task server has heard no rover"), world.sync_client():
         pass

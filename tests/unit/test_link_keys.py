@@ -33,7 +33,7 @@ def check(links: Links, keys: KeyRing | None) -> None:
 )
 def test_a_link_for_others_needs_somebody_who_can_sign(keys: KeyRing | None) -> None:
     for links in (Links(clients=(FAR,)), Links(push=("192.0.2.1:1",))):
-        with pytest.raises(InsecureLinkError, match=r"nobody there has a signing key: .* say --in"):
+        with pytest.raises(InsecureLinkError, match=r"nobody there has a signing key: .* use --in"):
             check(links, keys)
     check(Links(clients=(FAR,), insecure=True), keys)
     check(Links(clients=(NEAR,)), keys)
@@ -49,7 +49,9 @@ def test_a_key_that_is_named_must_be_there(side: str) -> None:
     for keys, there in ((None, "none"), (ring(anna="safety"), "anna")):
         with pytest.raises(UsageError) as caught:
             check(links, keys)
-        assert str(caught.value) == f"link {NEAR}: no key 'ben': there is {there}, in keys.toml"
+        assert (
+            str(caught.value) == f"link {NEAR}: no key 'ben' (usable keys: {there}), in keys.toml"
+        )
     with pytest.raises(UsageError, match="key ben was revoked on 2026-11-21"):
         check(links, ring(ben="safety").with_revoked("ben", at=AT))
     check(links, ring(ben="safety" if side == "clients" else "vehicle"))

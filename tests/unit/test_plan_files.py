@@ -314,30 +314,30 @@ ROOT_PROBLEMS: list[tuple[str, str]] = [
     ("\ufeff \r\n", "not a plan file: it is empty"),
     ("<?xml version='1.0'?>", "not a plan file: neither JSON nor QGC WPL 110"),
     ("[1]", "not a plan file: neither JSON nor QGC WPL 110"),
-    ("QGC WPL 120\n" + line(0), "'QGC WPL 120' is not read, 'QGC WPL 110' is needed"),
-    ("QGC WPL 100", "'QGC WPL 100' is not read, 'QGC WPL 110' is needed"),
-    ("QGC WPL", "'QGC WPL' is not read, 'QGC WPL 110' is needed"),
+    ("QGC WPL 120\n" + line(0), "'QGC WPL 120' is not supported, expected 'QGC WPL 110'"),
+    ("QGC WPL 100", "'QGC WPL 100' is not supported, expected 'QGC WPL 110'"),
+    ("QGC WPL", "'QGC WPL' is not supported, expected 'QGC WPL 110'"),
     ("{", "not a plan file: JSON line 1 column 2: Expecting property name enclosed in double"),
     ('{\n"a": 1}\n]', "not a plan file: JSON line 3 column 1: Extra data"),
-    ('{"a": NaN}', "not a plan file: NaN is no number in JSON"),
-    ('{"a": -Infinity}', "not a plan file: -Infinity is no number in JSON"),
+    ('{"a": NaN}', "not a plan file: NaN is not a JSON number"),
+    ('{"a": -Infinity}', "not a plan file: -Infinity is not a JSON number"),
     ('{"a": ' + "[" * 100_000, "not a plan file: JSON nested too deep"),
     ("{}", "file: fileType is missing"),
     ('{"fileType": "Mission"}', 'file: fileType is "Mission", "Plan" is needed'),
-    ('{"fileType": ' + "[" * 400 + "]" * 400 + "}", "file: fileType is a list, text is needed"),
+    ('{"fileType": ' + "[" * 400 + "]" * 400 + "}", "file: fileType is a list, expected text"),
     (edited(lambda root: root.pop("version")), "file: version is missing"),
-    (edited(lambda root: root.update(version=2)), "file: version 2 is not read, 1 is needed"),
-    (edited(lambda root: root.update(version=True)), "file: version is true, a number is needed"),
+    (edited(lambda root: root.update(version=2)), "file: version 2 is not supported, expected 1"),
+    (edited(lambda root: root.update(version=True)), "file: version is true, expected a number"),
     (edited(lambda root: root.pop("mission")), "file: mission is missing"),
-    (edited(lambda root: root.update(mission=[])), "file: mission is a list, an object is needed"),
+    (edited(lambda root: root.update(mission=[])), "file: mission is a list, expected an object"),
     (
         edited(lambda root: root["mission"].update(version=1)),
-        "mission: version 1 is not read, 2 is needed",
+        "mission: version 1 is not supported, expected 2",
     ),
     (edited(lambda root: root["mission"].pop("items")), "mission: items is missing"),
     (
         edited(lambda root: root["mission"].update(plannedHomePosition=[1, 2])),
-        "home: a point of 2 numbers, 3 are needed",
+        "home: a point needs 3 numbers, not 2",
     ),
     (
         edited(lambda root: root["mission"].update(plannedHomePosition=[1, 181, 0])),
@@ -345,19 +345,19 @@ ROOT_PROBLEMS: list[tuple[str, str]] = [
     ),
     (
         edited(lambda root: root["geoFence"].update(version=1)),
-        "geoFence: version 1 is not read, 2 is needed",
+        "geoFence: version 1 is not supported, expected 2",
     ),
     (
         edited(lambda root: root["geoFence"]["polygons"][1]["polygon"].pop()),
-        "fence polygon 2: 2 points, 3 are needed",
+        "fence polygon 2: 2 points, at least 3 are needed",
     ),
     (
         edited(lambda root: root["geoFence"]["polygons"][0].update(inclusion=1)),
-        "fence polygon 1: inclusion is 1, true or false is needed",
+        "fence polygon 1: inclusion is 1, expected true or false",
     ),
     (
         edited(lambda root: root["geoFence"]["polygons"][0].update(version=2)),
-        "fence polygon 1: version 2 is not read, 1 is needed",
+        "fence polygon 1: version 2 is not supported, expected 1",
     ),
     (
         edited(lambda root: root["geoFence"]["circles"][0]["circle"].update(radius=0)),
@@ -369,54 +369,54 @@ ROOT_PROBLEMS: list[tuple[str, str]] = [
     ),
     (
         edited(lambda root: root.update(geoFence={"polygon": [[1, 2]], "version": 1})),
-        "geoFence: version 1 is not read, 2 is needed",
+        "geoFence: version 1 is not supported, expected 2",
     ),
     (
         edited(lambda root: root["geoFence"].update(circles={"1": 2})),
-        "geoFence: circles is an object, a list is needed",
+        "geoFence: circles is an object, expected a list",
     ),
     (
         edited(lambda root: root["rallyPoints"].update(version=1)),
-        "rallyPoints: version 1 is not read, 2 is needed",
+        "rallyPoints: version 1 is not supported, expected 2",
     ),
     (
         edited(lambda root: root["rallyPoints"]["points"][1].__setitem__(0, None)),
-        "rally point 2: latitude is null, a number is needed",
+        "rally point 2: latitude is null, expected a number",
     ),
 ]
 
 ITEM_PROBLEMS: list[tuple[object, str]] = [
-    (None, "it is null, an object is needed"),
+    (None, "it is null, expected an object"),
     ({}, "type is missing"),
-    (waypoint(type="missionItem"), 'type "missionItem" is not known'),
-    (waypoint(params=[0] * 6), "6 params, 7 are needed"),
+    (waypoint(type="missionItem"), 'type "missionItem" is unknown'),
+    (waypoint(params=[0] * 6), "6 params, expected 7"),
     (waypoint(params=at(91, 8)), "latitude 91 not in -90..90"),
     (waypoint(params=at(-90.0000001, 8)), "latitude -90.0000001 not in -90..90"),
     (waypoint(params=at(0, -180.5)), "longitude -180.5 not in -180..180"),
-    (waypoint(params=at("47", 8)), 'param 5 is "47", a number is needed'),
-    (waypoint(params=at(True, 8)), "param 5 is true, a number is needed"),
-    (waypoint(params=at(47, None)), "command 16 needs a place and has none"),
-    (waypoint(params=at(None, 8)), "command 16 needs a place and has none"),
-    (waypoint(command=19, params=at(None, None)), "command 19 needs a place and has none"),
-    (waypoint(frame=2), "command 16 needs a place and has none"),
+    (waypoint(params=at("47", 8)), 'param 5 is "47", expected a number'),
+    (waypoint(params=at(True, 8)), "param 5 is true, expected a number"),
+    (waypoint(params=at(47, None)), "command 16 needs a place, but has none"),
+    (waypoint(params=at(None, 8)), "command 16 needs a place, but has none"),
+    (waypoint(command=19, params=at(None, None)), "command 19 needs a place, but has none"),
+    (waypoint(frame=2), "command 16 needs a place, but has none"),
     (waypoint(frame=1, params=at(214_749, 0)), "x 214749 not in -214748..214748"),
     (waypoint(frame=2, command=31, params=at(0, 1e10)), "param 6 10000000000 not in -2147483647.."),
     (waypoint(params=[1e300, 0, 0, 0, 1, 1, 0]), "param 1 1e+300 is too large"),
     (waypoint(params=[0, 0, 0, 0, 1, 1, 10**400]), "param 7 inf is too large"),
-    (waypoint(frame=99), "frame 99 is not known"),
-    (waypoint(frame=-1), "frame is -1, a whole number from 0 to 255 is needed"),
-    (waypoint(command=16.5), "command is 16.5, a whole number from 0 to 65535 is needed"),
-    (waypoint(command=65536), "command is 65536, a whole number from 0 to 65535 is needed"),
-    (waypoint(command=None), "command is null, a number is needed"),
-    (waypoint(autoContinue=1), "autoContinue is 1, true or false is needed"),
-    (waypoint(doJumpId="2"), 'doJumpId is "2", a number is needed'),
-    ({**JUMP, "params": [9, 1, 0, 0, 0, 0, 0]}, "jumps to 9, where no item is"),
-    ({**JUMP, "params": [1.5, 1, 0, 0, 0, 0, 0]}, "jumps to 1.5, where no item is"),
-    ({**JUMP, "params": [None, 1, 0, 0, 0, 0, 0]}, "jumps to nan, where no item is"),
-    ({**JUMP, "doJumpId": 1}, "jumps to 1, which is not one item"),
+    (waypoint(frame=99), "frame 99 is unknown"),
+    (waypoint(frame=-1), "frame is -1, expected a whole number from 0 to 255"),
+    (waypoint(command=16.5), "command is 16.5, expected a whole number from 0 to 65535"),
+    (waypoint(command=65536), "command is 65536, expected a whole number from 0 to 65535"),
+    (waypoint(command=None), "command is null, expected a number"),
+    (waypoint(autoContinue=1), "autoContinue is 1, expected true or false"),
+    (waypoint(doJumpId="2"), 'doJumpId is "2", expected a number'),
+    ({**JUMP, "params": [9, 1, 0, 0, 0, 0, 0]}, "jumps to 9, which is not an item"),
+    ({**JUMP, "params": [1.5, 1, 0, 0, 0, 0, 0]}, "jumps to 1.5, which is not an item"),
+    ({**JUMP, "params": [None, 1, 0, 0, 0, 0, 0]}, "jumps to nan, which is not an item"),
+    ({**JUMP, "doJumpId": 1}, "jumps to 1, which is several items"),
     (
         {"type": "ComplexItem", "complexItemType": "fwLandingPattern", "landCoordinate": [1, 2, 3]},
-        'the complex item "fwLandingPattern" does not carry its items',
+        'complex item "fwLandingPattern" does not contain its items',
     ),
     (
         {
@@ -424,22 +424,22 @@ ITEM_PROBLEMS: list[tuple[object, str]] = [
             "complexItemType": "survey",
             "TransectStyleComplexItem": {"Items": []},
         },
-        'the complex item "survey" does not carry its items',
+        'complex item "survey" does not contain its items',
     ),
 ]
 
 LINE_PROBLEMS: list[tuple[str, str]] = [
-    ("1 0 3 16 0 0 0 0 47 8 0", "11 fields, 12 are needed"),
-    ("1 0 3 16 0 0 0 0 47 8 0 1 1", "13 fields, 12 are needed"),
-    ("2 0 3 16 0 0 0 0 47 8 0 1", "numbered 2, 1 is expected"),
-    ("1 0 3 16 0 0 0 0 47,5 8 0 1", "field 9 is '47,5', a number is needed"),
-    ("1 0 3 16 0 0 0 0 4_7 8 0 1", "field 9 is '4_7', a number is needed"),
+    ("1 0 3 16 0 0 0 0 47 8 0", "11 fields, expected 12"),
+    ("1 0 3 16 0 0 0 0 47 8 0 1 1", "13 fields, expected 12"),
+    ("2 0 3 16 0 0 0 0 47 8 0 1", "numbered 2, expected 1"),
+    ("1 0 3 16 0 0 0 0 47,5 8 0 1", "field 9 is '47,5', expected a number"),
+    ("1 0 3 16 0 0 0 0 4_7 8 0 1", "field 9 is '4_7', expected a number"),
     ("1 0 3 16 0 0 0 0 147 8 0 1", "latitude 147 not in -90..90"),
-    ("1 0 3 16 0 0 0 0 nan nan 0 1", "command 16 needs a place and has none"),
+    ("1 0 3 16 0 0 0 0 nan nan 0 1", "command 16 needs a place, but has none"),
     ("1 0 3 16 inf 0 0 0 47 8 0 1", "param 1 inf is too large"),
-    ("1 0 3 16 0 0 0 0 47 8 0 2", "autocontinue is 2, a whole number from 0 to 1 is needed"),
-    ("1 0 3 177 0 1 0 0 0 0 0 1", "jumps to 0, where no item is"),  # 0 is home
-    ("1 0 3 177 2 1 0 0 0 0 0 1", "jumps to 2, where no item is"),
+    ("1 0 3 16 0 0 0 0 47 8 0 2", "autocontinue is 2, expected a whole number from 0 to 1"),
+    ("1 0 3 177 0 1 0 0 0 0 0 1", "jumps to 0, which is not an item"),  # 0 is home
+    ("1 0 3 177 2 1 0 0 0 0 0 1", "jumps to 2, which is not an item"),
 ]
 
 
@@ -471,7 +471,7 @@ def test_items_are_counted_as_on_the_map_of_the_planner() -> None:
 def test_no_jump_leads_into_a_survey() -> None:
     first, survey, *_ = json.loads(PLAN)["mission"]["items"]
     into = {**JUMP, "params": [3, 1, 0, 0, 0, 0, 0]}
-    assert problem(with_items(first, survey, into)) == "item 4: jumps to 3, where no item is"
+    assert problem(with_items(first, survey, into)) == "item 4: jumps to 3, which is not an item"
 
 
 def test_a_file_that_cannot_be_read_is_such_an_error(tmp_path: Path) -> None:
@@ -481,7 +481,7 @@ def test_a_file_that_cannot_be_read_is_such_an_error(tmp_path: Path) -> None:
     with pytest.raises(PlanFileError, match="Is a directory"):
         read_plan(tmp_path)
     missing.write_bytes(b'{"fileType": "Pl\xe4n"}')
-    with pytest.raises(PlanFileError, match=r"missing\.plan: not a plan file: no UTF-8 text$"):
+    with pytest.raises(PlanFileError, match=r"missing\.plan: not a plan file: not UTF-8 text$"):
         read_plan(missing)
 
 

@@ -134,5 +134,5 @@ def test_nobody_is_driven_without_a_yes(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("sys.stdin", Terminal("yes\n"))
     command._confirm(0.3)
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
-    with pytest.raises(UsageError, match="say --yes"):
+    with pytest.raises(UsageError, match="add --yes"):
         command._confirm(0.3)

@@ -32,11 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if values.system_id is not None and not 1 <= values.system_id <= 255:
         parser.error("--system-id must lie within 1..255")
     if unknown := set(values.only) - set(GROUPS):
-        parser.error(f"--only knows {', '.join(GROUPS)}; not {', '.join(unknown)}")
+        parser.error(f"--only {' '.join(unknown)}: expected {', '.join(GROUPS)}")
     if (values.arm or values.drive) and not url.is_local and not values.insecure:
-        parser.error(
-            f"{values.url} is beyond this machine: say --insecure if that vehicle is to be armed"
-        )
+        parser.error(f"{values.url} is beyond this machine: add --insecure to arm that vehicle")
     for number in ENDING:
         signal.signal(number, _interrupt_once)
     return _run(url, values)
@@ -47,7 +45,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rover_sim.check_vehicle",
         description="Check what a task server and its clients expect of a MAVLink rover. Nothing"
-        " that lasts is changed and nothing moves, unless you say so.",
+        " moves and nothing stays changed unless you give --arm, --drive or --write.",
     )
     add = parser.add_argument
     add("url", help="udpout:127.0.0.1:14580, udpin:…, tcp:…, tcpin:… or serial:/dev/ttyACM0:57600")
@@ -55,16 +53,26 @@ def make_parser() -> argparse.ArgumentParser:
         "--persona",
         choices=("auto", *WAYS),
         default="auto",
-        help="the make that it is to be (default: what it says that it is)",
+        help="autopilot to expect (default: the one that it reports)",
     )
-    add("--arm", action="store_true", help="arm and disarm it, standing")
-    add("--drive", action="store_true", help="arm it and drive some metres: keep 20 m free")
-    add("--write", action="store_true", help="upload missions and fences, then put back what was")
-    add("--insecure", action="store_true", help="arm or drive also what is beyond this machine")
-    add("--system-id", type=int, help="which vehicle, if there are several")
-    add("--only", nargs="+", default=list(GROUPS), metavar="GROUP", help=", ".join(GROUPS))
-    add("--speed", type=float, default=1.0, help="of a simulated vehicle's time")
-    add("--json", action="store_true", help="print a JSON list in the end instead of lines")
+    add("--arm", action="store_true", help="arm and disarm the vehicle, standing")
+    add(
+        "--drive", action="store_true", help="arm the vehicle and drive some metres: keep 20 m free"
+    )
+    add(
+        "--write", action="store_true", help="upload missions and fences, then restore the old ones"
+    )
+    add("--insecure", action="store_true", help="allow --arm and --drive beyond this machine")
+    add("--system-id", type=int, help="system id of the vehicle, if there are several")
+    add(
+        "--only",
+        nargs="+",
+        default=list(GROUPS),
+        metavar="GROUP",
+        help=f"groups of checks: {', '.join(GROUPS)}",
+    )
+    add("--speed", type=float, default=1.0, help="speed of a simulated vehicle's time")
+    add("--json", action="store_true", help="print a JSON list at the end instead of lines")
     return parser
 
 

@@ -41,10 +41,17 @@ def make_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--autopilot", choices=sorted({pair.autopilot for pair in PAIRS}), help="default: both")
     add("--frame", choices=sorted({pair.frame.value for pair in PAIRS}), help="default: all")
-    add("--only", metavar="WORD", default="", help="only groups of figures with that word")
-    add("--brief", action="store_true", help="only what differs and is not explained")
-    add("--seed", type=int, default=0, help="of the first run's chance (default %(default)s)")
-    add("--runs", type=int, default=RUNS, help="each with a seed of its own (default %(default)s)")
+    add(
+        "--only", metavar="WORD", default="", help="only groups of figures whose name contains WORD"
+    )
+    add("--brief", action="store_true", help="only figures that differ without an explanation")
+    add("--seed", type=int, default=0, help="seed of the first run (default %(default)s)")
+    add(
+        "--runs",
+        type=int,
+        default=RUNS,
+        help="number of runs, each with its own seed (default %(default)s)",
+    )
     return parser
 
 

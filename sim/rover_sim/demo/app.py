@@ -1,7 +1,7 @@
-"""The demonstration: a rover drives the tutorial's three tasks, submitted by a third party.
+"""Drive three tasks that a stock pymavlink client submits, and measure the result.
 
 Forward 2.0 m at priority 3 starts at once; rotate 90 degrees at priority 8 and forward 1.5 m at
-priority 5 wait, and the one with the higher priority runs first. Exit code 0: acknowledgements,
+priority 5 wait, and the one with the higher priority runs first. Exit status 0: acknowledgements,
 order, states and the measured movement are correct; 1: some are wrong; 2: it cannot be run.
 """
 
@@ -27,11 +27,11 @@ NO_PICTURE = (
     "demo: no picture of the track: it needs matplotlib, which is not installed"
     " (pip install matplotlib)"
 )
-NO_WINDOW = "demo: --gui is pybullet's window: it needs pybullet, and goes without --fast"
+NO_WINDOW = "demo: --gui shows pybullet's window: it needs pybullet, and cannot be used with --fast"
 
 
 def main() -> int:
-    """Run the demonstration; return the exit code."""
+    """Run the demonstration; return the exit status."""
     options = _parser().parse_args()
     console = Console()
     if not console.is_terminal:
@@ -85,7 +85,7 @@ def _conclude(console: Console, party: ThirdParty, track: list[Place], picture: 
     wrong = problems(party)
     for problem in wrong:
         _say(console, f"WRONG: {problem}")
-    _say(console, "demo: all as it should be" if not wrong else f"demo: {len(wrong)} wrong")
+    _say(console, "demo: all correct" if not wrong else f"demo: {len(wrong)} wrong")
     return 1 if wrong else 0
 
 
@@ -97,10 +97,27 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="mav-tasks demo", description=__doc__.partition("\n")[0])
     add = parser.add_argument
     add("--fast", action="store_true", help="one process, virtual time, no sockets")
-    add("--noise", choices=("on", "off"), default="on", help="off: an exact rover, no noise")
-    add("--gui", action="store_true", help="open pybullet's window; no picture then")
-    add("--body", choices=("bullet", "kinematic"), help="default: bullet where it is installed")
-    add("--record", metavar="FOLDER", default="", help="keep a record for mav-tasks replay")
-    add("--output", metavar="FOLDER", default=OUTPUT, help="for the picture; default: %(default)s")
-    add("--seed", type=int, default=0, help="varies friction by 30 %% either way; 0: not")
+    add(
+        "--noise", choices=("on", "off"), default="on", help="off: no errors of the simulated rover"
+    )
+    add("--gui", action="store_true", help="show pybullet's window instead of writing a picture")
+    add("--body", choices=("bullet", "kinematic"), help="default: bullet if it is installed")
+    add(
+        "--record",
+        metavar="FOLDER",
+        default="",
+        help="write a record for mav-tasks replay to this folder",
+    )
+    add(
+        "--output",
+        metavar="FOLDER",
+        default=OUTPUT,
+        help="folder for the picture; default: %(default)s",
+    )
+    add(
+        "--seed",
+        type=int,
+        default=0,
+        help="seed of the friction, which varies by 30 %%; 0: no variation",
+    )
     return parser

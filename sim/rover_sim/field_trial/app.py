@@ -26,7 +26,7 @@ from rover_sim.field_trial.truth import FileTruth, LinkTruth
 
 AREA = {
     "tasks": "36 m ahead and 16 m to each side of where it stands",
-    "stop": "40 m ahead, if the better way is measured, else 20 m",
+    "stop": "40 m ahead, or 20 m with --stop-distance",
 }
 OTHER_AREA = "10 m ahead"
 DEFAULTS = Limits()
@@ -44,7 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     say(f"rows: {', '.join(only)}. The rover drives; it needs:")
     for name in only:
         say(f"  {name}: {AREA.get(name, OTHER_AREA)}")
-    if not options.yes and input("Is all of it free of people and things? [y/N] ").lower() != "y":
+    if (
+        not options.yes
+        and input("Is all of this area free of people and things? [y/N] ").lower() != "y"
+    ):
         return USAGE
     try:
         rows = asyncio.run(_interruptible(_trial(options, only)))
@@ -66,8 +69,13 @@ def make_parser() -> argparse.ArgumentParser:
         prog="field_trial", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     add = parser.add_argument
-    add("url", metavar="URL", help="of the rover, as mav-tasks serve --vehicle has it")
-    add("--only", metavar="ROWS", default="", help=f"of {','.join(NAMES)}; default: all")
+    add("url", metavar="URL", help="URL of the rover, as for mav-tasks serve --vehicle")
+    add(
+        "--only",
+        metavar="ROWS",
+        default="",
+        help=f"rows to drive, of {','.join(NAMES)}; default: all",
+    )
     add("--yes", "-y", action="store_true", help="do not ask whether there is room")
     add(
         "--truth",
@@ -75,7 +83,7 @@ def make_parser() -> argparse.ArgumentParser:
         default="",
         help="true poses: a file of lines"
         " t,north,east,yaw or of JSON objects, or a link\nwith SIM_STATE or HIL_STATE_QUATERNION;"
-        " default: what the rover tells counts",
+        " default: the poses that the rover reports",
     )
     add(
         "--stick",
@@ -84,39 +92,54 @@ def make_parser() -> argparse.ArgumentParser:
         help="a second link to an ArduPilot, for"
         " RC_CHANNELS_OVERRIDE and a restart;\ndefault: that of --truth if it is a link",
     )
-    add("--reboot-command", metavar="CMD", default="", help="restarts the rover's autopilot")
+    add(
+        "--reboot-command",
+        metavar="CMD",
+        default="",
+        help="command that restarts the rover's autopilot",
+    )
     add(
         "--stop-distance",
         metavar="M",
         type=float,
-        help="of the better way of stopping from 1 m/s; default: it is measured",
+        help="shortest stopping distance from 1 m/s; default: measure it",
     )
     add(
         "--end-error",
         metavar="M",
         type=float,
         default=DEFAULTS.end,
-        help="p95 (default %(default)s)",
+        help="limit of the p95 end error (default %(default)s)",
     )
     add(
-        "--turn-error", metavar="DEG", type=float, default=DEFAULTS.turn, help="default %(default)s"
+        "--turn-error",
+        metavar="DEG",
+        type=float,
+        default=DEFAULTS.turn,
+        help="limit of the p95 turn error (default %(default)s)",
     )
     add(
         "--remainder",
         metavar="M",
         type=float,
         default=DEFAULTS.remainder,
-        help="default %(default)s",
+        help="limit of the error after an interruption (default %(default)s)",
     )
     add(
         "--stick-seconds",
         metavar="S",
         type=float,
         default=DEFAULTS.stick,
-        help="default %(default)s",
+        help="limit of the time from a moved stick to standstill (default %(default)s)",
     )
-    add("--keep", metavar="FOLDER", default="", help="keep store and log there")
-    add("--set", metavar="KEY=VALUE", action="append", default=[], help="a setting of the server")
+    add("--keep", metavar="FOLDER", default="", help="keep store and log in this folder")
+    add(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="setting of the server; repeatable",
+    )
     return parser
 
 

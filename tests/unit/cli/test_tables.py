@@ -80,14 +80,14 @@ def test_a_terminal_of_80_columns_shows_why_each_task_waits_and_when_it_runs() -
     lines = [
         "rover 1: task 12 executing; 1 waiting",
         "1 queued, 1 executing",
-        "id  prio  state      what           why              starts in     ends in  done",
+        "id  prio  state      goal           reason           starts in     ends in  done",
         "12     8  executing  rotate 90 deg                                     2 s  45 %",
         "13     8  queued     move 2 m       behind task 12  1 min 15 s  1 min 22 s   0 %",
     ]
     assert drawn(QUEUE, width=80) == lines
     wider = drawn(QUEUE, width=120)
     assert [line.split()[0] for line in wider[2:]] == ["id", "12", "13"]
-    for name in ("left", "from"):
+    for name in ("left", "by"):
         assert name in wider[2].split()
 
 
@@ -95,7 +95,7 @@ def test_a_narrow_window_shows_what_matters_most() -> None:
     assert drawn(QUEUE, width=44) == [
         "rover 1: task 12 executing; 1 waiting",
         "1 queued, 1 executing",
-        "id  state      what           why",
+        "id  state      goal           reason",
         "12  executing  rotate 90 deg",
         "13  queued     move 2 m       behind task 12",
     ]
@@ -173,10 +173,10 @@ def test_finished_tasks_say_how_and_when_they_ended() -> None:
     with console.capture() as captured:
         console.print(history_table([DONE, CANCELLED, STUCK], now=NOW, width=80))
     assert [line.rstrip() for line in captured.get().splitlines()] == [
-        "id  state      what           why         ended (CET)   took   done     from",
-        "12  completed  rotate 90 deg                 14:02:00  12.3s  100 %  244/190",
-        " 9  cancelled  move 2 m              2026-11-23 14:03           0 %  244/190",
-        " 8  failed     rotate 90 deg  stuck                    12.3s  100 %  244/190",
+        "id  state      goal           reason       ended (CET)  run time   done       by",
+        "12  completed  rotate 90 deg                  14:02:00     12.3s  100 %  244/190",
+        " 9  cancelled  move 2 m               2026-11-23 14:03              0 %  244/190",
+        " 8  failed     rotate 90 deg  stuck                        12.3s  100 %  244/190",
     ]
 
 
@@ -206,16 +206,19 @@ def test_what_has_no_room_is_counted() -> None:
 @pytest.mark.parametrize(
     ("queue", "line"),
     [
-        (replace(QUEUE, current=None, running=None), "rover 1: nothing runs; 1 waiting"),
+        (replace(QUEUE, current=None, running=None), "rover 1: no task runs; 1 waiting"),
         (
             replace(QUEUE, current=None, running=None, paused=TaskReason.STOPPED),
-            "rover 1: nothing runs; paused: stopped, to go on: mav-tasks resume; 1 waiting",
+            (
+                "rover 1: no task runs; queue paused (stopped); "
+                "to resume: mav-tasks resume; 1 waiting"
+            ),
         ),
         (
             replace(QUEUE, current=HELD),
             (
                 "rover 1: task 12 held (off track); "
-                "decide: mav-tasks release 12 again|remainder|skip; 1 waiting"
+                "release it: mav-tasks release 12 again|remainder|skip; 1 waiting"
             ),
         ),
     ],
@@ -243,7 +246,7 @@ def test_why_it_waits_has_the_rovers_own_words() -> None:
 
 
 def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
-    assert "decide: mav-tasks release 12" in words.line_of(HELD)
+    assert "release it: mav-tasks release 12" in words.line_of(HELD)
     released = replace(HELD, reason=TaskReason.NO_POSITION)
     assert words.way_on_of(released) == ""
 
@@ -253,15 +256,15 @@ def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
     [
         (
             replace(WAITING, reason=TaskReason.RESTARTED),
-            "rover 1: task 13: move 2 m: queued (restarted); to go on: mav-tasks resume",
+            "rover 1: task 13: move 2 m: queued (restarted); to resume: mav-tasks resume",
         ),
         (
             replace(WAITING, reason=TaskReason.QUEUE_PAUSED),
-            "rover 1: task 13: move 2 m: queued (queue paused); to go on: mav-tasks resume",
+            "rover 1: task 13: move 2 m: queued (queue paused); to resume: mav-tasks resume",
         ),
         (
             replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.TAKEOVER),
-            "rover 1: task 12: rotate 90 deg: paused (takeover); to go on: mav-tasks resume",
+            "rover 1: task 12: rotate 90 deg: paused (takeover); to resume: mav-tasks resume",
         ),
         (
             replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.PREEMPTED),
@@ -271,7 +274,7 @@ def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
             HELD,
             (
                 "rover 1: task 12: rotate 90 deg: held (off track); "
-                "decide: mav-tasks release 12 again|remainder|skip"
+                "release it: mav-tasks release 12 again|remainder|skip"
             ),
         ),
     ],
@@ -346,16 +349,16 @@ NEW = replace(WAITING, reason=TaskReason.QUEUE_PAUSED, words="move 2 m: queued (
     [
         (WAITING, QUEUE, ""),
         (RUNNING, QUEUE, ""),
-        (NEW, PAUSED, "the queue is paused (operator); to go on: mav-tasks resume"),
+        (NEW, PAUSED, "the queue is paused (operator); to resume: mav-tasks resume"),
         (
             replace(NEW, reason=TaskReason.HELD_AHEAD),
             replace(QUEUE, current=HELD),
-            "task 12 is held (off track); decide: mav-tasks release 12 again|remainder|skip",
+            "task 12 is held (off track); release it: mav-tasks release 12 again|remainder|skip",
         ),
         (
             replace(NEW, reason=TaskReason.DISARMED, words="move 2 m: queued (disarmed)"),
             replace(QUEUE, current=None),
-            "disarmed",
+            "disarmed; arm it in HOLD (or mav-tasks resume, if the server may arm)",
         ),
     ],
 )
@@ -364,6 +367,72 @@ def test_a_new_task_that_does_not_run_says_why(
 ) -> None:
     expected = f"rover 1: task 13 waits: {said}" if said else ""
     assert words.why_it_waits(status, queue) == expected
+
+
+DISARMED = replace(WAITING, reason=TaskReason.DISARMED, words="move 2 m: queued (disarmed)")
+
+
+@pytest.mark.parametrize(
+    ("reason", "said"),
+    [
+        (TaskReason.QUEUE_PAUSED, "to resume: mav-tasks resume --vehicle 1"),
+        (
+            TaskReason.DISARMED,
+            "arm it in HOLD (or mav-tasks resume --vehicle 1, if the server may arm)",
+        ),
+        (TaskReason.WRONG_MODE, "set HOLD, then: mav-tasks resume --vehicle 1"),
+        (TaskReason.NOT_READY, "wait, or fix what the rover reports"),
+        (
+            TaskReason.LOSS_FAILSAFE,
+            "to make it stop without setpoints: mav-tasks probe --set-failsafe --vehicle 1",
+        ),
+        (TaskReason.OUTSIDE_OWN_FENCE, "drive it back manually, or switch that fence off"),
+        (TaskReason.BEHIND_OTHERS, ""),
+        (TaskReason.OTHER_CONTROLLER, ""),
+    ],
+)
+def test_one_of_several_rovers_is_named_in_the_command(reason: TaskReason, said: str) -> None:
+    status = replace(WAITING, reason=reason)
+    assert words.way_on_of(status, is_alone=False) == said
+    assert words.way_on_of(status) == said.replace(" --vehicle 1", "")
+    assert words.line_of(status, is_alone=False).endswith(f"; {said}" if said else ")")
+
+
+def test_a_task_that_has_ended_needs_no_command() -> None:
+    for state in (TaskState.FAILED, TaskState.CANCELLED):
+        assert words.way_on_of(replace(STUCK, state=state, reason=TaskReason.TAKEOVER)) == ""
+
+
+def test_a_paused_queue_of_one_of_several_rovers_names_it() -> None:
+    resume = "to resume: mav-tasks resume --vehicle 1"
+    assert words.headline_of(PAUSED, is_alone=False) == (
+        f"rover 1: no task runs; queue paused (operator); {resume}; 1 waiting"
+    )
+    why = words.why_it_waits(NEW, PAUSED, is_alone=False)
+    assert why.endswith(f"waits: the queue is paused (operator); {resume}")
+    text = " ".join(str(each) for each in drawn_of_several(PAUSED))
+    assert resume in text
+
+
+def drawn_of_several(queue: QueueStatus) -> list[str]:
+    console = Console(file=io.StringIO(), width=200, color_system=None)
+    with console.capture() as captured:
+        console.print(queue_table(queue, width=200, is_alone=False))
+    return captured.get().splitlines()
+
+
+def test_the_first_line_says_what_the_next_task_waits_for_and_what_to_do() -> None:
+    idle = replace(QUEUE, current=None, running=None, waiting=(DISARMED,))
+    remedy = "arm it in HOLD (or mav-tasks resume, if the server may arm)"
+    assert words.headline_of(idle) == (
+        f"rover 1: no task runs; task 13 waits: disarmed; {remedy}; 1 waiting"
+    )
+    starting = replace(RUNNING, state=TaskState.STARTING, reason=TaskReason.NOT_READY)
+    assert words.headline_of(replace(QUEUE, current=starting)) == (
+        "rover 1: task 12 starting (not ready); wait, or fix what the rover reports; 1 waiting"
+    )
+    paused = replace(idle, paused=TaskReason.OPERATOR)
+    assert "disarmed" not in words.headline_of(paused)
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 120])

@@ -123,7 +123,7 @@ def test_the_next_half_past_two_is_that_of_the_clock_on_the_wall() -> None:
         ("2026-11-20", "14:30"),
         ("25:00", "14:30"),
         ("2026-02-30T10:00", "14:30"),
-        ("2026-11-20T13:00", "over"),
+        ("2026-11-20T13:00", "in the past"),
         ("2028-11-20T13:00", "more than a year"),
     ],
 )

@@ -64,9 +64,12 @@ def test_what_the_server_has_signed_is_believed_each_packet_once() -> None:
 @pytest.mark.parametrize(
     ("server", "words"),
     [
-        (Server(None), "what is heard is not signed: does the server know key anna ("),
-        (Server(b"x" * 32), "what is heard is signed with another key than anna ("),
-        (Server(utc=UTC - 3600.0), "what is heard is signed for another time: are both clocks"),
+        (Server(None), "the received packets are not signed: does the server have key anna ("),
+        (Server(b"x" * 32), "the received packets are signed with another key than anna ("),
+        (
+            Server(utc=UTC - 3600.0),
+            "the received packets are signed for another time: are both clocks",
+        ),
     ],
     ids=["unsigned", "another key", "an hour ago"],
 )
@@ -78,7 +81,7 @@ def test_other_packets_are_not_believed_and_it_is_told_why(server: Server, words
 
 def test_silence_has_words_too() -> None:
     assert ClientSignatures(KEY).why_silent() == (
-        f"does the server know key anna ({KEY.fingerprint}), and are both clocks right?"
+        f"does the server have key anna ({KEY.fingerprint}), and are both clocks right?"
     )
 
 
@@ -128,7 +131,7 @@ def test_a_link_id_is_a_byte(link_id: int) -> None:
 
 def test_what_a_server_s_url_says_of_signatures_is_none_of_a_client_s() -> None:
     client = SyncClient("udpout:127.0.0.1:1?key=anna")
-    with pytest.raises(LinkUrlError, match="is for a server"):
+    with pytest.raises(LinkUrlError, match="are for servers"):
         client.open()
 
 

@@ -165,11 +165,11 @@ def test_a_jump_goes_one_further_behind_a_home() -> None:
         (lambda: TaskOptions(delay=-1.0), "delay -1.0"),
         (lambda: TaskOptions(deadline=nan), "deadline nan"),
         (lambda: wire.items_of_goals([Move(nan)]), "distance"),
-        (lambda: wire.items_of_goals([Move("2")]), "distance is no number"),  # type: ignore[arg-type]
+        (lambda: wire.items_of_goals([Move("2")]), "distance is not a number"),  # type: ignore[arg-type]
         (lambda: wire.items_of_goals(["move"]), "'move': expected a goal"),  # type: ignore[list-item]
         (lambda: wire.items_of_goals([Drive(1.0, inf, 1.0)]), "yaw_rate"),
         (lambda: wire.items_of_goals([Wait(inf)]), "duration"),
-        (lambda: wire.items_of_goals([GoTo(LocalPlace(1e9, 0.0))]), "further away"),
+        (lambda: wire.items_of_goals([GoTo(LocalPlace(1e9, 0.0))]), "too far away"),
         (lambda: wire.items_of_goals([GoTo(LocalPlace(nan, 0.0))]), "north"),
         (lambda: wire.items_of_goals([GoTo(None, wait=3.0)]), "return"),
     ],

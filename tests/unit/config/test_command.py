@@ -123,7 +123,10 @@ def test_what_a_client_has_set_is_shown_from_the_store(run: Run, tmp_path: Path)
     code, output, error = run(*command, environment=variable)
     assert (code, error) == (
         0,
-        "mav-tasks: not in force, though set before: TSK_SPEED 2.5 is more than TSK_SPEED_MAX 2\n",
+        (
+            "mav-tasks: parameter of an earlier run ignored: "
+            "TSK_SPEED 2.5 is more than TSK_SPEED_MAX 2\n"
+        ),
     )
     assert re.search(r"^driving\.speed = 0\.5 +# m/s, default$", output, re.MULTILINE)
     before = path.read_bytes()

@@ -87,7 +87,7 @@ def test_all_faults_of_all_sources_are_told(tmp_path: Path) -> None:
 
 def test_a_key_is_said_by_one_flag() -> None:
     twice = (Flag("--arming", "rules.arming", "server"), flag_of_set("rules.arming=operator"))
-    assert faults("", {}, *twice) == ["--set rules.arming: rules.arming is said by --arming, too"]
+    assert faults("", {}, *twice) == ["--set rules.arming: rules.arming is already set by --arming"]
 
 
 def test_every_key_has_a_variable_of_its_own() -> None:

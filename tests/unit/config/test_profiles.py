@@ -108,7 +108,7 @@ NEEDED = 'system_id = 1\nautopilot = "px4"\nfirmware = "1"\nprobed = "2026"\n'
     ("text", "faults"),
     [
         ("", [f"p.toml: {n} is missing" for n in ("system_id", "autopilot", "firmware", "probed")]),
-        (NEEDED + "yaw = 1", ["p.toml: 'yaw': no such key of a profile"]),
+        (NEEDED + "yaw = 1", ["p.toml: 'yaw': a profile has no such key"]),
         (
             NEEDED + 'yaw_rate = "perhaps"',
             ["p.toml: yaw_rate: expected one of honoured, ignored"],
@@ -167,8 +167,8 @@ def test_sighup_reads_them_again(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     finally:
         logging.getLogger("mav_tasks").setLevel(logging.NOTSET)
     assert [record.getMessage() for record in caplog.records] == [
-        "configuration: read again, nothing has changed",
-        "vehicles.profiles: read again, 1 in force",
+        "configuration: reloaded, no changes",
+        "vehicles.profiles: reloaded, 1 in force",
     ]
     assert [settings.profiles for settings in server.put] == [(changed,)]
 

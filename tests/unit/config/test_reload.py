@@ -105,8 +105,8 @@ def test_a_file_with_faults_changes_nothing(
     assert said == [
         f"ERROR configuration: {path}:2: driving.sped: no such key; did you mean driving.speed?",
         f"ERROR configuration: {path}:3: x: no such key",
-        "ERROR configuration: nothing changes",
-        "INFO configuration: read again, nothing has changed",
+        "ERROR configuration: not applied",
+        "INFO configuration: reloaded, no changes",
     ]
     assert server.put == []
 
@@ -116,7 +116,10 @@ def test_what_a_client_has_set_stays_and_is_said(
 ) -> None:
     server = Server({"TSK_SPEED": 0.7})
     assert read_again(tmp_path / "c.toml", ["", "driving.speed = 0.8"], caplog, server) == [
-        "WARNING driving.speed: 0.5 -> 0.8 m/s, but TSK_SPEED stays as a client set it: 0.7"
+        (
+            "WARNING driving.speed: 0.5 -> 0.8 m/s, "
+            "but parameter TSK_SPEED, set by a client, overrides it: 0.7"
+        )
     ]
 
 
@@ -177,7 +180,7 @@ def test_a_slow_disk_keeps_nobody_and_what_is_asked_meanwhile_is_done_after_it(
         asyncio.run(run())
     disk.set()
     assert [record.getMessage() for record in caplog.records].count(
-        "configuration: still being read"
+        "configuration: the last reload still runs"
     ) == 2
 
 
@@ -195,7 +198,7 @@ def test_an_own_mistake_is_told_and_does_not_leave_it_reading(
 
     with caplog.at_level(logging.INFO, "mav_tasks"):
         asyncio.run(run())
-    assert "configuration: nothing changes" in [each.getMessage() for each in caplog.records]
+    assert "configuration: not applied" in [each.getMessage() for each in caplog.records]
 
 
 def test_of_a_bound_between_what_changes_and_what_does_not_both_stay() -> None:

@@ -102,7 +102,7 @@ def test_nothing_gives_the_defaults() -> None:
         ("a = 'x", 'c.toml:1: Expected "\'"'),
         ("x = " + "9" * 5000, "c.toml: Exceeds the limit (4300 digits)"),
         ("queueing.quota = 0x" + "f" * 9000, "c.toml:1: queueing.quota = a int too large to show"),
-        ("x = " + "[" * 5000 + "]" * 5000, "c.toml: tables or lists too deep"),
+        ("x = " + "[" * 5000 + "]" * 5000, "c.toml: tables or lists are nested too deep"),
         (
             "links.vehicles = ['udpin:127.0.0.1']",
             "c.toml:1: links.vehicles: link 'udpin:127.0.0.1': expected",
@@ -240,11 +240,11 @@ def test_the_finder_of_lines_ends_whatever_the_text(text: str) -> None:
 def test_a_key_of_very_many_parts_costs_nothing(key: str, text: str) -> None:
     """``tomllib`` would want 40 GB for it, while a rover drives: SIGHUP reads files, too."""
     (fault,) = faults(text.format(key))
-    assert fault == f"c.toml:{text.count(chr(10)) + 1}: a key of too many parts"
+    assert fault == f"c.toml:{text.count(chr(10)) + 1}: a key with too many parts"
 
 
 def test_of_very_many_faults_only_some_are_told() -> None:
     """Each is a line of the log when the file is read again, and looked at by the loop."""
     said = faults("".join(f"[t{number}]\n" for number in range(20_000)))
     assert len(said) < 100
-    assert said[-1] == "c.toml: there is more that is wrong"
+    assert said[-1] == "c.toml: there are more errors"

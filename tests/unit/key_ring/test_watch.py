@@ -64,8 +64,8 @@ def test_a_change_is_in_force_at_once(tmp_path: Path, caplog: pytest.LogCaptureF
 
     asyncio.run(story())
     assert [record.message for record in caplog.records] == [
-        "key ring: key ben is added, operator",
-        "key ring: key anna is revoked",
+        "key ring: key ben was added, role operator",
+        "key ring: key anna was revoked",
     ]
 
 
@@ -89,9 +89,9 @@ def test_a_ring_that_is_gone_or_broken_changes_nothing(
     async def story() -> None:
         watched = Watched(path)
         path.rename(tmp_path / "elsewhere")
-        await until_said(caplog, f"key ring {path}: it is gone: the keys in force stay")
+        await until_said(caplog, f"key ring {path} was removed: the keys in force stay")
         path.write_text("[keys.anna")
-        await until_said(caplog, "others can get at it")
+        await until_said(caplog, "other users can access it")
         path.chmod(0o600)
         await until_said(caplog, f"{path}:1: ")
         assert watched.news.empty()
@@ -116,7 +116,7 @@ def test_a_fault_is_told_once_for_as_long_as_it_lasts(
     async def story() -> None:
         watched = Watched(path)
         path.chmod(0o644)
-        await until_said(caplog, "others can get at it")
+        await until_said(caplog, "other users can access it")
         await asyncio.sleep(1.3)  # it is tried again each second
         path.chmod(0o600)
         add(path, "ben")
@@ -124,7 +124,7 @@ def test_a_fault_is_told_once_for_as_long_as_it_lasts(
         watched.watch.close()
 
     asyncio.run(story())
-    assert caplog.text.count("others can get at it") == 1
+    assert caplog.text.count("other users can access it") == 1
 
 
 def test_a_file_that_is_written_twice_within_a_tick_of_its_clock_is_read_twice(
@@ -156,9 +156,9 @@ def test_changes_are_told_by_the_names_of_keys() -> None:
         Key("d", b"d" * 32, role="operator"),
     )
     assert list(changes(old, new)) == [
-        "key a is observer now",
-        "key b has another secret, of vehicles",
-        "key c is gone",
-        "key d is added, operator",
+        "key a has role observer now",
+        "key b has a new secret, role vehicle",
+        "key c was removed",
+        "key d was added, role operator",
     ]
     assert list(changes(old, old)) == []

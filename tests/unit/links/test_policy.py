@@ -80,7 +80,7 @@ def test_what_reaches_others_without_a_key_needs_a_word(field: str, url: str, wo
     ((where, fault),) = faults(**{field: (url,)})
     assert where == field
     assert words in fault
-    assert "say --insecure" in fault
+    assert "use --insecure" in fault
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_who_pushes_to_others_unsigned_needs_a_word() -> None:
 def test_a_rover_that_could_not_be_heard_is_a_fault() -> None:
     ((where, fault),) = faults(unsigned="nowhere")
     assert where == "vehicles"
-    assert "takes nothing unsigned, and has no key: ?key=NAME" in fault
+    assert "accepts no unsigned packets, but has no key: add ?key=NAME" in fault
 
 
 def test_a_link_is_the_same_whatever_is_asked_on_it() -> None:

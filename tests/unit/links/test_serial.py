@@ -174,7 +174,7 @@ def test_a_device_that_is_not_there_is_waited_for(tmp_path: Path, clock: Clock) 
     for _ in range(5):
         clock.now += RETRY
         link.poll()
-    words = "is not there yet: No such file or directory; trying again every second"
+    words = "is not available yet: No such file or directory; trying again every second"
     assert link.take_changes() == [PeerChange(str(path), PeerState.DOWN, words)]
     with device(path) as line:
         clock.now += RETRY
@@ -221,7 +221,7 @@ def test_it_is_unplugged_while_something_is_sent(
 
 
 @pytest.mark.parametrize(
-    ("path", "words"), [("/dev/null", "no serial device"), ("/tmp", "directory")]
+    ("path", "words"), [("/dev/null", "not a serial device"), ("/tmp", "directory")]
 )
 def test_what_is_no_serial_device_is_one_clear_error(path: str, words: str) -> None:
     with pytest.raises(LinkOpenError, match=rf"^link serial:{path}:{BAUD} cannot be .*{words}"):
@@ -231,5 +231,5 @@ def test_what_is_no_serial_device_is_one_clear_error(path: str, words: str) -> N
 def test_a_plain_file_is_one_clear_error(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"")
-    with pytest.raises(LinkOpenError, match="no serial device"):
+    with pytest.raises(LinkOpenError, match="not a serial device"):
         open_link(SerialUrl(str(path), BAUD), limits=TO_VEHICLES)

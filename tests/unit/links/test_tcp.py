@@ -138,8 +138,8 @@ def test_who_comes_and_goes_is_told_in_order_and_in_words(listening: TcpInLink) 
     assert watched.heard(peer) == b"last words"
     name = f"{HOST}:{peer[1]}"
     assert watched.changes == [
-        PeerChange(peer, PeerState.UP, f"{name} has come"),
-        PeerChange(peer, PeerState.DOWN, f"{name} is gone: closed by the other end"),
+        PeerChange(peer, PeerState.UP, f"{name} connected"),
+        PeerChange(peer, PeerState.DOWN, f"{name} disconnected: closed by the other end"),
     ]
 
 
@@ -148,7 +148,7 @@ def test_one_that_resets_its_connection_is_gone(listening: TcpInLink) -> None:
     client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
     client.close()
     watched.until(lambda: PeerState.DOWN in watched.states)
-    assert watched.changes[-1].words.endswith("is gone: Connection reset by peer")
+    assert watched.changes[-1].words.endswith("disconnected: Connection reset by peer")
 
 
 def test_what_is_sent_to_who_is_gone_is_lost_and_said_by_nobody(listening: TcpInLink) -> None:
@@ -360,7 +360,7 @@ def test_it_waits_for_the_other_end_and_dials_again_when_it_is_lost(clock: Clock
         clock.now += RETRY
         link.poll()
     link.send((HOST, port), b"lost")
-    words = "is not there yet: Connection refused; trying again every second"
+    words = "is not available yet: Connection refused; trying again every second"
     assert [change.words for change in watched.changes] == [words]
     for expected in ("is up", "is back"):
         with socket.create_server((HOST, port)) as server:
@@ -416,7 +416,7 @@ def test_one_that_never_answers_is_given_up_and_dialled_again(
         clock.now += 0.2
         link.poll()
         (change,) = link.take_changes()
-        assert change.words == "is not there yet: no answer; trying again every second"
+        assert change.words == "is not available yet: no answer; trying again every second"
         for sock in backlog:
             sock.close()
     link.close()

@@ -200,7 +200,7 @@ def test_where_that_port_is_taken_it_is_said_and_another_one_is_used(other: sock
     port = other.getsockname()[1]
     first, second = dialling(port), dialling(port)
     assert address_of(second) != address_of(first)
-    assert second.note.startswith(f"local port {address_of(first)[1]} is taken")
+    assert second.note.startswith(f"local port {address_of(first)[1]} is in use")
     second.send(second.peers[0], b"hello")
     assert other.recvfrom(100) == (b"hello", address_of(second))
     first.close()

@@ -155,14 +155,14 @@ def test_a_url_says_what_is_asked_of_signatures(
     [
         (
             "?keys=a",
-            "no such option 'keys': there are unsigned=allow, unsigned=refuse, key=NAME and local",
+            "unknown option 'keys': expected unsigned=allow, unsigned=refuse, key=NAME and local",
         ),
         ("?unsigned=yes", "unsigned: expected one of "),
         ("?unsigned", "unsigned: expected one of "),
         ("?key=", "key: expected one of "),
-        ("?key=a&key=b", "key is said twice"),
-        ("?key=a&", "no such option ''"),
-        ("?local=14590", "local: only udpout dials from a port of its own"),
+        ("?key=a&key=b", "key is given twice"),
+        ("?key=a&", "unknown option ''"),
+        ("?local=14590", "local: only udpout has a local port"),
         ("?local=0", "local: expected a port from 1 to 65535"),
     ],
 )

@@ -99,11 +99,11 @@ class TestFaults:
         world = ProbeWorld(drive=True)
         world.fault(Faults(refuse_arm=True))
         world.finish()
-        assert world.driven.ended.startswith("arming was refused")
+        assert world.driven.ended.startswith("arming refused")
         assert world.driven.arming == world.driven.ended
         assert not any(is_moving(message) for _, message in world.setpoints())
         assert (world.rests(), world.farthest) == (True, 0.0)
-        assert why_none(world.probe.findings) == "the driving was not carried through"
+        assert why_none(world.probe.findings) == "the drive was not completed"
 
     @EACH
     def test_a_mode_that_is_refused_is_told(self, persona: Persona) -> None:
@@ -150,7 +150,7 @@ class TestFaults:
         world.fault(Faults(position_jump=jump))
         jumped_at = world.now
         world.finish()
-        assert world.driven.ended.startswith("at the side of the box")
+        assert world.driven.ended.startswith("at the edge of the area")
         assert max(at for at, message in world.setpoints() if is_moving(message)) < jumped_at + 0.15
         assert world.rests()
 
@@ -160,7 +160,7 @@ class TestFaults:
         world.until_moving()
         world.rover.autopilot.operator_mode(Mode.HOLD, now=world.now)
         world.finish()
-        assert "and not by us" in world.driven.ended
+        assert "its mode changed to" in world.driven.ended
         assert world.rests()
 
     @EACH
@@ -170,7 +170,7 @@ class TestFaults:
         world.rover.autopilot.operator_mode(Mode.MANUAL, now=world.now)
         taken_at = world.now
         world.finish()
-        assert "and not by us" in world.driven.ended
+        assert "its mode changed to" in world.driven.ended
         assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.MANUAL, True)
         later = [
             message.command
@@ -185,7 +185,7 @@ class TestFaults:
         world.until_moving()
         world.rover.autopilot.operator_arm(False, now=world.now)
         world.finish()
-        assert world.driven.ended == "somebody disarmed it"
+        assert world.driven.ended == "the rover was disarmed"
         assert world.rests()
 
     def test_setpoints_of_somebody_else_end_it(self) -> None:
@@ -194,7 +194,7 @@ class TestFaults:
         setpoint = m.SetPositionTargetLocalNed(0, 1, 1, 8, 0x05C7, *[0.0] * 11)
         world.somebody_sends(setpoint, Address(245, 190))
         world.finish()
-        assert world.driven.ended == "245/190 sends setpoints there: it is being driven"
+        assert world.driven.ended == "245/190 sends setpoints: the rover is being driven"
         assert world.rests()
 
     def test_a_machine_that_stood_still_does_not_drive_on_what_it_finds_then(self) -> None:
@@ -205,7 +205,7 @@ class TestFaults:
         world.join(world.party)
         woken_at = world.now
         world.finish()
-        assert world.driven.ended.startswith("a tick came 1.")
+        assert world.driven.ended.startswith("a setpoint was 1.")
         late = [at for at, message in world.setpoints() if is_moving(message) and at >= woken_at]
         assert (late, world.rests()) == ([], True)
 
@@ -213,7 +213,7 @@ class TestFaults:
         world = ProbeWorld(drive=True)
         world.rover.autopilot.operator_arm(True, now=world.now)
         world.finish()
-        assert world.driven.ended == "not driven: it is armed, and not by us"
+        assert world.driven.ended == "not driven: it is armed already"
         assert (world.setpoints(), world.rover.autopilot.armed) == ([], True)
 
     @pytest.mark.parametrize("missing", [POSITION, ATTITUDE])
@@ -221,7 +221,7 @@ class TestFaults:
         world = ProbeWorld(drive=True)
         world.fault(Faults(withheld=frozenset({missing})))
         world.finish()
-        assert world.driven.ended == "not driven: it does not say where it is"
+        assert world.driven.ended == "not driven: its position is unknown or too old"
         assert world.setpoints() == []
 
     def test_a_rover_that_says_it_too_seldom_is_not_driven(self) -> None:

@@ -57,11 +57,13 @@ def test_nothing_else_is_changed_and_nothing_is_moved() -> None:
 def test_one_that_stops_by_its_make_has_nothing_to_set() -> None:
     world = mended({}, ARDUPILOT)
     assert (written(world), world.probe.findings.failsafe_set) == ([], "nothing to set")
-    assert world.probe.findings.loss_by_parameters.startswith("stops by its make")
+    assert world.probe.findings.loss_by_parameters.startswith(
+        "stops 3 s after the last setpoint, as ArduPilot does"
+    )
 
 
 def test_one_that_does_not_take_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rover_sim.px4_parameters.Bytewise.from_wire", lambda *_: None)
     world = mended(BY_DEFAULT)
     assert isinstance(world.probe.error, NotSet)
-    assert str(world.probe.error) == "the rover does not take COM_OBL_RC_ACT 5"
+    assert str(world.probe.error) == "the rover does not accept COM_OBL_RC_ACT 5"

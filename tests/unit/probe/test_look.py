@@ -39,7 +39,7 @@ def test_without_leave_it_is_neither_armed_nor_moved_nor_changed(persona: Person
     assert dict(world.rover.autopilot._streams._intervals) == pytest.approx(intervals)
     assert dict(world.rover.autopilot.parameters._values) == parameters
     assert world.farthest == 0.0
-    assert why_none(world.probe.findings) == "without --drive nothing is measured"
+    assert why_none(world.probe.findings) == "only --drive measures one"
 
 
 @EACH
@@ -105,7 +105,7 @@ def test_nobody_there_is_told() -> None:
     world.fault(Faults(silent=True))
     error = world.finish().error
     assert isinstance(error, NothingHeard)
-    assert str(error) == "no heartbeat of a rover within 10 s"
+    assert str(error) == "no heartbeat from a rover within 10 s"
 
 
 def test_a_task_server_inside_the_rover_is_left_alone() -> None:
@@ -119,18 +119,18 @@ def test_a_task_server_inside_the_rover_is_left_alone() -> None:
     world.somebody_sends(queue, Address(1, 191))
     error = world.finish().error
     assert isinstance(error, Occupied)
-    assert str(error) == "a task server is there (1/191): probe the rover past it"
+    assert str(error) == "task server 1/191 is on this link: probe on a direct link"
     assert world.setpoints() == []
 
 
 @pytest.mark.parametrize(
     ("message", "source", "words"),
     [
-        (STATION, Address(250, 191), "a task server is there (250/191): end it first"),
+        (STATION, Address(250, 191), "task server 250/191 is on this link: end it first"),
         (
             m.SetPositionTargetLocalNed(0, 1, 1, 8, 0x05C7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0),
             Address(245, 190),
-            "245/190 sends setpoints there: it is being driven",
+            "245/190 sends setpoints: the rover is being driven",
         ),
     ],
 )
@@ -148,12 +148,12 @@ def test_who_else_drives_it_is_left_alone(message: m.Message, source: Address, w
         (
             COMPUTER,
             Address(1, 100),
-            "not driven: on-board computer 1/100 may drive it: end it first",
+            "not driven: on-board computer 1/100 may drive the rover: end it first",
         ),
         (
             m.CommandAck(400, 0, 0, 0, 245, 190),
             Address(1, 1),
-            "not driven: 245/190 commands it, too",
+            "not driven: 245/190 also commands the rover",
         ),
     ],
 )

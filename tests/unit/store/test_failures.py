@@ -214,7 +214,7 @@ def filled(path: Path, *, count: int = 3000) -> None:
 
 def test_what_is_no_database_is_refused_and_left_alone(path: Path) -> None:
     path.write_bytes(b"no database " * 1000)
-    assert "no database" in refusal(path)
+    assert "not a database" in refusal(path)
     assert path.read_bytes() == b"no database " * 1000
 
 
@@ -238,7 +238,7 @@ def test_rows_that_nobody_wrote_are_refused(path: Path) -> None:
     with sqlite3.connect(path) as other:
         other.execute("UPDATE tasks SET submitted = '[1, 2]' WHERE id = 2")
     other.close()
-    with opened(path) as store, pytest.raises(StoreError, match="cannot be understood"):
+    with opened(path) as store, pytest.raises(StoreError, match="its contents are invalid"):
         store.load()
 
 
@@ -270,7 +270,7 @@ def test_a_file_in_place_of_the_folder_is_refused(path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_made_is_refused() -> None:
-    assert "cannot be made" in refusal(Path("/proc/mav-tasks/tasks.sqlite3"))
+    assert "cannot be created" in refusal(Path("/proc/mav-tasks/tasks.sqlite3"))
 
 
 @contextmanager

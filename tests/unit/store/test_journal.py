@@ -192,13 +192,13 @@ def no_json(path: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (lambda path: None, "there is no such file"),
-        (lambda path: path.mkdir(), "there is no such file"),
-        (lambda path: path.touch(), "nothing was ever written to it"),
+        (lambda path: None, "does not exist"),
+        (lambda path: path.mkdir(), "does not exist"),
+        (lambda path: path.touch(), "it is empty"),
         (damaged, "damaged"),
         (foreign, "another program"),
         (newer, "newer version"),
-        (unknown_event, "Later is unknown to this version"),
+        (unknown_event, "this version does not know Later"),
         (no_json, "damaged"),
     ],
 )
