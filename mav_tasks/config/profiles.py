@@ -79,7 +79,10 @@ def read(place: str) -> tuple[VehicleProfile, ...]:
         path = _expanded(place)
     else:
         path = usual_folder()
-        if not path.is_dir():
+        try:
+            if not path.is_dir():
+                return ()
+        except OSError:  # a service whose home is closed: this account can have put nothing there
             return ()
     try:
         paths = sorted(path.glob(f"*{SUFFIX}")) if path.is_dir() else [path]

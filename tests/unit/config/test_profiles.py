@@ -177,3 +177,11 @@ def test_sighup_reads_them_again(tmp_path: Path, caplog: pytest.LogCaptureFixtur
 def test_a_record_of_a_run_has_them(given: tuple[VehicleProfile, ...]) -> None:
     settings = Settings(profiles=given)
     assert settings_of(json.loads(json.dumps(settings_to_json(settings)))) == settings
+
+
+def test_a_service_whose_home_is_closed_has_no_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    def closed(_path: Path) -> bool:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_dir", closed)
+    assert profiles.read("") == ()
