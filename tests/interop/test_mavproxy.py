@@ -61,7 +61,7 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
         it.ask("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
         it.wait_for("^ARMED")
         assert it.ask("long 54000 20 0 0 0 0 0 nan", TASK_SHOWN % 54000)[1] == "1"
-        running.server.wait_for("rover 1: task 1: move 20 m, priority 5")
+        running.server.wait_for("rover 1: task 1 submitted: move 20 m, priority 5")
         wait_until(lambda: running.speed() > 0.3, within=10, what="the rover at speed")
         it.ask("long 54003", TASK_SHOWN % 54003)
         running.server.wait_for("task 1 killed: STOP")
@@ -74,7 +74,7 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
             assert place(running) == pytest.approx((2.0, 0.0), abs=0.4)
         lat, lon = PLACES[1]
         it.ask(f"guided {lat + METRE} {lon} 0", "DO_REPOSITION: ACCEPTED")
-        running.server.wait_for(r"rover 1: task (\d): go to(.|\n)*task \1 executing")
+        running.server.wait_for(r"rover 1: task (\d) submitted: go to(.|\n)*task \1 executing")
         it.ask("disarm", "COMPONENT_ARM_DISARM: ACCEPTED")
         it.wait_for("^DISARMED")
         assert it.complaints(but="fence breach") == []
@@ -225,7 +225,7 @@ def tasks(it: MavProxy, running: Stand) -> None:
     assert it.ask("long 54000 0.6 0 0 0 0 0 8", TASK_SHOWN % 54000)[1] == "3"
     it.wait_for("AP: Task 3 started")
     it.ask("pause", "DO_PAUSE_CONTINUE: ACCEPTED")
-    it.wait_for("AP: Task 3 paused: operator")
+    it.wait_for("AP: Task 3 paused by")
     it.ask("long DO_PAUSE_CONTINUE 1", "DO_PAUSE_CONTINUE: ACCEPTED")
     it.wait_for("AP: Task 3 done", within=15)
     assert place(running) == pytest.approx((2.6, 0.0), abs=0.3)
