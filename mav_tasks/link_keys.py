@@ -30,11 +30,13 @@ def _check_key(link: ConfiguredLink, ring: KeyRing, where: str) -> None:
     except KeyRingError as error:
         raise UsageError(f"link {link.url}: {error}, in {where}") from None
     if link.side == "clients" and not key.role:
-        raise UsageError(f"link {link.url}: key {key.name} is of vehicles: no client may sign so")
+        raise UsageError(
+            f"link {link.url}: key {key.name} has role vehicle: clients may not use it"
+        )
     if link.side == "vehicles" and key.role:
         raise UsageError(
-            f"link {link.url}: key {key.name} is of clients, {key.role}: what a rover is told with "
-            "it could be sent back as theirs; give the rover one of its own, of vehicles"
+            f"link {link.url}: key {key.name} has role {key.role}: packets to the rover could "
+            "be replayed as that client's. Add a key with --role vehicle for the rover"
         )
 
 

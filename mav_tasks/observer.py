@@ -62,5 +62,5 @@ class EngineObservers:
             try:
                 say(observer)
             except Exception:  # a bug in an observer must not stop the vehicle
-                log.exception("internal error: %s ends here", observer)
+                log.exception("internal error: %s is switched off", observer)
                 self._all = tuple(each for each in self._all if each is not observer)

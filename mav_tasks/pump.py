@@ -86,9 +86,9 @@ class Pump:
                 log.error("%s", text)
                 return
             case NotKept(text=text):
-                log.error("%s: submissions are refused until it is mended", text)
+                log.error("%s: new tasks are refused until the store works", text)
             case Kept() if self._store_is_away:
-                log.warning("the store takes events again")
+                log.warning("the store works again")
         self._store_is_away = isinstance(outcome, NotKept)
 
     def _note(self, events: list[Event]) -> None:

@@ -42,18 +42,18 @@ def _task(
 #: QGroundControl shows three in a row, and inserts one of its own in front while a rover is armed:
 #: the buttons that stop a rover come first, and the order must not change
 ACTIONS = (
-    Action("STOP", "Stop at once, until continued", MavCmd.TASK_STOP, (0.0,)),
+    Action("STOP", "Stop at once; Continue ends it", MavCmd.TASK_STOP, (0.0,)),
     Action("Pause", "Pause task and queue", MavCmd.DO_PAUSE_CONTINUE, (0.0,)),
-    Action("Continue", "Continue; ends a STOP", MavCmd.DO_PAUSE_CONTINUE, (1.0,)),
+    Action("Continue", "Resume task and queue; ends a STOP", MavCmd.DO_PAUSE_CONTINUE, (1.0,)),
     _task("Forward 1 m", "Queue: drive 1 m ahead", MavCmd.TASK_MOVE, 1.0),
     _task("Back 1 m", "Queue: drive 1 m backwards", MavCmd.TASK_MOVE, -1.0),
     _task("Right 90", "Queue: turn 90 degrees clockwise on the spot", MavCmd.TASK_ROTATE, 90.0),
     _task("Left 90", "Queue: turn 90 degrees anticlockwise", MavCmd.TASK_ROTATE, -90.0),
-    Action("Cancel task", "Call off the running task", MavCmd.TASK_CANCEL, (0.0,)),
-    Action("Clear queue", "Call off all that wait", MavCmd.TASK_CLEAR, (0.0,)),
-    Action("Held: again", "Do the held task again from here", MavCmd.TASK_RELEASE, (0.0, 0.0)),
-    Action("Held: rest", "Do what is left of the held task", MavCmd.TASK_RELEASE, (0.0, 1.0)),
-    Action("Held: skip", "Leave the held task out", MavCmd.TASK_RELEASE, (0.0, 2.0)),
+    Action("Cancel task", "Cancel the running task", MavCmd.TASK_CANCEL, (0.0,)),
+    Action("Clear queue", "Cancel all waiting tasks", MavCmd.TASK_CLEAR, (0.0,)),
+    Action("Held: again", "Restart the held task here", MavCmd.TASK_RELEASE, (0.0, 0.0)),
+    Action("Held: remainder", "Finish the held task", MavCmd.TASK_RELEASE, (0.0, 1.0)),
+    Action("Held: skip", "Skip the held task", MavCmd.TASK_RELEASE, (0.0, 2.0)),
 )
 
 
@@ -70,10 +70,10 @@ def parse_action(text: str) -> Action:
         params = [float(value) for value in given]
     except ValueError as error:
         raise UsageError(
-            f"--action {text}: {str(error).rpartition(': ')[2]} is no number"
+            f"--action {text}: {str(error).rpartition(': ')[2]} is not a number"
         ) from error
     if len(params) > 7 or not all(abs(value) < float("inf") for value in params):
-        raise UsageError(f"--action {text}: expected seven finite parameters at the most")
+        raise UsageError(f"--action {text}: expected at most seven finite parameters")
     is_task = int(command) in (MavCmd.TASK_MOVE, MavCmd.TASK_ROTATE, MavCmd.TASK_DRIVE)
     if is_task and len(params) < 7:
         params = [*(params + [0.0] * 6)[:6], PRIORITY]

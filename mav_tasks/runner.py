@@ -298,7 +298,7 @@ class Runner:
         self._guarded(SettingsChanged(settings))
         for why in self._pump.engine.not_in_force:
             if why not in before:
-                log.warning("not in force, though set before: %s", why)
+                log.warning("parameter of an earlier run ignored: %s", why)
         return self._pump.engine.parameters
 
     def _begin_keys(self, keys: Keys) -> None:

@@ -83,10 +83,10 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             if isinstance(opened_link, UdpLink) and opened_link.note:
                 say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
-            say("nobody is spoken to unasked: none of the links for clients is UDP")
+            say("no push: no link for clients is UDP")
         say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
-            say(f"parameters set before: {_in_words(restored.parameters)}")
+            say(f"parameters of an earlier run: {_in_words(restored.parameters)}")
         running = _run(settings, journal, restored, client_links, vehicle_links, reload, keys, say)
         return asyncio.run(running)
 
@@ -153,7 +153,7 @@ async def _run(
     now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)
     for why in engine.not_in_force:
-        say(f"not in force, though set before: {why}")
+        say(f"parameter of an earlier run ignored: {why}")
     recorders = observers(settings.recording, settings.engine, restored, now=now)
     for recorder in recorders:
         say(f"{recorder}")

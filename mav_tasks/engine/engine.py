@@ -63,7 +63,7 @@ from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 
-UNHEARD = Word(text="no ground station is heard: paused")
+UNHEARD = Word(text="is paused: no ground station is heard")
 
 
 class Engine:
@@ -305,7 +305,7 @@ class Engine:
             tasks=self._registry.all(),
             decoded=(
                 f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
-                f" {self.signatures.counts}, left out {self._gates.left_out} datagrams,"
+                f" {self.signatures.counts}, dropped {self._gates.left_out} datagrams,"
                 f" {self._door.left_out} requests"
             ),
         )

@@ -55,11 +55,11 @@ class FieldNotes:
             case PeerChanged():
                 self._heard.discard((item.link, item.peer))
             case Congestion():
-                state = "takes all again" if not item.is_congested else "does not take all we send"
+                state = "is congested" if item.is_congested else "is no longer congested"
                 log.debug("link %s: %s %s", item.link, _name(item.peer), state)
         if now >= self._count_at:
             if self._count_at > -inf:
-                log.debug("came in: %s", self._counts())
+                log.debug("received so far: %s", self._counts())
             self._count_at = now + PERIOD
 
     def on_output(
@@ -69,7 +69,7 @@ class FieldNotes:
 
     def close(self) -> None:
         """Log the final counts."""
-        log.debug("came in: %s", self._counts())
+        log.debug("received so far: %s", self._counts())
 
     def _meet(self, link: str, peer: Peer) -> None:
         if len(self._heard) >= MOST_PEERS:

@@ -118,4 +118,4 @@ def _is_change(message: object) -> bool:
 
 def _count(repeated: tuple[int, float]) -> str:
     more, seconds = repeated
-    return f" ({more} more in {seconds:.0f} s)"
+    return f" (repeated {more} times in {seconds:.0f} s)"

@@ -132,7 +132,7 @@ class VehicleTexts:
             _say(text)
         for vehicle, talk in self._talks.items():
             if talk.left_out and now >= talk.tell_at:
-                log.warning("rover %d says too much: %d texts left out", vehicle, talk.left_out)
+                log.warning("rover %d sends too many texts: %d omitted", vehicle, talk.left_out)
                 talk.left_out, talk.tell_at = 0, inf
         self._plan()
 

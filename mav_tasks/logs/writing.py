@@ -53,7 +53,7 @@ class ThreadedHandler(logging.Handler):
         try:
             line = self._lines.of(record, now=time.monotonic())
         except Exception as mistake:  # noqa: BLE001 - a bug of ours must not stop a rover
-            line = f"a line cannot be said: {mistake!r}"
+            line = f"a log line cannot be formatted: {mistake!r}"
         if line is not None:
             self._waiting.put(line)
 
@@ -104,7 +104,7 @@ class ThreadedHandler(logging.Handler):
             self._told = lost
 
     def _gap(self, lost: int) -> str:
-        words = f"lines of this log that were not taken in time, and are lost: {lost}"
+        words = f"log lines lost: {lost} (the reader or the disk was too slow)"
         record = logging.makeLogRecord(
             {"msg": words, "levelname": "WARNING", "levelno": logging.WARNING}
         )

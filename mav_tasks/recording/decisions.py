@@ -25,8 +25,8 @@ SUFFIX = ".decisions.gz"
 BLOCK = 1 << 15  # bytes of text per write
 
 CLOSED = "the run is over"
-TOO_LONG = "the record is as long as it may be"
-TOO_MUCH = "too much waited to be written"
+TOO_LONG = "the record has reached its size limit"
+TOO_MUCH = "the disk was too slow"
 
 Entry = tuple[float, Input | None] | tuple[float, Sequence[Outgoing], Sequence[Event]]
 
@@ -51,7 +51,7 @@ class Decisions:
         try:
             fd, self.path, _ = new_file(folder, stamp(time.time()), 0, SUFFIX)
         except OSError as error:
-            raise RecordError(f"no records can be kept in {folder}: {error.strerror}") from error
+            raise RecordError(f"cannot write records to {folder}: {error.strerror}") from error
         self._file = RecordFile(fd, size=size)
         self._lines = LineWriter()
         self._beginning = self._beginning_of(settings, restored, now)
@@ -142,7 +142,7 @@ class Decisions:
         self._why = why
         is_marked = self._file.end(why)
         if why != CLOSED or not is_marked:
-            log.warning("%s ends%s: %s", self, "" if is_marked else " without a mark", why)
+            log.warning("%s ends%s: %s", self, "" if is_marked else " without an end mark", why)
 
     def _beginning_of(
         self, settings: Settings, restored: Restored | None, now: float

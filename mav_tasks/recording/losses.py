@@ -22,17 +22,17 @@ class Losses:
         self._count += count
         if not self.is_losing:
             self.is_losing = True
-            log.warning("%s: %s: packets are lost", self._name, why)
+            log.warning("%s: packets are being lost: %s", self._name, why)
 
     def over(self) -> None:
         """Note that packets are written again."""
         if self.is_losing:
             self.is_losing = False
             count = self._count
-            log.warning("%s: is written again; %d packets are lost", self._name, count - self._told)
+            log.warning("%s: writing again; %d packets lost", self._name, count - self._told)
             self._told = count
 
     def end(self) -> None:
         """Log the losses that are not yet logged."""
         if self.is_losing:
-            log.warning("%s: ends; %d packets are lost", self._name, self._count - self._told)
+            log.warning("%s: ends; %d packets lost", self._name, self._count - self._told)

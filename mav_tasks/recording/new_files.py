@@ -16,15 +16,15 @@ def prepared(folder: str) -> Path:
     try:
         path = Path(folder).expanduser().absolute()
     except RuntimeError as error:  # the home folder of an unknown user
-        raise RecordError(f"no records can be kept in {folder}: {error}") from error
+        raise RecordError(f"cannot write records to {folder}: {error}") from error
     try:
         make_private(path)
     except FileExistsError as error:
-        raise RecordError(f"no records can be kept in {path}: it is no folder") from error
+        raise RecordError(f"cannot write records to {path}: not a folder") from error
     except OSError as error:
-        raise RecordError(f"no records can be kept in {path}: {error.strerror}") from error
+        raise RecordError(f"cannot write records to {path}: {error.strerror}") from error
     if not os.access(path, os.W_OK | os.X_OK):
-        raise RecordError(f"no records can be kept in {path}: it cannot be written to")
+        raise RecordError(f"cannot write records to {path}: not writable")
     return path
 
 

@@ -81,7 +81,7 @@ def read(path: Path) -> Record:
     try:
         if first["rows"] != {name: list(places) for name, places in ROWS.items()}:
             raise RecordError(
-                f"{path}: recorded by version {first['version']}, whose events have another form"
+                f"{path}: recorded by version {first['version']}, whose events have another format"
             )
         for name in ("version", "python", "machine"):
             _check_words(first[name])
@@ -101,7 +101,7 @@ def read(path: Path) -> Record:
             why_it_ends=why_it_ends,
         )
     except NOT_OURS as error:
-        raise RecordError(f"{path}: its beginning cannot be understood: {_words(error)}") from error
+        raise RecordError(f"{path}: unreadable header: {_words(error)}") from error
 
 
 def _measure(path: Path) -> tuple[int, str | None]:
@@ -117,9 +117,9 @@ def _measure(path: Path) -> tuple[int, str | None]:
                 _, why, count, given = loads(raw)
                 _check_words(why)
             except NOT_OURS as error:
-                raise RecordError(f"{path}: line {number} is no end mark") from error
+                raise RecordError(f"{path}: line {number} is not a valid end mark") from error
             if (count, given) != (lines, digest.hexdigest()):
-                raise RecordError(f"{path}: it was changed after it had been written")
+                raise RecordError(f"{path}: modified after it was written")
             return lines, why
         digest.update(raw + b"\n")
         lines = number
@@ -134,12 +134,12 @@ def _first_line(path: Path) -> dict[str, Any]:
                 if first[MAGIC] == FORMAT:
                     return first
                 raise RecordError(
-                    f"{path}: a record of format {first[MAGIC]}; this version reads {FORMAT}"
+                    f"{path}: its format is {first[MAGIC]}; this version reads {FORMAT}"
                 )
         except NOT_OURS:
             pass
         break
-    raise RecordError(f"{path}: no record of decisions")
+    raise RecordError(f"{path}: not a record of decisions")
 
 
 def _tasks(path: Path, count: int) -> tuple[Task, ...]:
@@ -150,9 +150,9 @@ def _tasks(path: Path, count: int) -> tuple[Task, ...]:
         try:
             tasks += decoder.values(Task, rows, offset=0.0)
         except (*NOT_OURS, Unreadable) as error:
-            raise RecordError(f"{path}: tasks that cannot be understood: {error}") from error
+            raise RecordError(f"{path}: unreadable tasks: {error}") from error
     if len(tasks) < count:
-        raise RecordError(f"{path}: it ends before the run began")
+        raise RecordError(f"{path}: ends before the run began")
     return tuple(tasks)
 
 
@@ -162,7 +162,7 @@ def _row(path: Path, number: int, raw: bytes) -> list[Any]:
         if kind != "task":
             raise ValueError(f"{kind!r}")
     except NOT_OURS as error:
-        raise RecordError(f"{path}: line {number} is no task: {_words(error)}") from error
+        raise RecordError(f"{path}: line {number} is not a task: {_words(error)}") from error
     return row  # type: ignore[no-any-return]
 
 
@@ -172,7 +172,7 @@ def _entry_values(path: Path, number: int, raw: bytes) -> Sequence[Any]:
         if type(now) not in (int, float) or not isinstance(kind, str):
             raise ValueError("no time")
     except NOT_OURS as error:
-        raise RecordError(f"{path}: line {number} cannot be understood: {_words(error)}") from error
+        raise RecordError(f"{path}: line {number} is unreadable: {_words(error)}") from error
     return [kind, now, *rest]
 
 
@@ -202,11 +202,11 @@ def _inflated(path: Path) -> Iterator[bytes]:
                     yield stream.decompress(piece, PIECE)
                     piece = stream.unconsumed_tail
                 if stream.unused_data:
-                    raise RecordError(f"{path}: there is more after its end")
+                    raise RecordError(f"{path}: data after its end")
     except OSError as error:
         raise RecordError(f"{path}: {error.strerror}") from error
     except zlib.error as error:
-        raise RecordError(f"{path}: no record of decisions, or damaged: {error}") from error
+        raise RecordError(f"{path}: not a record of decisions, or damaged: {error}") from error
 
 
 def _check_words(value: Any) -> None:

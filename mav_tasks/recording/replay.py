@@ -68,7 +68,7 @@ class Replay:
         engine = Engine(record.settings, now=record.now, restored=record.restored)
         for entry in record.entries():
             if self.failure:
-                self._differs("the run went on", f"the engine failed: {self.failure}")
+                self._differs("the run continued", f"the engine failed: {self.failure}")
                 self.failure = ""
                 return
             if entry.kind == "out":
@@ -84,7 +84,7 @@ class Replay:
         try:
             item = input_of(entry.values)
         except NOT_OURS as error:
-            words = f"{self._record.path}: line {entry.number} cannot be understood: {error}"
+            words = f"{self._record.path}: line {entry.number} is unreadable: {error}"
             raise RecordError(words) from error
         self._last = entry
         self.inputs += 1
@@ -105,8 +105,8 @@ class Replay:
             return key
         secret = self._secrets.get(key.fingerprint)
         if secret is None:
-            words = f"signed with key {key.name} ({key.fingerprint}): no ring has its secret"
-            words += "; --keys FILE names the ring of that server"
+            words = f"signed with key {key.name} ({key.fingerprint}): its secret is missing"
+            words += "; use --keys FILE with the key ring of that server"
             raise RecordError(f"{self._record.path}: {words}")
         return replace(key, secret=secret)
 
@@ -142,7 +142,7 @@ class Replay:
                 self._differs(expected, f"{_in_words(packets, [])} (digest {given_digest})")
                 return
         except NOT_OURS as error:
-            words = f"{self._record.path}: line {entry.number} cannot be understood: {error}"
+            words = f"{self._record.path}: line {entry.number} is unreadable: {error}"
             raise RecordError(words) from error
         self._differs(entry.raw.decode("ascii", "replace"), came)
 

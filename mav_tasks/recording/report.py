@@ -55,7 +55,7 @@ class Report:
             self._explain(record, run.difference)
             return
         if run.failure:
-            self._say(f"the engine failed at the last input, as in the run: {run.failure}")
+            self._say(f"the engine failed at the last input, as it did in the run: {run.failure}")
         if record.why_it_ends is None:
             self._say("the record's end is missing: replayed up to its last whole line")
         elif record.why_it_ends != CLOSED:
@@ -70,8 +70,8 @@ class Report:
             f"different after line {difference.line} ({difference.kind} at {difference.now:.6f} s,"
             f" {difference.now - record.now:.6f} s into the run)"
         )
-        self._say(f"  expected: {difference.expected}")
-        self._say(f"  came:     {difference.came}")
+        self._say(f"  recorded: {difference.expected}")
+        self._say(f"  replayed: {difference.came}")
         self._say(f"  recorded with Python {record.python} on {record.machine}")
 
     def _say(self, words: str) -> None:

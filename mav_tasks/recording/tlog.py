@@ -65,7 +65,7 @@ class Tlog:
         """Queue received packets, and changes of links, peers and the wall clock."""
         if isinstance(item, Packets):
             if not self._backlog.put((now, item), room_of(item)):
-                self._too_many.lose(len(item.datagrams), "too much waits to be written")
+                self._too_many.lose(len(item.datagrams), "the disk is too slow")
         elif isinstance(item, AtOnce | inputs.Backlog):
             for each in item.packets:
                 self.on_input(each, now=now)
@@ -81,7 +81,7 @@ class Tlog:
     ) -> None:
         """Queue sent packets; a telemetry log has no events."""
         if packets and not self._backlog.put((now, packets), ROOM_OF_PACKET * len(packets)):
-            self._too_many.lose(len(packets), "too much waits to be written")
+            self._too_many.lose(len(packets), "the disk is too slow")
 
     def close(self) -> None:
         """Write the waiting packets; wait a bounded time for that."""
@@ -106,7 +106,7 @@ class Tlog:
 
     def _keep(self, packets: Sequence[bytes], *, utc: float) -> bool:
         """Write packets, or drop and count them; return whether all were written."""
-        why = "the disk takes nothing"
+        why = "waiting after a disk error"
         kept = self._files.kept
         if time.monotonic() >= self._retry_at:
             try:

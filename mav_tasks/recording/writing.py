@@ -32,7 +32,7 @@ class WritingThread:
         self._is_closing.set()
         self._thread.join(END_LIMIT)
         if self._thread.is_alive():
-            log.warning("%s: not all is written: the disk takes too long", self._name)
+            log.warning("%s: incomplete: the disk is too slow", self._name)
 
     def _run(self) -> None:
         try:
@@ -41,4 +41,4 @@ class WritingThread:
             self._write()
             self._end()
         except Exception:  # a bug in a recorder must not stop a rover
-            log.exception("%s: internal error: nothing more is written", self._name)
+            log.exception("%s: internal error: switched off", self._name)

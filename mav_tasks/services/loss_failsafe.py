@@ -51,9 +51,9 @@ STANDING: Mapping[str, float] = {AFTER: 1.0, ACTION: 5, NO_STATION: 1}
 class Deed(Enum):
     """What a failsafe does."""
 
-    NOTHING = "nothing, it drives on"
-    RETURN = "Return, it drives home by itself"
-    LAND = "Land, which no rover was seen to stand in"
+    NOTHING = "nothing, it keeps driving"
+    RETURN = "Return, it drives home"
+    LAND = "Land, not known to stop a rover"
     HOLD = "Hold"
     OFF = "motors off"
 
@@ -129,7 +129,7 @@ class LossFailsafe:
         if self._asked == NEVER or {AFTER, ACTION}.intersection(self._missing):
             return ""
         if self.why_off:
-            return f"would drive on without setpoints: {self.why_off}"
+            return f"would move without setpoints: {self.why_off}"
         _, deed = self._deed_of(int(self._values[ACTION]))
         return "stops when setpoints stop" + ("" if deed is None else f": {deed.value}")
 
@@ -165,7 +165,7 @@ class LossFailsafe:
             return ""
         self._has_changed = False
         if self.is_unknown:
-            return "does not say whether it stops when setpoints stop"
+            return "does not report whether it stops when setpoints stop"
         return self.what_it_does or "stops when setpoints stop"
 
     def forget(self) -> None:

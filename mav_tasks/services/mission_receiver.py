@@ -39,11 +39,11 @@ INT_SENDERS = 64  # clients remembered that know MISSION_ITEM_INT
 CAPACITY = 6_000  # items of one plan; to look at more would hold up a setpoint
 
 #: why the receiver itself ends an upload
-TAKEN = "another client is at it: wait"
-DISPLACED = "a client with more rights uploads instead: wait, then upload it again"
+TAKEN = "another client is uploading: wait"
+DISPLACED = "a client with a higher role is uploading: upload it again later"
 TOO_MANY = f"more than {CAPACITY} items"
 SILENT = f"no item came for {GIVE_UP:g} s: upload it again"
-TOO_SLOW = f"it took more than {LONGEST:g} s, and {EACH_ITEM:g} s for each item: upload it again"
+TOO_SLOW = f"took more than {LONGEST:g} s plus {EACH_ITEM:g} s per item: upload it again"
 
 #: mission type, number, item, count -> why not, or None
 Check = Callable[[int, int, Item, int], MavMissionResult | None]

@@ -180,7 +180,7 @@ class SubmissionDeduplicator:
             self._nonces.pop(key, None)
             return None
         if task.marks.payload != draft.marks.payload:
-            words = f"nonce {draft.marks.nonce} was used for something else"
+            words = f"nonce {draft.marks.nonce} was used for another task"
             raise Rejection(TaskReason.NONCE_REUSED, words)
         return Known(task_id, Rule.NONCE)
 

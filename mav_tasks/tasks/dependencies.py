@@ -49,7 +49,7 @@ class Dependencies:
         if task is None:
             raise Rejection(R.UNKNOWN_DEPENDENCY, f"run after {after}: no such task")
         if task.state in TERMINAL and task.state is not S.COMPLETED:
-            words = f"run after {after}: it is over, {task.state.name.lower()}"
+            words = f"run after {after}: that task has ended ({task.state.name.lower()})"
             raise Rejection(R.DEPENDENCY_FAILED, words)
 
     def check_cycle(self, task: Task, after: int) -> None:
@@ -57,7 +57,7 @@ class Dependencies:
         seen: int = after
         while seen:
             if seen == task.id:
-                raise Rejection(R.CYCLE, f"run after {after}: they would wait for each other")
+                raise Rejection(R.CYCLE, f"run after {after}: the tasks would wait for each other")
             ahead = self._registry.get(seen)
             seen = 0 if ahead is None or ahead.state not in WAITING else ahead.terms.after
 

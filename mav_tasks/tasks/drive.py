@@ -203,7 +203,7 @@ class Drive:
         if news:
             self._registry.record(VehicleNoted(task.vehicle, news, now))
         if self._astray.is_astray(course, motion):
-            words = "does not go where it is told to: is its heading right?"
+            words = "does not follow its setpoints: check its heading"
             self._registry.record(VehicleNoted(task.vehicle, words, now))
             return Becomes(S.HELD, R.OFF_TRACK)
         speed = None if course is self._way_back else course.progress.speed

@@ -14,6 +14,13 @@ from mav_tasks.tasks.timing import Timing
 
 SERVER = "server"
 
+#: new states, with the reason that adds nothing to the actor's name
+_ASKED_FOR = {
+    (TaskState.PAUSED, TaskReason.OPERATOR),
+    (TaskState.CANCELLED, TaskReason.CANCELLED),
+    (TaskState.KILLED, TaskReason.CANCELLED),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class TaskSubmitted:
@@ -24,9 +31,10 @@ class TaskSubmitted:
 
     def __str__(self) -> str:
         task = self.task
+        label = f" '{task.terms.label}'" if task.terms.label else ""
         return (
-            f"rover {task.vehicle}: task {task.id}: {describe(task.goal)}, "
-            f"priority {task.priority}, from {task.submitter}"
+            f"rover {task.vehicle}: task {task.id} submitted: {describe(task.goal)}{label}, "
+            f"priority {task.priority}, by {task.submitter}"
         )
 
 
@@ -49,12 +57,13 @@ class TaskChanged:
     timing: Timing | None = None
 
     def __str__(self) -> str:
-        why = f": {words_of(self.reason)}" if self.reason else ""
-        who = "" if self.actor == SERVER else f", by {self.actor}"
+        name, reason, comma = self.new.name.lower(), self.reason, ","
+        if (self.new, reason) in _ASKED_FOR:
+            reason, comma = TaskReason.NONE, ""  # "paused by", not "paused: operator, by"
+        why = f": {words_of(reason)}" if reason else ""
+        who = "" if self.actor == SERVER else f"{comma} by {self.actor}"
         driven = f"; {self.timing}" if self.timing and self.old is TaskState.EXECUTING else ""
-        return (
-            f"rover {self.vehicle}: task {self.task_id} {self.new.name.lower()}{why}{who}{driven}"
-        )
+        return f"rover {self.vehicle}: task {self.task_id} {name}{why}{who}{driven}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +79,9 @@ class TaskAdvanced:
 
     def __str__(self) -> str:
         item = f"item {self.item}, " if self.item > 0 else ""
-        return f"rover {self.vehicle}: task {self.task_id}: {item}leg {self.progress.leg + 1} begun"
+        return (
+            f"rover {self.vehicle}: task {self.task_id}: {item}leg {self.progress.leg + 1} started"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +137,8 @@ class PlanStored:
 
     def __str__(self) -> str:
         what = ("mission", "fence", "rally points")[self.kind]
-        return f"rover {self.vehicle}: {what} {self.plan_id or 'cleared'}, by {self.actor}"
+        done = f"{self.plan_id} stored" if self.plan_id else "cleared"
+        return f"rover {self.vehicle}: {what} {done} by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +153,7 @@ class TaskModified:
     at: float
 
     def __str__(self) -> str:
-        return f"rover {self.vehicle}: task {self.task_id} modified, by {self.actor}"
+        return f"rover {self.vehicle}: task {self.task_id} modified by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +205,7 @@ class SubmissionRefused:
         what = f"command {self.command}" if self.command > 0 else f"message {-self.command}"
         what = what if self.command else "upload"
         rover = f"rover {self.vehicle}: " if self.vehicle else ""
-        return f"{rover}{what} of {self.actor} refused: {self.text}"
+        return f"{rover}{what} by {self.actor} refused: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +219,9 @@ class QueuePaused:
 
     def __str__(self) -> str:
         if self.reason is TaskReason.STOPPED:
-            return f"rover {self.vehicle}: STOP by {self.actor}, nothing runs until continued"
+            return f"rover {self.vehicle}: STOP by {self.actor}; no task runs until a resume"
+        if self.reason is TaskReason.OPERATOR and self.actor != SERVER:
+            return f"rover {self.vehicle}: queue paused by {self.actor}"
         return f"rover {self.vehicle}: queue paused: {words_of(self.reason)}, by {self.actor}"
 
 
@@ -220,7 +234,7 @@ class QueueContinued:
     at: float
 
     def __str__(self) -> str:
-        return f"rover {self.vehicle}: queue continued by {self.actor}"
+        return f"rover {self.vehicle}: queue resumed by {self.actor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +251,7 @@ class VehicleHalted:
     at: float
 
     def __str__(self) -> str:
-        words = f"rover {self.vehicle}: halt {self.epoch}, {words_of(self.reason)}"
+        words = f"rover {self.vehicle}: halt epoch {self.epoch}: {words_of(self.reason)}"
         return words if self.actor == SERVER else f"{words}, by {self.actor}"
 
 
@@ -269,8 +283,8 @@ class VehicleHomeSet:
 
     def __str__(self) -> str:
         place = f"{self.latitude_degE7 / 1e7:.7f}, {self.longitude_degE7 / 1e7:.7f}"
-        who = "first armed there" if self.actor == SERVER else f"by {self.actor}"
-        return f"rover {self.vehicle}: its home is {place}, {who}"
+        who = "where it was first armed" if self.actor == SERVER else f"set by {self.actor}"
+        return f"rover {self.vehicle}: home is {place} ({who})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,8 +296,8 @@ class VehicleArmingSet:
     at: float
 
     def __str__(self) -> str:
-        words = "may be armed again" if self.may_arm else "is armed only after a continue"
-        return f"rover {self.vehicle} {words}"
+        words = "may arm it again" if self.may_arm else "does not arm it before a resume"
+        return f"rover {self.vehicle}: the server {words}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -338,7 +352,7 @@ class ServerStopped:
         if not self.unconfirmed:
             return "server stopped: no rover is being driven"
         names = ", ".join(map(str, self.unconfirmed))
-        return f"server stopped: rover {names} told to stop, not yet seen standing in HOLD"
+        return f"server stopped: rover {names} told to stop, HOLD and standstill not confirmed"
 
 
 Event = (

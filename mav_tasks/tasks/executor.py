@@ -235,7 +235,7 @@ class Executor:
             self._change(S.STARTING, R.NONE, actor=SERVER, now=now)
         elif task.state is not S.STARTING:
             return False
-        self.waits_for = (R.NOT_READY, "it has restarted")
+        self.waits_for = (R.NOT_READY, "the rover restarted")
         self._ask_again_at, self._taking_since = None, now
         return True
 

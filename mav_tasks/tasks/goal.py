@@ -234,7 +234,7 @@ def describe(goal: Goal) -> str:
         case Face(yaw=yaw):
             return f"face {degrees(yaw) % 360:.6g} deg"
         case Head(forward=forward, duration=duration):
-            return f"head {forward:g} m/s for {duration:g} s"
+            return f"drive {forward:g} m/s on a heading for {duration:g} s"
         case Wait(duration=duration):
             return f"wait {duration:g} s"
 

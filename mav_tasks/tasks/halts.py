@@ -19,7 +19,8 @@ _WORDS = {
     TaskReason.STOPPED: "STOP",
     TaskReason.TAKEOVER: "a takeover",
     TaskReason.CANCELLED: "a cancel",
-    TaskReason.RESTARTED: "a restart of the server",
+    TaskReason.CLEARED: "a clear",
+    TaskReason.RESTARTED: "a restart",
     TaskReason.FRAME_RESET: "a change of its position reference",
     TaskReason.DISARMED: "disarming",
 }

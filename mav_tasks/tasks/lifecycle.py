@@ -115,11 +115,25 @@ LOSSES = frozenset({TaskReason.LINK_LOST, TaskReason.POSITION_LOST})
 _WORDS = {
     **{reason: reason.name.lower().replace("_", " ") for reason in TaskReason},
     # reasons whose name is not what people say
-    TaskReason.FRAME_RESET: "position reference changed",
-    TaskReason.OFF_TRACK: "off track",
-    TaskReason.FAILSAFE: "failsafe of the rover",
+    TaskReason.BEHIND_OTHERS: "behind other tasks",
+    TaskReason.WAITING_FOR_START: "needs a start command",
+    TaskReason.OTHER_CONTROLLER: "another controller drives",
+    TaskReason.HELD_AHEAD: "behind a held task",
+    TaskReason.RESTARTED: "after a restart",
     TaskReason.OUTSIDE_OWN_FENCE: "outside the rover's own fence",
+    TaskReason.STOPPED: "STOP",
+    TaskReason.FAILSAFE: "rover's failsafe",
+    TaskReason.OUTCOME_UNKNOWN: "interrupted, progress unknown",
+    TaskReason.FENCE: "stopped at the fence",
+    TaskReason.LATE: "server was late",
+    TaskReason.FRAME_RESET: "position reference changed",
+    TaskReason.STOP_UNCONFIRMED: "standstill not confirmed",
+    TaskReason.REPLACED: "replaced by a newer task",
+    TaskReason.STOP: "STOP",
 }
+
+STOP_IN_FORCE = "STOP is in force"
+CONTINUE_FIRST = f"{STOP_IN_FORCE}: press Continue first"
 
 
 def words_of(reason: TaskReason) -> str:
@@ -161,7 +175,7 @@ TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
         _S.PAUSED: "operator, takeover, link or position lost",
         _S.CANCELLING: "client",
         _S.FAILED: "mode or arm refused",
-        _S.HELD: "needs a decision",
+        _S.HELD: "off track, position reference changed, server crashed",
         _S.KILLED: "STOP or kill",
     },
     _S.EXECUTING: {
@@ -169,19 +183,20 @@ TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
         _S.PAUSED: "operator, pre-empted, takeover, link or position lost",
         _S.CANCELLING: "client",
         _S.FAILED: "stuck",
-        _S.HELD: "late, off its line, frame reset",
+        _S.HELD: "off track, fence, overspeed, not standing, position reference changed,"
+        " server late, server crashed",
         _S.KILLED: "STOP or kill",
     },
     _S.PAUSED: {
-        _S.STARTING: "continued",
+        _S.STARTING: "resumed",
         _S.CANCELLING: "client",
         _S.FAILED: "time-out",
-        _S.HELD: "off its line, frame reset",
+        _S.HELD: "off track, position reference changed",
         _S.KILLED: "STOP or kill",
     },
     _S.CANCELLING: {
         _S.CANCELLED: "standing still",
-        _S.HELD: "standstill not confirmed",
+        _S.HELD: "standstill not confirmed, server crashed",
         _S.KILLED: "STOP or kill",
     },
     _S.HELD: {

@@ -29,8 +29,8 @@ R, S = TaskReason, TaskState
 #: what an operator can do about a refusal
 WAYS_OUT = {
     R.WRONG_MODE: "wrong mode, set HOLD first",
-    R.DISARMED: "disarmed; continue, or arm it",
-    R.LOSS_FAILSAFE: f"it would not stand without us, {SET_FAILSAFE}",
+    R.DISARMED: "disarmed, arm it or press Continue",
+    R.LOSS_FAILSAFE: f"it might drive on without setpoints, {SET_FAILSAFE}",
 }
 
 
@@ -221,7 +221,7 @@ class Lineup:
         """Raise Rejection, with a remedy, if a task with this goal could not start now."""
         blocker = start_blocker(seen, watch=self.settings.watch, now=now, goal=goal)
         if blocker:
-            raise Rejection(blocker, f"cannot go on: {WAYS_OUT.get(blocker, words_of(blocker))}")
+            raise Rejection(blocker, f"cannot start: {WAYS_OUT.get(blocker, words_of(blocker))}")
 
     def is_of_another_frame(self, task: Task, seen: VehicleView) -> bool:
         """Return whether a task of an earlier run has coordinates in a frame that is gone."""

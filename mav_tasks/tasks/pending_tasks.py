@@ -103,7 +103,7 @@ class PendingTasks:
             raise full(queueing.capacity)
         owner = draft.submitter.owner
         if self._of_owner.get(owner, 0) >= queueing.quota:
-            raise Rejection(R.QUOTA, f"quota: {queueing.quota} tasks of this client wait")
+            raise Rejection(R.QUOTA, f"quota: this client has {queueing.quota} waiting tasks")
         if draft.terms.after:
             self._dependencies.check(draft.terms.after)
         state = self._state_by(draft.terms, now=now)

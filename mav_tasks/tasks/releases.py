@@ -8,7 +8,7 @@ from mav_tasks.tasks.driving.mission_sequencer import goal_of, has_local_place
 from mav_tasks.tasks.driving.recovery_path import is_off_line
 from mav_tasks.tasks.events import TaskWaits, VehicleNoted
 from mav_tasks.tasks.goal import MoveTurned, Rotate
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason, TaskState, words_of
 from mav_tasks.tasks.lineup import Lineup, Released
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Task, same_frame
@@ -47,10 +47,10 @@ class Releases:
         a queue that is paused for a restart if the client ``may_continue`` it.
         """
         if self._lineup.is_stopped:
-            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+            raise Rejection(R.STOPPED, CONTINUE_FIRST)
         active = self._lineup.active
         if active is not None and active.id != task.id and active.state not in (S.HELD, S.PAUSED):
-            words = f"task {active.id} is {active.state.name.lower()}"
+            words = f"task {active.id} is {active.state.name.lower()}: release task {task.id} later"
             raise Rejection(R.WRONG_STATE, words)
         waits_for = self._waits_for(task, seen, may_continue=may_continue, now=now)
         if not waits_for:
@@ -100,7 +100,7 @@ class Releases:
     def _waits_for(
         self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
     ) -> TaskReason:
-        """Return what a released task waits for, NONE if it can go on."""
+        """Return what a released task waits for, NONE if it can start."""
         if self._lineup.paused and not (self._lineup.paused is R.RESTARTED and may_continue):
             return R.QUEUE_PAUSED
         return self._waits_for_restart(task, seen, now=now)
@@ -117,20 +117,18 @@ class Releases:
 
     def _note_held(self, task: Task, why: str, *, now: float) -> None:
         self._lineup.released = None
-        words = f"task {task.id} is on hold, release it again: {why}"
+        words = f"task {task.id} is held again: {why}. Release it again"
         self._lineup.registry.record(VehicleNoted(self._lineup.vehicle, words, now))
 
     def _check_remainder(self, task: Task, seen: VehicleView) -> None:
         """Raise Rejection unless the remainder is known, on its line or by what was counted."""
         progress = task.progress
         if task.reason is R.FRAME_RESET and has_local_place(task.goal):
-            words = (
-                f"places of task {task.id} were in a frame that is lost: run it again, or skip it"
-            )
+            words = f"the position reference of task {task.id} is lost: choose again or skip"
             raise Rejection(R.WRONG_STATE, words)
         counts_from_here = task.reason in (R.FRAME_RESET, R.OFF_TRACK)
         if not counts_from_here and seen.motion and is_off_line(task, seen.motion.pose):
-            words = f"off the line of task {task.id}: run it again from here, or skip it"
+            words = f"the rover is off the path of task {task.id}: choose again or skip"
             raise Rejection(R.OFF_TRACK, words)
         if task.reason is not R.OUTCOME_UNKNOWN or progress.anchor is None:
             return
@@ -138,5 +136,5 @@ class Releases:
         leg = leg_of(goal, progress) if isinstance(goal, Rotate | MoveTurned) else None
         turned = isinstance(leg, Rotate) and abs(leg.angle) > 3.0
         if turned or not same_frame(progress.frame, seen.frame):
-            words = f"what task {task.id} had done is not known: run it again, or skip it"
+            words = f"the progress of task {task.id} is unknown: choose again or skip"
             raise Rejection(R.WRONG_STATE, words)

@@ -62,6 +62,6 @@ class SignatureRefused:
     def __str__(self) -> str:
         when = f"{abs(self.seconds):.0f} s {'before' if self.seconds > 0 else 'after'}"
         return (
-            f"{self.actor} refused: signed {when} the time of this server. Set both clocks right;"
-            " if they are, it was held back or replayed"
+            f"packet of {self.actor} refused: signed {when} this server's time. Check both clocks;"
+            " if they are right, the packet was delayed or replayed"
         )

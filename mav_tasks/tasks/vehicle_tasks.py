@@ -15,7 +15,14 @@ from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.halts import Halts
-from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.lifecycle import (
+    CONTINUE_FIRST,
+    TAKEN,
+    WAITING,
+    TaskReason,
+    TaskState,
+    words_of,
+)
 from mav_tasks.tasks.lineup import Lineup
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
@@ -101,9 +108,9 @@ class VehicleTasks(Lineup):
         vehicle.
         """
         if self.is_stopped:
-            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+            raise Rejection(R.STOPPED, CONTINUE_FIRST)
         if self.is_held_ahead:
-            raise Rejection(R.HELD_AHEAD, "a held task must be released first")
+            raise Rejection(R.HELD_AHEAD, "release the held task first")
         self.check_start(seen, present_goal(draft.goal, Progress()), now=now)
         task = self.room.submit(draft, now=now)
         self.give_way_to(task, actor=actor, now=now)
@@ -230,8 +237,8 @@ class VehicleTasks(Lineup):
         resumes = active is not None and active.state is S.PAUSED and held is None
         if held is not None and not self.paused and not allows:
             words = (
-                f"task {held.id} is held ({words_of(held.reason)}): release it first, again,"
-                " remainder or skip"
+                f"task {held.id} is held ({words_of(held.reason)}): release it"
+                " (again, remainder or skip)"
             )
             raise Rejection(R.WRONG_STATE, words)
         if resumes:

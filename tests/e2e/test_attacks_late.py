@@ -26,7 +26,7 @@ def test_a_rover_is_not_driven_on_by_a_machine_that_was_asleep(tmp_path: Path) -
         link = running.connect()
         running.drive(link, 50.0)
         os.kill(running.server.popen.pid, signal.SIGUSR1)
-        wait_for(link, "STATUSTEXT", "'held: late' in STATUSTEXT.text", within=2)
+        wait_for(link, "STATUSTEXT", "'held: server was late' in STATUSTEXT.text", within=2)
         wait_until(lambda: running.speed() < 0.01, within=5, what="the rover to stand")
         assert "Traceback" not in running.server.text
 

@@ -109,6 +109,6 @@ def test_a_stop_that_nothing_keeps_is_said_to_everybody(tmp_path: Path) -> None:
         limit_files(running, NO_FILE_AT_ALL)
         assert command_long(link, STOP).result == 0
         for each in (link, other):
-            wait_for(each, "STATUSTEXT", "'STOP in force, but not kept' in STATUSTEXT.text")
+            wait_for(each, "STATUSTEXT", "'STOP in force but not stored' in STATUSTEXT.text")
         running.server.end(signal.SIGTERM)
     assert row_of(path, "SELECT ended_well FROM meta") == (0,)

@@ -324,7 +324,7 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
     assert done.status == 0
     (line,) = done.lines
     number = line.removeprefix("rover 1: task ")
-    why = {"pause": "operator", "stop": "stopped"}[halt]
+    why = {"pause": "operator", "stop": "STOP"}[halt]
     assert done.error == (
         f"mav-tasks: rover 1: task {number} waits: the queue is paused ({why});"
         " to resume: mav-tasks resume\n"

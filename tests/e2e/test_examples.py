@@ -54,7 +54,7 @@ def test_each_example_does_what_it_says(tmp_path: Path) -> None:
 
         (stopped,) = run("stop_button.py", url, folder=tmp_path, typed="\n")
         assert "stopped; to go on" in stopped
-        assert "paused: stopped" in mav_tasks("queue", server=url).output
+        assert "paused: STOP" in mav_tasks("queue", server=url).output
 
     assert {path.name for path in EXAMPLES.glob("*.py")} == {
         "tutorial_services.py",

@@ -271,7 +271,9 @@ def test_a_record_is_replayed_also_after_its_keys_were_revoked(
 
     without = replayed()
     assert without.status == 2
-    assert "no ring has its secret; --keys FILE names the ring of that server" in without.error
+    assert (
+        "its secret is missing; use --keys FILE with the key ring of that server" in without.error
+    )
     own = tmp_path / "mav-tasks" / "keys.toml"  # the user's own, which need not be named
     own.parent.mkdir(mode=0o700)
     own.touch(mode=0o600)

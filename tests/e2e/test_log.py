@@ -123,7 +123,7 @@ def test_what_a_rover_says_is_in_the_log_and_gives_no_orders_to_the_terminal(
         "DEBUG rover 42 says: that is all",
     ] + [line.split(" ", 1)[1] for line in lines[2:]]
     assert "\x1b" not in running.server.text
-    assert any("more in" in line for line in lines[2:])
+    assert any("(repeated" in line for line in lines[2:])
 
 
 def export(*options: str) -> tuple[int, str, str]:

@@ -109,7 +109,7 @@ def test_a_full_disk_holds_up_neither_the_task_nor_the_setpoints(tmp_path: Path)
         )
         with no_more_than(running, log.stat().st_size + 4_000):
             drive(running, 1.0)
-        running.server.wait_for(r"is written again; \d+ packets are lost", within=5)
+        running.server.wait_for(r"writing again; \d+ packets lost", within=5)
         running.server.end()
     said = running.server.text
     assert said.count("File too large: packets are lost") == 1

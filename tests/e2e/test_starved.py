@@ -91,7 +91,7 @@ def test_a_server_that_stood_still_for_5_s_sends_no_old_setpoint_and_holds_the_t
         os.kill(server, signal.SIGCONT)
         went_on_at = monotonic()
 
-        wait_for(link, "STATUSTEXT", "'held: late' in STATUSTEXT.text")
+        wait_for(link, "STATUSTEXT", "'held: server was late' in STATUSTEXT.text")
         wait_until(lambda: monotonic() - went_on_at > 2.0, within=5)
         after = [passed for passed in tap.setpoints if passed.at >= went_on_at]
         assert not any(passed.moves for passed in after)

@@ -61,10 +61,10 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
         it.ask("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
         it.wait_for("^ARMED")
         assert it.ask("long 54000 20 0 0 0 0 0 nan", TASK_SHOWN % 54000)[1] == "1"
-        running.server.wait_for("rover 1: task 1: move 20 m, priority 5")
+        running.server.wait_for("rover 1: task 1 submitted: move 20 m, priority 5")
         wait_until(lambda: running.speed() > 0.3, within=10, what="the rover at speed")
         it.ask("long 54003", TASK_SHOWN % 54003)
-        running.server.wait_for("task 1 killed: stop")
+        running.server.wait_for("task 1 killed: STOP")
         it.ask("resume", "DO_PAUSE_CONTINUE: ACCEPTED")
         if persona == "px4":
             load(it, "wp", [(3, WAYPOINT, 0.0, *place) for place in PLACES], tmp_path)
@@ -74,7 +74,7 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
             assert place(running) == pytest.approx((2.0, 0.0), abs=0.4)
         lat, lon = PLACES[1]
         it.ask(f"guided {lat + METRE} {lon} 0", "DO_REPOSITION: ACCEPTED")
-        running.server.wait_for(r"rover 1: task (\d): go to(.|\n)*task \1 executing")
+        running.server.wait_for(r"rover 1: task (\d) submitted: go to(.|\n)*task \1 executing")
         it.ask("disarm", "COMPONENT_ARM_DISARM: ACCEPTED")
         it.wait_for("^DISARMED")
         assert it.complaints(but="fence breach") == []
@@ -171,7 +171,7 @@ def stop(it: MavProxy, running: Stand) -> None:
     assert it.ask("long 54000 20", TASK_SHOWN % 54000)[1] == "1"
     wait_until(lambda: running.speed() > 0.3, within=10, what="the rover at speed")
     it.ask("long 54003", TASK_SHOWN % 54003)
-    it.wait_for("AP: Task 1 killed: stop")
+    it.wait_for("AP: Task 1 killed: STOP")
     it.wait_for_mode("HOLD")
     wait_until(lambda: running.speed() < 0.05, within=10, what="the rover standing")
     it.ask("resume", "DO_PAUSE_CONTINUE: ACCEPTED")
@@ -180,7 +180,7 @@ def stop(it: MavProxy, running: Stand) -> None:
 def plans(it: MavProxy, folder: Path) -> None:
     way = [(0, WAYPOINT, 0.0, *HOME), *((3, WAYPOINT, 0.0, *place) for place in PLACES)]
     load(it, "wp", way, folder)
-    assert "AP: Task 2 ready to be started: plan of 2 items" in it.text
+    assert "AP: Task 2 ready to start: plan of 2 items" in it.text
     it.ask("wp set 2", "DO_SET_MISSION_CURRENT: ACCEPTED")
     it.wait_for("waypoint 2")
     it.ask("wp set 1", "waypoint 1")
@@ -225,7 +225,7 @@ def tasks(it: MavProxy, running: Stand) -> None:
     assert it.ask("long 54000 0.6 0 0 0 0 0 8", TASK_SHOWN % 54000)[1] == "3"
     it.wait_for("AP: Task 3 started")
     it.ask("pause", "DO_PAUSE_CONTINUE: ACCEPTED")
-    it.wait_for("AP: Task 3 paused: operator")
+    it.wait_for("AP: Task 3 paused by")
     it.ask("long DO_PAUSE_CONTINUE 1", "DO_PAUSE_CONTINUE: ACCEPTED")
     it.wait_for("AP: Task 3 done", within=15)
     assert place(running) == pytest.approx((2.6, 0.0), abs=0.3)
@@ -240,7 +240,7 @@ def places(it: MavProxy, running: Stand) -> None:
     it.ask(f"guided {NORTH + METRE} {lon} 0", "DO_REPOSITION: DENIED")
     it.wait_for("AP: .* fence")
     it.ask("mode RTL", "RTL> ")
-    it.wait_for("AP: Task 5 begins now: return home")
+    it.wait_for("AP: Task 5 starts now: return home")
     it.wait_for("AP: Task 5 started")
     it.ask("mode HOLD", "AP: Task 5 paused: operator")
     it.wait_for_mode("HOLD")

@@ -286,4 +286,4 @@ def test_what_is_no_ground_vehicle_is_not_driven(world: World) -> None:
     world.run(0.5)
     assert [v.system_id for v in world.server.engine.snapshot(now=world.now).vehicles] == [1]
     noted = [event.text for event in world.events(VehicleNoted) if event.vehicle == 2]
-    assert noted == ["a vehicle of type 2 is no rover: not driven"]
+    assert noted == ["has vehicle type 2, not that of a rover: not driven"]

@@ -115,7 +115,7 @@ def test_after_a_restart_in_the_bend_the_rest_is_driven(
 
 def test_who_names_a_heading_reads_that_it_is_left_out(make_car: Drive) -> None:
     world = make_car(PROMPT)
-    words = "rover 1 steers as a car: it cannot choose its heading at the place"
+    words = "rover 1 steers like a car: the final heading is ignored"
     go_to(world, 3.0, 1.0, yaw=nan)
     assert not any(words in text for text in world.client.texts())
     go_to(world, 8.0, 4.0, yaw=1.0)
@@ -143,4 +143,4 @@ class TestOneOfWhichNobodyHasAProfile:
         sent = world.client.rotate(90)
         world.run(0.5)
         assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-        assert any("steers as a car" in text for text in world.client.texts())
+        assert any("steers like a car" in text for text in world.client.texts())

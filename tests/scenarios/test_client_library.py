@@ -313,7 +313,7 @@ def test_a_resume_undoes_no_halt_that_came_since_what_was_seen(world: RoverWorld
             await client.pause()
             seen = await client.queue()
             await person.pause()
-            with pytest.raises(Refused, match="since what you were shown") as refused:
+            with pytest.raises(Refused, match="after your status") as refused:
                 await client.resume(epoch=seen.halt_epoch)
             assert refused.value.reason == TaskReason.STALE
             with world.lossy_link(loss=0.3, delay=1.0):
@@ -533,7 +533,7 @@ def test_a_plan_whose_ack_is_lost_is_one_task_however_late_it_comes_again(
             task = await client.submit(plan, nonce=nonce)
             equal = await client.submit(plan)  # meant twice
             assert (task.id, another.id, equal.id) == (1, 2, 3)
-            with pytest.raises(Refused, match="used for something else"):
+            with pytest.raises(Refused, match="used for another task"):
                 await client.submit([Move(0.5), Move(0.5)], nonce=nonce)
 
     world.run(script())

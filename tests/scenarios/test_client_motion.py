@@ -250,7 +250,7 @@ class TestUnclaimed:
         world.operator_arm(True)
         world.run(1.2)
         assert self.go_to(world, flags=0) == (DENIED, R.NOT_ALLOWED)
-        assert any("ask for GUIDED first" in text for text in world.client.texts())
+        assert any("set GUIDED first" in text for text in world.client.texts())
 
     def test_takeoff_is_the_rovers_to_refuse(self, world: World) -> None:
         takes_control(world)

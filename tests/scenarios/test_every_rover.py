@@ -143,4 +143,4 @@ def test_a_task_command_must_name_its_rover_and_is_told_so_once(fleet: Fleet) ->
     assert sent.answer == (DENIED, R.BAD_PARAMETER)
     assert [source for source, _ in answers(fleet.client, MOVE)] == [(1, 191)]
     assert fleet.tasks() == ()
-    assert any("name its rover" in text for text in fleet.client.texts())
+    assert any("must name one rover" in text for text in fleet.client.texts())

@@ -33,7 +33,7 @@ def test_a_mode_that_a_failsafe_sets_is_no_person_s_takeover(driving: World) -> 
     world.fault(Faults(gps_lost=True))
     world.until(lambda: world.paused() is R.FAILSAFE, within=10)
     assert world.state(1)[0] is S.PAUSED
-    assert any("by its failsafe: " in text for text in world.client.texts())
+    assert any("set by its failsafe: " in text for text in world.client.texts())
 
 
 def test_a_person_s_mode_is_a_takeover(driving: World) -> None:

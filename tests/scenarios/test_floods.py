@@ -62,7 +62,7 @@ def test_of_a_client_s_flood_so_much_is_looked_at_and_stop_always(make_world: Ma
     assert late.ack is None
     assert stop.result == ACCEPTED
     assert served.result == ACCEPTED
-    assert "left out 50" in counts(world)
+    assert "dropped 50" in counts(world)
     world.run(2.0)
     world.client.proceed()
     again = world.client.rotate(10.0)

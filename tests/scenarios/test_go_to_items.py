@@ -82,7 +82,7 @@ def test_a_change_of_height_does_nothing_and_is_accepted(world: World) -> None:
 @pytest.mark.parametrize(
     ("message", "result", "says"),
     [
-        (go_there(1, 1, command=20), UNSUPPORTED, "item 20 is no place"),
+        (go_there(1, 1, command=20), UNSUPPORTED, "command 20 is not a place"),
         (go_there(1, 1, x=95.0), INVALID_X, "95.0"),
         (go_there(1, 1, x=inf), INVALID_X, "inf"),
         (go_there(1, 1, x=nan), INVALID_X, "not given"),

@@ -216,7 +216,7 @@ def test_only_an_operator_s_stop_clears_the_queue(with_roles: MakeRoles) -> None
     assert answer(world, observer.stop(clear=True)) == (ACCEPTED, task)
     assert world.paused() is R.STOPPED
     assert world.state(waiting.task_id)[0] is S.QUEUED
-    assert "stopped; role observer may not clear a queue, operator may" in observer.texts()
+    assert "stopped, but role observer may not clear a queue; operator may" in observer.texts()
     assert answer(world, operator.stop(clear=True)) == (ACCEPTED, 0)
     assert world.state(waiting.task_id)[0] is S.CANCELLED
 

@@ -75,4 +75,4 @@ def test_an_item_that_is_chosen_is_named_as_in_the_file(
     world.until(lambda: upload.result == 0, within=5)
     world.client.command(SET_CURRENT, len(before) + 7, target=(1, 1))
     world.run(0.2)
-    assert any("item 8: the last one is 2" in text for text in world.client.texts())
+    assert any("item 8: the last item is 2" in text for text in world.client.texts())

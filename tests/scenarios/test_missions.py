@@ -336,7 +336,7 @@ def test_what_the_rover_will_not_do_of_a_plan_is_told_and_the_plan_goes_on(world
     uploaded(world, HOME, place(1, 0), Item(PICTURE, frame=2, param4=0.0), place(1.5, 0, hold=0.1))
     start(world)
     world.until_state(1, S.COMPLETED, within=60)
-    assert "Rover 1 command 2000 of a plan: refused, result 3" in world.client.texts()
+    assert "Rover 1 refused command 2000 of the plan (result 3)" in world.client.texts()
 
 
 def test_moves_and_turns_can_be_items(world: World) -> None:
@@ -597,7 +597,7 @@ def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
     upload = Upload(direct, (place(1, 0), place(2, 0)))
     world.until(lambda: upload.result is not None, within=5)
     world.run(5)
-    words = "Rover 1 carries 2 mission items of its own: see its mission mode"
+    words = "Rover 1 has its own mission (2 items): its mission mode drives it"
     assert world.client.texts().count(words) == 1
 
 
@@ -617,7 +617,7 @@ def test_an_item_chosen_of_a_finished_plan_stays_shown_and_begins_the_next_start
     world.run(3)
     shown = {(each.seq, each.state) for each in currents(world.client)}
     assert shown == {(2, NOT_STARTED)}
-    assert world.client.texts() == ["Mission begins with item 2 when started"]
+    assert world.client.texts() == ["The mission will start with item 2"]
     assert start(world) == (ACCEPTED, 2)
     world.until_state(2, S.COMPLETED, within=60)
     assert set(reached(world.client)) == {2, 3}, "item 1 is left out"

@@ -29,7 +29,7 @@ ADDED = {
         "    MavCmd.NAV_WAYPOINT: _waypoint,\n": "    MavCmd.TASK_DOCK: _dock,\n",
     },
     "tasks/goal.py": {
-        "#: what is driven by itself": (
+        "#: a goal that drives on its own": (
             "@dataclass(frozen=True, slots=True)\nclass Dock:\n"
             '    """Drive ``distance`` metres straight on, slowly, and stand there."""\n\n'
             "    distance: float\n\n\n"

@@ -144,7 +144,7 @@ def test_a_lower_limit_slows_down_what_is_being_driven(world: World) -> None:
         (put("TSK_SPEED", 50.0), "TSK_SPEED 50: not in 0.05..10"),
         (put("TSK_SPEED", nan), "TSK_SPEED nan: not in 0.05..10"),
         (put("TSK_SPEED", 3.0), "TSK_SPEED 3 is more than TSK_SPEED_MAX 2"),
-        (put("TSK_SPEED", 1.0, type_=INT32), "TSK_SPEED: its type is REAL32"),
+        (put("TSK_SPEED", 1.0, type_=INT32), "TSK_SPEED must be sent as REAL32"),
     ],
 )
 def test_a_bad_value_changes_nothing_and_is_named(world: World, message: Any, says: str) -> None:

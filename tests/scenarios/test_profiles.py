@@ -74,16 +74,16 @@ def test_a_px4_that_was_measured_to_turn_is_turned(make_world: MakeWorld) -> Non
     assert world.client.move(-0.5)
     world.until_idle(tasks=2)
     assert near_pose(world.pose(), (0, -0.5, 90), metres=0.05)
-    assert noted(world) == ["profile of 2026-11-20 is used"]
-    assert any("profile of 2026-11-20 is used" in text for text in world.client.texts())
+    assert noted(world) == ["uses the profile of 2026-11-20"]
+    assert any("uses the profile of 2026-11-20" in text for text in world.client.texts())
 
 
 @pytest.mark.parametrize(
     ("change_of", "words"),
     [
-        ({"uid": "2"}, "profile not used: of another rover"),
-        ({"firmware": "1.14.0 99c40407"}, "profile not used: of firmware 1.14.0 99c40407"),
-        ({"autopilot": "generic"}, "profile not used: of generic"),
+        ({"uid": "2"}, "ignores the profile: it is of another rover"),
+        ({"firmware": "1.14.0 99c40407"}, "ignores the profile: it is of firmware 1.14.0 99c40407"),
+        ({"autopilot": "generic"}, "ignores the profile: it is of generic"),
     ],
 )
 def test_a_profile_of_something_else_is_told_and_not_used(
@@ -105,7 +105,7 @@ def test_of_two_of_one_rover_the_later_counts(make_world: MakeWorld) -> None:
     later = replace(PX4_PROFILE, yaw_rate="ignored", probed="2026-11-21T10:00:00Z")
     world = make_world(persona=TURNING, settings=known(later, PX4_PROFILE))
     assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    assert noted(world) == ["profile of 2026-11-21 is used"]
+    assert noted(world) == ["uses the profile of 2026-11-21"]
 
 
 def test_what_a_profile_does_not_say_stays_as_the_settings_have_it(make_world: MakeWorld) -> None:
@@ -135,7 +135,7 @@ def test_a_car_is_not_turned_on_the_spot_and_its_client_reads_why(
     sent = world.client.command(int(ask[0]), *ask[1:])
     world.run(0.3)
     assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    words = "rover 1 steers as a car and cannot turn on the spot"
+    words = "rover 1 steers like a car and cannot turn on the spot"
     assert any(words in text for text in world.client.texts())
 
 
@@ -147,7 +147,7 @@ def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
     world.until(lambda: world.truth.north > 0.5, within=20)
     change(world, known(PX4_PROFILE))
     world.run(1.1)
-    assert noted(world) == ["profile of 2026-11-20 is used"]
+    assert noted(world) == ["uses the profile of 2026-11-20"]
     assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     world.until_idle(tasks=1)
     world.run(1.1)
@@ -156,7 +156,7 @@ def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
     assert near_pose(world.pose(), (2, 0, 90), metres=0.05)
     change(world, known())
     world.run(1.1)
-    assert noted(world)[-1] == "no profile is used any more"
+    assert noted(world)[-1] == "uses no profile any more"
     assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
 
 
@@ -165,7 +165,7 @@ def test_another_rover_in_its_place_does_not_inherit_it(make_world: MakeWorld) -
     world.run(10)
     assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     world.replace_rover(switched_on=world.now - 5.0)  # its clock begins anew: it is asked again
-    world.until(lambda: "profile not used: of another rover" in noted(world), within=15)
+    world.until(lambda: "ignores the profile: it is of another rover" in noted(world), within=15)
     assert rotate(world) == (ACCEPTED, 1)
     world.until_idle(tasks=1)
 
@@ -175,7 +175,7 @@ def test_a_rover_that_was_seen_not_to_stop_by_itself_is_not_driven(make_world: M
     sent = world.client.move(1.0)
     world.run(3.0)
     assert sent.answer == (ACCEPTED, 1)
-    assert any("it does not stop by itself" in text for text in world.client.texts())
+    assert any("does not stop without setpoints" in text for text in world.client.texts())
     assert (world.rover.autopilot.armed, world.truth.north) == (False, 0.0)
 
 

@@ -173,7 +173,7 @@ class TestMovingBackwards:
         north, east = -cos(radians(heading)), -sin(radians(heading))
         assert near_pose(world.pose(), (north, east, heading), metres=0.05, angle=2)
         assert "Task 1 queued: move -1 m" in world.client.texts()
-        assert any("it turns round, drives and turns back" in t for t in world.client.texts())
+        assert any("it turns round, drives, turns back" in t for t in world.client.texts())
 
     @pytest.mark.parametrize("after", [1.5, 4.0, 7.0])
     def test_paused_in_each_part_it_goes_on_where_it_was(
@@ -379,8 +379,8 @@ class TestOneThatWouldDriveByItselfWithoutUs:
     def test_it_is_told_with_the_command_that_cures_it(self, make_world: MakeWorld) -> None:
         world = self.make(make_world)
         said = " ".join(world.client.texts())
-        assert "COM_OBL_RC_ACT is 3: Return, it drives home by itself" in said
-        assert "To make it stand: mav-tasks probe --set-failsafe" in said
+        assert "COM_OBL_RC_ACT is 3: Return, it drives home" in said
+        assert "To make it stop: mav-tasks probe --set-failsafe" in said
 
     def test_its_tasks_wait_and_say_why(self, make_world: MakeWorld) -> None:
         world = self.make(make_world)
@@ -389,7 +389,7 @@ class TestOneThatWouldDriveByItselfWithoutUs:
         assert sent.answer == (ACCEPTED, 1)
         assert world.state(1) == (S.QUEUED, R.NONE)
         assert why(world) == R.LOSS_FAILSAFE
-        assert any("waits: it would not stand without us" in t for t in world.client.texts())
+        assert any("waits: it might drive on without setpoints" in t for t in world.client.texts())
         assert not world.rover.autopilot.armed
 
     def test_what_is_to_run_at_once_is_refused(self, make_world: MakeWorld) -> None:

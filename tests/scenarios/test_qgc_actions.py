@@ -61,7 +61,7 @@ def test_what_runs_is_paused_continued_stopped_and_called_off(world: World) -> N
 
 @pytest.mark.parametrize(
     ("label", "ends"),
-    [("Held: again", S.COMPLETED), ("Held: rest", S.COMPLETED), ("Held: skip", S.CANCELLED)],
+    [("Held: again", S.COMPLETED), ("Held: remainder", S.COMPLETED), ("Held: skip", S.CANCELLED)],
 )
 def test_a_held_task_is_decided_about(world: World, label: str, ends: S) -> None:
     world.client.move(2)
@@ -81,6 +81,6 @@ def test_none_is_left_untried() -> None:
         "Cancel task",
         "STOP",
         "Held: again",
-        "Held: rest",
+        "Held: remainder",
         "Held: skip",
     }

@@ -34,7 +34,7 @@ def test_clearing_a_mission_that_is_driven_is_refused_with_a_line(world: World) 
     world.run(0.2)
     assert acks(world.client)[-1].result == 14  # DENIED
     (line,) = refusals(world)
-    assert line.startswith(f"rover 1: message {CLEAR} of 255/190")
+    assert line.startswith(f"rover 1: message {CLEAR} by 255/190")
     assert line.endswith("clear: task 1 is being driven: pause or cancel it first")
 
 
@@ -60,9 +60,9 @@ def test_what_has_no_acknowledgement_has_its_line_too(world: World) -> None:
     world.client.send(common.MAVLink_set_mode_message(1, 1, RTL))
     world.run(0.1)
     first, second = refusals(world)
-    assert f"message {SET_CURRENT} of" in first
+    assert f"message {SET_CURRENT} by" in first
     assert "item 7" in first
-    assert f"message {SET_MODE} of" in second
+    assert f"message {SET_MODE} by" in second
     assert "STOP" in second
 
 
@@ -72,7 +72,7 @@ def test_a_command_that_the_server_does_not_know_has_its_line(world: World) -> N
     assert sent.result == UNSUPPORTED
     (line,) = refusals(world)
     assert line == (
-        f"rover 1: command {SERVO} of 255/190@client refused: "
+        f"rover 1: command {SERVO} by 255/190@client refused: "
         f"command {SERVO}: not supported in this version"
     )
 
@@ -81,7 +81,7 @@ def test_a_stream_that_does_not_pass_has_one_line_in_half_a_minute(world: World)
     world.client.stream(setpoint(0.5), rate=20)
     world.run(20)
     assert len(refusals(world)) == 1
-    assert f"message {SETPOINT} of 255/190" in refusals(world)[0]
+    assert f"message {SETPOINT} by 255/190" in refusals(world)[0]
     assert "not armed" in refusals(world)[0]
     world.run(12)
     assert len(refusals(world)) == 2
@@ -104,4 +104,4 @@ def test_what_a_role_may_not_pass_on_has_its_line(make_world: MakeWorld) -> None
     world.client.send(setpoint(0.5))
     world.run(3)
     (line,) = refusals(world)
-    assert "role observer may not send that to a rover, operator may" in line
+    assert "role observer may not send this message to a rover; operator may" in line

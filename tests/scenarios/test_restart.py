@@ -172,13 +172,13 @@ def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> No
     sent = world.client.proceed()
     world.run(0.1)
     assert sent.answer == (ACCEPTED, 0), "the queue goes on when that is decided"
-    assert any("has task 1 on hold: release it" in text for text in world.client.texts())
+    assert any("has held task 1: press" in text for text in world.client.texts())
     world.run(3)
     assert (world.state(1)[0], world.stands()) == (S.HELD, True)
     again = world.client.proceed()
     world.run(0.1)
     assert again.answer == (DENIED, R.WRONG_STATE)
-    assert any("release it first" in text for text in world.client.texts())
+    assert any("release it (again" in text for text in world.client.texts())
 
 
 def test_a_turn_of_which_nobody_knows_how_far_it_came_is_not_resumed(

@@ -58,10 +58,10 @@ def test_it_is_told_what_to_do(driving: World) -> None:
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     assert world.paused() is R.RESTARTED, "nobody took it over"
     texts = world.client.texts()
-    assert "Queue paused: restarted" in texts
+    assert "Queue paused: after a restart. Press Continue" in texts
     assert (
-        "Rover 1 restarted: task 1 is on hold. Release it"
-        ' ("Held: rest", "Held: again" or "Held: skip"), then continue'
+        "Rover 1 restarted: task 1 is held. Press"
+        ' "Held: remainder", "Held: again" or "Held: skip", then Continue'
     ) in texts
 
 
@@ -87,7 +87,7 @@ def test_continue_and_release(driving: World, how: int) -> None:
     restart(world)
     where = world.pose()
     assert proceed(world).result == ACCEPTED
-    assert any("has task 1 on hold: release it" in text for text in world.client.texts())
+    assert any("has held task 1: press" in text for text in world.client.texts())
     world.run(5)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     assert near_pose(world.pose(), where), "what is held moves nothing"
@@ -135,7 +135,7 @@ def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str)
         assert proceed(world).result == ACCEPTED
     world.run(10)
     assert world.state(1)[0] is S.HELD
-    assert "Task 1 waits: no position" in world.client.texts()
+    assert "Task 1 waits: no valid position" in world.client.texts()
     world.client.request_status(1)
     world.run(0.1)
     assert world.client.statuses(1)[-1].why == (S.HELD, R.NO_POSITION)
@@ -156,7 +156,7 @@ def test_a_release_that_waits_too_long_is_to_be_given_again(
     world.until_state(1, S.HELD, within=3)
     release(world, REMAINDER)
     world.run(6)
-    assert any("task 1 is on hold, release it again" in text for text in world.client.texts())
+    assert any("task 1 is held again" in text for text in world.client.texts())
     where = world.pose()
     world.fault(Faults())
     world.run(10)
@@ -236,7 +236,7 @@ def test_nothing_to_continue_is_told_with_what_to_do(driving: World) -> None:
     proceed(world)
     world.run(4)
     assert proceed(world).answer == (DENIED, R.WRONG_STATE)
-    assert any("release it first" in text for text in world.client.texts())
+    assert any("release it (again" in text for text in world.client.texts())
 
 
 @pytest.mark.parametrize("after", [0.0, 0.3, 0.7, 1.2])

@@ -164,7 +164,7 @@ def test_its_record_is_replayed_with_the_secrets_and_only_so(
     whole = Replay(record, secrets={key.fingerprint: key.secret for key in (ROVERS, OTHER)})
     assert len(list(whole.events())) > 3
     assert whole.difference is None
-    with pytest.raises(RecordError, match=r"signed with key rovers \(.*no ring has its secret"):
+    with pytest.raises(RecordError, match=r"signed with key rovers \(.*its secret is missing"):
         list(Replay(record).events())
     wrong = Replay(
         record, secrets=dict.fromkeys((ROVERS.fingerprint, OTHER.fingerprint), b"x" * 32)

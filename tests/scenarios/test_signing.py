@@ -310,9 +310,9 @@ def test_setup_signing_with_a_known_key_has_the_server_sign(world: World) -> Non
 @pytest.mark.parametrize(
     ("secret", "setup", "words"),
     [
-        (BOB.secret, "known", "signing refused: the key is none of this server's"),
-        (ROVERS.secret, "known", "signing refused: the key is none of this server's"),
-        (ALICE.secret, "refuse", "signing refused: signing.setup says so"),
+        (BOB.secret, "known", "signing refused: this server has no such key for clients"),
+        (ROVERS.secret, "known", "signing refused: this server has no such key for clients"),
+        (ALICE.secret, "refuse", "signing refused: disabled by signing.setup"),
     ],
 )
 def test_setup_signing_brings_no_key_in(

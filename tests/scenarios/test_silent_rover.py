@@ -96,7 +96,7 @@ def test_a_server_that_has_not_heard_its_rover_yet_tells_of_its_tasks(
         with pytest.raises(Refused) as refused:
             tasks.submit(Move(1.0))
         assert refused.value.reason == TaskReason.VEHICLE_SILENT
-        assert "only STOP counts" in str(refused.value)
+        assert "only STOP works" in str(refused.value)
         with pytest.raises(Refused, match="no task 9"):
             tasks.status(9)
         with pytest.raises(Refused):

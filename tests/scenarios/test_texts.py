@@ -29,7 +29,9 @@ def test_what_is_too_much_at_once_is_counted_and_nothing_urgent_is_left_out(
     world.run(3)
     texts = listener.texts()
     queued = [text for text in texts if re.fullmatch(r"Task \d+ queued: move 1 m", text)]
-    left_out = [int(found[1]) for text in texts if (found := re.match(r"(\d+) more ", text))]
+    left_out = [
+        int(found[1]) for text in texts if (found := re.match(r"(\d+) messages dropped", text))
+    ]
     assert 10 <= len(queued) < 100
     assert len(queued) + sum(left_out) == TEXTS
     assert len(texts) == len(queued) + len(left_out)
@@ -70,7 +72,11 @@ def test_what_went_as_asked_is_no_warning(world: World) -> None:
     world.until_idle(tasks=2)
     world.run(0.2)
     said = severities(world)
-    assert {"Task 1 paused: operator", "Queue paused: operator", "Queue continued"} <= set(said)
+    assert {
+        "Task 1 paused by 255/190",
+        "Queue paused by 255/190",
+        "Queue resumed by 255/190",
+    } <= set(said)
     assert {"Task 1 cancelled", "Task 2 done", "Rover 1 found (ardupilot)"} <= set(said)
     assert set(said.values()) == {INFO}
 
@@ -85,10 +91,12 @@ def test_what_needs_a_hand_is_a_warning(world: World) -> None:
     world.client.stop()
     world.run(1)
     said = severities(world)
-    assert said["Task 1 paused: takeover"] == said["Queue paused: takeover"] == WARNING
-    assert said["STOP: nothing runs until continued"] == WARNING
-    assert said["cannot go on: wrong mode, set HOLD first"] == WARNING
-    assert said["Task 1 killed: stop"] == INFO
+    assert (
+        said["Task 1 paused: takeover"] == said["Queue paused: takeover. Press Continue"] == WARNING
+    )
+    assert said["STOP by 255/190: press Continue to resume"] == WARNING
+    assert said["cannot start: wrong mode, set HOLD first"] == WARNING
+    assert said["Task 1 killed: STOP"] == INFO
     assert NOTICE not in said.values()
 
 

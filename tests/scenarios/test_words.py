@@ -60,7 +60,7 @@ def test_a_task_that_begins_at_once_is_not_said_to_wait(world: World) -> None:
     world.until_state(1, S.EXECUTING)
     world.client.mode(RTL)
     world.run(0.3)
-    assert "Task 2 begins now: return home" in world.client.texts()
+    assert "Task 2 starts now: return home" in world.client.texts()
     texts = world.client.texts()
     assert not any("queue is paused" in text or "Continue" in text for text in texts)
 
@@ -93,7 +93,7 @@ def test_a_mode_that_is_refused_is_one_box_and_one_text_however_often_it_is_aske
         world.run(QGC_RETRY)
         results.append(sent.result)
     assert results == [TEMPORARILY_REJECTED, CANCELLED, CANCELLED]
-    assert [t for t in screen.texts() if "STOP" in t] == ["STOP is latched: continue first"]
+    assert [t for t in screen.texts() if "STOP" in t] == ["STOP is in force: press Continue first"]
     world.run(2)
     again = screen.mode(mode)
     world.run(0.2)
@@ -111,7 +111,7 @@ def test_a_set_mode_that_is_refused_is_one_text(make_world: MakeWorld, mode: int
     for _ in range(3):
         screen.send(common.MAVLink_set_mode_message(1, 157, mode))
         world.run(QGC_RETRY)
-    assert [t for t in screen.texts() if "STOP" in t] == ["STOP is latched: continue first"]
+    assert [t for t in screen.texts() if "STOP" in t] == ["STOP is in force: press Continue first"]
 
 
 def test_one_click_is_one_task_and_one_text(world: World) -> None:
@@ -139,7 +139,7 @@ class TestSummary:
         world.client.pause()
         world.run(3)
         assert said(station(world)) == {
-            "Task 1 paused, press Continue: queue paused; 1 wai": WARNING
+            "Task 1 paused, press Continue: queue paused; 1 tas": WARNING
         }
 
     def test_of_a_stop(self, world: World) -> None:
@@ -147,7 +147,7 @@ class TestSummary:
         world.client.stop()
         world.run(2)
         screen = station(world)
-        assert said(screen) == {"STOP in force, press Continue; 1 wait": WARNING}
+        assert said(screen) == {"STOP in force, press Continue; 1 task waits": WARNING}
         screen.received.clear()
         world.run(20)
         assert screen.texts() == [], "it is told once"
@@ -167,7 +167,7 @@ class TestSummary:
         screen.received.clear()
         screen.heartbeats = True
         world.run(2.5)
-        assert "STOP in force, press Continue; 1 wait" in screen.texts()
+        assert "STOP in force, press Continue; 1 task waits" in screen.texts()
 
     def test_of_a_task_that_a_killed_server_has_left(
         self, make_world: MakeWorld, tmp_path: Path

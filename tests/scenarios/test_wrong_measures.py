@@ -101,7 +101,7 @@ def test_a_wrong_heading_is_found_within_half_a_metre(
     assert world.state(1) == (S.HELD, R.OFF_TRACK)
     nothing_follows(world)
     assert way.furthest < WRONG[speed]
-    assert any("is its heading right?" in text for text in world.client.texts())
+    assert any("check its heading" in text for text in world.client.texts())
 
 
 @pytest.mark.parametrize("speed", [SLOW, FAST])

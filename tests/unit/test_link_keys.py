@@ -58,13 +58,13 @@ def test_a_key_that_is_named_must_be_there(side: str) -> None:
 
 
 def test_a_vehicles_key_is_none_of_a_clients() -> None:
-    with pytest.raises(UsageError, match="key r1 is of vehicles"):
+    with pytest.raises(UsageError, match="key r1 has role vehicle"):
         check(Links(clients=(f"{NEAR}?key=r1",)), ring(r1="vehicle"))
 
 
 def test_a_clients_key_is_none_of_a_vehicles() -> None:
     """Or who overhears what the rover is told could have it done on a link for clients."""
-    with pytest.raises(UsageError, match="key ben is of clients, safety: "):
+    with pytest.raises(UsageError, match="key ben has role safety: "):
         check(Links(vehicles=(f"{NEAR}?key=ben",)), ring(ben="safety"))
 
 

@@ -63,9 +63,9 @@ def test_an_action_of_ones_own() -> None:
         ("=54000,1", "expected LABEL=COMMAND"),
         ("Go=forward", "expected LABEL=COMMAND"),
         ("Go=70000", "expected LABEL=COMMAND"),
-        ("Go=54000,far", "'far' is no number"),
+        ("Go=54000,far", "'far' is not a number"),
         ("Go=54000,nan", "finite"),
-        ("Go=54000,1,2,3,4,5,6,7,8", "seven finite parameters at the most"),
+        ("Go=54000,1,2,3,4,5,6,7,8", "at most seven finite parameters"),
     ],
 )
 def test_a_bad_action_is_named(text: str, says: str) -> None:

@@ -507,7 +507,7 @@ def test_sighup_brings_new_settings_also_if_it_came_before(
         driving=Driving(speed=0.4, max_speed=1.0), queueing=Queueing(quota=7)
     )
     assert parameters == {"TSK_QUOTA": 7.0}
-    words = "not in force, though set before: TSK_SPEED 1.5 is more than TSK_SPEED_MAX 1"
+    words = "parameter of an earlier run ignored: TSK_SPEED 1.5 is more than TSK_SPEED_MAX 1"
     assert words in [record.getMessage() for record in caplog.records]
 
 

@@ -64,7 +64,7 @@ class Door:
     ) -> None:
         if message is None or row_of(packet.message_id, message).kind is Kind.TELL:
             return  # noise may look so, and nobody waits for an answer to a heartbeat
-        words = f"{packet.source} is an address of the server or of a rover"
+        words = f"address {packet.source} belongs to the server or a rover: use another"
         refusal = Rejection(TaskReason.NOT_ALLOWED, words)
         if isinstance(message, m.CommandLong | m.CommandInt):
             if client.may_be_refused(now=now):
@@ -81,7 +81,7 @@ class Door:
         now: float,
     ) -> None:
         rights = client.rights
-        words = f"role {rights.role} may send {rights.limits.rate:g} requests a second"
+        words = f"too many requests: role {rights.role} may send {rights.limits.rate:g} per second"
         refusal = Rejection(TaskReason.RATE_LIMITED, words)
         result = MavResult.TEMPORARILY_REJECTED
         self._refuse(client, packet, message, result, refusal, now=now)

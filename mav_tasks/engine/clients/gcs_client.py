@@ -242,7 +242,7 @@ class GcsClient:
         """Send one text for each source: the number of its dropped texts."""
         while self.left_out and self._texts.take(now=now):
             source, count = self.left_out.popitem()
-            self._say(f"{count} more messages: see the queue", MavSeverity.INFO, source)
+            self._say(f"{count} messages dropped: see mav-tasks log", MavSeverity.INFO, source)
 
     def _say(self, text: str, severity: MavSeverity, source: Address) -> None:
         self._text_id = self._text_id % 0xFFFF + 1

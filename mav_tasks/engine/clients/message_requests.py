@@ -41,9 +41,9 @@ class MessageRequests:
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         message_id, interval_us = translate.message_id_of(command), command.params[1]
         if message_id < 0:
-            raise Rejection(R.BAD_PARAMETER, f"param1 message id {command.params[0]:g} is none")
+            raise Rejection(R.BAD_PARAMETER, f"param1 {command.params[0]:g} is not a message id")
         if not isfinite(interval_us):
-            raise Rejection(R.BAD_PARAMETER, f"param2 interval {interval_us:g} is not a number")
+            raise Rejection(R.BAD_PARAMETER, f"param2 interval {interval_us:g} is not finite")
         if message_id == m.TaskStatus.id:
             client.uses_dialect = True
             interval = interval_us / 1e6 if interval_us > 0 else None
@@ -128,7 +128,7 @@ class MessageRequests:
                         now=now,
                     )
             case m.TaskTiming.id:  # needs the rover's setpoint rate
-                raise Rejection(R.VEHICLE_SILENT, f"rover {tasks.vehicle} was not heard yet")
+                raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
             case _:
                 return False
         return True

@@ -158,7 +158,7 @@ class ParameterServer:
             return
         try:
             if message.param_type != MavParamType.REAL32:
-                raise SettingError(f"{name}: its type is REAL32")
+                raise SettingError(f"{name} must be sent as REAL32")
             pending = {each.name: each.value for each in self._pending.values()}
             expected, _ = with_all(self._configured, self._kept | pending)
             changed(expected, name, value)

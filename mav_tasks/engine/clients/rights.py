@@ -48,13 +48,13 @@ class Rights(NamedTuple):
     def require(self, role: str, what: str) -> None:
         """Raise Rejection unless the client's role is this one or a higher one."""
         if RANKS[self.role] < RANKS[role]:
-            raise self.refusal(f"may not {what}, {role} may")
+            raise self.refusal(f"may not {what}; {role} may")
 
     def require_own(self, task: Task, submitter: Submitter, what: str) -> None:
         """Raise Rejection unless the task is the submitter's own, or the role reaches operator."""
         self.require(SUBMITTER, what)
         if not self.reach(OPERATOR) and task.submitter.owner != submitter.owner:
-            words = f"may not {what}: task {task.id} is of {task.submitter}"
+            words = f"may not {what}: task {task.id} belongs to {task.submitter}"
             raise self.refusal(words)
 
     def refusal(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
@@ -65,7 +65,7 @@ class Rights(NamedTuple):
         """Raise Rejection if the role may not submit tasks of this priority."""
         most = self.limits.max_priority
         if priority > most:
-            raise self.refusal(f"may not have priority {priority}, {most} at the most")
+            raise self.refusal(f"may use priority {most} at most, not {priority}")
 
     def check_preemptive(self) -> None:
         """Raise Rejection unless the role may submit pre-emptive tasks."""
@@ -83,17 +83,17 @@ class Rights(NamedTuple):
             if kind not in self.limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(self.limits.tasks)}")
         if RANKS[self.role] < RANKS[OPERATOR] and _performs(draft.goal):
-            raise self.refusal("may not send a plan with commands to the rover")
+            raise self.refusal("may not send a plan that contains rover commands")
         if draft.terms.is_preemptive:
             self.check_preemptive()
         if waiting >= self.limits.quota:
-            raise self.refusal(f"may have {self.limits.quota} tasks waiting", R.QUOTA)
+            raise self.refusal(f"may have at most {self.limits.quota} waiting tasks", R.QUOTA)
         top = self.limits.max_speed
         if top >= NO_LIMIT.max_speed:
             return draft
         fastest = _fastest(draft.goal)
         if fastest > top * SAME:
-            raise self.refusal(f"may not drive {fastest:g} m/s, {top:g} at the most")
+            raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
         return replace(draft, terms=self.bounded(draft.terms))
 
     def bounded(self, terms: Terms) -> Terms:

@@ -37,14 +37,14 @@ class SetupSigning:
     def _set_up(self, client: GcsClient, secret: bytes) -> str:
         link, peer = client.key
         if self._policy != "known":
-            return "signing.setup says so"
+            return "disabled by signing.setup"
         if not any(secret):
             if not self._signatures.takes_unsigned(link):
-                return "only signed packets are taken on this link"
+                return "this link requires signed packets"
             self._signatures.sign_to(link, peer, None)
             return ""
         key = self._signatures.key_of_secret(secret)
         if key is None or not key.role:
-            return "the key is none of this server's"
+            return "this server has no such key for clients"
         self._signatures.sign_to(link, peer, key)
         return ""

@@ -9,13 +9,13 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
-BUTTONS = "Held: rest, again or skip"  # of the actions file for QGroundControl
+BUTTONS = "Held: remainder, again or skip"  # of the actions file for QGroundControl
 
 
 def summary_of(tasks: VehicleTasks) -> str:
     """Return why a rover's tasks are stopped, and what to press; "" if they are not."""
     waiting = len(tasks.waiting)
-    wait = f"; {waiting} wait" if waiting else ""
+    wait = f"; {_waiting(waiting)}" if waiting else ""
     held = _in_state(tasks, TaskState.HELD)
     if tasks.paused is TaskReason.STOPPED:
         return f"STOP in force, press Continue{wait}"
@@ -26,8 +26,12 @@ def summary_of(tasks: VehicleTasks) -> str:
     if tasks.paused and active is not None:
         return f"Task {active.id} paused, press Continue: {why}{wait}"
     if tasks.paused and waiting:
-        return f"{waiting} tasks wait, press Continue: {why}"
+        return f"{_waiting(waiting)}, press Continue: {why}"
     return ""
+
+
+def _waiting(count: int) -> str:
+    return "1 task waits" if count == 1 else f"{count} tasks wait"
 
 
 def _in_state(tasks: VehicleTasks, state: TaskState) -> Task | None:

@@ -33,20 +33,20 @@ class Ability(NamedTuple):
     def why_no_turn(self) -> str:
         """Text: why it does not turn while it stands."""
         if self.turning is Turning.STEERED:
-            return f"{self.rover} steers as a car and cannot turn on the spot"
-        return f"{self.rover} does not turn on the spot, nor at a rate"
+            return f"{self.rover} steers like a car and cannot turn on the spot"
+        return f"{self.rover} can neither turn on the spot nor follow a yaw rate"
 
     @property
     def why_no_rate(self) -> str:
         """Text: why it does not turn at a rate."""
         if self.turning is Turning.STEERED:
-            return f"{self.rover} is steered by course and does not turn at a rate"
+            return f"{self.rover} is steered by course and cannot follow a yaw rate"
         return self.why_no_turn
 
     @property
     def why_no_reverse(self) -> str:
         """Text: why it does not reverse."""
-        return f"{self.rover} does not reverse"
+        return f"{self.rover} cannot reverse"
 
 
 def driven(goal: SingleGoal, persona: Persona, *, system_id: int) -> tuple[SingleGoal, str]:
@@ -88,10 +88,10 @@ def _turns_round(goal: SingleGoal, ability: Ability) -> bool:
 def driven_otherwise(wish: SingleGoal, ability: Ability) -> str:
     """Return a text on how a goal is driven differently than requested, or ""."""
     if _turns_round(wish, ability):
-        return f"{ability.why_no_reverse}: it turns round, drives and turns back"
+        return f"{ability.why_no_reverse}: it turns round, drives, turns back"
     if ability.turning is not Turning.STEERED or not isinstance(wish, GoTo) or wish.yaw is None:
         return ""
-    return f"{ability.rover} steers as a car: it cannot choose its heading at the place"
+    return f"{ability.rover} steers like a car: the final heading is ignored"
 
 
 def _check_rolls(goal: SingleGoal, ability: Ability) -> None:

@@ -150,7 +150,7 @@ class Commands:
             is_task_command(command.command) or command.command == MavCmd.DO_PAUSE_CONTINUE
         ):
             result, reason = result_of(R.VEHICLE_SILENT), int(R.VEHICLE_SILENT)
-            words = f"rover {system_id} was not heard yet: only STOP counts"
+            words = f"no heartbeat from rover {system_id} yet: only STOP works"
         else:
             return
         source = Address(system_id, component) if tasks is not None and component else address
@@ -171,7 +171,8 @@ class Commands:
     def _dispatch(self, asked: CommandRequest, *, now: float) -> None:
         if asked.command.target.system_id == EVERYBODY:  # others: see ``Broadcasts``
             number = asked.command.command
-            raise Rejection(R.BAD_PARAMETER, f"command {number}: name its rover, not system 0")
+            words = f"command {number} must name one rover, not system 0"
+            raise Rejection(R.BAD_PARAMETER, words)
         command, row = asked.command, asked.row
         component = command.target.component_id
         at_server = component == asked.vehicle.server_address.component_id
@@ -331,12 +332,13 @@ class Commands:
         )
         if silent:
             result, param2 = MavResult.FAILED, int(R.VEHICLE_SILENT)
-            words = ", ".join(map(str, silent))
-            client.tell(f"STOP kept: rover {words} silent", MavSeverity.ERROR, source, now=now)
+            rovers = "rover" if len(silent) == 1 else "rovers"
+            words = f"STOP in force, but {rovers} {', '.join(map(str, silent))} silent"
+            client.tell(words, MavSeverity.ERROR, source, now=now)
         else:
             result, param2 = MavResult.ACCEPTED, next((k for k in killed if k), 0)
         if is_to_clear and not clear and client.may_be_refused(now=now):
-            words = f"stopped; role {client.rights.role} may not clear a queue, {OPERATOR} may"
+            words = f"stopped, but role {client.rights.role} may not clear a queue; {OPERATOR} may"
             client.tell(words, MavSeverity.WARNING, source, now=now)
         client.answer(Answer(command.command, result, param2, source), packet.source)
 
@@ -386,4 +388,4 @@ def _is_of_what_nobody_sends(asked: CommandRequest) -> bool:
 def _check_last_item(asked: CommandRequest) -> None:
     last = whole(asked.command, 2, "last item", high=0xFFFF)
     if last:
-        raise bad(f"param2 last item {last}: a plan is driven to its end", param=2)
+        raise bad(f"param2 last item {last}: only the whole plan can run", param=2)

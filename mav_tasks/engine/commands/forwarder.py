@@ -94,11 +94,13 @@ class Forwarder:
     ) -> Rejection | None:
         """Return why a packet may go to no rover, or None if it may."""
         if not client.rights.reach(row.role):
-            return client.rights.refusal(f"may not send that to a rover, {row.role} may")
+            return client.rights.refusal(f"may not send this message to a rover; {row.role} may")
         if isinstance(message, m.FileTransferProtocol):
             is_safety = client.rights.reach(SAFETY)
             if not is_safety and self._writers.ends_anothers(message, client.key, now=now):
-                return client.rights.refusal("may not end that: somebody writes a file")
+                return client.rights.refusal(
+                    "may not end this session: another client writes a file"
+                )
             self._writers.note(message, client.key, now=now)
         return None
 
@@ -112,7 +114,10 @@ class Forwarder:
 
 def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
     """Return why a packet that the client's role may send does not go to a rover now."""
-    return why_not_sent(row, vehicle, client.key) or "not finite, or older than the server's pause"
+    return (
+        why_not_sent(row, vehicle, client.key)
+        or "a number is not finite, or a stall of the server delayed it"
+    )
 
 
 def _target(message: m.Message) -> Address:

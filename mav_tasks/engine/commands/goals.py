@@ -335,7 +335,7 @@ def _reposition(command: Command, driving: Driving) -> SingleGoal:
     radius = number(command, 3, "radius", low=-inf, high=1000.0, default=0.0)
     yaw = _yaw(command, 4, turn=tau)
     if yaw is not None and reposition_flags(command) & RELATIVE_YAW:
-        raise bad("param2 relative yaw: not supported, give it from north", param=2)
+        raise bad("param2 relative yaw is not supported, give the heading from north", param=2)
     return GoTo(_place(command), speed, max(radius, 0.0) or None, yaw)
 
 

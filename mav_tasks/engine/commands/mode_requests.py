@@ -21,7 +21,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.goal import GoTo, Plan
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
 
@@ -29,7 +29,7 @@ R = TaskReason
 
 SHOWN_FOR = 1.2  # s, in which heartbeats at 1 Hz show a mode at least once
 CRUISING = Terms(is_cruising=True)
-STOPPED = Rejection(R.STOPPED, "STOP is latched: continue first")
+STOPPED = Rejection(R.STOPPED, CONTINUE_FIRST)
 
 
 class _Started(NamedTuple):
@@ -69,7 +69,7 @@ class ModeRequests:
         main, sub = asked.command.params[1:3]
         mode = vehicle.persona.mode_in(main, sub)
         if mode is None:
-            raise Rejection(R.BAD_PARAMETER, f"param2 mode {main:g} is no mode number")
+            raise Rejection(R.BAD_PARAMETER, f"param2 {main:g} is not a mode number")
         if mode == vehicle.persona.hold_mode:
             self._submissions.held(vehicle, asked.submitter)
             paused = vehicle.joint.hold(sender=asked.sender, actor=asked.actor, now=now)

@@ -12,6 +12,7 @@ from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.services.orders import moves
+from mav_tasks.tasks.lifecycle import STOP_IN_FORCE
 
 NO_PLACE = 7  # type_mask that ignores x, y and z
 STICKS_CENTRED = 50  # of ±1000 (MANUAL_CONTROL) or µs around 1500 (RC override)
@@ -29,7 +30,7 @@ def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable, *, takes_over: bo
     if not row.passes_beside_task:
         return vehicle.motion_rights.why_no_motion(takes_over=takes_over)
     if not row.passes_under_stop and vehicle.tasks.is_stopped:
-        return "STOP is latched"
+        return STOP_IN_FORCE
     return ""
 
 

@@ -22,7 +22,7 @@ EPOCH_IN: dict[int, int] = {
 }
 REPEATED = 2.0  # s, within which MAVSDK repeats an unanswered command, unmarked: at 1.5 s
 EPOCHS = 1 << 24  # epochs that a float32 tells apart
-AGAIN = "if you still mean it, send it again in 4 s"
+AGAIN = "repeat this in 4 s if you mean it"
 
 
 def require_newer(asked: CommandRequest, *, now: float) -> None:
@@ -80,10 +80,10 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     if epoch == halts.epoch:
         return ""
     if is_old:
-        return f"it waited while the server stood still: {AGAIN}"
+        return f"delayed by a stall of the server: {AGAIN}"
     if named:
-        return f"{halts.words} came since what you were shown: look again"
-    return f"{halts.words} came since: {AGAIN}"
+        return f"{halts.words} came after your status: look again"
+    return f"{halts.words} came later: {AGAIN}"
 
 
 def has_left_before_halt(asked: CommandRequest, *, now: float, anybodys: bool = False) -> bool:

@@ -17,7 +17,7 @@ from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
 from mav_tasks.services.command_receiver import Answer
 from mav_tasks.services.command_sender import Answered, Standing
 from mav_tasks.settings import ROLES
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
 
 R = TaskReason
 
@@ -36,7 +36,7 @@ def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
     number, params = command.command, command.params
     asked.rights.require(row.role, f"send command {number} to a rover")
     if vehicle.tasks.is_stopped and not row.passes_under_stop:
-        raise Rejection(R.STOPPED, "STOP is latched: continue first")
+        raise Rejection(R.STOPPED, CONTINUE_FIRST)
     is_reposition = number == MavCmd.DO_REPOSITION
     takes_over = is_reposition and bool(reposition_flags(command) & CHANGE_MODE)
     why_not = why_not_sent(row, vehicle, asked.client.key, takes_over=takes_over)
@@ -95,7 +95,7 @@ def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -
     elif not answered.was_sent:
         reason = int(R.RATE_LIMITED)
         answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
-        words = f"command {command}: rover {vehicle.system_id} is busy, ask again"
+        words = f"command {command}: rover {vehicle.system_id} is busy, try again"
         client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
     elif command == MavCmd.REQUEST_MESSAGE:
         answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)

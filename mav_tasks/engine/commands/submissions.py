@@ -33,9 +33,9 @@ R = TaskReason
 PAUSED = {
     R.OPERATOR: "queue paused",
     R.STOPPED: "STOP in force",
-    R.TAKEOVER: "taken over",
+    R.TAKEOVER: "takeover",
     R.FAILSAFE: "failsafe",
-    R.RESTARTED: "server restarted",
+    R.RESTARTED: "after a restart",
 }
 GIVEN_UP = 3.5  # s, after which a client has stopped waiting for an answer
 NONCE = 3  # its index among the parameters
@@ -93,7 +93,7 @@ class Submissions:
         """Submit the task of a command. Raise Rejection if it is refused."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         if client.waited > GIVEN_UP:
-            words = "it waited while the server stood still: send it again"
+            words = "delayed by a stall of the server: send it again"
             raise Rejection(R.STALE, words)
         is_ours = command.command in TASK_COMMANDS
         wish = parse_command(
@@ -119,7 +119,7 @@ class Submissions:
             return
         waits = bool(vehicle.tasks.paused)  # then nothing moves before a command to continue
         if has_left_before_halt(asked, anybodys=not waits, now=now):
-            raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came since: {AGAIN}")
+            raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
         task = self.take_in(
             asked.rights,
             vehicle,
@@ -170,7 +170,7 @@ class Submissions:
         """
         self.check_open()
         if runs_now:
-            rights.require(OPERATOR, "interrupt what a rover does")
+            rights.require(OPERATOR, "run a task immediately")
         draft = rights.checked(draft, waiting=vehicle.tasks.count_of(draft.submitter))
         if ends_driving_of is not None:
             vehicle.joint.end_driving_of(ends_driving_of, now=now)
@@ -226,7 +226,7 @@ class Submissions:
         if self._is_closing:
             raise Rejection(R.RATE_LIMITED, "the server is shutting down")
         if self._store_is_away:
-            raise Rejection(R.STORE_UNAVAILABLE, "the store is away: not accepted")
+            raise Rejection(R.STORE_UNAVAILABLE, "the store is unavailable: not accepted")
 
     def _await_commit(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         self._deduplicator.remember(task, at=now, now=now)
@@ -245,12 +245,13 @@ class Submissions:
         tasks, source, goal = asked.vehicle.tasks, asked.vehicle.server_address, describe(task.goal)
         paused, is_blocked = tasks.paused, True
         if tasks.immediate == task.id:
-            words, is_blocked = f"Task {task.id} begins now: {goal}", False
+            words, is_blocked = f"Task {task.id} starts now: {goal}", False
         elif paused:  # somebody else may have paused
             words = f"Task {task.id} waits, press Continue: {PAUSED.get(paused, words_of(paused))}"
             words += f". {goal}"
         elif tasks.is_held_ahead:
-            words = f"Task {task.id} waits, press a Held button: a task is held. {goal}"
+            held = "a task" if tasks.held is None else f"task {tasks.held.id}"
+            words = f"Task {task.id} waits, press a Held button: {held} is held. {goal}"
         else:
             words, is_blocked = f"Task {task.id} queued: {goal}", False
         for client in self._gcs.clients:
@@ -266,7 +267,7 @@ class Submissions:
         self.take_back(asked.vehicle, task, now=now)
         words = "not stored in time: not accepted"
         if was_for_now:
-            words += "; tasks are paused"
+            words += "; queue paused"
         refusal = Rejection(R.STORE_UNAVAILABLE, words)
         for each in askers:
             self._registry.record(each.refuse(refusal, now=now))
@@ -296,7 +297,7 @@ class Submissions:
         if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL) and not is_other_message:
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
             state = "" if task is None else f", {task.state.name.lower()}"
-            words = f"same {what} again: still task {known.task_id}{state}"
+            words = f"repeated {what}: it is task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
 
 

@@ -78,7 +78,7 @@ class TaskControl:
         if first is not None and first.result == MavResult.ACCEPTED:
             return first.result_param2
         if first is not None:
-            words = "refused a moment ago; if you still want it, send it again"
+            words = "just refused; send it again if you mean it"
             raise Rejection(R(first.result_param2), words)
         task_id = identifier(asked.command, 1, "task", default=None)
         kill = flag(asked.command, 2, "kill")
@@ -88,7 +88,7 @@ class TaskControl:
         task = active if task_id == 0 and active is not None else self._find(asked, task_id)
         asked.rights.require_own(task, asked.submitter, "cancel")
         if asked.client.is_late and task.state is TaskState.HELD:  # other tasks would start
-            words = f"it waited while the server stood still, and task {task.id} is held since"
+            words = f"delayed by a stall of the server; task {task.id} is held now"
             raise Rejection(R.STALE, words)
         asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id
@@ -102,7 +102,8 @@ class TaskControl:
         """Release or skip a held task. A copy has no effect on a task held since the first."""
         copy = asked.receiver.answer_to_copy(asked.command, now=now)
         if copy is not None:
-            words = f"task {copy.result_param2}: that was decided a moment ago"
+            done = "skipped" if asked.command.params[1] == SKIP else "released"
+            words = f"task {copy.result_param2}: already {done}"
             asked.tell(words, MavSeverity.INFO, now=now)
             return copy.result_param2
         task_id = identifier(asked.command, 1, "task", default=None)
@@ -148,9 +149,9 @@ class TaskControl:
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
         if task.vehicle != asked.vehicle.system_id:
-            raise Rejection(R.NOT_FOUND, f"task {task_id} is one of rover {task.vehicle}")
+            raise Rejection(R.NOT_FOUND, f"task {task_id} belongs to rover {task.vehicle}")
         if task.state in TERMINAL:
-            raise Rejection(R.WRONG_STATE, f"task {task_id} is over, {_words(task)}")
+            raise Rejection(R.WRONG_STATE, f"task {task_id} has ended ({_words(task)})")
         return task
 
 
@@ -167,7 +168,8 @@ def _modified(task: Task, command: Command, *, now: float) -> Terms:
     terms = task.terms
     wanted = whole(command, 2, "property", low=1, high=max(P), default=None)
     if task.state not in WAITING and wanted in _OF_WAITING:
-        raise Rejection(R.WRONG_STATE, f"task {task.id} has begun: {P(wanted).name} is fixed")
+        words = f"task {task.id} has started: {P(wanted).name} can no longer change"
+        raise Rejection(R.WRONG_STATE, words)
     match wanted:
         case P.PRIORITY:
             return replace(
@@ -197,7 +199,7 @@ _OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
 def _label(label: str, command: Command) -> str:
     """Return the label with the piece in a command put in."""
     if command.frame is None:
-        words = "LABEL: a float is too coarse, send it as COMMAND_INT"
+        words = "LABEL must be sent as COMMAND_INT"
         raise Rejection(R.BAD_PARAMETER, words)
     offset = whole(command, 3, "byte", high=MAX_LABEL, default=None)
     x, y = int(command.params[4]), int(command.params[5])
@@ -209,6 +211,6 @@ def _label(label: str, command: Command) -> str:
 
 def _utc(command: Command) -> int:
     if command.frame is None:
-        words = "START_UTC: a float is too coarse, send it as COMMAND_INT"
+        words = "START_UTC must be sent as COMMAND_INT"
         raise Rejection(R.BAD_PARAMETER, words)
     return whole(command, 5, "UTC", low=1, high=0x7FFFFFFF, default=None)

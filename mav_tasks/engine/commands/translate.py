@@ -58,14 +58,14 @@ RESULT_OF: dict[int, MavResult] = {
 #: texts why a task waits, and what a person can do about it
 WAITS_FOR = {
     R.VEHICLE_SILENT: "the rover is silent",
-    R.OTHER_CONTROLLER: "somebody else drives",
-    R.WRONG_MODE: "wrong mode; set HOLD, then continue",
-    R.QUEUE_PAUSED: "released, and goes on when continued",
-    R.NO_POSITION: "no position",
-    R.DISARMED: "disarmed; arm, or continue",
+    R.OTHER_CONTROLLER: "another controller drives it",
+    R.WRONG_MODE: "wrong mode; set HOLD, press Continue",
+    R.QUEUE_PAUSED: "released; press Continue to start it",
+    R.NO_POSITION: "no valid position",
+    R.DISARMED: "disarmed; arm it or press Continue",
     R.NOT_READY: "the rover is not ready to arm",
     R.OUTSIDE_OWN_FENCE: "outside its own fence; drive it back by hand",
-    R.LOSS_FAILSAFE: f"it would not stand without us; {SET_FAILSAFE}",
+    R.LOSS_FAILSAFE: f"it might drive on without setpoints; {SET_FAILSAFE}",
 }
 
 #: reasons to wait or stop that somebody asked for, or that need no action: told as INFO
@@ -207,17 +207,19 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
             return event.vehicle, MavSeverity.INFO, f"Task {event.task_id} started"
         case TaskChanged(new=TaskState.COMPLETED):
             return event.vehicle, MavSeverity.INFO, f"Task {event.task_id} done"
-        case TaskChanged(
-            new=TaskState.FAILED | TaskState.HELD | TaskState.EXPIRED as new, reason=reason
-        ):
+        case TaskChanged(new=TaskState.HELD, reason=reason):
+            text = f"Task {event.task_id} held: {words_of(reason)}. Press a Held button"
+            return event.vehicle, MavSeverity.ERROR, text
+        case TaskChanged(new=TaskState.FAILED | TaskState.EXPIRED as new, reason=reason):
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(reason)}"
             return event.vehicle, MavSeverity.ERROR, text
         case TaskChanged(
             new=TaskState.KILLED | TaskState.CANCELLED as new, reason=TaskReason.CANCELLED
         ):
-            who = event.actor.partition("@")[0]  # the endpoint says nothing to people
-            text = f"Task {event.task_id} {new.name.lower()}"
-            text += "" if event.actor == SERVER else f" by {who}"
+            text = f"Task {event.task_id} {new.name.lower()}{_by(event.actor)}"
+            return event.vehicle, _severity(event.reason), text
+        case TaskChanged(new=TaskState.PAUSED, reason=TaskReason.OPERATOR):
+            text = f"Task {event.task_id} paused{_by(event.actor)}"
             return event.vehicle, _severity(event.reason), text
         case TaskChanged(new=TaskState.PAUSED | TaskState.KILLED | TaskState.CANCELLED as new):
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
@@ -227,16 +229,25 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
             text = f"Task {task_id} waits: {WAITS_FOR.get(reason) or words_of(reason)}{words}"
             return event.vehicle, _severity(reason), text
         case QueuePaused(reason=TaskReason.STOPPED):
-            return event.vehicle, MavSeverity.WARNING, "STOP: nothing runs until continued"
+            text = f"STOP{_by(event.actor)}: press Continue to resume"
+            return event.vehicle, MavSeverity.WARNING, text
+        case QueuePaused(reason=TaskReason.OPERATOR as reason):
+            return event.vehicle, _severity(reason), f"Queue paused{_by(event.actor)}"
         case QueuePaused(reason=reason):
-            return event.vehicle, _severity(reason), f"Queue paused: {words_of(reason)}"
+            text = f"Queue paused: {words_of(reason)}. Press Continue"
+            return event.vehicle, _severity(reason), text
         case QueueContinued():
-            return event.vehicle, MavSeverity.INFO, "Queue continued"
+            return event.vehicle, MavSeverity.INFO, f"Queue resumed{_by(event.actor)}"
         case VehicleSeen(text=text):
             return event.vehicle, MavSeverity.INFO, f"Rover {event.vehicle} {text}"
         case VehicleNoted(text=text):
             return event.vehicle, MavSeverity.WARNING, f"Rover {event.vehicle} {text}"
     return None
+
+
+def _by(actor: str) -> str:
+    """Return " by" and the actor without its endpoint, which says nothing to people."""
+    return "" if actor == SERVER else f" by {actor.partition('@')[0]}"
 
 
 def _severity(reason: TaskReason) -> MavSeverity:

@@ -37,11 +37,15 @@ def check_fence_item(item: Item, seq: int, *, count: int) -> None:
     elif item.command in CORNERS:
         _place(item)
         if not (3 <= item.param1 <= count and item.param1 == int(item.param1)):
-            raise bad(f"item {seq + 1}: param1 {item.param1:g} corners", param=1)
+            words = (
+                f"item {seq + 1}: param1 {item.param1:g} corners: not a whole number in 3..{count}"
+            )
+            raise bad(words, param=1)
     elif item.command in CIRCLES:
         _place(item)
         if not 0.0 <= item.param1 <= MAX_RADIUS:
-            raise bad(f"item {seq + 1}: param1 radius {item.param1:g} m", param=1)
+            words = f"item {seq + 1}: param1 radius {item.param1:g} m not in 0..{MAX_RADIUS:g}"
+            raise bad(words, param=1)
     else:
         raise _unsupported(item, seq, "a fence")
     _group(item, seq)
@@ -66,7 +70,7 @@ def fence_of(items: Sequence[Item]) -> Fence:
             if len(corners) < number or any(
                 (corner.command, corner.param1) != (item.command, item.param1) for corner in corners
             ):
-                words = f"item {seq + 1}: a polygon of {number} corners has others between them"
+                words = f"item {seq + 1}: polygon of {number} corners is incomplete or mixed"
                 raise Rejection(R.BAD_PARAMETER, words)
             places = tuple(_place(corner) for corner in corners)
             zones.append(Polygon(places, CORNERS[MavCmd(item.command)], _group(item, seq)))

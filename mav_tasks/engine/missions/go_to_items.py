@@ -80,7 +80,7 @@ class GoToItems:
                 asked.answer(MavResult.ACCEPTED)
                 return
             if message.command != MavCmd.NAV_WAYPOINT:
-                words = f"item {message.command} is no place to go to"
+                words = f"command {message.command} is not a place"
                 raise Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
             self._submissions.submit(asked, now=now)
         except Rejection as refusal:

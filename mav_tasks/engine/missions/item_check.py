@@ -75,7 +75,7 @@ class ItemCheck:
         wanted = plan_of(items, steps, has_home=self._manner.has_home, now=now)
         forbidden = self._vehicle.where.leg_over_fence(steps)
         if forbidden is not None:
-            words = f"item {wanted.plan.item_number(forbidden)}: a jump there leads over the fence"
+            words = f"item {wanted.plan.item_number(forbidden)}: a jump to it crosses the fence"
             raise Rejection(R.OUTSIDE_FENCE, words)
         return wanted
 
@@ -112,4 +112,4 @@ class ItemCheck:
             if isinstance(steps[0], GoTo):
                 break
         if self._vehicle.where.leg_over_fence(steps) is not None:
-            raise Rejection(R.OUTSIDE_FENCE, f"{name}: the way there leads over the fence")
+            raise Rejection(R.OUTSIDE_FENCE, f"{name}: the path to it crosses the fence")

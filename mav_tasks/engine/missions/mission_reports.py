@@ -141,8 +141,9 @@ class MissionReports:
         """Record plan commands that the vehicle refused or did not answer; the plan goes on."""
         for answered in vehicle.requests.take_unperformed():
             ack, command = answered.ack, answered.command
-            what = "no answer" if ack is None else f"refused, result {ack.result}"
-            words = f"command {command} of a plan: {what}"
+            words = f"did not answer command {command} of the plan"
+            if ack is not None:
+                words = f"refused command {command} of the plan (result {ack.result})"
             self._registry.record(VehicleNoted(vehicle.system_id, words, now))
 
     def _tell(self, vehicle: Vehicle, message: m.Message) -> None:

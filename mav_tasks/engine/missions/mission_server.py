@@ -134,7 +134,7 @@ class MissionServers:
         match message:
             case m.MissionCount() if message.mission_type not in STORED:
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
-                words = f"upload: plans of kind {message.mission_type} are not supported"
+                words = f"upload: mission type {message.mission_type} is not supported"
                 unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
                 self._uploads.refused(sender, vehicle, unknown, now=now)
             case m.MissionCount():

@@ -148,7 +148,7 @@ class MissionUploads:
     def _check_not_begun(self, vehicle: Vehicle) -> None:
         task = self._plans.task(vehicle)
         if task is not None and task.state in ACTIVE:
-            raise Rejection(R.NOT_ALLOWED, f"task {task.id} has begun: cancel it first")
+            raise Rejection(R.NOT_ALLOWED, f"task {task.id} has started: cancel it first")
 
     def _is_nothing(self, vehicle: Vehicle, upload: Upload) -> bool:
         """Whether a mission is empty: no item, or only ArduPilot's home item."""
@@ -172,7 +172,7 @@ class MissionUploads:
         if known is not None:
             desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=known, now=now)
             self.flush(desk, vehicle, now=now)
-            words = f"same plan again: still task {known}"
+            words = f"repeated plan: it is task {known}"
             self._answers.tell(sender, vehicle, words, now=now)
             return
         halts = vehicle.tasks.halts
@@ -200,7 +200,7 @@ class MissionUploads:
             self._plans.end(vehicle, replaced, R.REPLACED, actor=str(sender.address), now=now)
         if task.terms.is_staged:
             self._plans.begin_at(vehicle, 0)
-        what = "ready to be started" if task.terms.is_staged else "queued"
+        what = "ready to start" if task.terms.is_staged else "queued"
         words = f"Task {task.id} {what}: {describe(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
@@ -247,7 +247,7 @@ class MissionUploads:
 
     def _undo_kept(self, kept: _Kept, *, now: float) -> None:
         self._plans.keep(kept.vehicle, kept.kind, kept.before, actor=kept.actor, now=now)
-        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: as it was before")
+        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: nothing changed")
         self._refuse(kept.desk, kept.vehicle, refusal, now=now)
 
     def _refuse(

@@ -154,7 +154,7 @@ def plan_of(
     plan = Plan(steps, packed(items), has_home=has_home, has_options=has_options)
     loop = loops_in_vain(plan)
     if loop is not None:
-        words = f"item {plan.item_number(loop)}: a loop in which nothing is driven"
+        words = f"item {plan.item_number(loop)}: a loop without motion"
         raise Rejection(R.BAD_PARAMETER, words)
     return ParsedMission(plan, _terms_of(items, now=now), _nonce_of(items))
 
@@ -265,7 +265,7 @@ def _speed(command: Command, _count: int, driving: Driving) -> Step:
 def _own(command: Command, driving: Driving) -> Step:
     for index, name in ((5, "run after"), (6, "start delay")):
         if command.params[index - 1] not in HERE:
-            raise bad(f"param{index} {name}: not within a plan, see TASK_OPTIONS", param=index)
+            raise bad(f"param{index} {name}: not in a plan item, use TASK_OPTIONS", param=index)
     return goal_of(command, driving)
 
 

@@ -20,7 +20,15 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of
-from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.lifecycle import (
+    ACTIVE,
+    CONTINUE_FIRST,
+    TERMINAL,
+    WAITING,
+    TaskReason,
+    TaskState,
+    words_of,
+)
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
@@ -136,9 +144,9 @@ class Plans:
         """Raise Rejection unless a client may start the vehicle's plans, or jump in them."""
         rights.require(SUBMITTER, "start a plan")
         if vehicle.tasks.paused:
-            rights.require(OPERATOR, "start a plan while tasks are paused")
+            rights.require(OPERATOR, "start a plan in a paused queue")
         if vehicle.armed and vehicle.parts.is_manual:
-            rights.require(OPERATOR, "end driving by hand")
+            rights.require(OPERATOR, "end manual control")
         for task in (vehicle.tasks.active, self.task(vehicle)):
             if task is not None and isinstance(task.goal, Plan):
                 rights.require_own(task, submitter, "start that plan")
@@ -152,7 +160,7 @@ class Plans:
         ``restarted``. Raise Rejection if there is nothing to start, or it must not start now.
         """
         if vehicle.tasks.is_stopped:
-            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+            raise Rejection(R.STOPPED, CONTINUE_FIRST)
         self._check_queue(vehicle)
         vehicle.parts.check_not_manual(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
@@ -169,7 +177,7 @@ class Plans:
         if not stored.items:
             raise Rejection(R.NOT_FOUND, "no plan is uploaded")
         if first >= len(stored.items):
-            words = f"param1 first item {first}: there are {len(stored.items)}"
+            words = f"param1 first item {first}: the plan has {len(stored.items)} items"
             raise Rejection(R.BAD_PARAMETER, words, param=1)
         if task is not None and self._is_started_again(vehicle, submitter, task, now=now):
             return task
@@ -187,7 +195,7 @@ class Plans:
         """Raise Rejection if the queue is paused for another reason than an operator's pause."""
         paused = vehicle.tasks.paused
         if paused and paused is not R.OPERATOR:
-            words = f"paused, {words_of(paused)}: continue first"
+            words = f"queue paused ({words_of(paused)}): press Continue first"
             raise Rejection(R.QUEUE_PAUSED, words)
         task = self.task(vehicle)
         if task is not None and task.state is S.HELD:
@@ -263,7 +271,7 @@ class Plans:
         if seq >= count:
             has_home = self._has_home(vehicle)
             number, last = (number_of(n, has_home=has_home) for n in (seq, count - 1))
-            raise Rejection(R.BAD_PARAMETER, f"item {number}: the last one is {last}", param=1)
+            raise Rejection(R.BAD_PARAMETER, f"item {number}: the last item is {last}", param=1)
         if task is None or task.state in TERMINAL:
             self.begin_at(vehicle, seq)
             return None
@@ -273,7 +281,7 @@ class Plans:
     def begins_with(self, vehicle: Vehicle, seq: int) -> str:
         """Return the text to a client that chose the item at which the next start begins."""
         number = number_of(seq, has_home=self._has_home(vehicle))
-        return f"Mission begins with item {number} when started"
+        return f"The mission will start with item {number}"
 
     def _has_home(self, vehicle: Vehicle) -> bool:
         task = self.shown(vehicle)

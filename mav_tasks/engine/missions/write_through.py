@@ -49,10 +49,10 @@ class WriteThrough:
             if result in (MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED):
                 go_on(now=now)
             elif result is None:
-                words = f"rover {vehicle.system_id} does not answer: not stored"
+                words = f"rover {vehicle.system_id} did not answer: not stored"
                 refuse(Rejection(R.VEHICLE_SILENT, words), now=now)
             else:
-                words = f"rover {vehicle.system_id} refuses it: {result.name}"
+                words = f"rover {vehicle.system_id} refused it: {result.name}"
                 refuse(Rejection(R.NOT_ALLOWED, words), now=now)
 
         vehicle.requests.write_plan(kind, items, done, now=now)

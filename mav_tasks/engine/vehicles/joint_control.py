@@ -18,7 +18,7 @@ from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import Address
-from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
+from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, RUNNING, TaskReason
 from mav_tasks.tasks.task import Draft, Task, TaskId
 from mav_tasks.tasks.view import VehicleView
 
@@ -100,7 +100,7 @@ class JointControl:
 
     def sticks_moved(self, *, now: float) -> None:
         """Let go: a client sends manual control input."""
-        word = Word(R.TAKEOVER, self._parts.actor, "driven by hand")
+        word = Word(R.TAKEOVER, self._parts.actor, "manual control")
         self.on(Event.DRIVEN_BY_HAND, word, now=now)
 
     def check_late(self, *, now: float) -> None:
@@ -241,7 +241,7 @@ class JointControl:
         def ask() -> None:
             authority.client_asks(mode, client, present_mode=present_mode, now=now)
 
-        text = f"client asks for {persona.mode_name(mode)}"
+        text = f"a client asked for {persona.mode_name(mode)}"
         self.on(event, Word(R.TAKEOVER, parts.actor, text, do=ask), now=now)
 
     def arm(self, *, now: float) -> None:
@@ -274,7 +274,7 @@ class JointControl:
         Raise Rejection under STOP, and while a person drives.
         """
         if self._parts.tasks.is_stopped:
-            raise Rejection(R.STOPPED, "STOP is latched: continue first")
+            raise Rejection(R.STOPPED, CONTINUE_FIRST)
         self._parts.check_not_manual(now=now)
         self.end_driving_of(client, now=now)
         self.on(Event.LANDED, Word(), now=now)

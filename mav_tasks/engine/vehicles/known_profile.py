@@ -42,7 +42,7 @@ class KnownProfile:
     def why_drives_on(self) -> str:
         """Why it would not stop when setpoints end, in words; "" if it stops or is unknown."""
         is_off = self.chosen is not None and self.chosen.loss_stop == "no"
-        return "its profile says that it does not stop by itself" if is_off else ""
+        return "its profile says that it does not stop without setpoints" if is_off else ""
 
     def identify(self, identity: VehicleIdentity) -> None:
         """Note the identity of the vehicle."""
@@ -60,7 +60,7 @@ class KnownProfile:
         if words == self._told:
             return ""
         self._told = words
-        return words or "no profile is used any more"
+        return words or "uses no profile any more"
 
     def _read_as_known(self) -> Persona:
         known = "" if self.chosen is None else self.chosen.yaw_rate
@@ -86,17 +86,17 @@ class KnownProfile:
 
     def _words(self) -> str:
         if self.chosen is not None:
-            words = f"profile of {self.chosen.probed[:10]} is used"
-            return f"{words}: it does not stop by itself" if self.why_drives_on else words
+            words = f"uses the profile of {self.chosen.probed[:10]}"
+            return f"{words}: does not stop without setpoints" if self.why_drives_on else words
         if self._identity is None or not self._profiles:
             return ""
         latest = max(self._profiles, key=lambda each: each.probed)
-        return f"profile not used: {self._why_not(latest)}"
+        return f"ignores the profile: it is {self._why_not(latest)}"
 
     def _why_not(self, profile: VehicleProfile) -> str:
         identity = self._identity
         if identity is None:
-            return "the rover has not said which one it is"
+            return "of a rover that has not reported its identity"
         if profile.autopilot != self._by_default.name:
             return f"of {profile.autopilot or 'no autopilot'}"
         if profile.uid != identity.uid:

@@ -52,12 +52,12 @@ class LinkBudget:
             size = len(packet.raw) + _size_of_answer(message)
             may_ask = self._of(who, now=now).take(tokens=size, now=now)
             may_ask = may_ask and self._questions.take(tokens=size, now=now)
-            return None if may_ask else "may ask so much, and no more, over a narrow link"
+            return None if may_ask else "may not send so many requests over a slow link"
         takes = LIST / (LIST_SHARE * self._carries)
         if is_driven and takes > SLOW_LIST:
-            return "may not ask for a list over a narrow link while a task drives"
+            return "may not ask for a list over a slow link during a task"
         if now < self._listed_until:
-            return "may ask for one list at a time over a narrow link"
+            return "may ask for only one list at a time over a slow link"
         self._listed_until = now + takes
         return None
 

@@ -128,7 +128,9 @@ class MotionGuard:
         if step is Step.HOLD:
             return [Found(Measure.HOLD)]
         if step is Step.DISARM and told.armed:
-            return [Found(Measure.DISARM, f"moves in HOLD, {speed or 0.0:.1f} m/s: disarmed")]
+            return [
+                Found(Measure.DISARM, f"still moves in HOLD ({speed or 0.0:.1f} m/s): disarmed")
+            ]
         ends = told.is_stopping or (told.rolls_out and not told.goes_on)
         if ends and speed is not None and speed < NEARLY_STANDS:
             return [Found(Measure.HOLD_NOW)]
@@ -140,7 +142,7 @@ class MotionGuard:
         most = self._overspeed.look(asked, min(speed or 0.0, reported), now=now)
         if most is None:
             return ""
-        return f"drives {speed:.1f} m/s, asked for {most:.1f}: stopped. Is a stick off its centre?"
+        return f"drives {speed:.1f} m/s instead of {most:.1f}: stopped. Is a stick off centre?"
 
     def _speed(self, *, now: float) -> float | None:
         """Return the speed by displacement, m/s, or None without fresh data."""

@@ -4,6 +4,7 @@ from collections.abc import Hashable
 
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.services.phase import Phase
+from mav_tasks.tasks.lifecycle import STOP_IN_FORCE
 
 
 class MotionRights:
@@ -25,11 +26,11 @@ class MotionRights:
         if why_not:
             return why_not
         if parts.tasks.is_driving:  # also one that is paused
-            return "not while tasks drive"
+            return "not during a task"
         if not parts.monitor.armed:
             return "the rover is not armed"
         if not takes_over and not parts.authority.has_granted(client):
-            return f"ask for {parts.persona.mode_name(parts.persona.control_mode)} first"
+            return f"set {parts.persona.mode_name(parts.persona.control_mode)} first"
         return ""
 
     def why_no_motion(self, *, takes_over: bool = False) -> str:
@@ -39,12 +40,12 @@ class MotionRights:
         """
         parts = self._parts
         if parts.tasks.is_stopped:
-            return "STOP is latched"
+            return STOP_IN_FORCE
         is_handed_over = takes_over and parts.control.phase is Phase.RELEASING
         if parts.control.is_engaged and not is_handed_over:
-            return "not while tasks drive"
+            return "not during a task"
         if parts.control.awaits_mode:
-            return "HOLD is being asked for"
+            return "the server is setting HOLD"
         return ""
 
     def withheld(self, client: Hashable, *, now: float) -> None:

@@ -114,9 +114,9 @@ class Parts:
         if not (self.monitor.armed and self.is_manual):
             return
         if self.is_driven_by_others(now=now):
-            raise Rejection(TaskReason.OTHER_CONTROLLER, "somebody is at the sticks")
+            raise Rejection(TaskReason.OTHER_CONTROLLER, "the rover is under manual control")
         if not self.where.motion.is_still(now=now):
-            raise Rejection(TaskReason.WRONG_MODE, "driven by hand: it must stand first")
+            raise Rejection(TaskReason.WRONG_MODE, "under manual control and moving: stop it first")
 
     def view(self, *, drives_on: bool, now: float) -> VehicleView:
         """Return a snapshot of the vehicle for the task domain.

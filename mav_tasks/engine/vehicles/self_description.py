@@ -49,7 +49,7 @@ class SelfDescription:
         items = total if total not in NO_MISSION else 0
         if items and items != self._own_items and self._parts.settings.claim:
             self._parts.note(
-                f"carries {items} mission items of its own: see its mission mode", now=now
+                f"has its own mission ({items} items): its mission mode drives it", now=now
             )
         self._own_items = items
 
@@ -66,7 +66,9 @@ class SelfDescription:
         if turning.turning is not before:
             self._use_profile(now=now)
         if turning.turning is Turning.STEERED is not before:
-            self._parts.registry.record(VehicleSeen(self._parts.system_id, "steers as a car", now))
+            self._parts.registry.record(
+                VehicleSeen(self._parts.system_id, "steers like a car", now)
+            )
 
     def look(self, *, now: float) -> None:
         """Report and apply what has changed; called with each heartbeat."""
@@ -77,7 +79,7 @@ class SelfDescription:
         failsafe = self._parts.requests.loss_failsafe
         news = failsafe.take_news()
         if news and failsafe.why_off:
-            news = f"{news}. To make it stand: {SET_FAILSAFE}"
+            news = f"{news}. To make it stop: {SET_FAILSAFE}"
         if news and (failsafe.is_unknown or failsafe.why_off):
             self._parts.note(news, now=now)
         elif news:

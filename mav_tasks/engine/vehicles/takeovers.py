@@ -50,8 +50,8 @@ class Takeovers:
         # taken it, our set-points had ended before.
         is_lost = persona.has_loss_failsafe and mode == persona.hold_mode and not is_taken
         words = (
-            f"is in {persona.mode_name(mode)}, by its failsafe or by somebody, and is left to it:"
-            " HOLD stops it, then release its task"
+            f"is in {persona.mode_name(mode)} (failsafe or a person): not touched."
+            " Set HOLD to stop it, then release its task"
         )
         if halt is not None:
             self._may_show_until = halt.at + SHOWN_LATE
@@ -85,15 +85,15 @@ class Takeovers:
         ours = parts.control.arming_asked_at
         if armed and parts.armings.are_older(ours=ours, now=now):
             words = (
-                "is armed by a word from before it was to be disarmed: disarmed again;"
-                " to arm it, try again in 5 s"
+                "was armed by a command older than the disarming: disarmed again."
+                " Arm it in 5 s if you mean it"
             )
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
         self.look_at_motion(now=now)
         by_hand = not parts.persona.manual_modes.isdisjoint((was_mode, mode))
         by_client = parts.armings.are_by_client(now=now)
         if armed and by_hand and not by_client and parts.control.is_asking_mode:
-            self._taken(Event.TAKEN, "armed to be driven by hand", now=now)
+            self._taken(Event.TAKEN, "armed in a manual mode", now=now)
         self._shows_restart = False
         self._note_rest(now=now)
         self._note_others(now=now)
@@ -101,7 +101,7 @@ class Takeovers:
     def look_at_motion(self, *, now: float) -> None:
         """Detect that it drives to a place that it was sent to before a halt."""
         if now - self._parts.tasks.halts.at <= SHOWN_LATE and self._moves_late(now=now):
-            words = "moves in HOLD, by a word from before it was to stand: HOLD again"
+            words = "moves in HOLD because of an older command: HOLD sent again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
 
     def heard_again(self, *, now: float) -> None:
@@ -128,7 +128,7 @@ class Takeovers:
                 parts.authority.restarted(was_allowed=parts.authority.may_arm)
             held, words = parts.tasks.held, "restarted"
             if held is not None:
-                words += f": task {held.id} is on hold. Release it ({BUTTONS}), then continue"
+                words += f": task {held.id} is held. Press {BUTTONS}, then Continue"
             parts.note(words, now=now)
 
         self._joint.on(Event.REBOOTED, Word(R.FRAME_RESET, text="restarted", do=restart), now=now)
@@ -147,7 +147,7 @@ class Takeovers:
             words = "is inside its own fence again"
             parts.registry.record(VehicleSeen(parts.system_id, words, now))
         if news.cause and parts.tasks.paused is R.TAKEOVER:
-            words = f"was taken by its failsafe: {news.cause}"
+            words = f"was taken over by its failsafe: {news.cause}"
             self._joint.on(Event.EXPLAINED, Word(R.FAILSAFE, parts.actor, words), now=now)
 
     def _taken(
@@ -168,7 +168,7 @@ class Takeovers:
         elif self._shows_restart:
             pass  # a restart, which its clock has shown before: nobody changed the mode
         elif is_late:
-            words = f"shows {persona.mode_name(mode)}, asked for before it was to stand: HOLD again"
+            words = f"shows {persona.mode_name(mode)} because of an older command: HOLD sent again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         elif not ours and was_mode != persona.booting_mode:
             what = f"mode is {persona.mode_name(mode)}"
@@ -176,7 +176,7 @@ class Takeovers:
             lapses = control.is_streaming and mode == persona.hold_mode
             event = Event.LAPSED if lapses else Event.MODE
             if cause:
-                what = f"{what}, by its failsafe: {cause}"
+                what = f"{what}, set by its failsafe: {cause}"
                 self._taken(event, what, reason=R.FAILSAFE, now=now)
             else:
                 self._taken(event, what, now=now)

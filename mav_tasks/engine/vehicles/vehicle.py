@@ -233,7 +233,7 @@ class Vehicle:
     def _look_at_frame(self, *, now: float) -> None:
         if self.where.frame.changed:
             self.where.frame.changed = False
-            self.parts.note("has another origin", now=now)
+            self.parts.note("changed the origin of its local frame", now=now)
             self.tasks.hold(TaskReason.FRAME_RESET, now=now)
 
     def _receive_heartbeat(self, heartbeat: m.Heartbeat, *, now: float) -> None:
@@ -274,7 +274,9 @@ class Vehicle:
         before = self.server_component
         if component_id not in self.components and self.components.note(component_id):
             self.server_address = self.components.server
-            words = f"component {before} is its own; tasks are at {self.server_component}"
+            words = (
+                f"has its own component {before}; send tasks to component {self.server_component}"
+            )
             self.parts.note(words, now=now)
 
     def relay(

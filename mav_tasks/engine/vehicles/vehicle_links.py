@@ -154,11 +154,13 @@ class VehicleLinks:
         is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
         old = self.router.place_of(vehicle.system_id)
         if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
-            words = f"one of this id at {peer} has no key, this one had: ignored"
+            words = f"ignored a rover with its id at {peer}: that link has no key"
             self._note_once(vehicle.system_id, words, now=now)
             return False
         if is_another or (old not in self._left and vehicle.is_heard(now=now)):
-            self._note_once(vehicle.system_id, f"another of this id at {peer}: ignored", now=now)
+            self._note_once(
+                vehicle.system_id, f"ignored another rover with its id at {peer}", now=now
+            )
             return False
         outlets, may_arm = self._links[link].outlets, self.may_arm(link)
         if peer not in outlets and len(outlets) >= MAX_PEERS:
@@ -167,7 +169,7 @@ class VehicleLinks:
         vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
         self.learn(vehicle.system_id, (link, peer))
         self._forget_if_empty(old)
-        self._registry.record(VehicleSeen(vehicle.system_id, f"is at {peer} now", now))
+        self._registry.record(VehicleSeen(vehicle.system_id, f"is now at {peer}", now))
         return True
 
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:

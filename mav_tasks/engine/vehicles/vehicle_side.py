@@ -177,7 +177,8 @@ class VehicleSide:
             ids = ", ".join(str(task.id) for task in theirs[:MOST_NAMED])
             more = f" and {len(theirs) - MOST_NAMED} more" if len(theirs) > MOST_NAMED else ""
             words = (
-                f"is paused: key {names} counts no more. Cancel its tasks {ids}{more}, or continue"
+                f"is paused: key {names} is no longer valid."
+                f" Cancel its tasks {ids}{more}, or press Continue"
             )
             self._registry.record(VehicleNoted(tasks.vehicle, words, now))
             vehicle = self.get(tasks.vehicle)
@@ -294,7 +295,7 @@ class VehicleSide:
         if packet.system_id in (0, self.our_address.system_id):
             return None  # 0 addresses every vehicle, and our own id belongs to no vehicle
         if heartbeat.type not in DRIVEN:  # other types give the mode numbers other meanings
-            words = f"a vehicle of type {heartbeat.type} is no rover: not driven"
+            words = f"has vehicle type {heartbeat.type}, not that of a rover: not driven"
             self._note_once(packet.system_id, words, now=now)
             return None
         honours = self._settings.yaw_rate == "honoured"
@@ -302,7 +303,7 @@ class VehicleSide:
         if persona is None:
             self._note_once(
                 packet.system_id,
-                f"autopilot {heartbeat.autopilot} is not supported in this version",
+                f"has autopilot type {heartbeat.autopilot}, which is not supported: not driven",
                 now=now,
             )
             return None

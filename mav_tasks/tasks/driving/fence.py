@@ -63,13 +63,12 @@ def check(fence: Fence) -> str | None:
         match zone:
             case Polygon(corners=corners):
                 if len(corners) < MIN_CORNERS:
-                    has = "1 corner" if len(corners) == 1 else f"{len(corners)} corners"
-                    return f"a polygon has {has}, at least {MIN_CORNERS} are needed"
+                    return f"a polygon needs at least {MIN_CORNERS} corners, not {len(corners)}"
                 if not _has_area(corners):
                     return "a polygon has no area"
             case Circle(radius=radius):
                 if not 0 < radius < inf:
-                    return f"a circle's radius is {radius:g} m"
+                    return f"a circle needs a positive radius, not {radius:g} m"
     return None
 
 

@@ -57,7 +57,7 @@ class Follows:
         if self._is_said or now - self._since < SAID_AFTER:
             return ""
         self._is_said = True
-        return f"asked for {speed:.1f} m/s, stands: look at its brake, speed gains, least speed"
+        return f"does not move (told {speed:.1f} m/s): check brake, speed gains, minimum speed"
 
 
 class StuckWatch:

@@ -39,7 +39,7 @@ def test_an_observer_does_not_end_what_somebody_writes(world: World) -> None:
     request(observer, TERMINATE)
     world.run(0.2)
     assert FILE_TRANSFER not in passed
-    assert any("somebody writes a file" in text for text in refusals(world))
+    assert any("another client writes a file" in text for text in refusals(world))
 
 
 @pytest.mark.parametrize("why", ["it has ended", "it was given up", "nobody writes"])

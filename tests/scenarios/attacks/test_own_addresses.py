@@ -71,7 +71,9 @@ def test_nothing_is_done_for_who_calls_itself_the_server_or_a_rover(
     assert (world.tasks(), world.paused()) == ((), R.NONE)
     assert len(of_source(world, source)) == reached
     refused = [
-        event for event in world.events(SubmissionRefused) if "is an address of" in str(event)
+        event
+        for event in world.events(SubmissionRefused)
+        if "belongs to the server or a rover" in str(event)
     ]
     assert len(refused) == 1
 

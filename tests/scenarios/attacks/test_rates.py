@@ -235,7 +235,7 @@ def test_an_observers_parameter_list_does_not_fill_the_radio_of_a_rover_that_dri
     list_of(observer)
     world.run(1.0)
     assert lists_towards(meter) == 0
-    assert any("narrow" in text for text in observer.texts()), observer.texts()
+    assert any("slow link" in text for text in observer.texts()), observer.texts()
     list_of(operator)
     world.run(1.0)
     assert lists_towards(meter) == 1

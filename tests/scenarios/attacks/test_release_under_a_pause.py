@@ -41,7 +41,7 @@ def test_it_waits_for_the_continue_and_then_goes_on(world: World, how: str) -> N
     assert released.answer == (ACCEPTED, 1)
     assert world.pose() == pytest.approx(before, abs=0.001)
     assert world.state(1)[0] is S.HELD
-    assert "Task 1 waits: released, and goes on when continued" in world.client.texts()
+    assert "Task 1 waits: released; press Continue to start it" in world.client.texts()
     world.client.proceed()
     world.until_state(1, S.EXECUTING, within=5)
 

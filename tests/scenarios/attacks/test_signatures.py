@@ -182,7 +182,9 @@ def test_a_task_of_a_revoked_key_drives_no_further(world: World) -> None:
     assert world.stands()
     assert world.state(driven.task_id) == (S.PAUSED, R.OPERATOR)
     assert world.state(waiting.task_id)[0] is S.QUEUED
-    told = "Rover 1 is paused: key alice counts no more. Cancel its tasks 1, 2, or continue"
+    told = (
+        "Rover 1 is paused: key alice is no longer valid. Cancel its tasks 1, 2, or press Continue"
+    )
     assert told in operator.texts()
     operator.proceed()
     world.until(lambda: world.state(driven.task_id)[0] is S.EXECUTING, within=10)

@@ -88,7 +88,7 @@ def test_a_slow_submitter_keeps_no_operator_s_mission_out(
     assert result(world, Upload(operator, PLAN, target=target)) == MISSION_ACCEPTED
     (displaced,) = slow.acks
     assert displaced[1] == MISSION_DENIED
-    assert any("a client with more rights uploads instead" in text for text in submitter.texts())
+    assert any("a client with a higher role is uploading" in text for text in submitter.texts())
     assert [task.submitter.system_id for task in world.tasks()] == [12]
 
 
@@ -106,7 +106,7 @@ def test_a_lower_role_displaces_nobody(world: World) -> None:
     world.run(3.0)
     submitter = join(world, 10)
     assert result(world, Upload(submitter, PLAN)) == MISSION_DENIED
-    assert any("another client is at it" in text for text in submitter.texts())
+    assert any("another client is uploading" in text for text in submitter.texts())
     assert not slow.acks
 
 
@@ -118,6 +118,6 @@ def test_an_upload_that_is_slow_for_ever_ends(world: World) -> None:
     world.until(lambda: slow.acks, within=90)
     ended, how = slow.acks[0]
     assert (how, 70 < ended - began < 85) == (CANCELLED, True)
-    assert any("it took more than 60 s" in text for text in slow.client.texts())
+    assert any("took more than 60 s" in text for text in slow.client.texts())
     assert result(world, Upload(waiting, PLAN)) == MISSION_ACCEPTED
     assert [task.submitter.system_id for task in world.tasks()] == [11]

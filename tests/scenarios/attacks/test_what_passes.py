@@ -83,7 +83,7 @@ def test_a_command_that_does_more_than_move_is_of_safety_alone(
     sent = client.command(number, 1, target=(1, component))
     world.run(0.6)
     assert sent.answer == NOT_ALLOWED
-    assert f"role operator may not send command {number} to a rover, safety may" in client.texts()
+    assert f"role operator may not send command {number} to a rover; safety may" in client.texts()
     assert number not in passed
     world.client.command(number, 1, target=(1, component))
     world.run(0.2)
@@ -116,7 +116,7 @@ def test_nobody_tests_or_services_a_rover_that_a_task_drives(
     sent = world.client.command(number, 1, target=(1, component))
     world.run(0.6)
     assert sent.answer == NOT_ALLOWED
-    assert f"command {number}: not while tasks drive" in world.client.texts()
+    assert f"command {number}: not during a task" in world.client.texts()
     assert number not in passed
     assert world.state(1)[0] is S.EXECUTING
 

@@ -42,7 +42,7 @@ WAITING = replace(
     id=13,
     state=TaskState.QUEUED,
     reason=TaskReason.BEHIND_OTHERS,
-    words="move 2 m: queued (behind others)",
+    words="move 2 m: queued (behind other tasks)",
     progress=0.0,
     remaining=1.2000000476837158,
     unit=Unit.METRES,
@@ -116,7 +116,7 @@ WAITS = {
     15: (TaskState.BLOCKED, TaskReason.DEPENDENCY, 13, "after task 13"),
     16: (TaskState.SCHEDULED, TaskReason.START_TIME, 0, "start time"),
     17: (TaskState.SCHEDULED, TaskReason.START_TIME, 14, "start time, after task 14"),
-    18: (TaskState.BLOCKED, TaskReason.WAITING_FOR_START, 0, "waiting for start"),
+    18: (TaskState.BLOCKED, TaskReason.WAITING_FOR_START, 0, "needs a start command"),
     19: (TaskState.QUEUED, TaskReason.DISARMED, 0, "disarmed"),
 }
 
@@ -209,10 +209,7 @@ def test_what_has_no_room_is_counted() -> None:
         (replace(QUEUE, current=None, running=None), "rover 1: no task runs; 1 waiting"),
         (
             replace(QUEUE, current=None, running=None, paused=TaskReason.STOPPED),
-            (
-                "rover 1: no task runs; queue paused (stopped); "
-                "to resume: mav-tasks resume; 1 waiting"
-            ),
+            ("rover 1: no task runs; queue paused (STOP); to resume: mav-tasks resume; 1 waiting"),
         ),
         (
             replace(QUEUE, current=HELD),
@@ -230,7 +227,7 @@ def test_the_first_line_says_what_is_in_the_way_and_what_to_do(
 
 
 def test_a_task_in_one_line_says_what_it_is_and_why_it_ended() -> None:
-    assert words.line_of(WAITING) == "rover 1: task 13: move 2 m: queued (behind others)"
+    assert words.line_of(WAITING) == "rover 1: task 13: move 2 m: queued (behind other tasks)"
     stuck = replace(RUNNING, state=TaskState.FAILED, reason=TaskReason.STUCK, execution_time=12.34)
     assert words.line_of(stuck) == "rover 1: task 12: rotate 90 deg: failed (stuck), in 12.3s"
 
@@ -256,7 +253,7 @@ def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
     [
         (
             replace(WAITING, reason=TaskReason.RESTARTED),
-            "rover 1: task 13: move 2 m: queued (restarted); to resume: mav-tasks resume",
+            "rover 1: task 13: move 2 m: queued (after a restart); to resume: mav-tasks resume",
         ),
         (
             replace(WAITING, reason=TaskReason.QUEUE_PAUSED),

@@ -22,7 +22,7 @@ RATE = "driving.max_turn_rate_deg"
             "item 1 is 445.0 km away, more than 100 km",
             "the place is 445.0 km away, more than 100 km",
         ),
-        ("item 2: the way there leads over the fence", "the way there leads over the fence"),
+        ("item 2: the path to it crosses the fence", "the path to it crosses the fence"),
         ("param7 priority 11 not in 0..10", "--priority 11: at most 10"),
         ("param3 phase 4 not in 0..1", None),
         ("the queue is full", None),

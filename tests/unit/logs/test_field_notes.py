@@ -25,10 +25,10 @@ def test_who_is_heard_is_told_once_and_counts_now_and_then(
         "link x for vehicles",
         "link x for vehicles: first bytes from 127.0.0.1:5000",
         "link x for vehicles: first bytes from /dev/ttyUSB0",
-        "came in: many",
-        "link x: /dev/ttyUSB0 does not take all we send",
+        "received so far: many",
+        "link x: /dev/ttyUSB0 is congested",
         "link x for vehicles: first bytes from /dev/ttyUSB0",
-        "came in: many",
+        "received so far: many",
     ]
 
 

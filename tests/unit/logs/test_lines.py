@@ -30,7 +30,7 @@ def test_the_same_words_are_said_once() -> None:
         "ERROR store x: disk full",
         None,
         "ERROR store y: disk full",
-        "INFO rover 1: command 54000 of 255/190@a refused: too many",
+        "INFO rover 1: command 54000 by 255/190@a refused: too many",
         None,
     ]
 
@@ -49,7 +49,7 @@ def test_the_count_is_a_line_with_words_and_numbers() -> None:
     assert list(lines.due(now=29.0)) == []
     (line,) = lines.due(now=30.0)
     said = json.loads(line)
-    assert said["message"] == "link x lost (2 more in 30 s)"
+    assert said["message"] == "link x lost (repeated 2 times in 30 s)"
     assert (said["repeated"], said["within"], said["level"]) == (2, 30.0, "info")
 
 

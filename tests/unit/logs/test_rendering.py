@@ -189,6 +189,32 @@ def test_a_submission_says_what_it_is_about() -> None:
     assert place["kind"] == "GlobalPlace"
 
 
+def test_a_submission_is_named_by_its_label() -> None:
+    one = task(Move(3.0))
+    words = "rover 1: task 17 submitted: move 3 m{}, priority 5, by " + str(SOMEBODY)
+    assert str(TaskSubmitted(one, AT)) == words.format("")
+    labelled = replace(one, terms=replace(one.terms, label="patrol"))
+    assert str(TaskSubmitted(labelled, AT)) == words.format(" 'patrol'")
+
+
+@pytest.mark.parametrize(
+    ("new", "reason", "actor", "words"),
+    [
+        (TaskState.CANCELLED, TaskReason.CANCELLED, "255/190@a", "cancelled by 255/190@a"),
+        (TaskState.CANCELLED, TaskReason.CLEARED, "255/190@a", "cancelled: cleared, by 255/190@a"),
+        (TaskState.PAUSED, TaskReason.OPERATOR, "255/190@a", "paused by 255/190@a"),
+        (TaskState.PAUSED, TaskReason.TAKEOVER, "vehicle 1", "paused: takeover, by vehicle 1"),
+        (TaskState.STARTING, TaskReason.NONE, "255/190@a", "starting, by 255/190@a"),
+        (TaskState.COMPLETED, TaskReason.NONE, "server", "completed"),
+    ],
+)
+def test_a_change_says_why_and_who_and_nothing_twice(
+    new: TaskState, reason: TaskReason, actor: str, words: str
+) -> None:
+    event = replace(CHANGED, new=new, reason=reason, actor=actor)
+    assert str(event) == f"rover 1: task 17 {words}"
+
+
 def test_times_within_an_event_are_utc() -> None:
     record = logging.makeLogRecord({"msg": TaskSubmitted(task(Move(1.0)), AT), "levelname": "INFO"})
     record.created = time.monotonic() + OFFSET

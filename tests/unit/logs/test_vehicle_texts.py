@@ -121,6 +121,6 @@ def test_a_thousand_texts_a_second_are_counted(
     texts.on_input(Packets("rovers", [(PEER, packet("me", encoder=other))]), now=11.0)
     assert said(caplog) == ["WARNING rover 2 says: me"]
     texts.on_input(None, now=2.0 + TELL)
-    assert said(caplog) == [f"WARNING rover 1 says too much: {10_000 - shown} texts left out"]
+    assert said(caplog) == [f"WARNING rover 1 sends too many texts: {10_000 - shown} omitted"]
     texts.on_input(None, now=100.0)
     assert said(caplog) == []

@@ -238,7 +238,7 @@ class TestLoss:
         world.rover.autopilot.parameters["COM_OBL_RC_ACT"] = -1
         found = world.finish().findings
         assert (world.driven.ended, world.driven.loss_stop) == ("", "")
-        why = "COM_OBL_RC_ACT is -1: nothing, it drives on"
+        why = "COM_OBL_RC_ACT is -1: nothing, it keeps driving"
         assert world.driven.loss_note == f"not tried: {why}"
         line = next(each for each in lines_of(found) if each.topic == "without setpoints")
         assert line.mark is Mark.BAD
@@ -249,7 +249,7 @@ class TestLoss:
         world = ProbeWorld(drive=True, persona=PX4)
         world.rover.autopilot.parameters["COM_OBL_RC_ACT"] = 3
         world.finish()
-        why = "COM_OBL_RC_ACT is 3: Return, it drives home by itself"
+        why = "COM_OBL_RC_ACT is 3: Return, it drives home"
         assert world.driven.loss_note == f"not tried: {why}"
         assert (world.driven.loss_stop, world.rests()) == ("", True)
 

@@ -125,9 +125,9 @@ def test_a_changed_engine_is_found_out_at_its_first_decision(
     shown = words.splitlines()
     assert shown[0].startswith("different after line 10 (packets at 1.001000 s, 1.001000 s into")
     assert shown[1].startswith(
-        "  expected: VehicleSeen(vehicle=1, text='found (ardupilot)', at=1.0"
+        "  recorded: VehicleSeen(vehicle=1, text='found (ardupilot)', at=1.0"
     )
-    assert shown[2].startswith("  came:     VehicleSeen(vehicle=1, text='FOUND', at=1.0")
+    assert shown[2].startswith("  replayed: VehicleSeen(vehicle=1, text='FOUND', at=1.0")
     code, words = said(whole, "--json")
     assert code == 1
     assert loads(words.splitlines()[-1])["difference"]["line"] == 10
@@ -182,7 +182,7 @@ def test_an_engine_that_fails_differs_unless_the_run_ended_there(
     )
     code, words = said(until_then)
     assert code == 0
-    assert "the engine failed at the last input, as in the run: ZeroDivisionError" in words
+    assert "the engine failed at the last input, as it did in the run: ZeroDivisionError" in words
 
 
 def flipped(lines: list[Any]) -> list[Any]:
@@ -199,7 +199,7 @@ def flipped(lines: list[Any]) -> list[Any]:
 
 
 def test_a_record_that_was_changed_is_told_from_an_engine_that_was(whole: Path) -> None:
-    with pytest.raises(RecordError, match="was changed after it had been written"):
+    with pytest.raises(RecordError, match="modified after it was written"):
         read(changed(whole, flipped))
     crashed = changed(whole, lambda lines: flipped(without_end(lines)))
     assert run(crashed).difference is not None
@@ -220,7 +220,7 @@ def test_a_record_cut_anywhere_is_replayed_as_far_as_it_goes(whole: Path, part: 
 def test_a_record_without_its_beginning_is_none(whole: Path, cut: int) -> None:
     other = whole.with_name("short.gz")
     other.write_bytes(whole.read_bytes()[:cut])
-    with pytest.raises(RecordError, match="no record of decisions"):
+    with pytest.raises(RecordError, match="not a record of decisions"):
         read(other)
 
 
@@ -229,30 +229,30 @@ def with_tasks(first: dict[str, Any]) -> dict[str, Any]:
 
 
 BAD_LINES: dict[str, Callable[[list[Any]], list[Any]]] = {
-    "cannot be understood": lambda lines: [*without_end(lines), ["packets", 9.0, "x", [["y"]]]],
+    "is unreadable": lambda lines: [*without_end(lines), ["packets", 9.0, "x", [["y"]]]],
     "'melody' is unknown": lambda lines: [*without_end(lines), ["melody", 9.0]],
-    "line 2 cannot be understood": lambda lines: [lines[0], ["link", "now"]],
-    "line 3 cannot be understood: cannot": lambda lines: [*lines[:2], 5],
-    "its beginning cannot be understood": lambda lines: [{**lines[0], "settings": {"x": 1}}],
-    "its beginning": lambda lines: [{"mav-tasks record": 2, "version": "x"}],
-    "a record of format 3; this version reads 2": lambda lines: [{"mav-tasks record": 3}],
-    "recorded by version 0.0.1, whose events have another form": lambda lines: [
+    "line 2 is unreadable": lambda lines: [lines[0], ["link", "now"]],
+    "line 3 is unreadable: cannot": lambda lines: [*lines[:2], 5],
+    "unreadable header": lambda lines: [{**lines[0], "settings": {"x": 1}}],
+    "unreadable header: KeyError": lambda lines: [{"mav-tasks record": 2, "version": "x"}],
+    "its format is 3; this version reads 2": lambda lines: [{"mav-tasks record": 3}],
+    "recorded by version 0.0.1, whose events have another format": lambda lines: [
         {**lines[0], "rows": {}, "version": "0.0.1"}
     ],
-    "line 2 is no task": lambda lines: [with_tasks(lines[0]), ["deadline", 1.0]],
-    "tasks that cannot be understood": lambda lines: [with_tasks(lines[0]), ["task", [1]]],
-    "it ends before the run began": lambda lines: [with_tasks(lines[0])],
-    "no record of decisions": lambda lines: [[1, 2, 3]],
-    "its beginning cannot be understood: no words": lambda lines: [
+    "line 2 is not a task": lambda lines: [with_tasks(lines[0]), ["deadline", 1.0]],
+    "unreadable tasks": lambda lines: [with_tasks(lines[0]), ["task", [1]]],
+    "ends before the run began": lambda lines: [with_tasks(lines[0])],
+    "not a record of decisions": lambda lines: [[1, 2, 3]],
+    "unreadable header: no words": lambda lines: [
         {**lines[0], "version": "\x1b[31m1"},
         *without_end(lines)[1:],
     ],
-    "its beginning cannot be understood: no time": lambda lines: [
+    "unreadable header: no time": lambda lines: [
         {**lines[0], "now": "noon"},
         *without_end(lines)[1:],
     ],
-    " is no end mark": lambda lines: [*without_end(lines), ["end", "\x1b[31m", 1, ""]],
-    "no end mark": lambda lines: [*without_end(lines), ["end", 3]],
+    " is not a valid end mark": lambda lines: [*without_end(lines), ["end", "\x1b[31m", 1, ""]],
+    "not a valid end mark": lambda lines: [*without_end(lines), ["end", 3]],
 }
 
 
@@ -289,8 +289,8 @@ def test_a_file_that_is_none_is_said_so(tmp_path: Path) -> None:
     [
         (b"\0" * 10**8, "too long for a record"),
         (b'{"mav-tasks record":2}\n' + b"[]," * 3 * 10**7, "too long for a record"),
-        (b"\n" * 10**7, "no record of decisions"),
-        (b"[" * 10**6 + b"\n" + b"\n" * 10**7, "no record of decisions"),
+        (b"\n" * 10**7, "not a record of decisions"),
+        (b"[" * 10**6 + b"\n" + b"\n" * 10**7, "not a record of decisions"),
     ],
 )
 def test_what_is_small_on_the_disk_and_large_to_read_is_refused_soon(
@@ -326,9 +326,9 @@ def test_a_record_ends_before_it_is_too_long(
     assert 5_000 < path.stat().st_size <= 9_000
     code, words = said(path)
     assert code == 0
-    assert "ends before the run did: the record is as long as it may be" in words
+    assert "ends before the run did: the record has reached its size limit" in words
     assert caplog.messages == [
-        f"record of decisions {path} ends: the record is as long as it may be"
+        f"record of decisions {path} ends: the record has reached its size limit"
     ]
 
 
@@ -339,7 +339,7 @@ def test_a_record_ends_when_too_much_waits(
     path = recorded(tmp_path, most_waiting=20_000)
     code, words = said(path)
     assert code == 0
-    assert "ends before the run did: too much waited to be written" in words
+    assert "ends before the run did: the disk was too slow" in words
     assert len(caplog.messages) == 1
 
 
@@ -368,7 +368,7 @@ def test_a_record_ends_with_a_mark_when_the_disk_fails(
         assert code == 0
         assert "ends before the run did: the disk failed: No space left on device" in words
     else:  # the only block had to give way for the mark
-        with pytest.raises(RecordError, match="no record of decisions"):
+        with pytest.raises(RecordError, match="not a record of decisions"):
             read(path)
     assert len(caplog.messages) == 1
 

@@ -211,8 +211,8 @@ def test_a_full_disk_loses_packets_and_is_told_of_twice(
     tlog.close()
     name = f"telemetry log in {tmp_path}"
     assert caplog.messages == [
-        f"{name}: No space left on device: packets are lost",
-        f"{name}: is written again; 3 packets are lost",
+        f"{name}: packets are being lost: No space left on device",
+        f"{name}: writing again; 3 packets lost",
     ]
     assert [seq for *_, seq in told(tmp_path)] == [3]
 
@@ -236,9 +236,9 @@ def test_a_disk_that_does_not_answer_keeps_nobody_waiting(
     there = len(told(tmp_path))
     assert 10 < there < 90
     assert caplog.messages == [
-        f"{name}: too much waits to be written: packets are lost",
-        f"{name}: not all is written: the disk takes too long",
-        f"{name}: is written again; {101 - there} packets are lost",
+        f"{name}: packets are being lost: the disk is too slow",
+        f"{name}: incomplete: the disk is too slow",
+        f"{name}: writing again; {101 - there} packets lost",
     ]
 
 

@@ -92,9 +92,9 @@ def test_after_a_failure_the_file_goes_on_behind_its_last_whole_packet(
 
 def test_a_folder_that_cannot_be_made_is_told_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(RecordError, match=r"no records can be kept in .*/file/folder: Not a dir"):
+    with pytest.raises(RecordError, match=r"cannot write records to .*/file/folder: Not a dir"):
         prepared(str(tmp_path / "file" / "folder"))
-    with pytest.raises(RecordError, match="it is no folder"):
+    with pytest.raises(RecordError, match="not a folder"):
         prepared(str(tmp_path / "file"))
 
 
@@ -119,5 +119,5 @@ def test_a_folder_is_found_in_the_home_of_who_runs_it(
     """In a file or a variable no shell does that; the store's path is read in the same way."""
     monkeypatch.setenv("HOME", str(tmp_path))
     assert prepared("~/logs") == tmp_path / "logs"
-    with pytest.raises(RecordError, match=r"no records can be kept in ~nobody\.there/logs: "):
+    with pytest.raises(RecordError, match=r"cannot write records to ~nobody\.there/logs: "):
         prepared("~nobody.there/logs")

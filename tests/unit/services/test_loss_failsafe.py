@@ -9,7 +9,7 @@ from mav_tasks.services.loss_failsafe import ASKS, LossFailsafe
 AFTER, ACTION = "COM_OF_LOSS_T", "COM_OBL_RC_ACT"
 STICKS, STATION, EXCEPT = "NAV_RCL_ACT", "NAV_DLL_ACT", "COM_DLL_EXCEPT"
 REAL32, INT32 = 9, 6
-UNKNOWN = "does not say whether it stops when setpoints stop"
+UNKNOWN = "does not report whether it stops when setpoints stop"
 
 
 def value(name: str, number: float) -> ParamValue:
@@ -68,8 +68,8 @@ def test_one_that_never_says_is_unknown_and_not_asked_for_ever() -> None:
     assert made.why_off == ""
 
 
-HOME, LAND = "Return, it drives home by itself", "Land, which no rover was seen to stand in"
-ON = "nothing, it drives on"
+HOME, LAND = "Return, it drives home", "Land, not known to stop a rover"
+ON = "nothing, it keeps driving"
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_whether_it_stops_by_itself(after: float, action: int, sticks: int, why:
         value(AFTER, after), value(ACTION, action), value(STICKS, sticks), value(STATION, 0)
     )
     assert made.why_off == why
-    assert made.take_news() == (f"would drive on without setpoints: {why}" if why else "")
+    assert made.take_news() == (f"would move without setpoints: {why}" if why else "")
 
 
 @pytest.mark.parametrize(
@@ -125,14 +125,14 @@ def test_what_it_does_is_said_by_its_name() -> None:
     assert made.what_it_does == "stops when setpoints stop: Hold"
     made.receive(value(ACTION, 3))
     assert made.what_it_does == (
-        "would drive on without setpoints: COM_OBL_RC_ACT is 3: Return, it drives home by itself"
+        "would move without setpoints: COM_OBL_RC_ACT is 3: Return, it drives home"
     )
 
 
 def test_a_change_by_anybody_is_noticed() -> None:
     made = failsafe(value(AFTER, 1.0), value(ACTION, 5))
     made.receive(value(AFTER, 30.0))
-    assert made.take_news().startswith("would drive on")
+    assert made.take_news().startswith("would move")
     made.receive(value(AFTER, 2.0))
     assert (made.take_news(), made.why_off) == ("stops when setpoints stop: Hold", "")
 

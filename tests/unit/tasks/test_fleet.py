@@ -126,7 +126,7 @@ class TestWhatHadBegun:
             assert rover.pose.north == pytest.approx(4.0, abs=0.03)
         else:
             seen = rover.view(after.now)
-            with pytest.raises(Rejection, match="is not known: run it again, or skip it"):
+            with pytest.raises(Rejection, match="is unknown: choose again or skip"):
                 after.tasks.releases.release(
                     after.task(1),
                     again=False,

@@ -250,7 +250,9 @@ class TestHeldTasks:
 
     def test_continuing_says_that_it_must_be_released(self) -> None:
         rig = self.held()
-        with pytest.raises(Rejection, match=r"task 1 is held \(late\): release it first"):
+        with pytest.raises(
+            Rejection, match=r"task 1 is held \(server was late\): release it \(again"
+        ):
             rig.tasks.proceed(in_control(rig.now), actor=BY, now=rig.now)
 
 

@@ -201,7 +201,9 @@ def test_who_is_refused_for_the_time_is_told_once_a_minute() -> None:
             assert it.admit(CLIENTS, "p", packet(timestamp=timestamp)) is None
         told += it.take_refused()
     assert [round(each.seconds) for each in told] == [-3600, -3600]
-    assert str(told[0]).startswith("255/190@p signed anna refused: signed 3600 s after the time")
+    assert str(told[0]).startswith(
+        "packet of 255/190@p signed anna refused: signed 3600 s after this server's time"
+    )
     assert (it.counts.ahead, it.counts.old) == (90, 90)
 
 

@@ -150,7 +150,7 @@ def test_every_command_that_becomes_a_task_is_tried_here() -> None:
         (command(C.DO_REPOSITION, -1, 0, 0, nan, nan, 8), "param5 latitude is not given"),
         (command(C.DO_REPOSITION, -1, 0, 0, inf, 47, 8), "param4 yaw inf not in"),
         (whole(C.DO_REPOSITION, -1, 0, 0, 90, x=5, y=5), "param4 yaw 90 not in -6.28"),
-        (whole(C.DO_REPOSITION, -1, 3, 0, 1, x=5, y=5), "param2 relative yaw: not supported"),
+        (whole(C.DO_REPOSITION, -1, 3, 0, 1, x=5, y=5), "param2 relative yaw is not supported"),
         (command(C.DO_REPOSITION, -1, 0, 0, nan, 47, 8, inf), "param7 is infinite"),
         (command(C.DO_REPOSITION, -1, 0, -inf, nan, 47, 8), "param3 is infinite"),
         (command(C.NAV_RETURN_TO_LAUNCH, 0, inf), "param2 is infinite"),

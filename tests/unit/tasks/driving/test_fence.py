@@ -360,18 +360,18 @@ class TestCheck:
     @pytest.mark.parametrize(
         ("zone", "words"),
         [
-            (Polygon((), True), "a polygon has 0 corners, at least 3 are needed"),
-            (Polygon((ORIGIN,), True), "a polygon has 1 corner, at least 3 are needed"),
+            (Polygon((), True), "a polygon needs at least 3 corners, not 0"),
+            (Polygon((ORIGIN,), True), "a polygon needs at least 3 corners, not 1"),
             (
                 polygon((0, 0), (9, 9), inclusion=True),
-                "a polygon has 2 corners, at least 3 are needed",
+                "a polygon needs at least 3 corners, not 2",
             ),
             (Polygon((ORIGIN,) * 3, False), "a polygon has no area"),
             (polygon((0, 0), (5, 9), (10, 18), (5, 9), inclusion=True), "a polygon has no area"),
-            (Circle(ORIGIN, 0.0, True), "a circle's radius is 0 m"),
-            (Circle(ORIGIN, -2.5, True), "a circle's radius is -2.5 m"),
-            (Circle(ORIGIN, inf, True), "a circle's radius is inf m"),
-            (Circle(ORIGIN, nan, True), "a circle's radius is nan m"),
+            (Circle(ORIGIN, 0.0, True), "a circle needs a positive radius, not 0 m"),
+            (Circle(ORIGIN, -2.5, True), "a circle needs a positive radius, not -2.5 m"),
+            (Circle(ORIGIN, inf, True), "a circle needs a positive radius, not inf m"),
+            (Circle(ORIGIN, nan, True), "a circle needs a positive radius, not nan m"),
         ],
     )
     def test_what_is_wrong_is_said_in_words(self, zone: Zone, words: str) -> None:
