@@ -154,7 +154,7 @@ def test_a_vehicle_that_is_gone_may_be_back_at_once_from_anywhere(rig: Rig) -> N
     rig.peer("v", NEW, up=True)
     rig.now = 0.2
     rig.rover(NEW, seq=1)
-    assert "rover 1: is at ('10.0.0.1', 2) now" in " ".join(map(str, rig.engine.take_events()))
+    assert "rover 1: is now at ('10.0.0.1', 2)" in " ".join(map(str, rig.engine.take_events()))
     sent = rig.passes(2.0)
     assert 0 in ids(sent, "v", NEW)
     assert ids(sent, "v", OLD) == []
@@ -217,7 +217,7 @@ def test_what_is_at_another_place_is_armed_only_if_we_may_arm_there(
     rig.peer("v", OLD, up=False)
     rig.peer("radio", NEW, up=True)
     rig.rover(NEW, link="radio", seq=1)
-    assert "is at" in " ".join(map(str, rig.engine.take_events()))
+    assert "is now at" in " ".join(map(str, rig.engine.take_events()))
     vehicle = rig.engine._vehicles.get(1)
     assert vehicle is not None
     assert vehicle._view(0.0).may_arm is may
@@ -231,13 +231,13 @@ def test_as_long_as_it_is_there_another_of_its_id_is_ignored(rig: Rig) -> None:
     rig.rover(OLD)
     rig.now = 0.2
     rig.rover(NEW, seq=1)
-    assert "another of this id" in " ".join(map(str, rig.engine.take_events()))
+    assert "ignored another rover with its id" in " ".join(map(str, rig.engine.take_events()))
     for step in range(3):
         rig.passes(1.0)
         rig.rover(OLD, seq=2 + step)
     rig.peer("v", OLD, up=False)
     rig.rover(NEW, seq=9)
-    assert "is at" not in " ".join(map(str, rig.engine.take_events()))
+    assert "is now at" not in " ".join(map(str, rig.engine.take_events()))
 
 
 def test_a_vehicle_comes_back_however_often_its_connection_breaks(rig: Rig) -> None:
