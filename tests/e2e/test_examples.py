@@ -53,8 +53,8 @@ def test_each_example_does_what_it_says(tmp_path: Path) -> None:
         assert seen[-1] == "done"
 
         (stopped,) = run("stop_button.py", url, folder=tmp_path, typed="\n")
-        assert "stopped; to go on" in stopped
-        assert "paused: STOP" in mav_tasks("queue", server=url).output
+        assert "stopped; to resume" in stopped
+        assert "queue paused (STOP)" in mav_tasks("queue", server=url).output
 
     assert {path.name for path in EXAMPLES.glob("*.py")} == {
         "tutorial_services.py",

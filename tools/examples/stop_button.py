@@ -18,4 +18,4 @@ with SyncClient(url) as tasks:
     except NoAnswer:
         sys.exit("NO ANSWER: use the switch on the rover")
     else:
-        print("stopped; to go on: mav-tasks resume --all")
+        print("stopped; to resume: mav-tasks resume --all")

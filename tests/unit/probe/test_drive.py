@@ -1,4 +1,4 @@
-"""Driving in the box: what is measured, and that it ends well, whatever happens on the way."""
+"""Driving in an area: what is measured, and that it ends well, whatever happens on the way."""
 
 from dataclasses import replace
 from functools import partial
@@ -34,7 +34,7 @@ POSITION, ATTITUDE = m.LocalPositionNed.id, m.Attitude.id
 
 @EACH
 @pytest.mark.parametrize("yaw", [0.0, 2.5])
-def test_all_is_measured_inside_the_box_and_the_rover_is_left_at_rest(
+def test_all_is_measured_inside_its_area_and_the_rover_is_left_at_rest(
     persona: Persona, yaw: float
 ) -> None:
     world = ProbeWorld(drive=True, persona=persona, start=Pose(north=5.0, east=-3.0, yaw=yaw))
@@ -142,7 +142,7 @@ class TestFaults:
 
     @EACH
     @pytest.mark.parametrize("jump", [(1.2, 0.0), (0.0, -1.2)])
-    def test_a_rover_that_is_outside_the_box_is_stopped(
+    def test_a_rover_that_is_outside_its_area_is_stopped(
         self, persona: Persona, jump: tuple[float, float]
     ) -> None:
         world = ProbeWorld(drive=True, persona=persona)
@@ -339,7 +339,7 @@ class TestCar:
         persona = replace(ARDUPILOT, parameters=(*ARDUPILOT.parameters, *outputs))
         return ProbeWorld(drive=True, persona=persona, body=partial(Car, radius=1.2))
 
-    def test_it_is_driven_in_a_larger_box_and_gets_a_profile_that_says_so(self) -> None:
+    def test_it_is_driven_in_a_larger_area_and_gets_a_profile_that_says_so(self) -> None:
         world = self.world()
         found = world.finish().findings
         assert (world.driven.ended, world.rests()) == ("", True)
