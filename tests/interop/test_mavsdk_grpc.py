@@ -38,7 +38,7 @@ def test_the_older_api_drives_a_mission_and_to_a_place(loss: float, tmp_path: Pa
     assert "heard position velocity_ned attitude_euler battery flight_mode in_air" in said
     assert "downloaded 2" in said
     for goal, state in (("plan", "completed"), ("go to", "executing")):
-        ids = re.findall(rf"rover 1: task (\d+): {goal}", said)
+        ids = re.findall(rf"rover 1: task (\d+) submitted: {goal}", said)
         assert any(f"task {task} {state}" in said for task in ids), said
     if not loss:  # else some of it may be missing
         assert "progress [(0, 2), (1, 2), (2, 2)]" in said

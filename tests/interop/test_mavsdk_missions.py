@@ -32,4 +32,4 @@ def test_missions_are_driven_as_tasks(persona: str, face: str, loss: float, tmp_
 
 def tasks(log: str, goal: str) -> list[str]:
     """The ids of the tasks with such a goal."""
-    return re.findall(rf"rover 1: task (\d+): {goal}.*, from ", log)
+    return re.findall(rf"rover 1: task (\d+) submitted: {goal}", log)

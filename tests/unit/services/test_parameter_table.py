@@ -1,6 +1,4 @@
-import re
 from math import degrees, inf, nan
-from pathlib import Path
 from struct import pack, unpack
 
 import pytest
@@ -92,10 +90,3 @@ def test_a_kept_value_that_is_none_any_more_is_left_out_and_named() -> None:
 @pytest.mark.parametrize("value", [0.1, 0.7, 40.0, 1e6, 0.05, 123.456])
 def test_a_float32_is_read_as_the_number_that_was_meant(value: float) -> None:
     assert as_sent(single(value)) == value
-
-
-def test_the_contract_lists_all_of_them_with_their_ranges() -> None:
-    contract = Path(__file__).resolve().parents[3] / "dialects" / "README.md"
-    rows = re.findall(r"^\| (TSK_\w+) \| (\S+)\.\.(\S+) \|", contract.read_text(), re.MULTILINE)
-    listed = [(name, float(low), float(high)) for name, low, high in rows]
-    assert listed == [(each.name, each.low, each.high) for each in PARAMETERS.values()]

@@ -52,7 +52,7 @@ def test_the_example_is_able_to_fail(pytester: pytest.Pytester) -> None:
             "tasks:",
             "     1 of rover 1: move 2 m: completed",
             "journal:",
-            "*rover 1: task 1: move 2 m, priority 5, from *",
+            "*rover 1: task 1 submitted: move 2 m, priority 5, by *",
             "*task 1 completed; * setpoints at 20 Hz: p50 50.0, p99 50.0, max 50.0 ms, 0 late",
             "texts:",
             "* s  1/191  Task 1 done",

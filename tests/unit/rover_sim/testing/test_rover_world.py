@@ -224,7 +224,7 @@ def test_killed_and_started_again_the_server_has_its_tasks(served: RoverWorld) -
     served.server.restart()
     assert states(served) == [TaskState.COMPLETED] * 2
     words = [str(event) for event in served.server.events]
-    assert sum(word.startswith("rover 1: task 1: move 2 m") for word in words) == 1
+    assert sum(word.startswith("rover 1: task 1 submitted: move 2 m") for word in words) == 1
 
 
 def test_stopped_in_order_it_leaves_the_rover_standing(served: RoverWorld) -> None:
