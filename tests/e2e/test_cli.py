@@ -132,11 +132,11 @@ def test_a_shell_completes_values_and_the_options_of_the_simulator(tmp_path: Pat
         (("queue", "-s", "pigeon:1"), ("pigeon:1", "udpout:host:port")),
         (("submit", "move", "1", "--in", "soon"), ("--in soon", "1h30m")),
         (("submit", "move", "1", "--in", "5s", "--at", "14:30"), ("--in and --at",)),
-        (("submit", "move", "1", "--at", "2020-01-01T10:00"), ("over",)),
+        (("submit", "move", "1", "--at", "2020-01-01T10:00"), ("in the past",)),
         (("submit", "wait", "-5"), ("DURATION -5",)),
         (("modify", "3"), ("modify 3", "--priority")),
         (("release", "perhaps"), ("release perhaps", "again, remainder or skip")),
-        (("release", "x", "again"), ("release x", "number")),
+        (("release", "x", "again"), ("release x", "id of a task")),
         (("clear", "--all"), ("--all", "--yes")),
         (("mission", "upload", "no/such/file"), ("no/such/file", "No such file")),
     ],
@@ -199,14 +199,14 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert table.lines[0].startswith(f"rover 1: task {first} ")
     assert "\x1b" not in table.output
     assert all(line == line.rstrip() for line in table.lines)
-    assert table.lines[2].split()[:5] == ["id", "prio", "state", "label", "what"]
+    assert table.lines[2].split()[:5] == ["id", "prio", "state", "label", "goal"]
     assert "dock 3" in table.lines[4]
     assert [line.split()[0] for line in table.lines[3:]] == [str(first), str(waiting["id"])]
 
     shown = called("status", str(waiting["id"]), server=server)
-    assert "what        move -2 m" in shown.lines
-    assert "label       dock 3" in shown.lines
-    assert "why         start time" in shown.lines
+    assert "goal          move -2 m" in shown.lines
+    assert "label         dock 3" in shown.lines
+    assert "reason        start time" in shown.lines
 
     assert called("cancel", "--json", server=server).objects == [
         {"done": "cancel", "task": first, "vehicle": 1}
@@ -231,10 +231,10 @@ def test_finished_tasks_are_listed_newest_first(server: str, client: SyncClient)
 
     headline, names, *rows = called("history", "--limit", "2", server=server).lines
     assert headline == "rover 1: the last 2 finished tasks"
-    assert names.split()[:3] == ["id", "state", "what"]
+    assert names.split()[:3] == ["id", "state", "goal"]
     assert [row.split()[0] for row in rows] == [str(gone.id), str(done.id)]
     shown = called("status", str(done.id), server=server)
-    assert any(re.match(r"ended       \d\d:\d\d:\d\d .*ago$", line) for line in shown.lines)
+    assert any(re.match(r"ended         \d\d:\d\d:\d\d .*ago$", line) for line in shown.lines)
 
 
 def test_a_queue_says_when_each_task_runs_and_why_it_waits(server: str, client: SyncClient) -> None:
@@ -372,7 +372,7 @@ def test_latitude_and_longitude_are_not_taken_for_metres(server: str) -> None:
 def test_what_is_out_of_range_is_no_task(server: str, client: SyncClient) -> None:
     too_far = called("submit", "move", "1000000", server=server)
     assert_one_line(too_far, 1, "1e+06" if "e+" in too_far.error else "1000000")
-    assert_one_line(called("submit", "move", "nan", server=server), 2, "no number")
+    assert_one_line(called("submit", "move", "nan", server=server), 2, "not a number")
     assert_one_line(called("submit", "move", "1", "--priority", "11", server=server), 2, "11")
     assert_one_line(called("submit", "goto", "91", "0", "--global", server=server), 2, "91")
     assert client.queue().waiting_count == 0

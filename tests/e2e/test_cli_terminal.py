@@ -181,7 +181,7 @@ def test_a_terminal_that_knows_ascii_only_is_none_the_worse(
     client.submit(Wait(1.0), delay=600.0)
     with at(there, "queue", size=(24, 30), PYTHONIOENCODING="ascii") as screen:
         assert screen.end() == 0
-    assert screen.lines[0].startswith("rover 1: no task runs; queue paused")
+    assert screen.lines[0].startswith("rover 1: no task runs; queue")
     client.resume()
     submit = ("submit", "wait", "0.5s", "--wait")
     with at(there, *submit, PYTHONIOENCODING="ascii") as screen:

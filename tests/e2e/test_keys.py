@@ -300,7 +300,7 @@ def test_a_passphrase_is_asked_for_twice_and_not_shown(ring: Path) -> None:
     with at_terminal(*command) as shown:
         shown.wait_for(lambda text: "Passphrase:" in text)
         shown.type(f"{PASSPHRASE}\n".encode())
-        shown.wait_for(lambda text: "again:" in text)
+        shown.wait_for(lambda text: "Repeat it:" in text)
         shown.type(f"{PASSPHRASE}\n".encode())
         assert shown.end() == 0
         assert PASSPHRASE.encode() not in shown.written

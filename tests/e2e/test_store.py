@@ -87,7 +87,7 @@ def test_a_full_disk_refuses_new_tasks_and_nothing_else(running: Stand, path: Pa
     task = taken.result_param2
     wait_for(link, "STATUSTEXT", f"'Task {task} done' in STATUSTEXT.text", within=20)
     assert {1, task} <= set(stored(path))
-    assert "takes events again" in running.server.text
+    assert "the store works again" in running.server.text
     assert "Traceback" not in running.server.text
 
 

@@ -66,7 +66,7 @@ def test_a_stopped_server_shows_in_its_own_figures_as_in_a_capture(tmp_path: Pat
     assert shown["late"] >= 1
     # the zeros of the start and the end are not in the captured ones: at most two seconds of them
     assert len(intervals) <= shown["count"] <= len(intervals) + 40
-    assert f"setpoints   {shown['count']} at 20 Hz: p50 " in line
+    assert f"setpoints     {shown['count']} at 20 Hz: p50 " in line
 
     events = [json.loads(row) for row in journal(store)]
     (end,) = [event for event in events if event.get("new") == "completed"]

@@ -242,7 +242,7 @@ def places(it: MavProxy, running: Stand) -> None:
     it.ask("mode RTL", "RTL> ")
     it.wait_for("AP: Task 5 starts now: return home")
     it.wait_for("AP: Task 5 started")
-    it.ask("mode HOLD", "AP: Task 5 paused: operator")
+    it.ask("mode HOLD", "AP: Task 5 paused by 255/230")
     it.wait_for_mode("HOLD")
 
 

@@ -52,7 +52,7 @@ def test_with_our_dialect_each_request_tells_its_task(
         assert "goto [(0, 2)]" in said
         mission = re.search(r"mission (\d+)$", said, re.MULTILINE)
         assert mission is not None, said
-        assert f"rover 1: mission {mission[1]}, by" in log
+        assert f"rover 1: mission {mission[1]} stored by" in log
         assert "task 1 completed" in log
         for goal in ("move", "go to"):
             assert len(re.findall(rf"submitted: {goal}", log)) == 1, (

@@ -23,6 +23,7 @@ PACKETS = 50_000
 SOME = 4_000  # enough for what is broken on purpose to show
 
 
+@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_where_signatures_are_asked_for_unsigned_forged_and_replayed_ones_do_nothing() -> None:
@@ -39,6 +40,7 @@ def test_a_server_that_takes_a_packet_twice_is_found(monkeypatch: pytest.MonkeyP
         signed_only(SEED).run(PACKETS // 5)
 
 
+@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_50000_mutated_packets_do_nothing_that_they_must_not() -> None:

@@ -31,6 +31,7 @@ def world_of(persona: Persona) -> World:
     return World(persona=persona).ready()
 
 
+@pytest.mark.volume
 @pytest.mark.parametrize("start", STARTS, ids=" ".join)
 @pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=["ardupilot", "px4"])
 def test_whatever_happens_in_any_state_what_holds_the_rover_holds(

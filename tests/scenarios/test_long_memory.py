@@ -13,6 +13,7 @@ SHORT = HourSettings(seconds=200.0, rovers=1, clients=10, kept=5)
 SHORTER = HourSettings(seconds=80.0, rovers=1, clients=3, kept=3)
 
 
+@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_memory_stays_what_it_was() -> None:
@@ -20,6 +21,7 @@ def test_memory_stays_what_it_was() -> None:
         print(line)
 
 
+@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_a_leak_is_noticed() -> None:

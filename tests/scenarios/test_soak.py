@@ -29,6 +29,7 @@ SOAK = ROOT / "tools" / "soak.py"
 VIRTUAL_MINUTE = 60.0
 
 
+@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(240)  # it takes some three seconds, of a processor of its own
 @pytest.mark.parametrize("seed", range(20))
@@ -40,6 +41,7 @@ def test_a_life_of_a_minute_breaks_no_rule(seed: int) -> None:
     assert not figures.broken  # what somebody has halted stands until somebody says go
 
 
+@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_the_same_seed_is_the_same_life_whatever_the_hashes() -> None:
@@ -60,6 +62,7 @@ def test_the_same_seed_is_the_same_life_whatever_the_hashes() -> None:
     assert f"digest {digests[0]:08x}" in other.stdout.splitlines()
 
 
+@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_a_life_that_fails_says_its_seed_and_how_to_have_it_again(tmp_path: Path) -> None:

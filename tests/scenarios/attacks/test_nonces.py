@@ -41,6 +41,7 @@ def test_an_old_nonce_does_not_swallow_an_equal_task(world: World) -> None:
     assert world.truth.north - before == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.volume
 def test_an_old_nonce_does_not_refuse_another_task(world: World) -> None:
     done(world)
     world.run(KEPT + 1.0)
@@ -49,6 +50,7 @@ def test_an_old_nonce_does_not_refuse_another_task(world: World) -> None:
     assert other.task_id == 2
 
 
+@pytest.mark.volume
 @pytest.mark.parametrize("late", [20.0, KEPT - 30.0])
 def test_a_late_copy_is_still_the_same_task(world: World, late: float) -> None:
     first = done(world)
@@ -70,6 +72,7 @@ def test_after_a_restart_too(world: World, away: float, task_id: int) -> None:
     assert again.task_id == task_id
 
 
+@pytest.mark.volume
 def test_of_100000_equal_submissions_none_is_taken_for_an_old_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
