@@ -214,7 +214,7 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     (gone,) = called("status", str(first), "--json", server=server).objects
     assert gone["state"] in ("cancelling", "cancelled")
     assert called("clear", server=server).lines == ["rover 1: all waiting tasks cancelled"]
-    assert_one_line(called("cancel", str(waiting["id"]), server=server), 1, "over")
+    assert_one_line(called("cancel", str(waiting["id"]), server=server), 1, "has ended")
 
 
 def test_finished_tasks_are_listed_newest_first(server: str, client: SyncClient) -> None:

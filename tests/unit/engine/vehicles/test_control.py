@@ -11,7 +11,7 @@ from tests.kit.joint.graph import PEOPLE, TIME, Graph, variants
 from tests.kit.joint.model import MAKES
 
 #: the graph takes half a minute, and as much longer as the machine is busy
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # every reachable state is walked
 
 
 E, F = Event, Effect
@@ -22,6 +22,7 @@ SEEN = (
     *(E.TAKEN, E.MODE, E.LAPSED, E.DISARMED, E.PARKED, E.STICK, E.DRIVEN_BY_HAND),
     *(E.LATE, E.TOO_FAST, E.NOT_STANDING),
 )
+
 STAND = {F.BRAKE, F.HOLD_AT_ONCE, F.LET_GO, F.STEP, F.ZERO, F.ZERO_KEPT, F.ZERO_AND_HOLD}
 MOVES = (Grip.TAKING, Grip.DRIVING)
 HAS_IT = (Work.RUNS, Work.ENDS, Work.LOST, Work.STANDS, Work.TAKEN)
