@@ -128,13 +128,18 @@ def test_the_tour_goes_as_it_is_told(tmp_path: Path) -> None:
 @pytest.mark.timeout(150)
 def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
     broken, *told = commands(BROKEN)
-    with stand(tmp_path, rover_options=rover_options(broken)) as it:
-        ended = [
-            mav_tasks(*shlex.split(command)[1:], server=f"udpout:127.0.0.1:{it.client_port}")
-            for command in told
-        ]
-    assert [done.status for done in ended] == [1, 0, 0]
-    moved, queue, resumed = ended
+    with stand(tmp_path) as it:
+        run = partial(mav_tasks, server=f"udpout:127.0.0.1:{it.client_port}")
+        assert run("submit", "move", "0.3", "--wait").status == 0
+        it.rover.end()
+        again = ("-m", "rover_sim", "--port", str(it.rover_port), "--body", "kinematic")
+        exact = ("--noise", "off", *rover_options(broken))
+        with process(*again, *exact, folder=tmp_path, name="broken") as rover:
+            rover.wait_for("rover 1")
+            it.server.wait_for("rover 1: restarted")
+            ended = [run(*shlex.split(command)[1:]) for command in told]
+    assert [done.status for done in ended] == [0, 1, 0, 0]
+    _, moved, queue, resumed = ended
     assert "failed (stuck)" in moved.output
     assert "queue paused (stuck); to resume: mav-tasks resume" in queue.output
     assert resumed.output == "rover 1: resumed\n"

@@ -46,7 +46,7 @@ async def follow(client: Client, task: Task, common: Common) -> None:
                 looking.cancel()
     except asyncio.CancelledError:
         name = f"rover {task.vehicle}: task {task.id}"
-        goes_on = f"{name} keeps running; to cancel it: mav-tasks cancel {task.id}"
+        goes_on = f"{name} is not cancelled; to cancel it: mav-tasks cancel {task.id}"
         sys.stderr.write(f"mav-tasks: {goes_on}\n")
         raise
     await task.done()

@@ -115,7 +115,8 @@ def list_(
         for entry in entries:
             output.say_json({"file": str(path), **_as_json(entry)})
         return
-    output.say(f"key ring {path}, {sum(entry.is_usable for entry in entries)} keys")
+    usable = sum(entry.is_usable for entry in entries)
+    output.say(f"key ring {path}, {usable} key{'' if usable == 1 else 's'}")
     if entries:
         _show(entries)
 

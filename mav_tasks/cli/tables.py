@@ -52,15 +52,15 @@ class Row(NamedTuple):
 
 TASK_COLUMNS: tuple[Column[Row], ...] = (
     Column("id", lambda row: str(row.status.id), is_right=True),
-    Column("prio", lambda row: str(row.status.priority), worth=6, is_right=True),
+    Column("prio", lambda row: str(row.status.priority), worth=2, is_right=True),
     Column("state", lambda row: words.state_of(row.status)),
     Column("label", lambda row: row.status.label, worth=1, is_words=True),
     Column("goal", lambda row: words.what_of(row.status), is_words=True),
     Column("reason", lambda row: row.why, worth=1, is_words=True),
-    Column("starts in", lambda row: words.starts_of(row.status), worth=2, is_right=True),
-    Column("ends in", lambda row: words.ends_of(row.status), worth=3, is_right=True),
-    Column("done", lambda row: words.percent_of(row.status), worth=4, is_right=True),
-    Column("left", lambda row: words.left_of(row.status), worth=5, is_right=True),
+    Column("starts in", lambda row: words.starts_of(row.status), worth=3, is_right=True),
+    Column("ends in", lambda row: words.ends_of(row.status), worth=4, is_right=True),
+    Column("done", lambda row: words.percent_of(row.status), worth=5, is_right=True),
+    Column("left", lambda row: words.left_of(row.status), worth=6, is_right=True),
     Column("by", lambda row: row.status.submitter, worth=7, is_right=True),
 )
 

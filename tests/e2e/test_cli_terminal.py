@@ -105,7 +105,8 @@ def test_ctrl_c_leaves_the_task_and_says_how_to_call_it_off(
         assert screen.end() == 130
     number = int(screen.lines[0].removeprefix("rover 1: task "))
     assert screen.lines[-1] == (
-        f"mav-tasks: rover 1: task {number} keeps running; to cancel it: mav-tasks cancel {number}"
+        f"mav-tasks: rover 1: task {number} is not cancelled; "
+        f"to cancel it: mav-tasks cancel {number}"
     )
     assert "Traceback" not in screen.text
     assert screen.written.rstrip().endswith(str(number).encode())

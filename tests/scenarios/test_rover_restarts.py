@@ -301,3 +301,31 @@ def test_it_is_not_armed_any_more_once_its_clock_tells_of_the_restart(driving: W
     assert "move" not in world.observer.sent_since(at), "nobody has seen it armed since"
     world.fault(Faults())
     world.until_state(1, S.COMPLETED, within=60)
+
+
+EVERYTHING, ALL_BUT_HEARTBEATS = frozenset(range(300)), frozenset(range(1, 300))
+
+
+@pytest.mark.parametrize("unheard", [0.0, 2.2, 6.0])
+@pytest.mark.parametrize("unstamped", [0.0, 1.2])
+def test_a_rover_that_restarts_between_two_tasks_is_driven_or_says_what_to_do(
+    make_world: MakeWorld, persona: Persona, unheard: float, unstamped: float
+) -> None:
+    """A first heartbeat in another mode, before any clock, is taken for a person's act."""
+    world = make_world(persona=persona)
+    world.client.move(0.5)
+    world.until_idle(tasks=1)
+    world.run(3)
+    assert (world.rover.autopilot.armed, world.rover.autopilot.mode) == (False, Mode.HOLD)
+    world.rover.autopilot.reboot(now=world.now)
+    for withheld, seconds in ((EVERYTHING, unheard), (ALL_BUT_HEARTBEATS, unstamped)):
+        world.fault(Faults(withheld=withheld))
+        world.run(seconds)
+    world.fault(Faults())
+    world.run(10)
+    world.client.move(0.5, nonce=2)
+    world.run(12)
+    if world.state(2)[0] is S.QUEUED:
+        assert any(text.startswith("Task 2 waits: disarmed") for text in world.client.texts())
+        assert proceed(world).result == ACCEPTED
+    world.until_state(2, S.COMPLETED, within=30)
