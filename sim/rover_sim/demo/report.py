@@ -46,11 +46,11 @@ def problems(party: ThirdParty) -> list[str]:
 
 
 def print_table(console: Console, party: ThirdParty) -> None:
-    """Print one line for each task."""
+    """Print one line for each task; measured and error have the unit of what was asked."""
     table = Table(title="What the rover did")
-    for heading in ("id", "type", "priority", "order", "state", "time"):
+    for heading in ("id", "type", "prio", "order", "state", "time"):
         table.add_column(heading, justify="left" if heading in ("type", "state") else "right")
-    for heading in ("commanded", "measured", "error"):
+    for heading in ("asked", "measured", "error"):
         table.add_column(heading, justify="right")
     for index, task in enumerate(party.tasks):
         leg, real = task.leg, measured(task)
@@ -63,8 +63,8 @@ def print_table(console: Console, party: ThirdParty) -> None:
             STATES[task.state],
             f"{task.execution_time:.1f} s",
             f"{leg.amount:g} {leg.unit}",
-            f"{real:.{digits}f} {leg.unit}",
-            f"{real - leg.amount:+.{digits}f} {leg.unit}",
+            f"{real:.{digits}f}",
+            f"{real - leg.amount:+.{digits}f}",
         )
     console.print(table)
 
