@@ -29,10 +29,11 @@ async def ready(
     Exit status 0: ready; 1: a rover is silent; 3: no server answered, or it has no rover.
     """
     from mav_tasks.cli import output, words  # noqa: PLC0415
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
+    from mav_tasks.cli.session import all_show, opened  # noqa: PLC0415
     from mav_tasks.errors import Refused  # noqa: PLC0415
 
     async with opened(replace(common, timeout=wait_for)) as client:
+        await all_show(client, lambda each: each.is_heard)
         rovers = [each for each in client.vehicles() if common.vehicle in (None, each.id)]
     silent = [_silence(each) for each in rovers if not each.is_heard]
     if common.json:

@@ -30,7 +30,7 @@ def main() -> None:
     from mav_tasks.cli.app import main as run
 
     try:
-        run()
+        run(sys.argv[1:])  # with arguments it ends as a function does, and not the process at once
     finally:
         os.write(fd, json.dumps(seen).encode())
 
