@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _leave(status: object) -> None:
     """End the process without taking its objects apart, which is a fifth of a short call's time.
 
-    Return if that must be done all the same: for the server, or if the output cannot be written.
+    Return where an ordinary end is needed: for the server, or if the output cannot be written.
     """
     if "mav_tasks.serve" in sys.modules or not isinstance(status, int | None):
         return
