@@ -306,17 +306,24 @@ def test_it_is_not_armed_any_more_once_its_clock_tells_of_the_restart(driving: W
 EVERYTHING, ALL_BUT_HEARTBEATS = frozenset(range(300)), frozenset(range(1, 300))
 
 
-@pytest.mark.parametrize("unheard", [0.0, 2.2, 6.0])
-@pytest.mark.parametrize("unstamped", [0.0, 1.2])
-def test_a_rover_that_restarts_between_two_tasks_is_driven_or_says_what_to_do(
-    make_world: MakeWorld, persona: Persona, unheard: float, unstamped: float
-) -> None:
-    """A first heartbeat in another mode, before any clock, is taken for a person's act."""
+@pytest.fixture
+def idle(make_world: MakeWorld, persona: Persona) -> World:
+    """A world in which the rover has driven a task, and stands disarmed in HOLD."""
     world = make_world(persona=persona)
     world.client.move(0.5)
     world.until_idle(tasks=1)
-    world.run(3)
+    world.run(15)
     assert (world.rover.autopilot.armed, world.rover.autopilot.mode) == (False, Mode.HOLD)
+    return world
+
+
+@pytest.mark.parametrize("unheard", [0.0, 2.2, 6.0])
+@pytest.mark.parametrize("unstamped", [0.0, 1.2, 4.5])
+def test_a_rover_that_restarts_between_two_tasks_is_driven(
+    idle: World, unheard: float, unstamped: float
+) -> None:
+    """Its first heartbeat may show another mode before its clock shows the restart."""
+    world = idle
     world.rover.autopilot.reboot(now=world.now)
     for withheld, seconds in ((EVERYTHING, unheard), (ALL_BUT_HEARTBEATS, unstamped)):
         world.fault(Faults(withheld=withheld))
@@ -324,8 +331,61 @@ def test_a_rover_that_restarts_between_two_tasks_is_driven_or_says_what_to_do(
     world.fault(Faults())
     world.run(10)
     world.client.move(0.5, nonce=2)
+    world.until_state(2, S.COMPLETED, within=40)
+
+
+@pytest.mark.parametrize("restarts", ["before it", "after it", "long after it", "never"])
+def test_a_mode_that_a_person_sets_on_a_disarmed_rover_is_no_restart(
+    idle: World, restarts: str
+) -> None:
+    world, at = idle, idle.now
+    if restarts == "before it":
+        restart(world)
+    is_manual = world.rover.autopilot.mode is Mode.MANUAL
+    world.operator_mode(Mode.HOLD if is_manual else Mode.MANUAL)
+    world.run(5.0 if restarts == "long after it" else 1.2)
+    if restarts in ("after it", "long after it"):
+        restart(world)
+    world.client.move(0.5, nonce=2)
     world.run(12)
-    if world.state(2)[0] is S.QUEUED:
-        assert any(text.startswith("Task 2 waits: disarmed") for text in world.client.texts())
-        assert proceed(world).result == ACCEPTED
+    assert world.state(2) == (S.QUEUED, R.NONE)
+    assert "arm" not in world.observer.sent_since(at)
+    assert any(text.startswith("Task 2 waits: disarmed") for text in world.client.texts())
+    assert proceed(world).result == ACCEPTED
     world.until_state(2, S.COMPLETED, within=30)
+
+
+def test_a_mode_without_a_clock_is_a_persons_after_5_s(idle: World) -> None:
+    world = idle
+    world.fault(Faults(withheld=ALL_BUT_HEARTBEATS))
+    world.operator_mode(Mode.MANUAL)
+    world.run(1.2)
+    at = world.now
+    world.client.move(0.5, nonce=2)
+    world.run(8)
+    world.fault(Faults())
+    world.run(8)
+    assert world.state(2) == (S.QUEUED, R.NONE)
+    assert "arm" not in world.observer.sent_since(at)
+    assert proceed(world).result == ACCEPTED
+    world.until_state(2, S.COMPLETED, within=30)
+
+
+@pytest.mark.parametrize("word", ["move", "resume", "arm"])
+def test_a_word_is_newer_than_the_mode_that_was_seen_before_it(idle: World, word: str) -> None:
+    """The server decides first what the mode change was: a resume after it counts."""
+    world = idle
+    world.fault(Faults(withheld=ALL_BUT_HEARTBEATS))
+    world.operator_mode(Mode.MANUAL)
+    world.run(1.2)
+    at = world.now
+    if word == "resume":
+        proceed(world)
+    elif word == "arm":
+        world.operator_arm(True)
+        world.run(1.2)
+    world.client.move(0.5, nonce=2)
+    world.fault(Faults())
+    world.run(12)
+    assert ("arm" in world.observer.sent_since(at)) is (word == "resume")
+    assert (world.state(2)[0] is S.COMPLETED) is (word == "resume")

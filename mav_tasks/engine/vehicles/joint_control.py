@@ -45,6 +45,7 @@ class JointControl:
 
         Raise Rejection if the request is refused. The effects before the refusal remain in force.
         """
+        self.decide(now=now)
         result = None
         for effect in effects_of(event, self.state(now=now)):
             if isinstance(effect, Event):
@@ -53,6 +54,12 @@ class JointControl:
                 found = carry_out(effect, self._reach, word, now=now)
             result = result if found is None else found
         return result
+
+    def decide(self, *, now: float) -> None:
+        """Take a mode change for a person's: the vehicle's clock has shown no restart."""
+        decide, self._parts.undecided = self._parts.undecided, None
+        if decide is not None:
+            decide(now)
 
     def step(self, now: float) -> None:
         """Run the tasks, carry out their demand, and handle the events that this reveals."""

@@ -1,5 +1,6 @@
 """What the parts of one vehicle share: its state, its tasks, and the way to send to it."""
 
+from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
@@ -52,6 +53,8 @@ class Parts:
     start_mark: StartMark = field(default_factory=StartMark)
     #: its heartbeats as clients see them
     shown: ShownHeartbeat = field(default_factory=ShownHeartbeat)
+    #: handles a mode change that a person, or a restart, has caused; no task starts before that
+    undecided: Callable[[float], None] | None = None
 
     @property
     def control(self) -> OffboardControl:
@@ -76,6 +79,12 @@ class Parts:
         """Return whether it shows armed, by a request that no halt has outdated."""
         ours = self.control.arming_asked_at
         return self.monitor.armed and not self.armings.do_not_count(ours=ours, now=now)
+
+    @property
+    def _is_unknown(self) -> bool:
+        """Whether it has not said which vehicle it is, or may just have restarted."""
+        unidentified = self.tasks.terms.has_uid and not self.requests.is_identified
+        return unidentified or self.undecided is not None
 
     def note(self, text: str, *, now: float) -> None:
         """Report a text about the vehicle."""
@@ -147,6 +156,6 @@ class Parts:
             turning=persona.turning,
             turns_by_course=persona.turns_by_course,
             turning_radius=persona.turning_radius or self.settings.driving.turning_radius,
-            is_unknown=self.tasks.terms.has_uid and not self.requests.is_identified,
+            is_unknown=self._is_unknown,
             drives_on=drives_on,
         )

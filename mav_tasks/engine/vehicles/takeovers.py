@@ -4,6 +4,7 @@ A change may be our own doing, a client's through us, a person's at the vehicle,
 This module finds out which; the control table decides what follows.
 """
 
+from functools import partial
 from math import inf
 
 from mav_tasks.engine.vehicles.armings import SHOWN_LATE
@@ -18,6 +19,8 @@ from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason
 
 R = TaskReason
+#: s after which a mode change is a person's if the clock has not been heard
+UNDECIDED = 5.0
 
 
 class Takeovers:
@@ -29,6 +32,7 @@ class Takeovers:
         self._may_show_until = -inf  # s, effects of packets sent before an earlier run's last halt
         self._shows_restart = False  # a restart was seen, and the next heartbeat will show it, too
         self._others_drive = False  # it moved in a mode in which we did not drive it
+        self._undecided_at = -inf  # s, when it showed the mode that may come from a restart
 
     def __repr__(self) -> str:
         return f"Takeovers({self._joint!r})"
@@ -77,8 +81,10 @@ class Takeovers:
         """Detect what a heartbeat shows that is new; ``before`` is the state before it."""
         parts = self._parts
         armed, mode = parts.monitor.armed, parts.monitor.custom_mode
+        if armed or mode != was_mode or now - self._undecided_at > UNDECIDED:
+            self._joint.decide(now=now)
         if mode != was_mode:
-            self._mode_changed(was_mode, mode, now=now)
+            self._mode_changed(was_mode, mode, was_armed=was_armed, now=now)
         if was_armed and not armed:
             self._disarmed(before, now=now)
         parts.armings.shows(armed=armed)
@@ -114,6 +120,9 @@ class Takeovers:
         A restart disarms, so no person caused a disarming that was seen since ``booted_at``.
         """
         parts = self._parts
+        if self._undecided_at < booted_at:
+            self._joint.decide(now=now)
+        parts.undecided = None  # the restart has changed the mode
         self._shows_restart = True
         parts.forget_answers()
         before = parts.authority.take_disarmed(since=booted_at)
@@ -155,7 +164,7 @@ class Takeovers:
     ) -> None:
         self._joint.on(event, Word(reason, self._parts.actor, what), now=now)
 
-    def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
+    def _mode_changed(self, was_mode: int, mode: int, *, was_armed: bool, now: float) -> None:
         parts = self._parts
         persona, control = parts.persona, parts.control
         by_us, is_late = control.may_have_set(mode, now=now), self._comes_late(mode, now=now)
@@ -170,17 +179,37 @@ class Takeovers:
         elif is_late:
             words = f"shows {persona.mode_name(mode)} because of an older command: HOLD sent again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
-        elif not ours and was_mode != persona.booting_mode:
-            what = f"mode is {persona.mode_name(mode)}"
-            cause = parts.failsafes.mode_changed(now=now)
-            lapses = control.is_streaming and mode == persona.hold_mode
-            event = Event.LAPSED if lapses else Event.MODE
-            if cause:
-                what = f"{what}, set by its failsafe: {cause}"
-                self._taken(event, what, reason=R.FAILSAFE, now=now)
-            else:
-                self._taken(event, what, now=now)
+        elif ours or was_mode == persona.booting_mode:
+            pass
+        elif was_armed or not self._may_come_from_restart(mode):
+            self._changed_by_person(mode, now)
             self._look_for_parking(was_mode, mode, now=now)
+        else:
+            parts.undecided = partial(self._changed_by_person, mode)
+            self._undecided_at = now
+
+    def _may_come_from_restart(self, mode: int) -> bool:
+        """Return whether an idle vehicle shows a mode in which it may boot.
+
+        Its first heartbeat may come before a message with its clock, which tells of the restart.
+        """
+        parts = self._parts
+        is_idle = parts.tasks.active is None and not parts.control.is_engaged
+        boots_in = {parts.persona.hold_mode, *parts.persona.manual_modes}
+        return is_idle and not parts.monitor.armed and mode in boots_in
+
+    def _changed_by_person(self, mode: int, now: float) -> None:
+        """Handle a mode that a person, another program or a failsafe has set."""
+        parts, persona = self._parts, self._parts.persona
+        what = f"mode is {persona.mode_name(mode)}"
+        cause = parts.failsafes.mode_changed(now=now)
+        lapses = parts.control.is_streaming and mode == persona.hold_mode
+        event = Event.LAPSED if lapses else Event.MODE
+        if cause:
+            what = f"{what}, set by its failsafe: {cause}"
+            self._taken(event, what, reason=R.FAILSAFE, now=now)
+        else:
+            self._taken(event, what, now=now)
 
     def _comes_late(self, mode: int, *, now: float) -> bool:
         """Return whether a mode request was sent before a halt and arrived after it.

@@ -191,9 +191,12 @@ class Vehicle:
             self._receive_heartbeat(message, now=now)
         elif isinstance(message, Stamped):
             due = self._clock.next_at  # after a late tick, data looks old, so that a zero follows
-            if self.where.receive(message, now=now, not_after=due) is Heard.RESTART:
+            heard = self.where.receive(message, now=now, not_after=due)
+            if heard is Heard.RESTART:
                 self._restarted(booted_at=now - message.time_boot_ms / 1000, now=now)
                 self.where.receive(message, now=now, not_after=due)
+            elif heard is Heard.NEWS:
+                self.joint.decide(now=now)
             self._look_at_frame(now=now)
             self._takeovers.look_at_motion(now=now)
             if not self.tasks.is_idle:

@@ -32,6 +32,7 @@ class Agreement:
         def on(joint: JointControl, event: Event, word: Word, *, now: float) -> Any:
             if self._is_within:
                 return done(joint, event, word, now=now)
+            joint.decide(now=now)  # an event of its own, which is compared, too
             self._is_within = True
             try:
                 before = joint.state(now=now)
