@@ -58,7 +58,7 @@ _LINKS = (
     _key(
         "links.push",
         Texts("a list of host:port"),
-        "UDP addresses of listening clients; the server sends to them unasked",
+        "UDP addresses where clients listen; the server sends there first",
         live=False,
     ),
     _key("links.vehicles", Texts(f"a list of {URL}", least=1), "links to rovers", live=False),
@@ -93,7 +93,7 @@ _SIGNING = (
     _key(
         "signing.setup",
         Choice(("known", "refuse")),
-        "on SETUP_SIGNING of a client: sign to it if the key is in the key ring, or refuse",
+        "reaction to a client's SETUP_SIGNING; known: sign to it if the key is in the key ring",
         field="engine.signing.setup",
     ),
 )
@@ -128,7 +128,7 @@ _ROLES = (
             _key(
                 f"roles.{role}.quota",
                 Number(0, 1e6, is_whole=True),
-                "maximum number of waiting tasks per client, within queueing.quota",
+                "maximum number of waiting tasks per client; queueing.quota limits it, too",
             ),
             _key(
                 f"roles.{role}.rate",
@@ -196,7 +196,7 @@ _DRIVING = (
     _key(
         "driving.max_distance",
         Number(1, 1e6, "m"),
-        "longest move, and farthest place, that is accepted",
+        "maximum length of a move, and maximum distance to a place",
     ),
     _key(
         "driving.max_turn_deg",
@@ -250,7 +250,7 @@ _DRIVING = (
     _key(
         "driving.turning_radius",
         Number(0.1, 50, "m"),
-        "minimum of a rover that steers like a car, if its profile and parameters do not tell it",
+        "minimum turning radius of a car-like rover, if its profile and parameters have none",
     ),
 )
 _RULES = (
@@ -269,7 +269,7 @@ _RULES = (
     _key(
         "rules.loss_failsafe",
         Choice(("must_stand", "accept")),
-        "whether to drive a rover that would keep moving when setpoints stop; accept: yes",
+        "a rover that would keep moving when setpoints stop: make its tasks wait, or drive it",
     ),
     _key(
         "rules.claim",
@@ -279,7 +279,7 @@ _RULES = (
     _key(
         "rules.guided",
         Choice(("queue", "now")),
-        'a "go to" that changes the mode: queue it, or run it at once',
+        'a "go to" that changes the mode (DO_REPOSITION, guided item): queue it, or run it at once',
     ),
     _key(
         "rules.operator_lost",
@@ -289,12 +289,12 @@ _RULES = (
     _key(
         "rules.on_failure",
         Choice(("pause", "continue")),
-        "what the queue does after a task failed that had moved the rover",
+        "what the queue does after a task moved the rover and failed",
     ),
     _key(
         "rules.on_restart",
         Choice(("pause", "continue")),
-        "what queues do after a crash, or if the last write was ten minutes before the start",
+        "what queues do after a crash, or after a break of more than ten minutes",
     ),
 )
 _QUEUEING = (
@@ -311,12 +311,12 @@ _QUEUEING = (
     _key(
         "queueing.aging",
         _seconds(0, DAY),
-        "waiting time that counts as one priority more; 0: waiting does not count",
+        "waiting time that raises the priority by one; 0: waiting does not raise it",
     ),
     _key(
         "queueing.preemption_gap",
         Number(0, 10, is_whole=True),
-        "priority difference from which a task interrupts the running one; 0: never",
+        "priority lead with which a task interrupts the running one; 0: only preemptive tasks do",
     ),
     _key(
         "queueing.preemption_rest",
@@ -353,7 +353,7 @@ _CLIENTS = (
     _key(
         "clients.telemetry_budget",
         Number(1000, 1e7, "bytes/s"),
-        "telemetry of all rovers behind one endpoint; set less for a radio behind a UDP link",
+        "maximum telemetry of all rovers at one endpoint; lower it for a radio behind a UDP link",
     ),
     _key("clients.text_rate", Number(1, 1000, "1/s"), "maximum rate of STATUSTEXTs per client"),
     _key("clients.status_rate", Number(1, 1000, "1/s"), "maximum rate of TASK_STATUS per client"),
@@ -381,7 +381,7 @@ _WATCH = (
     _key(
         "watch.position_lost",
         _seconds(0.2, 10),
-        "a task is paused if its position data is older than this",
+        "a task is paused if the rover's position data is older than this",
     ),
     # only heartbeats show that the rover is armed and in our mode
     _key(
@@ -441,7 +441,7 @@ _WATCH = (
     _key(
         "watch.disarm_moving",
         Number(0, 60, "s"),
-        "a rover told to stand is disarmed if it moves this long after it showed HOLD; 0: never",
+        "a rover that should stand is disarmed if it still moves this long after HOLD; 0: never",
     ),
     _key(
         "watch.stop_unconfirmed",
@@ -449,15 +449,23 @@ _WATCH = (
         "a cancelled task is held if its rover does not stand still within this time",
     ),
     # a rover driven slower than this seems to stand, and its stop would be confirmed too soon
-    _key("watch.still_speed", Number(0.001, 0.1, "m/s"), "a rover stands below this speed"),
+    _key(
+        "watch.still_speed",
+        Number(0.001, 0.1, "m/s"),
+        "a rover stands still if its speed stays below this for still_time",
+    ),
     _key(
         "watch.still_turn_rate_deg",
         Number(0.1, 5, "deg/s", DEGREE),
-        "and below this turn rate",
+        "and if its turn rate stays below this for still_time",
         field="still_turn_rate",
     ),
     # at least two messages of 10 Hz telemetry: a rover that reverses is slow for a moment
-    _key("watch.still_time", _seconds(0.2, 5), "and for this time"),
+    _key(
+        "watch.still_time",
+        _seconds(0.2, 5),
+        "time below still_speed and still_turn_rate_deg after which a rover stands still",
+    ),
 )
 _IDENTITY = (
     _key(
@@ -510,7 +518,7 @@ _LOG = (
     _key(
         "log.level",
         Choice(("debug", "info", "warning", "error")),
-        "lowest level that is logged; new addresses on links only if the server starts with debug",
+        "lowest level that is logged; start with debug to log new addresses on links, too",
     ),
 )
 
