@@ -20,12 +20,14 @@ Everywhere = Annotated[bool, typer.Option("--all", help="Apply to every rover of
 @command
 async def stop(
     common: Common,
-    everywhere: Everywhere = False,
+    everywhere: Annotated[
+        bool, typer.Option("--all", help="Stop every rover, which is the default.")
+    ] = False,
     clear: Annotated[bool, typer.Option("--clear", help="Also cancel the waiting tasks.")] = False,
 ) -> None:
     """Stop the rovers at once; no task runs until you resume.
 
-    Stops every rover unless you give --vehicle. --timeout limits the wait for confirmation.
+    Stops every rover unless you give --vehicle. Here --timeout limits the wait for confirmation.
     """
     from mav_tasks.cli.session import unfound  # noqa: PLC0415
     from mav_tasks.tasks.lifecycle import TaskReason  # noqa: PLC0415
@@ -80,7 +82,7 @@ async def resume(
         typer.Option(
             metavar="N",
             min=1,
-            help="Resume only if no halt came after this halt_epoch of 'queue --json'.",
+            help="Resume only if halt_epoch of 'queue --json' is still this number.",
         ),
     ] = None,
 ) -> None:

@@ -20,13 +20,16 @@ async def ready(
     wait_for: Annotated[
         float,
         typer.Option(
-            "--within", min=0.1, metavar="SECONDS", help="How long to wait for the answer."
+            "--within",
+            min=0.1,
+            metavar="SECONDS",
+            help="How long to look for the server; --timeout has no effect here.",
         ),
     ] = WITHIN,
 ) -> None:
     """Check that the server answers and that it hears its rovers.
 
-    Exit status 0: ready; 1: a rover is silent; 3: no server answered, or it has no rover.
+    Exit status 0: ready; 1: a rover is silent; 3: no server answered, or it has heard no rover.
     """
     from mav_tasks.cli import output, words  # noqa: PLC0415
     from mav_tasks.cli.session import all_show, opened  # noqa: PLC0415

@@ -105,9 +105,10 @@ async def goto(
         float | None, typer.Option(metavar="DEGREES", help="Final heading, clockwise from north.")
     ] = None,
 ) -> None:
-    """Drive to a place: metres from the rover's origin, or latitude and longitude.
+    """Drive to a place: metres from the local origin, or latitude and longitude.
 
-    If the numbers could be a latitude and a longitude, you must add --local or --global.
+    The numbers are metres unless you give --global. If they look like degrees, --local or --global
+    is required.
     """
     from mav_tasks.cli.places import parse_place  # noqa: PLC0415
     from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
