@@ -26,9 +26,11 @@ MaybeTaskId = Annotated[
 async def cancel(
     common: Common,
     task_id: MaybeTaskId = None,
-    kill: Annotated[bool, typer.Option("--kill", help="Also set HOLD at once.")] = False,
+    kill: Annotated[
+        bool, typer.Option("--kill", help="Also put the rover into HOLD at once.")
+    ] = False,
 ) -> None:
-    """Cancel a task: the named one, or the running one."""
+    """Cancel a task, by default the running one."""
     from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
 
     async with opened(common) as client:
@@ -51,7 +53,7 @@ async def clear(
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
 ) -> None:
-    """Cancel all waiting tasks."""
+    """Cancel all waiting tasks of a rover."""
     if everything and not yes:
         _confirm("Cancel all tasks, including the running one?")
     from mav_tasks.cli.session import opened  # noqa: PLC0415
@@ -131,7 +133,7 @@ async def release(
         typer.Argument(
             metavar="[ID] again|remainder|skip",
             autocompletion=completions.releases,
-            help="Id of the task; default: the held task.",
+            help="Id of the task (default: the held task), then what to do with it.",
         ),
     ],
 ) -> None:

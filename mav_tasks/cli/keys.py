@@ -61,7 +61,7 @@ def add(
 ) -> None:
     """Add a key; a running server accepts it at once.
 
-    If standard input is not a terminal, the passphrase or the digits are read from its first line.
+    If standard input is not a terminal, its first line must be the passphrase or the digits.
     """
     from datetime import UTC, datetime  # noqa: PLC0415
 

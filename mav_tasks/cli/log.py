@@ -36,7 +36,7 @@ def log(
         str | None,
         typer.Option(
             metavar="2h|2026-11-20T10:00",
-            help="Print only events of this last period, or since this time (UTC).",
+            help="Print only events of the last 30m, 2h or 7d, or since a time (UTC).",
         ),
     ] = None,
     as_json: Annotated[
@@ -49,7 +49,7 @@ def log(
 ) -> None:
     """Print the journal, one event per line; times are UTC.
 
-    Reads the store, whether or not the server runs.
+    Reads the store file; the server need not run.
     """
     import time  # noqa: PLC0415
     from contextlib import closing  # noqa: PLC0415

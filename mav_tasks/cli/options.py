@@ -99,7 +99,7 @@ class TaskOptions:
         int,
         typer.Option(
             metavar="NUMBER",
-            help="Number of this submission: the same number twice makes one task; 0: random.",
+            help="Idempotency key: submissions with the same number make one task; 0: random.",
         ),
     ] = 0
     label: Annotated[

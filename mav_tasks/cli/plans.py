@@ -21,7 +21,7 @@ STANDARD_OUTPUT = "-"
 FileIn = Annotated[
     Path, typer.Argument(metavar="FILE", help="Mission file: .plan or QGC WPL 110 (.waypoints).")
 ]
-PlanIn = Annotated[Path, typer.Argument(metavar="FILE", help="File: a .plan of QGroundControl.")]
+PlanIn = Annotated[Path, typer.Argument(metavar="FILE", help="QGroundControl .plan file.")]
 FileOut = Annotated[
     str,
     typer.Argument(
@@ -33,7 +33,12 @@ PlanOut = Annotated[
     str, typer.Argument(metavar="FILE", help="Output file: .plan; '-': standard output.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
-Empty = Annotated[bool, typer.Option("--empty", help="If the file has none, remove the rover's.")]
+EmptyFence = Annotated[
+    bool, typer.Option("--empty", help="Delete the rover's fence if the file has none.")
+]
+EmptyRally = Annotated[
+    bool, typer.Option("--empty", help="Delete the rover's rally points if the file has none.")
+]
 
 mission = typer.Typer(
     no_args_is_help=True, rich_markup_mode=None, help="Upload, start and download missions."
@@ -93,8 +98,8 @@ async def start_mission(common: Common, wait: Wait = False) -> None:
 async def download_mission(file: FileOut, common: Common, force: Force = False) -> None:
     """Save the staged mission of a rover to a file.
 
-    A ground station's upload or 'mission upload --stage' stages a mission. What 'mission upload'
-    queued is a task and cannot be downloaded.
+    A ground station's upload or 'mission upload --stage' stages a mission. A mission that
+    'mission upload' queued is a task and cannot be downloaded.
     """
     from mav_tasks.cli.session import opened  # noqa: PLC0415
 
@@ -107,8 +112,8 @@ async def download_mission(file: FileOut, common: Common, force: Force = False) 
 
 @fence.command("upload")
 @command
-async def upload_fence(file: PlanIn, common: Common, empty: Empty = False) -> None:
-    """Upload the fence of a file to the rover."""
+async def upload_fence(file: PlanIn, common: Common, empty: EmptyFence = False) -> None:
+    """Upload the fence from a file to the rover."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 
@@ -135,8 +140,8 @@ async def download_fence(file: PlanOut, common: Common, force: Force = False) ->
 
 @rally.command("upload")
 @command
-async def upload_rally_points(file: PlanIn, common: Common, empty: Empty = False) -> None:
-    """Upload the rally points of a file to the rover."""
+async def upload_rally_points(file: PlanIn, common: Common, empty: EmptyRally = False) -> None:
+    """Upload the rally points from a file to the rover."""
     from mav_tasks.cli.session import opened  # noqa: PLC0415
     from mav_tasks.plan_files import read_plan  # noqa: PLC0415
 

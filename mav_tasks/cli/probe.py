@@ -22,7 +22,7 @@ SetFailsafe = Annotated[
     bool,
     typer.Option(
         "--set-failsafe",
-        help="Only set the rover's parameters so that it stops when setpoints stop. "
+        help="Set the parameters that stop the rover when setpoints stop, and test nothing. "
         "URL may be that of a task server (default: the server on this machine).",
     ),
 ]
@@ -30,14 +30,18 @@ DriveFlag = Annotated[
     bool,
     typer.Option(
         "--drive",
-        help="Arm the rover and drive it slowly, within 1 m of its place (a car: 4 m or more).",
+        help="Arm the rover and drive it slowly, within 1 m of where it stands (4 m or more if it "
+        "steers like a car).",
     ),
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="With --drive: do not ask first.")]
 Speed = Annotated[
     float,
     typer.Option(
-        min=0.1, max=0.5, metavar="M/S", help="Speed at which the stopping distance is measured."
+        min=0.1,
+        max=0.5,
+        metavar="M/S",
+        help="With --drive: speed from which to measure the stopping distance.",
     ),
 ]
 Number = Annotated[
@@ -96,7 +100,7 @@ async def probe(
     keys: Keys = "",
     as_json: Json = False,
 ) -> None:
-    """Test what a rover can do, directly, without a server.
+    """Test what a rover can do, without a server.
 
     Nothing moves and nothing stays changed unless you give --set-failsafe or --drive.
     """

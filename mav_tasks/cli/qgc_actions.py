@@ -18,7 +18,7 @@ def qgc_actions(
         typer.Option(metavar="LABEL=COMMAND,P1,...", help="Add a button; repeatable."),
     ] = None,
     only: Annotated[
-        bool, typer.Option("--only", help="Print only the buttons of --action.")
+        bool, typer.Option("--only", help="Leave out all buttons except those of --action.")
     ] = False,
     component: Annotated[
         int, typer.Option(min=1, max=255, metavar="N", help="Component id of the task server.")

@@ -19,7 +19,10 @@ async def queue(
         bool, typer.Option("--watch", help="Update the display until Ctrl-C.")
     ] = False,
     limit: Annotated[
-        int, typer.Option(min=1, metavar="NUMBER", help="Show at most this many waiting tasks.")
+        int,
+        typer.Option(
+            min=1, metavar="NUMBER", help="Show at most this many waiting tasks per rover."
+        ),
     ] = 100,
 ) -> None:
     """Show the running and the waiting tasks, and why they wait.

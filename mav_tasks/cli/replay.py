@@ -17,7 +17,8 @@ def replay(
         str,
         typer.Option(
             metavar="FILE",
-            help="Key ring of the recorded server, if it used signatures; default: your own.",
+            help="Key ring of the recorded server, if it used signatures; default: keys.toml in "
+            "your configuration folder.",
         ),
     ] = "",
 ) -> None:

@@ -27,11 +27,11 @@ def serve(
         list[str] | None,
         typer.Option(
             metavar="HOST:PORT",
-            help="Where a client listens on UDP; the server sends to it unasked; repeatable. "
+            help="UDP address where a client listens; the server sends there first; repeatable. "
             "Default: 127.0.0.1:14550 and 127.0.0.1:14540.",
         ),
     ] = None,
-    no_push: Annotated[bool, typer.Option("--no-push", help="Send to no client unasked.")] = False,
+    no_push: Annotated[bool, typer.Option("--no-push", help="Use no push addresses.")] = False,
     vehicle: Annotated[
         list[str] | None,
         typer.Option(
@@ -96,7 +96,8 @@ def serve(
     config: Annotated[
         str | None,
         typer.Option(
-            metavar="FILE", help='Configuration file, see "mav-tasks config"; "": no file.'
+            metavar="FILE",
+            help='Configuration file; default: config.toml in your configuration folder; "": none.',
         ),
     ] = None,
     set_: Annotated[
