@@ -145,11 +145,16 @@ def read_options(arguments: Sequence[str] | None) -> Options:
         default="",
         help="sign with this key, and accept only packets signed with it",
     )
-    add("--keys", metavar="FILE", default="", help="key ring file (default: your own)")
+    add(
+        "--keys",
+        metavar="FILE",
+        default="",
+        help="key ring file (default: keys.toml in your configuration folder)",
+    )
     add(
         "--frame",
         choices=tuple(frame.value for frame in Frame),
-        help="how the rover steers; skid and differential are the same (default: as the persona)",
+        help="how the rover steers; skid and differential are the same (default: the persona's)",
     )
     add("--fault", metavar="TEXT", action="append", default=[], help=HELP)
     add_realism_arguments(parser)

@@ -68,14 +68,15 @@ def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--peers",
         choices=[each.value for each in Peers],
-        help="clients to answer: all, or only the first until a restart (default: first for px4"
-        " with --noise on, else all)",
+        help="clients to answer: all, or only the first one (default: first for px4 with --noise"
+        " on, else all)",
     )
     add(
         "--sticks",
         type=read_sticks,
         metavar="THROTTLE[,STEERING]",
-        help="RC transmitter with its sticks held so, in microseconds (1500 is neutral)",
+        help="simulate an RC transmitter that holds its sticks at these pulse widths, in"
+        " microseconds (1500 is neutral)",
     )
 
 

@@ -44,8 +44,8 @@ def make_parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(
         prog="rover_sim.check_vehicle",
-        description="Check what a task server and its clients expect of a MAVLink rover. Nothing"
-        " moves and nothing stays changed unless you give --arm, --drive or --write.",
+        description="Check whether a MAVLink rover behaves as a task server and its clients expect."
+        " Nothing moves and nothing stays changed unless you give --arm, --drive or --write.",
     )
     add = parser.add_argument
     add("url", help="udpout:127.0.0.1:14580, udpin:…, tcp:…, tcpin:… or serial:/dev/ttyACM0:57600")
@@ -55,14 +55,18 @@ def make_parser() -> argparse.ArgumentParser:
         default="auto",
         help="autopilot to expect (default: the one that it reports)",
     )
-    add("--arm", action="store_true", help="arm and disarm the vehicle, standing")
+    add("--arm", action="store_true", help="arm and disarm the vehicle without moving it")
     add(
         "--drive", action="store_true", help="arm the vehicle and drive some metres: keep 20 m free"
     )
     add(
         "--write", action="store_true", help="upload missions and fences, then restore the old ones"
     )
-    add("--insecure", action="store_true", help="allow --arm and --drive beyond this machine")
+    add(
+        "--insecure",
+        action="store_true",
+        help="allow --arm and --drive for a vehicle that is not on this machine",
+    )
     add("--system-id", type=int, help="system id of the vehicle, if there are several")
     add(
         "--only",
@@ -71,7 +75,12 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="GROUP",
         help=f"groups of checks: {', '.join(GROUPS)}",
     )
-    add("--speed", type=float, default=1.0, help="speed of a simulated vehicle's time")
+    add(
+        "--speed",
+        type=float,
+        default=1.0,
+        help="simulated seconds per real second of a simulated vehicle",
+    )
     add("--json", action="store_true", help="print a JSON list at the end instead of lines")
     return parser
 

@@ -89,8 +89,8 @@ def make_parser() -> argparse.ArgumentParser:
         "--stick",
         metavar="URL",
         default="",
-        help="a second link to an ArduPilot, for"
-        " RC_CHANNELS_OVERRIDE and a restart;\ndefault: that of --truth if it is a link",
+        help="second link to an ArduPilot, for"
+        " RC_CHANNELS_OVERRIDE and a restart;\ndefault: the link of --truth, if there is one",
     )
     add(
         "--reboot-command",
