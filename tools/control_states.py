@@ -1,9 +1,9 @@
-"""Tries every event in every reachable state of control, and judges the server's reaction.
+"""Try every event in every reachable state of control, and check the server's reaction.
 
-    tools/control_states.py --persona px4 --most 1000      about a state a second
-    tools/control_states.py --start "task, pause"          from there
+    tools/control_states.py --persona px4 --most 1000      takes about a second per state
+    tools/control_states.py --start "task, pause"          begins after these events
 
-Exit code 0: nothing was wrong; 1: something was, and its sequence of events is printed. Linux only.
+Exit code 0: no fault; 1: a fault, and its sequence of events is printed. Linux only.
 """
 
 import argparse
@@ -31,8 +31,10 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--persona", choices=PERSONAS, default="ardupilot")
-    parser.add_argument("--most", type=int, default=300, metavar="N", help="states to go on from")
-    parser.add_argument("--start", default="", metavar="DEEDS", help="what has happened before")
+    parser.add_argument(
+        "--most", type=int, default=300, metavar="N", help="explore at most this many states"
+    )
+    parser.add_argument("--start", default="", metavar="DEEDS", help="events before the search")
     arguments = parser.parse_args()
     start = [name.strip() for name in arguments.start.split(",") if name.strip()]
     if unknown := [name for name in start if name not in BY_NAME]:

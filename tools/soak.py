@@ -1,4 +1,4 @@
-"""Soaks the server: random lives in virtual time, mutated packets, fuzzed parsers.
+"""Soak-test the server: random lives in virtual time, mutated packets, fuzzed parsers.
 
     tools/soak.py --seeds 100 --minutes 5 --jobs 2     random worlds, rules judged at each step
     tools/soak.py --seed 17 --minutes 5                repeat the one that failed
@@ -6,8 +6,8 @@
     tools/soak.py --fuzz 10                            minutes of fuzzing
     tools/soak.py --hour                               memory over an hour of 5 rovers, 10 clients
 
-Exit code 0: nothing was wrong; 1: something was, and its seed is printed; 2: wrong arguments; 3: a
-halted rover moved before it was released.
+Exit code 0: no fault; 1: a fault, and its seed is printed; 2: usage error; 3: a halted rover moved
+before it was released.
 """
 
 import argparse
@@ -39,14 +39,24 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--seeds", type=_positive, metavar="N", help="live so many lives")
-    what.add_argument("--seed", type=int, metavar="N", help="live this one life")
-    what.add_argument("--packets", type=_positive, metavar="N", help="send mutated packets")
-    what.add_argument("--fuzz", type=float, metavar="MINUTES", help="fuzz what reads bytes")
-    what.add_argument("--hour", action="store_true", help="look at memory over a virtual hour")
-    parser.add_argument("--minutes", type=float, default=5.0, help="virtual, of each life")
-    parser.add_argument("--jobs", type=_positive, default=1, help="lives side by side")
-    parser.add_argument("--first-seed", type=int, default=0, metavar="N")
+    what.add_argument("--seeds", type=_positive, metavar="N", help="run this many random lives")
+    what.add_argument("--seed", type=int, metavar="N", help="run the life of this seed")
+    what.add_argument(
+        "--packets", type=_positive, metavar="N", help="send this many mutated packets"
+    )
+    what.add_argument(
+        "--fuzz", type=float, metavar="MINUTES", help="fuzz the parsers for this long"
+    )
+    what.add_argument("--hour", action="store_true", help="measure memory over a virtual hour")
+    parser.add_argument(
+        "--minutes", type=float, default=5.0, help="virtual minutes of each life (default 5)"
+    )
+    parser.add_argument(
+        "--jobs", type=_positive, default=1, help="lives to run in parallel (default 1)"
+    )
+    parser.add_argument(
+        "--first-seed", type=int, default=0, metavar="N", help="seed of the first life (default 0)"
+    )
     parser.add_argument("--figures", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     logging.disable(logging.CRITICAL)  # thousands of logged refusals

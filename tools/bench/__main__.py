@@ -66,8 +66,16 @@ def main() -> None:
     parser.add_argument("what", nargs="*", help=", ".join(MEASUREMENTS) + "; default: all")
     parser.add_argument("--profile", metavar="FILE", help="profile the server of one measurement")
     parser.add_argument("--against", metavar="REVISION", help="measure that revision's server, too")
-    parser.add_argument("--rounds", type=int, default=3, metavar="N", help="with --against; 3")
-    parser.add_argument("--names", type=int, default=0, metavar="N", help="with turns: functions")
+    parser.add_argument(
+        "--rounds", type=int, default=3, metavar="N", help="with --against: rounds (default 3)"
+    )
+    parser.add_argument(
+        "--names",
+        type=int,
+        default=0,
+        metavar="N",
+        help="with turns: print the N most called functions",
+    )
     parser.add_argument("--json", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     unknown = set(arguments.what) - MEASUREMENTS.keys()
