@@ -1,6 +1,6 @@
 """Keep the generated parts of documents current; each stands between two marker lines."""
 
-import sys
+import argparse
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -12,6 +12,11 @@ def keep_current(document: str, what: str, tool: str, made: str) -> int:
     With ``--check`` on the command line, only report whether the document is outdated, and return 1
     if so.
     """
+    parser = argparse.ArgumentParser(description=f"Write the {what} into {document}.")
+    parser.add_argument(
+        "--check", action="store_true", help="change nothing; exit status 1 if it is outdated"
+    )
+    is_check = parser.parse_args().check
     path = ROOT / document
     begin, end = f"<!-- {what}: made by tools/{tool} -->\n", f"<!-- end of {what} -->\n"
     text = path.read_text(encoding="utf-8")
@@ -23,7 +28,7 @@ def keep_current(document: str, what: str, tool: str, made: str) -> int:
     current = before + begin + made + end + after
     if current == text:
         return 0
-    if "--check" in sys.argv[1:]:
+    if is_check:
         print(f"{document}: the {what} is outdated; run tools/{tool}")
         return 1
     path.write_text(current, encoding="utf-8")
