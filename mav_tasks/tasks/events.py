@@ -10,6 +10,7 @@ from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.server_events import ParameterSet, SignatureRefused, SignaturesSeen
 from mav_tasks.tasks.task import Frame, Progress, Task, TaskId, Terms
+from mav_tasks.tasks.term_changes import changes_of
 from mav_tasks.tasks.timing import Timing
 
 SERVER = "server"
@@ -143,7 +144,7 @@ class PlanStored:
 
 @dataclass(frozen=True, slots=True)
 class TaskModified:
-    """The terms of a task were changed."""
+    """The terms of a task were changed; ``before`` is None in events of older versions."""
 
     task_id: TaskId
     vehicle: int
@@ -151,9 +152,13 @@ class TaskModified:
     terms: Terms
     actor: str
     at: float
+    before: Terms | None = None
 
     def __str__(self) -> str:
-        return f"rover {self.vehicle}: task {self.task_id} modified by {self.actor}"
+        what = ""
+        if self.before is not None:
+            what = f": {changes_of(self.before, self.terms, at=self.at) or 'no change'}"
+        return f"rover {self.vehicle}: task {self.task_id} modified by {self.actor}{what}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -165,7 +165,8 @@ class TaskRegistry:
         """Change the terms of a task that is not over."""
         old = self._tasks[task_id]
         task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)
-        self.record(TaskModified(task_id, task.vehicle, task.version, terms, actor, now))
+        modified = TaskModified(task_id, task.vehicle, task.version, terms, actor, now, old.terms)
+        self.record(modified)
         self._last_event[task_id] = self.recorded
         return task
 

@@ -1,0 +1,62 @@
+"""What a modification changed in the terms of a task, as text: "priority 9 (was 5)". Pure."""
+
+from collections.abc import Iterator
+
+from mav_tasks.tasks.task import Terms
+
+
+def changes_of(before: Terms, after: Terms, *, at: float) -> str:
+    """Return the changed terms as text; "" if none changed.
+
+    ``at``: time of the change, on the same clock as the start time and the deadline.
+    """
+    return ", ".join(_changes(before, after, at))
+
+
+def _changes(before: Terms, after: Terms, at: float) -> Iterator[str]:
+    if after.priority != before.priority:
+        yield f"priority {after.priority} (was {before.priority})"
+    if after.after != before.after:
+        yield f"runs after task {after.after}" if after.after else "runs after no other task"
+    if (after.start_at, after.start_utc) != (before.start_at, before.start_utc):
+        yield _start_of(after, at)
+    if after.deadline != before.deadline:
+        is_none = after.deadline is None
+        yield "no deadline" if is_none else f"deadline in {_seconds(after.deadline, at)}"
+    if after.is_preemptible != before.is_preemptible:
+        yield "pre-emptible" if after.is_preemptible else "not pre-emptible"
+    if after.is_preemptive != before.is_preemptive:
+        yield "pre-emptive" if after.is_preemptive else "not pre-emptive"
+    if after.is_staged != before.is_staged:
+        yield "needs a start command" if after.is_staged else "start command received"
+    if after.label != before.label:
+        yield f"label '{after.label}'" if after.label else "no label"
+
+
+def _start_of(terms: Terms, at: float) -> str:
+    starts = []
+    if terms.start_at is not None:
+        starts.append(f"start in {_seconds(terms.start_at, at)}")
+    if terms.start_utc is not None:
+        starts.append(f"start at {_utc_text(terms.start_utc)}")
+    return " and ".join(starts) or "no start time"
+
+
+def _utc_text(utc: int) -> str:
+    """Return UTC seconds since 1970 as ISO 8601, by arithmetic: ``datetime`` would bring a clock.
+
+    Years begin in March here, so that a leap day is the last day of its year.
+    """
+    days, second = divmod(utc, 86_400)
+    era, day = divmod(days + 719_468, 146_097)  # 400 years, from 0000-03-01
+    year = (day - day // 1_460 + day // 36_524 - day // 146_096) // 365
+    day -= 365 * year + year // 4 - year // 100
+    month = (5 * day + 2) // 153
+    day -= (153 * month + 2) // 5
+    year += 400 * era + (month >= 10)
+    date = f"{year:04}-{(month + 2) % 12 + 1:02}-{day + 1:02}"
+    return f"{date}T{second // 3_600:02}:{second // 60 % 60:02}:{second % 60:02}Z"
+
+
+def _seconds(moment: float | None, at: float) -> str:
+    return f"{round((moment or 0.0) - at, 1):g} s"
