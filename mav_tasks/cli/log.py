@@ -49,7 +49,7 @@ def log(
 ) -> None:
     """Print the journal, one event per line; times are UTC.
 
-    Reads the store file; the server need not run.
+    Reads the store file; the server need not run. On a terminal, long lines wrap at words.
     """
     import time  # noqa: PLC0415
     from contextlib import closing  # noqa: PLC0415
@@ -72,15 +72,16 @@ def log(
         raise StoreError("--store: expected the path of a store file")
     which = Which(task=task, vehicle=vehicle, since=begin)
     entry_of = export.json_entry if as_json else export.csv_entry if as_csv else export.text_entry
+    wraps = not as_json and not as_csv and sys.stdout.isatty()  # a program gets whole lines
     with closing(Journal(path, which)) as journal:
         try:
             if as_csv:
                 sys.stdout.write(export.csv_row(export.COLUMNS))
             seen = journal.version()
-            _print(journal, entry_of)
+            _print(journal, entry_of, wraps=wraps)
             while follow and _is_written_to(journal, seen):
                 seen = journal.version()
-                _print(journal, entry_of)
+                _print(journal, entry_of, wraps=wraps)
         except BrokenPipeError:  # the reader has ended, as ``head`` does
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         except KeyboardInterrupt:
@@ -89,9 +90,13 @@ def log(
             raise UsageError(f"standard output: {error.strerror}") from error
 
 
-def _print(journal: "Journal", entry_of: "EntryOf") -> None:
+def _print(journal: "Journal", entry_of: "EntryOf", *, wraps: bool) -> None:
+    from mav_tasks.cli import output  # noqa: PLC0415
+
+    columns = output.columns() if wraps else None
     for number, event in journal.take(offset=0.0):
-        sys.stdout.write(entry_of(number, event))
+        entry = entry_of(number, event)
+        sys.stdout.write(output.wrapped(entry, columns) if columns else entry)
     sys.stdout.flush()
 
 

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 
 DUMB = ("dumb", "unknown", "")
 PIPE_WIDTH = 1000  # columns: nothing is cut for a program that reads
+INDENT = " " * 4  # of the second and further lines of one that is wrapped
+NARROWEST = 20  # columns; in a narrower terminal the words break
 
 
 def is_drawn_on() -> bool:
@@ -71,5 +73,28 @@ def show(what: "RenderableType") -> None:
     say("\n".join(line.rstrip() for line in captured.get().rstrip("\n").split("\n")))
 
 
+def columns() -> int:
+    """Return the width of the terminal."""
+    return shutil.get_terminal_size().columns
+
+
+def wrapped(line: str, width: int) -> str:
+    """Return a line wrapped at words to a terminal's width; an indent marks what continues it."""
+    if len(line.rstrip("\n")) <= width:
+        return line
+    from textwrap import wrap  # noqa: PLC0415
+
+    return "".join(
+        f"{piece}\n"
+        for piece in wrap(
+            line,
+            max(width, NARROWEST),
+            subsequent_indent=INDENT,
+            break_long_words=False,  # the terminal breaks them, and they can be copied whole
+            break_on_hyphens=False,
+        )
+    )
+
+
 def _plain_width() -> int:
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
+    return columns() if sys.stdout.isatty() else PIPE_WIDTH

@@ -18,7 +18,8 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.tasks.events import VehicleSeen
+from mav_tasks.tasks.events import TaskModified, VehicleSeen
+from mav_tasks.tasks.task import TaskId, Terms
 from tests.kit.commands import Done, mav_tasks
 from tests.kit.processes import (
     Process,
@@ -31,6 +32,7 @@ from tests.kit.processes import (
     wait_for,
     wait_until,
 )
+from tests.kit.terminal import terminal
 from tests.unit.store.samples import opened
 
 MOVE, STOP, CONTINUE = 54000, 54003, 193
@@ -210,6 +212,26 @@ def full(tmp_path: Path) -> Path:
 def begun(path: Path, *options: str, **streams: Any) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "mav_tasks.cli", "log", "--store", str(path), *options]
     return subprocess.Popen(command, stderr=subprocess.PIPE, **streams)
+
+
+def test_only_a_terminal_gets_long_lines_wrapped_at_words(tmp_path: Path) -> None:
+    path = tmp_path / "t.sqlite3"
+    before, terms = Terms(), Terms(priority=9, label="north of the shed")
+    with opened(path) as store:
+        store.append([TaskModified(TaskId(3), 1, 2, terms, "client", 1.0, before)])
+    command = ("-m", "mav_tasks.cli", "log", "--store", str(path))
+    (line,) = export("--store", str(path))[1].splitlines()
+    words = "modified by client: priority 9 (was 5), label 'north of the shed'"
+    assert line.endswith(f"rover 1: task 3 {words}")
+    with terminal(*command, size=(24, 50)) as screen:
+        assert screen.end() == 0
+    first, *rest = screen.lines
+    assert len(rest) == 2
+    assert all(each.startswith("    ") for each in rest)
+    assert " ".join([first, *map(str.strip, rest)]) == line
+    with terminal(*command, "--json", size=(24, 50)) as screen:
+        assert screen.end() == 0
+    assert json.loads(screen.written)["before"]["priority"] == 5
 
 
 @pytest.mark.parametrize("follow", [(), ("--follow",)])
