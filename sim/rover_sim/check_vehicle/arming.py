@@ -13,7 +13,7 @@ def check_arming(context: Context) -> None:
     """Arm and disarm; the heartbeat must show both."""
     probe, report = context.probe, context.report
     if not context.options.arm:
-        report.skip("arm and disarm", "not without --arm")
+        report.skip("arm and disarm", "needs --arm")
         return
     if probe.armed:
         report.skip("arm and disarm", "it is armed, and not by us")

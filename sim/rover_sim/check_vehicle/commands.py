@@ -51,7 +51,7 @@ def check_answers(context: Context) -> None:
         report.expect(
             f"{name} on request",
             answer.result is not None,
-            expected="an answer within 1 s (a real ArduPilot accepts it and has none to send)",
+            expected="an answer within 1 s (a real ArduPilot accepts it, but sends no message)",
             seen=f"{answer}",
         )
     answer = probe.command(REQUEST_MESSAGE, UNKNOWN_MESSAGE)
@@ -80,14 +80,14 @@ def check_addresses(context: Context) -> None:
     answer = probe.command(REQUEST_MESSAGE, AUTOPILOT_VERSION)
     targets = {(each.message.target_system, each.message.target_component) for each in answer.acks}
     report.expect(
-        "ack names the asker",
+        "ack is addressed to the sender",
         targets == {OURS},
-        expected=f"target {OURS[0]}/{OURS[1]}, which asked",
+        expected=f"target {OURS[0]}/{OURS[1]}, the sender",
         seen=", ".join(f"{system}/{component}" for system, component in targets) or f"{answer}",
     )
     sources = [each.component for each in answer.acks]
     report.expect(
-        "one ack, from whom was asked",
+        "one ack, from the target",
         sources == [AUTOPILOT],
         expected="one COMMAND_ACK from component 1 (clients match by component and command)",
         seen=f"from components {sources}" if sources else f"{answer}",
@@ -163,7 +163,7 @@ def check_files(context: Context) -> None:
     report.expect(
         "MAVLink FTP",
         code in (FTP_ACK, FTP_NAK) and (reply.target_system, reply.target_component) == OURS,
-        expected="an ACK or a NAK, addressed to the asker, within 1 s",
+        expected="an ACK or a NAK, addressed to the sender, within 1 s",
         seen=seen.get(code, f"opcode {code}")
         + ("" if reply is None else f" to {reply.target_system}/{reply.target_component}"),
     )

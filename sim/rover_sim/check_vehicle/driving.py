@@ -37,7 +37,7 @@ def check_driving(context: Context) -> None:
     """Arm, drive, stop; on every exit send zeros, HOLD and disarm."""
     probe, report = context.probe, context.report
     if not context.options.drive:
-        report.skip("driving", "not without --drive")
+        report.skip("driving", "needs --drive")
         return
     if probe.armed:
         report.skip("driving", "it is armed, and not by us")
@@ -48,7 +48,7 @@ def check_driving(context: Context) -> None:
         if _take_control(context):
             _drive(context)
     except Interference as reason:
-        report.fail("driving", expected="a vehicle that is ours to drive", seen=str(reason))
+        report.fail("driving", expected="a vehicle that nobody else controls", seen=str(reason))
     finally:
         rested = bring_to_rest(context)
         report.expect(
@@ -158,7 +158,7 @@ def _check_yaw_rate(context: Context, wheel: DriveController) -> None:
     """Check a curve and reverse where yaw rates are honoured; note a turn on the spot."""
     if not context.way.honours_yaw_rate:
         turned, _ = _turn(wheel, 0.0, TURN_RATE)
-        said = f"{math.degrees(turned):.0f}° in {LEG:g} s (its make passes over yaw rates)"
+        said = f"{math.degrees(turned):.0f}° in {LEG:g} s (this autopilot ignores yaw rates)"
         context.report.note("yaw rate in BODY_NED", said)
         return
     turned, _ = _turn(wheel, SPEED, TURN_RATE)
@@ -173,13 +173,13 @@ def _check_yaw_rate(context: Context, wheel: DriveController) -> None:
     context.report.expect(
         "backwards in BODY_NED",
         -1.5 * SPEED * LEG < moved < -0.3 * SPEED * LEG,
-        expected=f"up to {SPEED * LEG:.1f} m backwards, for a yaw rate of zero is given",
+        expected=f"up to {SPEED * LEG:.1f} m backwards, at yaw rate 0",
         seen=f"{-moved:.2f} m backwards",
     )
     turned, _ = _turn(wheel, 0.0, TURN_RATE)
     seen = f"{math.degrees(turned):.0f}° in {LEG:g} s"
     if turned < 0.4 * wanted:
-        context.report.note("on the spot", f"{seen}: it steers as a car, it seems")
+        context.report.note("on the spot", f"{seen}: it may steer like a car")
     else:
         context.report.ok("on the spot", seen)
 

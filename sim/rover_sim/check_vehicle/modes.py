@@ -26,9 +26,9 @@ def check_modes(context: Context) -> None:
             probe.wait(HEARTBEAT, SHOWN_WITHIN, since=probe.mark())
         is_answered = answer.accepted if way.accepts_nonsense else False
         report.expect(
-            "a mode that there is not",
+            "a mode that does not exist",
             (answer.refused or is_answered) and probe.custom_mode in (present, before),
-            expected="an answer, and no change" if way.accepts_nonsense else "a refusal",
+            expected="an answer, and the same mode" if way.accepts_nonsense else "a refusal",
             seen=f"{answer}, mode {probe.custom_mode:#x}",
         )
     finally:

@@ -174,7 +174,7 @@ def _check_needed(context: Context, names: set[str]) -> None:
     report.expect(
         "parameters for QGroundControl",
         not missing,
-        expected="those without which it asks for a set-up as soon as it connects",
+        expected="all without which QGroundControl asks for setup when it connects",
         seen=f"missing: {_some(missing)}" if missing else "all there",
     )
     if missing := way.in_setup - names:

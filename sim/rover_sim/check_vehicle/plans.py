@@ -45,8 +45,8 @@ def check_plans(context: Context) -> None:
         finally:
             result = _upload(context, mission_type, items)
             if result != "accepted":
-                why = f"what was there is not back: {result}"
-                context.report.fail(f"{name}: put back", expected="accepted", seen=why)
+                why = f"the old items are not restored: {result}"
+                context.report.fail(f"{name}: restore", expected="accepted", seen=why)
 
 
 def _check_download(context: Context, mission_type: int, name: str) -> list[Any] | None:
@@ -54,7 +54,7 @@ def _check_download(context: Context, mission_type: int, name: str) -> list[Any]
     context.report.expect(
         f"{name}: download",
         not isinstance(items, str),
-        expected="MISSION_COUNT, addressed to the asker, and each item that is asked for",
+        expected="MISSION_COUNT, addressed to the sender, and each requested item",
         seen=items if isinstance(items, str) else f"{len(items)} items",
     )
     return None if isinstance(items, str) else items
@@ -67,7 +67,7 @@ def _check_upload(context: Context, mission_type: int, name: str) -> None:
     report.expect(
         f"{name}: upload",
         result == "accepted",
-        expected="a request for each item in turn, then MISSION_ACK ACCEPTED to the asker",
+        expected="a request for each item in turn, then MISSION_ACK ACCEPTED to the sender",
         seen=result,
     )
     back = _download(context, mission_type)

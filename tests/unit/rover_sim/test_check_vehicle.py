@@ -202,8 +202,8 @@ FAULTS: dict[str, Fault] = {
                 "an unknown message",
                 "an unknown command",
                 "an unknown COMMAND_INT",
-                "ack names the asker",
-                "one ack, from whom was asked",
+                "ack is addressed to the sender",
+                "one ack, from the target",
                 "AVAILABLE_MODES",
             }
         ),
@@ -227,12 +227,12 @@ FAULTS: dict[str, Fault] = {
     ),
     "acks to everybody": Fault(
         COMMANDS,
-        frozenset({"ack names the asker"}),
+        frozenset({"ack is addressed to the sender"}),
         says=with_fields(m.CommandAck, target_system=0, target_component=0),
     ),
-    "acks twice": Fault(COMMANDS, frozenset({"one ack, from whom was asked"}), says=twice),
+    "acks twice": Fault(COMMANDS, frozenset({"one ack, from the target"}), says=twice),
     "acks from the wrong component": Fault(
-        COMMANDS, frozenset({"one ack, from whom was asked"}), packets=acks_from_component_2
+        COMMANDS, frozenset({"one ack, from the target"}), packets=acks_from_component_2
     ),
     "obeys what is for others": Fault(
         COMMANDS, frozenset({"a command for another system"}), hears=takes_commands_of_others
@@ -326,7 +326,7 @@ FAULTS: dict[str, Fault] = {
     "an upload without an end": Fault(
         PLANS,
         frozenset({f"{kind}: {what}" for kind in ("mission", "fence", "rally points")
-                   for what in ("upload", "clear", "put back")}),
+                   for what in ("upload", "clear", "restore")}),
         says=without(m.MissionAck),
         persona=PX4,
         options=Options(write=True),
@@ -556,4 +556,4 @@ def test_a_px4_that_accepts_a_mode_that_there_is_not_may_not_leave_its_own() -> 
 
     assert run(VirtualWire(PX4, says=says), NOTHING, ("identity", "modes")).failed == []
     failed = run(VirtualWire(ARDUPILOT, says=says), NOTHING, ("identity", "modes")).failed
-    assert [line.name for line in failed] == ["a mode that there is not"]
+    assert [line.name for line in failed] == ["a mode that does not exist"]
