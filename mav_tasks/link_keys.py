@@ -19,8 +19,8 @@ def check_keys(links: Links, ring: KeyRing | None, *, where: str) -> None:
         is_for_none = not any(key.role for key in (ring or KeyRing()).usable)
         if link.side == "clients" and is_far and is_for_none and not links.insecure:
             raise InsecureLinkError(
-                f"link {link.url} reaches beyond this machine, and nobody there has a signing key: "
-                f'"mav-tasks keys add" makes one, in {where}; or {MEANT}'
+                f"link {link.url} reaches beyond this machine, but no client has a signing key: "
+                f'add one with "mav-tasks keys add" (key ring {where}); or {MEANT}'
             )
 
 

@@ -83,7 +83,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             if isinstance(opened_link, UdpLink) and opened_link.note:
                 say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
-            say("no push: no link for clients is UDP")
+            say("links.push not used: no link for clients is UDP")
         say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
             say(f"parameters of an earlier run: {_in_words(restored.parameters)}")

@@ -43,7 +43,9 @@ async def ready(
         shown = [words.vehicle_json(each) for each in rovers]
         output.say_json({"ready": not silent, "rovers": shown})
     if silent:
-        raise Refused(f"the server answers, but {', '.join(silent)}", result=0, reason=0)
+        raise Refused(
+            f"the server answers, but does not hear {', '.join(silent)}", result=0, reason=0
+        )
     if not common.json:
         ids = ", ".join(str(each.id) for each in rovers)
         output.say(f"ready: the server hears rover{'s' if len(rovers) > 1 else ''} {ids}")
@@ -52,4 +54,4 @@ async def ready(
 def _silence(rover: "VehicleStatus") -> str:
     from mav_tasks.cli import words  # noqa: PLC0415
 
-    return f"rover {rover.id} is {words.silence_of(rover.heartbeat_age) or 'silent'}"
+    return f"rover {rover.id} ({words.silence_of(rover.heartbeat_age) or 'silent'})"

@@ -64,7 +64,7 @@ class Reload:
     def begin(self, put: Put) -> None:
         """Start to read; then apply live keys with ``put``. Called in the loop."""
         if self._is_reading:
-            log.warning("configuration: the last reload still runs")
+            log.warning("configuration: still reloading; it will be read once more")
             self._is_asked_again = True
             return
         self._is_reading = True
@@ -89,7 +89,7 @@ class Reload:
         if isinstance(outcome, ConfigError):
             for fault in outcome.faults:
                 log.error("configuration: %s", fault)
-            log.error("configuration: not applied")
+            log.error("configuration: not applied, the old one stays in force")
         else:
             self._take(outcome, put)
         if self._is_asked_again:

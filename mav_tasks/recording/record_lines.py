@@ -199,7 +199,7 @@ def _packets_to_json(item: Packets) -> list[Any]:
 def _packets_of(link: str, datagrams: Sequence[Any], waited: Sequence[float] = ()) -> Packets:
     pairs = [(peer_of(peer), a2b_base64(data, strict_mode=True)) for peer, data in datagrams]
     if waited and len(waited) != len(pairs):
-        raise ValueError("so many datagrams did not wait")
+        raise ValueError("waiting times and datagrams differ in number")
     return Packets(link, pairs, waited)
 
 
@@ -215,7 +215,7 @@ def _base64(data: bytes) -> str:
 def _peer_to_json(peer: Hashable) -> Hashable:
     parts = peer if isinstance(peer, tuple) else (peer,)
     if not all(type(part) in (str, int) for part in parts):
-        raise Unwritable(f"a peer of another kind than links have: {peer!r}")
+        raise Unwritable(f"unknown kind of peer: {peer!r}")
     return peer  # JSON writes a tuple as an array
 
 

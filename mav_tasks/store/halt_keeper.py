@@ -100,7 +100,7 @@ class HaltKeeper:
         now = time.monotonic()
         if word.is_halt and now >= self._report_at.setdefault(word.key, now + GRACE):
             self._report_at[word.key] = now + REPORT
-            text = f"store {self._name}: record of halts: {why}: not kept: {_told(word)}"
+            text = f"store {self._name}: halt not stored ({why}): {_told(word)}"
             self._mail.put(HaltNotKept(word.vehicle, text))
 
 

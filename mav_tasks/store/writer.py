@@ -128,7 +128,9 @@ class Writer:
         )
         while not self._is_written(batch):
             if self._give_up_at is not None and time.monotonic() > self._give_up_at:
-                words = f"not written before the end: {len(events)} events or more are lost"
+                words = (
+                    f"{len(events)} events or more are lost: not written before the server ended"
+                )
                 self._mail.put(NotKept(f"store {self._name}: {words}"))
                 return False
             time.sleep(RETRY)

@@ -123,7 +123,9 @@ def test_a_silent_rover_keeps_no_other_from_being_paused(tmp_path: Path) -> None
             half = called("ready", "--json", server=server)
             assert half.status == 1
             assert re.fullmatch(
-                r"mav-tasks: the server answers, but rover 2 is silent for [\d.]+s\n", half.error
+                r"mav-tasks: the server answers, but does not hear rover 2"
+                r" \(silent for [\d.]+s\)\n",
+                half.error,
             )
             assert half.objects[0]["ready"] is False
             assert [each["heard"] for each in half.objects[0]["rovers"]] == [True, False]

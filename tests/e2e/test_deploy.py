@@ -70,7 +70,7 @@ def test_the_health_check_of_the_container_asks_the_server_of_the_unit(tmp_path:
             answers.append(mav_tasks(*asked, server=url))
             assert len(answers) < 50
         assert answers[-1].status == 1
-        assert "rover 1 is silent for" in answers[-1].error
+        assert "does not hear rover 1 (silent for" in answers[-1].error
         server.end()
         assert server.popen.returncode == 0
     assert mav_tasks(*asked, server=url).status == 3

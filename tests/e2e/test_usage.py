@@ -106,7 +106,7 @@ def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
         folder=tmp_path,
         name="server",
     ) as server:
-        server.wait_for("no push: no link for clients is UDP")
+        server.wait_for("links.push not used: no link for clients is UDP")
         server.wait_for(re.escape(f"link {serial} is not available yet: No such file"))
         server.wait_for(re.escape(f"link {tcp} is not available yet: Connection refused"))
         with socket.create_server(("127.0.0.1", port)) as rover:

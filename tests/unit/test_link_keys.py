@@ -33,7 +33,7 @@ def check(links: Links, keys: KeyRing | None) -> None:
 )
 def test_a_link_for_others_needs_somebody_who_can_sign(keys: KeyRing | None) -> None:
     for links in (Links(clients=(FAR,)), Links(push=("192.0.2.1:1",))):
-        with pytest.raises(InsecureLinkError, match=r"nobody there has a signing key: .* use --in"):
+        with pytest.raises(InsecureLinkError, match=r"no client has a signing key: .* use --in"):
             check(links, keys)
     check(Links(clients=(FAR,), insecure=True), keys)
     check(Links(clients=(NEAR,)), keys)

@@ -105,7 +105,7 @@ def test_a_file_with_faults_changes_nothing(
     assert said == [
         f"ERROR configuration: {path}:2: driving.sped: no such key; did you mean driving.speed?",
         f"ERROR configuration: {path}:3: x: no such key",
-        "ERROR configuration: not applied",
+        "ERROR configuration: not applied, the old one stays in force",
         "INFO configuration: reloaded, no changes",
     ]
     assert server.put == []
@@ -180,7 +180,7 @@ def test_a_slow_disk_keeps_nobody_and_what_is_asked_meanwhile_is_done_after_it(
         asyncio.run(run())
     disk.set()
     assert [record.getMessage() for record in caplog.records].count(
-        "configuration: the last reload still runs"
+        "configuration: still reloading; it will be read once more"
     ) == 2
 
 
@@ -198,7 +198,9 @@ def test_an_own_mistake_is_told_and_does_not_leave_it_reading(
 
     with caplog.at_level(logging.INFO, "mav_tasks"):
         asyncio.run(run())
-    assert "configuration: not applied" in [each.getMessage() for each in caplog.records]
+    assert "configuration: not applied, the old one stays in force" in [
+        each.getMessage() for each in caplog.records
+    ]
 
 
 def test_of_a_bound_between_what_changes_and_what_does_not_both_stay() -> None:

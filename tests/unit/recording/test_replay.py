@@ -381,7 +381,7 @@ def test_a_peer_that_no_link_has_ends_the_record(
     decisions.on_input(Packets(CLIENT_LINK, [(object(), b"x")]), now=1.5)
     decisions.close()
     record = read(decisions.path)
-    assert (record.why_it_ends or "").startswith("a peer of another kind than links have: <object")
+    assert (record.why_it_ends or "").startswith("unknown kind of peer: <object")
     assert [entry.kind for entry in record.entries()] == ["wall clock"]
     assert (record.restored, len(caplog.messages)) == (Restored(), 1)
 
