@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from mav_tasks.mavlink.enums import MavResult, MavType
 from mav_tasks.probe.findings import Drive, Findings, Rate
+from mav_tasks.services.loss_failsafe import KEEPS_MOVING
 from mav_tasks.settings import SET_FAILSAFE, Identity, Turning
 
 NOT_TRIED = "not tried: needs --drive"
@@ -96,7 +97,7 @@ def _lines(findings: Findings) -> Iterator[Line]:
 
 
 def _without_setpoints(said: str) -> Line:
-    if said.startswith("would"):
+    if said.startswith(KEEPS_MOVING):
         return Line("without setpoints", f"{said}. To make it stop: {SET_FAILSAFE} URL", Mark.BAD)
     mark = Mark.GOOD if said.startswith("stops") else Mark.WARNING
     return Line("without setpoints", said or UNKNOWN, mark)

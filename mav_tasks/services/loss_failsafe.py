@@ -40,6 +40,8 @@ AFTER, ACTION = "COM_OF_LOSS_T", "COM_OBL_RC_ACT"  # s; what is done then
 NO_STICKS = "NAV_RCL_ACT"
 NO_STATION, EXCEPT = "NAV_DLL_ACT", "COM_DLL_EXCEPT"
 OFFBOARD_BIT = 4  # of COM_DLL_EXCEPT
+#: how the description of a vehicle begins that does not stop by itself
+KEEPS_MOVING = "keeps moving when setpoints stop"
 LONGEST = 5.0  # s that a vehicle may drive on without setpoints; ArduPilot takes 3
 ASKS = 10  # times that a parameter is asked for
 NEVER = ASKS + 1
@@ -129,7 +131,7 @@ class LossFailsafe:
         if self._asked == NEVER or {AFTER, ACTION}.intersection(self._missing):
             return ""
         if self.why_off:
-            return f"would move without setpoints: {self.why_off}"
+            return f"{KEEPS_MOVING}: {self.why_off}"
         _, deed = self._deed_of(int(self._values[ACTION]))
         return "stops when setpoints stop" + ("" if deed is None else f": {deed.value}")
 

@@ -87,7 +87,7 @@ class Releases:
             else:
                 self._begin_released(again=release.again, actor=release.actor, now=now)
         elif now >= release.until and waits_for is not R.QUEUE_PAUSED:
-            self._note_held(task, f"waited too long: {words_of(waits_for)}", now=now)
+            self._note_held(task, f"waited too long ({words_of(waits_for)})", now=now)
         elif waits_for is not release.waits_for:
             self._lineup.released = replace(release, waits_for=waits_for)
             self._lineup.registry.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
@@ -117,7 +117,7 @@ class Releases:
 
     def _note_held(self, task: Task, why: str, *, now: float) -> None:
         self._lineup.released = None
-        words = f"task {task.id} is held again: {why}. Release it again"
+        words = f"holds task {task.id} again: {why}. Release it again"
         self._lineup.registry.record(VehicleNoted(self._lineup.vehicle, words, now))
 
     def _check_remainder(self, task: Task, seen: VehicleView) -> None:

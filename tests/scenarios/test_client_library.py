@@ -313,7 +313,7 @@ def test_a_resume_undoes_no_halt_that_came_since_what_was_seen(world: RoverWorld
             await client.pause()
             seen = await client.queue()
             await person.pause()
-            with pytest.raises(Refused, match="after your status") as refused:
+            with pytest.raises(Refused, match="since you read the status") as refused:
                 await client.resume(epoch=seen.halt_epoch)
             assert refused.value.reason == TaskReason.STALE
             with world.lossy_link(loss=0.3, delay=1.0):

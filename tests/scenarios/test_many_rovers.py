@@ -629,8 +629,8 @@ def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes
     alone, _ = beside_a_twin(where, is_there=False)
     fleet, twin = beside_a_twin(where, is_there=True)
     notes = [e.text for e in fleet.events(VehicleNoted)]
-    assert notes == ["ignored another rover with its id at twin"]
-    assert any("ignored another rover with its id" in text for text in fleet.client.texts())
+    assert notes == ["shares its id with a rover at twin: ignored. Give that one another id"]
+    assert any("shares its id with a rover" in text for text in fleet.client.texts())
     assert (twin.truth.north, twin.truth.east) == (50.0, 5.0)
     assert {data[7] for _, data in fleet.watched.towards["twin"]} == {HEARTBEAT, TIMESYNC}
     assert max(m.x for m in fleet.client.of_type("LOCAL_POSITION_NED")) < 3.0
@@ -659,7 +659,7 @@ def test_a_second_vehicle_of_one_id_is_not_driven_either_when_the_first_falls_si
         twin.autopilot.operator_mode(Mode.GUIDED, now=fleet.now)
         fleet.client.move(2, target=(1, 191))
         fleet.run(1.5)
-    assert any("ignored another rover with its id" in e.text for e in fleet.events(VehicleNoted))
+    assert any("shares its id with a rover" in e.text for e in fleet.events(VehicleNoted))
     fleet.break_rover(1, OFF)
     fleet.run(12)
     assert twin.truth.north == 0.5

@@ -597,7 +597,7 @@ def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
     upload = Upload(direct, (place(1, 0), place(2, 0)))
     world.until(lambda: upload.result is not None, within=5)
     world.run(5)
-    words = "Rover 1 has its own mission (2 items): its mission mode drives it"
+    words = "Rover 1 has its own mission on board (2 items): its mission mode runs that"
     assert world.client.texts().count(words) == 1
 
 

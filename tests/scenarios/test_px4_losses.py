@@ -189,7 +189,7 @@ class TestOneThatDrivesHomeWithoutUs:
         assert world.rover.autopilot.mode is Mode.RTL
         assert "zero" not in world.observer.sent_since(began)
         noted = [event.text for event in world.events(VehicleNoted)]
-        assert noted[0].startswith("is in Return (failsafe or a person): not touched")
+        assert noted[0].startswith("is in Return (failsafe or a person): mode not changed")
 
     def test_what_is_refused_says_the_way_out_and_that_is_one(self, world: World) -> None:
         self.restart(world, away=2.5)

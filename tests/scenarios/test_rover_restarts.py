@@ -87,7 +87,7 @@ def test_continue_and_release(driving: World, how: int) -> None:
     restart(world)
     where = world.pose()
     assert proceed(world).result == ACCEPTED
-    assert any("has held task 1: press" in text for text in world.client.texts())
+    assert any("waits for held task 1: press" in text for text in world.client.texts())
     world.run(5)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     assert near_pose(world.pose(), where), "what is held moves nothing"
@@ -156,7 +156,7 @@ def test_a_release_that_waits_too_long_is_to_be_given_again(
     world.until_state(1, S.HELD, within=3)
     release(world, REMAINDER)
     world.run(6)
-    assert any("task 1 is held again" in text for text in world.client.texts())
+    assert any("holds task 1 again" in text for text in world.client.texts())
     where = world.pose()
     world.fault(Faults())
     world.run(10)

@@ -85,7 +85,7 @@ def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, tas
     paused.run(0.1)
     assert again.task_id == task_id
     told = [text for text in paused.client.texts() if "repeated command" in text]
-    assert told == ["repeated command: it is task 1, queued"] * (2 - task_id)
+    assert told == ["repeated command, no new task: see task 1, queued"] * (2 - task_id)
 
 
 def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:

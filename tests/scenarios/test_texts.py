@@ -132,4 +132,4 @@ def test_who_queues_behind_a_pause_is_told_that_nothing_runs(
     world.run(1.2)
     other.move(1)
     world.run(0.2)
-    assert f"Task 1 waits, press Continue: {why}. move 1 m" in other.texts()
+    assert f"Task 1 waits, press Continue ({why}): move 1 m" in other.texts()

@@ -51,7 +51,7 @@ def test_a_go_to_that_waits_for_a_button_is_a_warning_that_names_it(
     screen.command_int(REPOSITION, -1, 1, 0, nan, **at(3, 0), frame=0, target=(1, 1))
     world.run(0.3)
     (text,) = (t for t in said(screen) if t.startswith("Task 2"))
-    assert text.startswith(f"Task 2 waits, press Continue: {why}"[:FIRST_PIECE])
+    assert text.startswith(f"Task 2 waits, press Continue ({why})"[:FIRST_PIECE])
     assert said(screen)[text] == WARNING
 
 
@@ -139,7 +139,7 @@ class TestSummary:
         world.client.pause()
         world.run(3)
         assert said(station(world)) == {
-            "Task 1 paused, press Continue: queue paused; 1 tas": WARNING
+            "Task 1 paused, press Continue (queue paused); 1 ta": WARNING
         }
 
     def test_of_a_stop(self, world: World) -> None:

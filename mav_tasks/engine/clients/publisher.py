@@ -103,7 +103,7 @@ class Publisher:
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None and vehicle.tasks.paused:
             what = "STOP" if vehicle.tasks.is_stopped else "Pause"
-            text = f"{what} in force but not stored: a restart loses it. See the server's log"
+            text = f"{what} in force but not stored: a server restart loses it. See its log"
             self._gcs.tell(text, MavSeverity.ERROR, vehicle.server_address, now=now)
 
     def _tell_ends(self, ended: _Ended, *, now: float) -> None:

@@ -24,9 +24,9 @@ def summary_of(tasks: VehicleTasks) -> str:
     active = _in_state(tasks, TaskState.PAUSED)
     why = PAUSED.get(tasks.paused, words_of(tasks.paused))
     if tasks.paused and active is not None:
-        return f"Task {active.id} paused, press Continue: {why}{wait}"
+        return f"Task {active.id} paused, press Continue ({why}){wait}"
     if tasks.paused and waiting:
-        return f"{_waiting(waiting)}, press Continue: {why}"
+        return f"{_waiting(waiting)}, press Continue ({why})"
     return ""
 
 

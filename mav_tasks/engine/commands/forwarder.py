@@ -115,8 +115,7 @@ class Forwarder:
 def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
     """Return why a packet that the client's role may send does not go to a rover now."""
     return (
-        why_not_sent(row, vehicle, client.key)
-        or "a number is not finite, or a stall of the server delayed it"
+        why_not_sent(row, vehicle, client.key) or "a number is not finite, or the server delayed it"
     )
 
 

@@ -74,7 +74,9 @@ class ModeRequests:
             self._submissions.held(vehicle, asked.submitter)
             paused = vehicle.joint.hold(sender=asked.sender, actor=asked.actor, now=now)
             if not vehicle.is_heard(now=now):
-                raise Rejection(R.VEHICLE_SILENT, f"rover {vehicle.system_id} is silent")
+                raise Rejection(
+                    R.VEHICLE_SILENT, f"HOLD requested, but rover {vehicle.system_id} is silent"
+                )
             asked.answer(MavResult.ACCEPTED, paused or 0)
             return True
         if vehicle.tasks.is_stopped:

@@ -22,7 +22,7 @@ EPOCH_IN: dict[int, int] = {
 }
 REPEATED = 2.0  # s, within which MAVSDK repeats an unanswered command, unmarked: at 1.5 s
 EPOCHS = 1 << 24  # epochs that a float32 tells apart
-AGAIN = "repeat this in 4 s if you mean it"
+AGAIN = "wait 4 s and repeat it if you mean it"
 
 
 def require_newer(asked: CommandRequest, *, now: float) -> None:
@@ -80,9 +80,9 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     if epoch == halts.epoch:
         return ""
     if is_old:
-        return f"delayed by a stall of the server: {AGAIN}"
+        return f"delayed by the server: {AGAIN}"
     if named:
-        return f"{halts.words} came after your status: look again"
+        return f"{halts.words} came since you read the status: read it again"
     return f"{halts.words} came later: {AGAIN}"
 
 

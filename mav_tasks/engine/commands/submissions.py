@@ -93,7 +93,7 @@ class Submissions:
         """Submit the task of a command. Raise Rejection if it is refused."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         if client.waited > GIVEN_UP:
-            words = "delayed by a stall of the server: send it again"
+            words = "delayed by the server: send it again"
             raise Rejection(R.STALE, words)
         is_ours = command.command in TASK_COMMANDS
         wish = parse_command(
@@ -247,8 +247,8 @@ class Submissions:
         if tasks.immediate == task.id:
             words, is_blocked = f"Task {task.id} starts now: {goal}", False
         elif paused:  # somebody else may have paused
-            words = f"Task {task.id} waits, press Continue: {PAUSED.get(paused, words_of(paused))}"
-            words += f". {goal}"
+            words = f"Task {task.id} waits, press Continue ({PAUSED.get(paused, words_of(paused))})"
+            words += f": {goal}"
         elif tasks.is_held_ahead:
             held = "a task" if tasks.held is None else f"task {tasks.held.id}"
             words = f"Task {task.id} waits, press a Held button: {held} is held. {goal}"
@@ -297,7 +297,7 @@ class Submissions:
         if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL) and not is_other_message:
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
             state = "" if task is None else f", {task.state.name.lower()}"
-            words = f"repeated {what}: it is task {known.task_id}{state}"
+            words = f"repeated {what}, no new task: see task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
 
 

@@ -88,7 +88,7 @@ class TaskControl:
         task = active if task_id == 0 and active is not None else self._find(asked, task_id)
         asked.rights.require_own(task, asked.submitter, "cancel")
         if asked.client.is_late and task.state is TaskState.HELD:  # other tasks would start
-            words = f"delayed by a stall of the server; task {task.id} is held now"
+            words = f"delayed by the server; task {task.id} is held now: cancel it again"
             raise Rejection(R.STALE, words)
         asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id

@@ -74,7 +74,7 @@ class MissionClearing:
             return
         if MISSION in kinds and task is not None and is_late and task.state is TaskState.HELD:
             self._answers.ack(sender, kind, MavMissionResult.DENIED)
-            words = f"clear: delayed by a stall of the server; task {task.id} is held now"
+            words = f"clear: delayed by the server; task {task.id} is held now: clear again"
             self._refused(sender, vehicle, Rejection(R.STALE, words), now=now)
             return
         stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]

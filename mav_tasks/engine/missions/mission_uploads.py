@@ -172,7 +172,7 @@ class MissionUploads:
         if known is not None:
             desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=known, now=now)
             self.flush(desk, vehicle, now=now)
-            words = f"repeated plan: it is task {known}"
+            words = f"repeated plan, no new task: see task {known}"
             self._answers.tell(sender, vehicle, words, now=now)
             return
         halts = vehicle.tasks.halts

@@ -291,7 +291,7 @@ def _tell_taken(on: Reach, word: Word, now: float) -> None:
 @_does(Effect.TELL_STICK)
 def _tell_stick(on: Reach, _word: Word, now: float) -> None:
     """Report that a stick keeps the vehicle from driving."""
-    on.parts.note("has a stick off centre: HOLD. Centre the stick", now=now)
+    on.parts.note("has a stick off centre: HOLD is set. Centre it", now=now)
 
 
 @_does(Effect.TELL_HELD)
@@ -299,4 +299,4 @@ def _tell_held(on: Reach, _word: Word, now: float) -> None:
     """Remind of a held task."""
     held = on.parts.tasks.held
     if held is not None:
-        on.parts.note(f"has held task {held.id}: press {BUTTONS}", now=now)
+        on.parts.note(f"waits for held task {held.id}: press {BUTTONS}", now=now)

@@ -102,7 +102,7 @@ class JointControl:
 
     def second_controller(self, who: Address, *, now: float) -> None:
         """Send HOLD once and let go: setpoints, or our own address, come from elsewhere."""
-        word = Word(R.OTHER_CONTROLLER, str(who), f"second controller {who}")
+        word = Word(R.OTHER_CONTROLLER, str(who), f"also controlled by {who}")
         self.on(Event.SECOND, word, now=now)
 
     def sticks_moved(self, *, now: float) -> None:

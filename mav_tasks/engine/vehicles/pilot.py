@@ -209,7 +209,7 @@ class Pilot:
             case Measure.STOP_TASK if active is not None and active.state is TaskState.EXECUTING:
                 return Seen(Event.TOO_FAST, TaskReason.OVERSPEED, found.words)
             case Measure.HOLD if demand.kind in GOES_ON:
-                words = "does not stop on zero setpoints: HOLD"
+                words = "does not stop on zero setpoints: HOLD is set"
                 return Seen(Event.NOT_STANDING, TaskReason.STOP_UNCONFIRMED, words)
             case Measure.HOLD_NOW | Measure.HOLD if control.in_control:
                 if not self._is_deaf(now=now):

@@ -48,9 +48,8 @@ class SelfDescription:
         """Report a mission stored on board: clients cannot see it, but its mode would drive it."""
         items = total if total not in NO_MISSION else 0
         if items and items != self._own_items and self._parts.settings.claim:
-            self._parts.note(
-                f"has its own mission ({items} items): its mission mode drives it", now=now
-            )
+            words = f"has its own mission on board ({items} items): its mission mode runs that"
+            self._parts.note(words, now=now)
         self._own_items = items
 
     def receive_parameter(self, message: m.ParamValue, *, now: float) -> None:

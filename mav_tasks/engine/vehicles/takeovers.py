@@ -54,7 +54,7 @@ class Takeovers:
         # taken it, our set-points had ended before.
         is_lost = persona.has_loss_failsafe and mode == persona.hold_mode and not is_taken
         words = (
-            f"is in {persona.mode_name(mode)} (failsafe or a person): not touched."
+            f"is in {persona.mode_name(mode)} (failsafe or a person): mode not changed."
             " Set HOLD to stop it, then release its task"
         )
         if halt is not None:
@@ -91,8 +91,8 @@ class Takeovers:
         ours = parts.control.arming_asked_at
         if armed and parts.armings.are_older(ours=ours, now=now):
             words = (
-                "was armed by a command older than the disarming: disarmed again."
-                " Arm it in 5 s if you mean it"
+                "was armed by a delayed command: disarmed again."
+                " Wait 5 s, then arm it if you mean it"
             )
             self._joint.on(Event.LATE_ARMING, Word(text=words), now=now)
         self.look_at_motion(now=now)
@@ -107,7 +107,7 @@ class Takeovers:
     def look_at_motion(self, *, now: float) -> None:
         """Detect that it drives to a place that it was sent to before a halt."""
         if now - self._parts.tasks.halts.at <= SHOWN_LATE and self._moves_late(now=now):
-            words = "moves in HOLD because of an older command: HOLD sent again"
+            words = "moves in HOLD because of a delayed command: HOLD sent again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
 
     def heard_again(self, *, now: float) -> None:
@@ -177,7 +177,7 @@ class Takeovers:
         elif self._shows_restart:
             pass  # a restart, which its clock has shown before: nobody changed the mode
         elif is_late:
-            words = f"shows {persona.mode_name(mode)} because of an older command: HOLD sent again"
+            words = f"shows {persona.mode_name(mode)} because of a delayed command: HOLD sent again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         elif ours or was_mode == persona.booting_mode:
             pass

@@ -154,13 +154,14 @@ class VehicleLinks:
         is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
         old = self.router.place_of(vehicle.system_id)
         if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
-            words = f"ignored a rover with its id at {peer}: that link has no key"
+            words = f"shares its id with a rover at {_named(peer)}: ignored, that link has no key"
             self._note_once(vehicle.system_id, words, now=now)
             return False
         if is_another or (old not in self._left and vehicle.is_heard(now=now)):
-            self._note_once(
-                vehicle.system_id, f"ignored another rover with its id at {peer}", now=now
+            words = (
+                f"shares its id with a rover at {_named(peer)}: ignored. Give that one another id"
             )
+            self._note_once(vehicle.system_id, words, now=now)
             return False
         outlets, may_arm = self._links[link].outlets, self.may_arm(link)
         if peer not in outlets and len(outlets) >= MAX_PEERS:
@@ -169,7 +170,7 @@ class VehicleLinks:
         vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
         self.learn(vehicle.system_id, (link, peer))
         self._forget_if_empty(old)
-        self._registry.record(VehicleSeen(vehicle.system_id, f"is now at {peer}", now))
+        self._registry.record(VehicleSeen(vehicle.system_id, f"is now at {_named(peer)}", now))
         return True
 
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
@@ -209,3 +210,8 @@ class VehicleLinks:
         ):
             self._left.discard(place)
             self._outlets.pop(place, None)
+
+
+def _named(peer: Peer) -> str:
+    """Return an endpoint as text: "10.0.0.2:14580"."""
+    return ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)

@@ -177,6 +177,6 @@ def test_a_clearing_of_a_mission_held_since_lets_nothing_else_go(world: World) -
     world.run(0.5)
     assert moved(world, 8) < 0.001
     assert world.state(1) == (S.HELD, R.LATE)
-    assert "clear: delayed by a stall of the server; task 1 is held now" in "".join(
+    assert "clear: delayed by the server; task 1 is held now: clear again" in "".join(
         world.client.texts()
     )

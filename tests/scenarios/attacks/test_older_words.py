@@ -268,7 +268,7 @@ def test_a_refusal_says_what_came_and_what_to_do_and_4_s_later_it_counts(world: 
     refused = script.proceed()
     world.run(0.2)
     assert refused.answer == STALE
-    words = "a pause by 255/190 came later: repeat this in 4 s if you mean it"
+    words = "a pause by 255/190 came later: wait 4 s and repeat it if you mean it"
     assert script.texts()[-1] == words
     world.run(4)
     going = script.proceed()
@@ -293,7 +293,7 @@ def test_a_word_that_names_the_present_epoch_counts_and_one_that_names_another_d
     stale = script.command(PAUSE_CONTINUE, 1, shown)
     world.run(0.2)
     assert stale.answer == STALE
-    assert script.texts()[-1] == "a pause by 255/190 came after your status: look again"
+    assert script.texts()[-1] == "a pause by 255/190 came since you read the status: read it again"
     script.request_status(1)
     world.run(0.2)
     going = script.command(PAUSE_CONTINUE, 1, script.statuses(1)[-1].halt_epoch)

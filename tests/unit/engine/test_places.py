@@ -89,4 +89,4 @@ def test_however_many_have_called_a_vehicle_can_come_back_elsewhere() -> None:
     rig.heard(2.0, old=True)
     rig.heard(2.0 + LOST + 1.0, old=False)
     assert rig.reached_at(7.0) == {NEW}
-    assert "rover 1: is now at ('10.0.0.1', 2)" in " ".join(map(str, rig.engine.take_events()))
+    assert "rover 1: is now at 10.0.0.1:2" in " ".join(map(str, rig.engine.take_events()))

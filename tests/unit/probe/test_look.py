@@ -83,7 +83,7 @@ def test_parameters_are_read_as_their_make_writes_them() -> None:
     found = px4.finish().findings
     assert (found.parameters["COM_OBL_RC_ACT"], found.parameters["COM_OF_LOSS_T"]) == (-1, 2.5)
     assert found.loss_by_parameters == (
-        "would move without setpoints: COM_OBL_RC_ACT is -1: nothing, it keeps driving"
+        "keeps moving when setpoints stop: COM_OBL_RC_ACT is -1: nothing, it keeps driving"
     )
 
 

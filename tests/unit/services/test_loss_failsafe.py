@@ -96,7 +96,7 @@ def test_whether_it_stops_by_itself(after: float, action: int, sticks: int, why:
         value(AFTER, after), value(ACTION, action), value(STICKS, sticks), value(STATION, 0)
     )
     assert made.why_off == why
-    assert made.take_news() == (f"would move without setpoints: {why}" if why else "")
+    assert made.take_news() == (f"keeps moving when setpoints stop: {why}" if why else "")
 
 
 @pytest.mark.parametrize(
@@ -125,14 +125,14 @@ def test_what_it_does_is_said_by_its_name() -> None:
     assert made.what_it_does == "stops when setpoints stop: Hold"
     made.receive(value(ACTION, 3))
     assert made.what_it_does == (
-        "would move without setpoints: COM_OBL_RC_ACT is 3: Return, it drives home"
+        "keeps moving when setpoints stop: COM_OBL_RC_ACT is 3: Return, it drives home"
     )
 
 
 def test_a_change_by_anybody_is_noticed() -> None:
     made = failsafe(value(AFTER, 1.0), value(ACTION, 5))
     made.receive(value(AFTER, 30.0))
-    assert made.take_news().startswith("would move")
+    assert made.take_news().startswith("keeps moving")
     made.receive(value(AFTER, 2.0))
     assert (made.take_news(), made.why_off) == ("stops when setpoints stop: Hold", "")
 
