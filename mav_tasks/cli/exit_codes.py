@@ -44,7 +44,7 @@ def tell(error: BaseException) -> int:
             _let_go_of_output()
             return READER_GONE
         case NoAnswer(nonce=nonce) if nonce:
-            again = f"repeat the command with --nonce {nonce} to avoid a second one"
+            again = f"with --nonce {nonce} the same command makes no second task"
             _say(f"{error}. The task may exist: {again}")
         case NoSuchVehicle():
             _say(f"{error} (--vehicle N)")

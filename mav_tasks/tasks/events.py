@@ -357,7 +357,8 @@ class ServerStopped:
         if not self.unconfirmed:
             return "server stopped: no rover is being driven"
         names = ", ".join(map(str, self.unconfirmed))
-        return f"server stopped: rover {names} told to stop, HOLD and standstill not confirmed"
+        rovers = "rover" if len(self.unconfirmed) == 1 else "rovers"
+        return f"server stopped, HOLD and standstill not confirmed: check {rovers} {names}"
 
 
 Event = (
