@@ -86,21 +86,21 @@ def _push(words: Words, _frame: Frame) -> Event:
         "left": Push(right=-metres),
     }
     if direction not in known:
-        raise ValueError(f"it goes {', '.join(known)}, not {direction!r}")
+        raise ValueError(f"expected {', '.join(known)}, not {direction!r}")
     return known[direction]
 
 
 def _turn(words: Words, _frame: Frame) -> Event:
     degrees, direction = _amount(words, unit="deg", default="right")
     if direction not in ("right", "left"):
-        raise ValueError(f"it goes right or left, not {direction!r}")
+        raise ValueError(f"expected right or left, not {direction!r}")
     return Push(turn=radians(degrees if direction == "right" else -degrees))
 
 
 def _plain(event: Event) -> Callable[[Words, Frame], Event]:
     def read(words: Words, _frame: Frame) -> Event:
         if words:
-            raise ValueError(f"nothing follows it, but here {' '.join(words)!r} does")
+            raise ValueError(f"unexpected {' '.join(words)!r}")
         return event
 
     return read
@@ -133,7 +133,7 @@ def read_fault(text: str, frame: Frame) -> PlannedFault:
         raise PlanError(f"not understood: {text!r}; for example: {EXAMPLE}")
     name = form["name"].lower()
     if name not in ACTIONS:
-        raise PlanError(f"{name!r} in {text!r} is none of {', '.join(ACTIONS)}")
+        raise PlanError(f"unknown fault {name!r} in {text!r}; expected one of {', '.join(ACTIONS)}")
     written, read = ACTIONS[name]
     try:
         event = read(tuple(form["rest"].lower().split()), frame)
@@ -150,12 +150,12 @@ def _seconds(number: str, text: str) -> float:
     try:
         return float(number)
     except ValueError:
-        raise PlanError(f"{text!r}: {number!r} is no number of seconds") from None
+        raise PlanError(f"{text!r}: {number!r} is not a number of seconds") from None
 
 
 def _only(words: Words, what: str) -> str:
     if len(words) != 1:
-        raise ValueError(f"it takes {what}")
+        raise ValueError(f"expected {what}")
     return words[0]
 
 
@@ -166,7 +166,7 @@ def _amount(words: Words, *, unit: str, default: str) -> tuple[float, str]:
         " ".join(words),
     )
     if joined is None or (joined["before"] and joined["after"]):
-        raise ValueError("it takes an amount and a direction")
+        raise ValueError("expected an amount and a direction")
     return float(joined["number"]), joined["before"] or joined["after"] or default
 
 

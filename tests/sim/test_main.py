@@ -319,7 +319,10 @@ def test_faults_are_planned_on_the_command_line() -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--fault", "at 1 s: bang"], "--fault: 'bang' in 'at 1 s: bang' is none of block-wheel"),
+        (
+            ["--fault", "at 1 s: bang"],
+            "--fault: unknown fault 'bang' in 'at 1 s: bang'; expected one of block-wheel",
+        ),
         (["--fault", "rover 2 at 1 s: reboot"], "there is no rover 2"),
         (
             ["--frame", "ackermann", "--fault", "at 1 s: freeze-output left"],

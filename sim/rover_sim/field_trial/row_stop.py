@@ -40,7 +40,9 @@ async def measure_ways(session: Session) -> float | None:
 async def stop(session: Session, *, best: float | None) -> Row:
     """Drive at 1 m/s and send STOP."""
     if best is None:
-        return not_tried(NAME, ASKED, "the better way is not known (--stop-distance)")
+        return not_tried(
+            NAME, ASKED, "the shortest stopping distance is not known (--stop-distance)"
+        )
     metres: list[float] = []
     wrong = ""
     for _ in range(RUNS):

@@ -67,7 +67,7 @@ async def _drive_one(session: Session, maker: Maker, begun: Place, tally: Tally)
     before = session.track.last
     end = await session.drive(asked.goals, within=WITHIN)
     if _is_turned_down(end):
-        session.say(f"  {asked.words}: turned down: {end.words}")
+        session.say(f"  {asked.words}: refused: {end.words}")
         tally.refused.append(asked)
         return
     after = await session.rest()
@@ -135,7 +135,7 @@ def _row(session: Session, tally: Tally) -> Row:
     states = Counter(end.state for _, end in tally.ends)
     result = ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
     if tally.refused:
-        result += f"; {len(tally.refused)} turned down"
+        result += f"; {len(tally.refused)} refused"
     moved = [each for each in tally.driven if each.asked.end is not None]
     metres = [hypot(*_off(each, tally.shift)) for each in moved]
     angles = [_turned_wrong(each) for each in tally.driven if each.asked.turn is not None]

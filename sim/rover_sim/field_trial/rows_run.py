@@ -20,7 +20,7 @@ async def run_rows(
     """Run rows, and call ``done`` with each; measure stop distances before the server starts."""
     best = stop_distance
     if "stop" in only and best is None:
-        session.say("stop: the better way, without the server")
+        session.say("stop: measuring the shortest distance, without the server")
         best = await row_stop.measure_ways(session)
     await session.begin()
     singles: dict[str, Callable[[], Awaitable[Row]]] = {

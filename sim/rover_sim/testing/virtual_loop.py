@@ -152,7 +152,7 @@ class _Pace(selectors.BaseSelector):
     def _move(self, timeout: float | None) -> None:
         """Advance the world to the next event, of the world or of the loop after ``timeout``."""
         if timeout is None and self._world.next_due() is None:
-            raise self._stalled("nothing will ever happen any more")
+            raise self._stalled("deadlock: everything waits for something that never comes")
         if time.monotonic() > self._real_end:
             raise self._stalled(f"not over within {self._real_seconds:g} s of real time")
         end = self._end if timeout is None else min(self._end, self._world.now + timeout)

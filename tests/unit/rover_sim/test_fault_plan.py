@@ -57,17 +57,20 @@ def test_a_person_can_guess_how_it_is_written(
     ("text", "says"),
     [
         ("block-wheel left", f"not understood: 'block-wheel left'; for example: {EXAMPLE}"),
-        ("at 5 s: explode", f"'explode' in 'at 5 s: explode' is none of {', '.join(ACTIONS)}"),
-        ("at 5 s: block-wheel", "it takes left, right or all; write: block-wheel left|right|all"),
+        (
+            "at 5 s: explode",
+            f"unknown fault 'explode' in 'at 5 s: explode'; expected one of {', '.join(ACTIONS)}",
+        ),
+        ("at 5 s: block-wheel", "expected left, right or all; write: block-wheel left|right|all"),
         ("at 5 s: block-wheel middle", "wheels are left, right or all, not 'middle'"),
         ("at 5 s: freeze-output steering", "this frame (skid) are left and right, not 'steering'"),
-        ("at 5 s: push 1 m up", "it goes forward, back, right, left, not 'up'"),
-        ("at 5 s: turn 1 deg up", "it goes right or left, not 'up'"),
-        ("at 5 s: push", "it takes an amount and a direction"),
-        ("at 5 s: reboot now", "nothing follows it, but here 'now' does"),
+        ("at 5 s: push 1 m up", "expected forward, back, right, left, not 'up'"),
+        ("at 5 s: turn 1 deg up", "expected right or left, not 'up'"),
+        ("at 5 s: push", "expected an amount and a direction"),
+        ("at 5 s: reboot now", "unexpected 'now'"),
         ("at 5 s: reboot for 3 s", "reboot is over at once, leave out 'for'"),
-        ("at 5 s: lose-gps for ever", "'ever' is no number of seconds"),
-        ("at 1.2.3 s: reboot", "'1.2.3' is no number of seconds"),
+        ("at 5 s: lose-gps for ever", "'ever' is not a number of seconds"),
+        ("at 1.2.3 s: reboot", "'1.2.3' is not a number of seconds"),
     ],
 )
 def test_what_is_not_understood_is_said_in_one_line(text: str, says: str) -> None:
