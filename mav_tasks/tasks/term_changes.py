@@ -38,24 +38,8 @@ def _start_of(terms: Terms, at: float) -> str:
     if terms.start_at is not None:
         starts.append(f"start in {_seconds(terms.start_at, at)}")
     if terms.start_utc is not None:
-        starts.append(f"start at {_utc_text(terms.start_utc)}")
+        starts.append(f"start at {terms.start_utc} s UTC")  # since 1970
     return " and ".join(starts) or "no start time"
-
-
-def _utc_text(utc: int) -> str:
-    """Return UTC seconds since 1970 as ISO 8601, by arithmetic: ``datetime`` would bring a clock.
-
-    Years begin in March here, so that a leap day is the last day of its year.
-    """
-    days, second = divmod(utc, 86_400)
-    era, day = divmod(days + 719_468, 146_097)  # 400 years, from 0000-03-01
-    year = (day - day // 1_460 + day // 36_524 - day // 146_096) // 365
-    day -= 365 * year + year // 4 - year // 100
-    month = (5 * day + 2) // 153
-    day -= (153 * month + 2) // 5
-    year += 400 * era + (month >= 10)
-    date = f"{year:04}-{(month + 2) % 12 + 1:02}-{day + 1:02}"
-    return f"{date}T{second // 3_600:02}:{second // 60 % 60:02}:{second % 60:02}Z"
 
 
 def _seconds(moment: float | None, at: float) -> str:

@@ -129,17 +129,18 @@ def test_the_lines_of_the_guide_install_a_service_that_serves(tmp_path: Path) ->
 
     (keys,) = re.findall(r"`(sudo -u [^`]*keys) list`", SERVICE)
     for command in ("add tester --role operator", "list"):
-        line, secret = f"{here(keys)} {command}", b"a passphrase for a test"
+        line, secret = f"{here(keys)} {command}", "a passphrase for a test"
         done = subprocess.run(
             ["bash", "-euc", line],
             cwd=tmp_path,
             env=paths,
             input=secret,
+            text=True,
             capture_output=True,
             check=False,
         )
         assert done.returncode == 0, done.stderr
-    assert b"tester" in done.stdout
+    assert "tester" in done.stdout
     assert list(tmp_path.rglob("keys.toml"))
 
 
