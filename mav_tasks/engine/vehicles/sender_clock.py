@@ -51,6 +51,10 @@ class SenderClock:
         ms = self._counted_on(message.time_boot_ms, now=now)
         if self._newest is not None and self._newest - ms >= REBOOT:
             return self._went_back(ms, now=now)
+        if self._newest is not None and self._expected(now) - ms > LATEST:
+            # it was silent for longer than it had been up before, or its clock stood still
+            if self._may_have_booted(ms % OVERFLOW / 1000, now=now):
+                return Heard.RESTART
         if ms <= self._latest.get(message.id, ms - 1):
             return Heard.OLD
         self._latest[message.id] = ms
@@ -82,12 +86,15 @@ class SenderClock:
         assert self._newest is not None
         return self._newest + round(1000 * (now - self._newest_at))
 
-    def _went_back(self, ms: int, *, now: float) -> Heard:
+    def _may_have_booted(self, uptime: float, *, now: float) -> bool:
+        """Return whether it can have booted since the newest message was sent."""
         assert self._newest is not None
-        is_near = self._expected(now) - ms <= LATEST  # also if it has just overflowed
-        uptime = (ms if is_near else ms % OVERFLOW) / 1000
         unheard = now - self._newest / 1000 - self.offset.at(now=now)
-        if 0 <= uptime <= unheard + SHRINKS:
+        return 0 <= uptime <= unheard + SHRINKS
+
+    def _went_back(self, ms: int, *, now: float) -> Heard:
+        is_near = self._expected(now) - ms <= LATEST  # also if it has just overflowed
+        if self._may_have_booted((ms if is_near else ms % OVERFLOW) / 1000, now=now):
             return Heard.RESTART
         if self._back_since is None:
             self._back_since = now

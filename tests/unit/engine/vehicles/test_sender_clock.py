@@ -33,6 +33,27 @@ def test_a_restart_is_seen_at_its_first_message_however_long_the_vehicle_was_up(
     assert clock.hear(position(500), now=61.5) is Heard.RESTART
 
 
+@pytest.mark.parametrize("uptime", [60_100, 61_000, 90_000])
+def test_a_restart_is_seen_after_a_silence_longer_than_it_was_up_before(uptime: int) -> None:
+    clock = drives(up=0)
+    assert clock.hear(position(uptime), now=60.0 + uptime / 1000 + 26.0) is Heard.RESTART
+
+
+@pytest.mark.parametrize("days", [0.001, 1, 25, 49.71])
+@pytest.mark.parametrize("lost", [0.0, 1.0, 24.0])
+def test_a_vehicle_that_is_heard_after_a_long_silence_goes_on(days: float, lost: float) -> None:
+    """Also if its clock is slow: 24 s are what the slowest lose in two days."""
+    clock = drives(up=round(days * DAY))
+    ms = round(days * DAY + 60_000 + 3_600_000 - 1000 * lost)
+    assert clock.hear(position(ms), now=60.0 + 3_600.0) is Heard.NEWS
+
+
+def test_a_vehicle_whose_clock_stood_still_has_not_restarted() -> None:
+    """As that of a simulator that was suspended."""
+    clock = drives(up=DAY)
+    assert clock.hear(position(DAY + 60_100), now=60.0 + 600.0) is Heard.NEWS
+
+
 @pytest.mark.parametrize("late", [1.1, 2.0, 5.0, 20.0])
 @pytest.mark.parametrize("days", [0.0, 1, 25, 49.71])
 def test_one_that_comes_again_late_is_old(days: float, late: float) -> None:
