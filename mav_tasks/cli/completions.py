@@ -34,9 +34,11 @@ def derivations(incomplete: str) -> list[str]:
 
 def arming(incomplete: str) -> list[str]:
     """Return who may arm."""
-    from mav_tasks.settings import ARMING  # noqa: PLC0415
+    from mav_tasks.setting_keys.shapes import Choice  # noqa: PLC0415
+    from mav_tasks.settings import KEYS  # noqa: PLC0415
 
-    return beginning_with(incomplete, ARMING)
+    shape = KEYS["rules.arming"].shape
+    return beginning_with(incomplete, shape.words if isinstance(shape, Choice) else ())
 
 
 def releases(incomplete: str) -> list[str]:
@@ -50,7 +52,7 @@ def releases(incomplete: str) -> list[str]:
 
 def settings(incomplete: str) -> list[str]:
     """Return keys of the configuration, as ``--set`` takes them."""
-    from mav_tasks.setting_keys.table import KEYS  # noqa: PLC0415
+    from mav_tasks.settings import KEYS  # noqa: PLC0415
 
     return beginning_with(incomplete, [f"{name}=" for name in KEYS])
 

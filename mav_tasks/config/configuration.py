@@ -10,8 +10,8 @@ from mav_tasks.config import profiles, toml_file, words
 from mav_tasks.config.given import Given, Layer
 from mav_tasks.errors import ConfigError, SettingError
 from mav_tasks.links.config_check import faults_of
-from mav_tasks.setting_keys.table import BOUNDED, check_bounds
-from mav_tasks.settings import ServerSettings
+from mav_tasks.setting_keys.key import check_bounds
+from mav_tasks.settings import BOUNDED, ServerSettings
 
 FILE_NAME = "config.toml"
 

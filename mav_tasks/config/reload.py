@@ -15,10 +15,9 @@ from typing import NamedTuple
 from mav_tasks.config.configuration import Configuration, Sources
 from mav_tasks.errors import ConfigError, SettingError
 from mav_tasks.services.parameter_table import NAMES
-from mav_tasks.setting_keys.key import Key
+from mav_tasks.setting_keys.key import Key, check_bounds
 from mav_tasks.setting_keys.literals import literal
-from mav_tasks.setting_keys.table import BOUNDED, KEYS, check_bounds
-from mav_tasks.settings import ServerSettings, Settings
+from mav_tasks.settings import BOUNDED, KEYS, ServerSettings, Settings
 
 log = logging.getLogger("mav_tasks")
 

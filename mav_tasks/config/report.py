@@ -2,17 +2,14 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mav_tasks.config.configuration import Configuration
 from mav_tasks.config.given import Source, suggestion
 from mav_tasks.errors import UsageError
 from mav_tasks.services.parameter_table import NAMES, with_all
-from mav_tasks.setting_keys.key import value_at
 from mav_tasks.setting_keys.literals import literal
-from mav_tasks.setting_keys.table import KEYS, PLACES
-
-ENGINE = "engine."
+from mav_tasks.settings import KEYS, TABLES
 
 
 def chosen(names: Sequence[str]) -> list[str]:
@@ -22,12 +19,12 @@ def chosen(names: Sequence[str]) -> list[str]:
     """
     found: list[str] = []
     for name in names:
-        if name in PLACES:
-            found += [key for key in KEYS if key.startswith(f"{name}.")]
+        if name in TABLES:
+            found += [key.name for key in KEYS.values() if key.table == name]
         elif name in KEYS:
             found.append(name)
         else:
-            raise UsageError(f"{name}: no such key{suggestion(name, [*KEYS, *PLACES])}")
+            raise UsageError(f"{name}: no such key{suggestion(name, [*KEYS, *TABLES])}")
     return found or list(KEYS)
 
 
@@ -48,7 +45,8 @@ class Report:
     def __init__(self, configuration: Configuration, parameters: Mapping[str, float]) -> None:
         self._configuration = configuration
         self._parameters = parameters
-        self._engine, why_not = with_all(configuration.settings.engine, parameters)
+        engine, why_not = with_all(configuration.settings.engine, parameters)
+        self._in_force = replace(configuration.settings, engine=engine)
         self._why_not = why_not
         #: a text for each parameter without effect
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
@@ -57,10 +55,9 @@ class Report:
         """Return the entry of one key."""
         key, given = KEYS[name], self._configuration.given.get(name)
         parameter = NAMES.get(name, "")
+        value = key.plain_of(self._in_force)
         if parameter in self._parameters and parameter not in self._why_not:
-            value = key.shape.plain(value_at(self._engine, key.path.removeprefix(ENGINE)))
             return Entry(name, value, key.shape.unit, Source.PARAMETER, parameter)
-        value = key.plain_of(self._configuration.settings)
         if given is None:
             return Entry(name, value, key.shape.unit, Source.DEFAULT, "")
         return Entry(name, value, key.shape.unit, given.source, given.where)

@@ -1,12 +1,12 @@
 """The sample configuration file: each key with its meaning, and its default commented out."""
 
+from itertools import groupby
 from textwrap import wrap
 
 from mav_tasks.config.words import variable_of
 from mav_tasks.setting_keys.key import Key
 from mav_tasks.setting_keys.literals import literal
-from mav_tasks.setting_keys.table import KEYS, PLACES
-from mav_tasks.settings import ServerSettings
+from mav_tasks.settings import KEYS, ServerSettings
 
 WIDTH = 100
 OPENING = f"""\
@@ -22,9 +22,8 @@ OPENING = f"""\
 def sample() -> str:
     """Return the text of the sample file."""
     parts = [OPENING]
-    for table in PLACES:
-        parts.append(f"\n[{table}]\n")
-        parts += [_entry(key) for name, key in KEYS.items() if name.startswith(f"{table}.")]
+    for table, keys in groupby(KEYS.values(), key=lambda key: key.table):
+        parts += [f"\n[{table}]\n", *map(_entry, keys)]
     return "".join(parts)
 
 

@@ -11,7 +11,7 @@ from mav_tasks.config import toml_lines
 from mav_tasks.config.given import Layer, Source, by_path, shown, suggestion
 from mav_tasks.errors import ConfigError
 from mav_tasks.setting_keys.literals import literal
-from mav_tasks.setting_keys.table import KEYS, PLACES
+from mav_tasks.settings import KEYS, TABLES
 
 LARGEST = 256_000  # bytes, maximum size of a file
 MOST_FAULTS = 50  # reported for one file
@@ -101,7 +101,7 @@ def _walk(
         elif path not in _TABLES:
             words = shown(".".join(map(_quoted, path)))
             what = "table" if isinstance(value, dict) else "key"
-            known = PLACES if what == "table" and not before else KEYS
+            known = TABLES if what == "table" and not before else KEYS
             layer.faults.append(f"{where}: {words}: no such {what}{suggestion(words, known)}")
         elif not isinstance(value, dict):
             words = ".".join(map(str, path))

@@ -4,22 +4,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mav_tasks.config.given import Layer, Source, shown, suggestion
-from mav_tasks.setting_keys.table import KEYS
+from mav_tasks.settings import KEYS
 
 PREFIX = "MAV_TASKS_"
 FILE_VARIABLE = "MAV_TASKS_CONFIG"  # the configuration file; "" for none
 SERVER_VARIABLE = "MAV_TASKS_SERVER"  # the server that client commands address
 SIGN_VARIABLE = "MAV_TASKS_SIGN"  # the key with which client commands sign
-STORE_VARIABLE = "MAV_TASKS_STORE"  # not ..._STORE_PATH: older than the naming rule
-
-
 #: variables that set no key
 OTHERS = (FILE_VARIABLE, SERVER_VARIABLE, SIGN_VARIABLE)
 
 
 def variable_of(name: str) -> str:
     """Return the environment variable of a key."""
-    return STORE_VARIABLE if name == "store.path" else PREFIX + name.upper().replace(".", "_")
+    return KEYS[name].variable or PREFIX + name.upper().replace(".", "_")
 
 
 VARIABLES: Mapping[str, str] = {variable_of(name): name for name in KEYS}

@@ -10,12 +10,9 @@ from dataclasses import dataclass
 from struct import pack, unpack
 
 from mav_tasks.errors import SettingError
-from mav_tasks.setting_keys.key import Key, value_at, with_value_at
+from mav_tasks.setting_keys.key import ENGINE, Key, value_at, with_value_at
 from mav_tasks.setting_keys.shapes import Choice, Number
-from mav_tasks.setting_keys.table import KEYS
-from mav_tasks.settings import Settings
-
-ENGINE = "engine."  # where the server's settings have those of the engine
+from mav_tasks.settings import KEYS, Settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,30 +59,10 @@ def _parameter(name: str, key: Key) -> Parameter:
             raise TypeError(f"{name}: {shape} is no parameter")
 
 
+#: in the order of their indices
 PARAMETERS: Mapping[str, Parameter] = {
-    name: _parameter(name, KEYS[key])
-    for name, key in (
-        ("TSK_SPEED", "driving.speed"),
-        ("TSK_SPEED_MAX", "driving.max_speed"),
-        ("TSK_TURN", "driving.turn_rate_deg"),
-        ("TSK_TURN_MAX", "driving.max_turn_rate_deg"),
-        ("TSK_ACCEL", "driving.acceleration"),
-        ("TSK_ACC_RAD", "driving.acceptance_radius"),
-        ("TSK_TURN_RAD", "driving.turning_radius"),
-        ("TSK_DIST_MAX", "driving.max_distance"),
-        ("TSK_QUEUE_MAX", "queueing.capacity"),
-        ("TSK_QUOTA", "queueing.quota"),
-        ("TSK_PREEMPT", "queueing.preemption_gap"),
-        ("TSK_PREEMPT_S", "queueing.preemption_rest"),
-        ("TSK_START_TMO", "watch.start_timeout"),
-        ("TSK_STUCK_TMO", "watch.stuck"),
-        ("TSK_LOST_TMO", "watch.lost_timeout"),
-        ("TSK_OPER_TMO", "watch.operator_lost"),
-        ("TSK_ON_OPLOST", "rules.operator_lost"),
-        ("TSK_ON_FAIL", "rules.on_failure"),
-        ("TSK_ON_RESTART", "rules.on_restart"),
-        ("TSK_GUIDED", "rules.guided"),
-    )
+    name: _parameter(name, key)
+    for _, name, key in sorted((*key.parameter, key) for key in KEYS.values() if key.parameter)
 }
 NAMES: Mapping[str, str] = {each.key.name: name for name, each in PARAMETERS.items()}
 #: each parameter that another one bounds, with that other

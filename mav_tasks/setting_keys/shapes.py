@@ -201,7 +201,7 @@ class ByClient:
     """A value for each named client; ``read`` takes ``255/190=7,245/190=3``."""
 
     each: Shape
-    example: object
+    example: Any
     unit: str = ""
 
     @property

@@ -7,8 +7,7 @@ import pytest
 from mav_tasks.engine.inputs import Shutdown
 from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.setting_keys.shapes import HIGHEST_ID, Number
-from mav_tasks.setting_keys.table import BOUNDED, KEYS
-from mav_tasks.settings import ServerSettings, Settings
+from mav_tasks.settings import BOUNDED, KEYS, ServerSettings, Settings
 from rover_sim.faults import Faults
 from rover_sim.personas import Persona
 from tests.kit.px4 import PROMPT_PX4

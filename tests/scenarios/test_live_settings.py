@@ -11,8 +11,15 @@ import pytest
 
 from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.setting_keys.shapes import Number
-from mav_tasks.setting_keys.table import KEYS
-from mav_tasks.settings import Clients, Driving, Queueing, ServerSettings, Settings, Watch
+from mav_tasks.settings import (
+    KEYS,
+    Clients,
+    Driving,
+    Queueing,
+    ServerSettings,
+    Settings,
+    Watch,
+)
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults

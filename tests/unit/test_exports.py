@@ -13,7 +13,11 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Input
 from mav_tasks.errors import MavTasksError
 
-KINDS: list[Any] = [kind for _, kind in inspect.getmembers(settings, dataclasses.is_dataclass)]
+KINDS: list[Any] = [
+    kind
+    for _, kind in inspect.getmembers(settings, inspect.isclass)
+    if dataclasses.is_dataclass(kind) and kind.__module__ == settings.__name__
+]
 
 
 def public(thing: object) -> list[str]:
@@ -63,9 +67,9 @@ def test_every_setting_is_known_by_name() -> None:
             "forget_after",
             "push_lost",
             "stream_interval",
-            "text_rate",
             "packet_rate",
             "telemetry_budget",
+            "text_rate",
             "status_rate",
             "priorities",
         ],
@@ -88,7 +92,7 @@ def test_every_setting_is_known_by_name() -> None:
         ],
         "Identity": ["system_id", "component_id"],
         "Limits": ["tasks", "max_priority", "max_speed", "quota", "rate"],
-        "Links": ["clients", "push", "vehicles", "insecure", "unsigned", "keys"],
+        "Links": ["clients", "push", "vehicles", "insecure", "keys", "unsigned"],
         "Log": ["format", "level"],
         "Queueing": ["capacity", "quota", "aging", "preemption_gap", "preemption_rest"],
         "Recording": ["tlog", "tlog_size", "tlog_files", "decisions", "decisions_size"],
@@ -101,7 +105,7 @@ def test_every_setting_is_known_by_name() -> None:
             "operator",
             "safety",
         ],
-        "ServerSettings": ["engine", "links", "store", "profiles", "recording", "log"],
+        "ServerSettings": ["links", "store", "engine", "profiles", "recording", "log"],
         "Settings": [
             "identity",
             "signing",

@@ -4,7 +4,7 @@ import pytest
 
 from mav_tasks.cli.typed_words import TYPED, in_typed_words, typed_words
 from mav_tasks.errors import Refused
-from mav_tasks.setting_keys.table import KEYS
+from mav_tasks.settings import KEYS
 
 SPEED, DISTANCE = "driving.max_speed", "driving.max_distance"
 RATE = "driving.max_turn_rate_deg"

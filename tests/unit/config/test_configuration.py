@@ -10,8 +10,7 @@ from mav_tasks.config.sample import sample
 from mav_tasks.config.toml_file import layer_of
 from mav_tasks.config.words import VARIABLES, Flag, flag_of_set, variable_of
 from mav_tasks.errors import ConfigError
-from mav_tasks.setting_keys.table import KEYS
-from mav_tasks.settings import ServerSettings
+from mav_tasks.settings import KEYS, ServerSettings
 
 
 @pytest.fixture

@@ -11,8 +11,7 @@ import pytest
 from mav_tasks.config.configuration import Configuration, Sources
 from mav_tasks.config.reload import Put, Reload, changes_of, taken
 from mav_tasks.errors import ConfigError
-from mav_tasks.setting_keys.table import KEYS
-from mav_tasks.settings import ServerSettings, Settings
+from mav_tasks.settings import KEYS, ServerSettings, Settings
 
 
 class Watched(Reload):

@@ -16,8 +16,7 @@ from mav_tasks.config.configuration import Configuration, merged
 from mav_tasks.config.toml_file import LARGEST, decoded, layer_of, read_text
 from mav_tasks.config.toml_lines import lines_of
 from mav_tasks.errors import ConfigError
-from mav_tasks.setting_keys.table import KEYS, PLACES
-from mav_tasks.settings import ServerSettings
+from mav_tasks.settings import KEYS, TABLES, ServerSettings
 
 
 def read(text: str) -> Configuration:
@@ -181,7 +180,7 @@ def outcome(text: str | bytes) -> tuple[ServerSettings | None, tuple[str, ...]]:
         return None, error.faults
 
 
-KEY_TEXTS = st.sampled_from([*KEYS, *PLACES, "x", "driving.speed.x", '"driving.speed"'])
+KEY_TEXTS = st.sampled_from([*KEYS, *TABLES, "x", "driving.speed.x", '"driving.speed"'])
 VALUES = st.sampled_from(
     [
         "1",

@@ -1,4 +1,4 @@
-"""The table of keys: every setting has one, and its default is a value that it may have."""
+"""Every setting declares a key, and its default is a value that it may have."""
 
 import dataclasses
 import tomllib
@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mav_tasks.errors import SettingError
-from mav_tasks.setting_keys.key import Key
+from mav_tasks.setting_keys.key import Key, check_bounds
 from mav_tasks.setting_keys.literals import in_digits, literal
 from mav_tasks.setting_keys.shapes import (
     ByClient,
@@ -19,8 +19,7 @@ from mav_tasks.setting_keys.shapes import (
     Text,
     Texts,
 )
-from mav_tasks.setting_keys.table import BOUNDED, KEYS, check_bounds
-from mav_tasks.settings import ServerSettings
+from mav_tasks.settings import BOUNDED, KEYS, ServerSettings
 from mav_tasks.tasks.task import Submitter
 
 EACH = pytest.mark.parametrize("key", KEYS.values(), ids=lambda key: key.name)
@@ -48,7 +47,8 @@ PRIORITIES = ByClient(Number(0, 10, is_whole=True), example=7)
 @EACH
 def test_the_default_comes_back_from_how_people_write_it(key: Key) -> None:
     plain = key.plain_of(DEFAULTS)
-    assert key.shape.kept(plain) == key.of(DEFAULTS)
+    kept = key.shape.kept(plain)
+    assert (type(kept), kept) == (type(key.of(DEFAULTS)), key.of(DEFAULTS))
     assert tomllib.loads(f"x = {literal(plain)}") == {"x": plain}
     assert key.put(DEFAULTS, key.shape.kept(plain)) == DEFAULTS
 
