@@ -437,24 +437,48 @@ class Roles:
 
 @dataclass(frozen=True, slots=True)
 class VehicleProfile:
-    """A probe's measurements of one vehicle; unknown values are "" or None."""
+    """A probe's measurements of one vehicle; unknown values are "" or None.
 
-    system_id: int = 0
-    uid: str = ""  # of AUTOPILOT_VERSION, in hex; "": the vehicle does not send it
-    autopilot: str = ""  # name of the persona
-    firmware: str = ""  # version and hash, as AUTOPILOT_VERSION has them
-    probed: str = ""  # when, UTC
-    yaw_rate: str = ""  # "honoured", also on the spot, or "ignored"
-    reverse: str = ""  # "yes" or "no"
-    turning: str = ""  # value of a Turning
-    turning_radius: float | None = None  # m, minimum of a car-like rover
-    #: velocity setpoints that the rover followed: "BODY_NED 0x05C7"
-    setpoints: tuple[str, ...] = ()
-    loss_stop: str = ""  # whether it stops by itself when setpoints stop: "yes" or "no"
-    setpoint_timeout: float | None = None  # s, from the last setpoint until it slows down
-    speed: float | None = None  # m/s, at which the stop was measured
-    stopping_distance: float | None = None  # m, from the first zero setpoint to standstill
-    stopping_time: float | None = None  # s, the same
+    The fields are the keys of a profile's file, each with its meaning unless the name says it.
+    """
+
+    system_id: int = setting(0, _count(1, HIGHEST_ID), "")
+    uid: str = setting(
+        "", Text("the rover's unique id, in hex"), "the profile is used only for this rover"
+    )
+    autopilot: str = setting("", Text("name of the autopilot"), "")  # of the persona
+    #: version and hash, as AUTOPILOT_VERSION has them
+    firmware: str = setting("", Text("version of the firmware"), "and only with this firmware")
+    probed: str = setting("", Text("a time, UTC"), "")
+    yaw_rate: str = setting(
+        "", Choice(("honoured", "ignored")), "whether it follows yaw rates, also on the spot"
+    )
+    reverse: str = setting("", Choice(("yes", "no")), "whether it drives backwards")
+    turning: str = setting(
+        "",
+        Choice(tuple([each.value for each in Turning])),
+        "whether it turns on the spot, or steers like a car",
+    )
+    turning_radius: float | None = setting(
+        None, Number(0.1, 50, "m"), "minimum, if it steers like a car"
+    )
+    #: such as "BODY_NED 0x05C7"
+    setpoints: tuple[str, ...] = setting(
+        (), Texts("a list of setpoints"), "velocity setpoints that it followed: frame and mask"
+    )
+    loss_stop: str = setting(
+        "", Choice(("yes", "no")), "whether it stopped by itself when setpoints stopped"
+    )
+    setpoint_timeout: float | None = setting(
+        None, _seconds(0, 60), "from the last setpoint until it slowed down"
+    )
+    speed: float | None = setting(None, Number(0.01, 10, "m/s"), "at which the stop was measured")
+    stopping_distance: float | None = setting(
+        None, Number(0, 100, "m"), "from the first zero until it stood"
+    )
+    stopping_time: float | None = setting(
+        None, _seconds(0, 60), "from the first zero until it stood"
+    )
 
 
 @dataclass(frozen=True, slots=True)

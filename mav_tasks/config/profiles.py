@@ -5,9 +5,7 @@ Every value is checked, because a profile changes how a rover is driven.
 
 import os
 import tomllib
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,48 +14,17 @@ from platformdirs import user_config_path
 from mav_tasks.config import toml_file
 from mav_tasks.errors import ConfigError, SettingError
 from mav_tasks.folders import make_private
+from mav_tasks.setting_keys.key import declared_in
 from mav_tasks.setting_keys.literals import literal
-from mav_tasks.setting_keys.shapes import HIGHEST_ID, Choice, Number, Shape, Text, Texts
-from mav_tasks.settings import Turning, VehicleProfile
+from mav_tasks.settings import VehicleProfile
 
 NONE = "none"
 SUFFIX = ".toml"
 MOST_FILES = 1000
 MODE = 0o600  # private: a profile identifies a rover and tells its weaknesses
 
-_YES_NO = Choice(("yes", "no"))
-_SHAPES: Mapping[str, Shape] = {
-    "system_id": Number(1, HIGHEST_ID, is_whole=True),
-    "uid": Text("the rover's unique id, in hex"),
-    "autopilot": Text("name of the autopilot"),
-    "firmware": Text("version of the firmware"),
-    "probed": Text("a time, UTC"),
-    "yaw_rate": Choice(("honoured", "ignored")),
-    "reverse": _YES_NO,
-    "turning": Choice(tuple(turning.value for turning in Turning)),
-    "turning_radius": Number(0.1, 50, "m"),
-    "setpoints": Texts("a list of setpoints"),
-    "loss_stop": _YES_NO,
-    "setpoint_timeout": Number(0, 60, "s"),
-    "speed": Number(0.01, 10, "m/s"),
-    "stopping_distance": Number(0, 100, "m"),
-    "stopping_time": Number(0, 60, "s"),
-}
+_KEYS = declared_in(VehicleProfile)
 _NEEDED = ("system_id", "autopilot", "firmware", "probed")
-_MEANINGS = {
-    "uid": "the profile is used only for this rover",
-    "firmware": "and only with this firmware",
-    "yaw_rate": "whether it follows yaw rates, also on the spot",
-    "reverse": "whether it drives backwards",
-    "turning": "whether it turns on the spot, or steers like a car",
-    "turning_radius": "m, minimum, if it steers like a car",
-    "setpoints": "velocity setpoints that it followed: frame and mask",
-    "loss_stop": "whether it stopped by itself when setpoints stopped",
-    "setpoint_timeout": "s, from the last setpoint until it slowed down",
-    "speed": "m/s, at which the stop was measured",
-    "stopping_distance": "m, from the first zero until it stood",
-    "stopping_time": "s, from the first zero until it stood",
-}
 
 
 def usual_folder() -> Path:
@@ -112,29 +79,28 @@ def profile_of(text: str, *, name: str) -> VehicleProfile:
     kept: dict[str, Any] = {}
     faults = [f"{name}: {key} is missing" for key in _NEEDED if key not in table]
     for key, value in table.items():
-        if key not in _SHAPES:
+        if key not in _KEYS:
             faults.append(f"{name}: {key!a}: a profile has no such key")
             continue
         try:
-            kept[key] = _SHAPES[key].kept(value)
+            kept[key] = _KEYS[key].shape.kept(value)
         except SettingError as error:
             faults.append(f"{name}: {key}: {error}")
     if faults:
         raise ConfigError(*faults)
-    return replace(VehicleProfile(), **kept)
+    return VehicleProfile(**kept)
 
 
 def text_of(profile: VehicleProfile) -> str:
     """Return a profile as TOML, without unknown values."""
     lines = ["# Profile of a rover, measured by mav-tasks probe; see the key vehicles.profiles."]
-    for field in fields(profile):
-        value = getattr(profile, field.name)
-        if value in ("", None, ()) and field.name not in _NEEDED:
+    for name, key in _KEYS.items():
+        value = getattr(profile, name)
+        if value in ("", None, ()) and name not in _NEEDED:
             continue
-        plain = list(value) if isinstance(value, tuple) else value
-        line = f"{field.name} = {literal(plain)}"
-        meaning = _MEANINGS.get(field.name)
-        lines.append(f"{line}  # {meaning}" if meaning else line)
+        line = f"{name} = {literal(key.shape.plain(value))}"
+        remark = ", ".join(filter(None, (key.shape.unit, key.meaning)))
+        lines.append(f"{line}  # {remark}" if remark else line)
     return "\n".join(lines) + "\n"
 
 
