@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from math import pi, radians
 
-from mav_tasks.setting_keys.key import Key, keys_of, setting
+from mav_tasks.setting_keys.key import Key, Option, keys_of, setting
 from mav_tasks.setting_keys.shapes import (
     HIGHEST_ID,
     HIGHEST_PRIORITY,
@@ -41,7 +41,7 @@ SET_FAILSAFE = "mav-tasks probe --set-failsafe"
 DEGREE = pi / 180  # rad
 DAY = 86_400.0  # s
 FOREVER = "forever"
-URL = "link URLs: udpin:, udpout:, tcpin: or tcp:host:port, or serial:device:baud"
+URL = "link URLs: udpin:host:port and tcpin: listen, udpout: and tcp: connect, serial:device:baud"
 
 
 def _seconds(low: float, high: float) -> Number:
@@ -97,7 +97,7 @@ class Driving:
     acceleration: float = setting(
         0.5,
         Number(0.05, 5, "m/s2"),
-        "acceleration and deceleration of setpoints; a rover that brakes less hard overshoots",
+        "acceleration and braking of setpoints; a rover that brakes less overshoots goal and fence",
         parameter=(4, "TSK_ACCEL"),
     )
     turn_acceleration: float = setting(
@@ -340,6 +340,7 @@ class Retention:
         "finished tasks are deleted after this time",
         key="store.keep_days",
         is_live=False,
+        options=(Option("--keep-days", "DAYS"),),
     )
     max_count: int | None = setting(
         10_000,
@@ -347,6 +348,7 @@ class Retention:
         "maximum number of finished tasks; the oldest are deleted first",
         key="store.keep_tasks",
         is_live=False,
+        options=(Option("--keep-tasks", "COUNT"),),
     )
 
 
@@ -499,6 +501,7 @@ class Settings:
         "who arms the rovers; auto: the server on loopback links, else the operator",
         key="rules.arming",
         is_live=False,
+        options=(Option("--arming", "WHO"),),
     )
     #: if ignored, they are steered by course, and neither turn on the spot nor reverse
     yaw_rate: str = setting(
@@ -561,24 +564,35 @@ class Links:
         Texts(f"a list of {URL}", least=1),
         "links for clients",
         is_live=False,
+        options=(Option("--client", "URL"),),
     )
     push: tuple[str, ...] = setting(
         ("127.0.0.1:14550", "127.0.0.1:14540"),
         Texts("a list of host:port"),
         "UDP addresses where clients listen; the server sends there first",
         is_live=False,
+        options=(
+            Option("--push", "HOST:PORT"),
+            Option("--no-push", sets=[], help="Use no push addresses."),
+        ),
     )
     vehicles: tuple[str, ...] = setting(
         ("udpout:127.0.0.1:14580",),
         Texts(f"a list of {URL}", least=1),
         "links to rovers",
         is_live=False,
+        options=(Option("--vehicle", "URL"),),
     )
     insecure: bool = setting(
         False,
         Flag(),
         "whether to allow unsigned links that other machines can reach",
         is_live=False,
+        options=(
+            Option(
+                "--insecure", sets=True, help="Allow unsigned links that other machines can reach."
+            ),
+        ),
     )
     keys: str = setting(
         "",
@@ -586,6 +600,7 @@ class Links:
         "key ring file",
         key="signing.keys",
         is_live=False,
+        options=(Option("--keys", "FILE"),),
     )
     unsigned: str = setting(
         "loopback",
@@ -601,7 +616,11 @@ class Recording:
     """Recordings of a run, beside the store."""
 
     tlog: str = setting(
-        "", Text('a folder, "" for none'), "folder for telemetry logs", is_live=False
+        "",
+        Text('a folder, "" for none'),
+        "folder for telemetry logs",
+        is_live=False,
+        options=(Option("--tlog", "FOLDER"),),
     )
     tlog_size: int = setting(
         50_000_000,
@@ -620,6 +639,7 @@ class Recording:
         Text('a folder, "" for none'),
         "folder for records for mav-tasks replay, one per run",
         is_live=False,
+        options=(Option("--record", "FOLDER"),),
     )
     decisions_size: int = setting(
         200_000_000,
@@ -633,11 +653,18 @@ class Recording:
 class Log:
     """The server's log on standard error."""
 
-    format: str = setting("text", Choice(("text", "json")), "format of the log", is_live=False)
+    format: str = setting(
+        "text",
+        Choice(("text", "json")),
+        "format of the log",
+        is_live=False,
+        options=(Option("--log-json", sets="json", help="Log JSON, one object per line."),),
+    )
     level: str = setting(
         "info",
         Choice(("debug", "info", "warning", "error")),
         "lowest level that is logged; start with debug to log new addresses on links, too",
+        options=(Option("--verbose", sets="debug", help="Log more details.", short="-v"),),
     )
 
 
@@ -653,6 +680,7 @@ class ServerSettings:
         key="store.path",
         is_live=False,
         variable="MAV_TASKS_STORE",  # older than the rule for names of variables
+        options=(Option("--store", "PATH|:memory:"),),
     )
     engine: Settings = field(default_factory=Settings)
     profiles: str = setting(

@@ -19,7 +19,7 @@ from mav_tasks.cli.queue import queue
 from mav_tasks.cli.ready import ready
 from mav_tasks.cli.replay import replay
 from mav_tasks.cli.root import Root, root
-from mav_tasks.cli.serve import serve
+from mav_tasks.cli.serve import ServeCommand, serve
 from mav_tasks.cli.sim import sim
 from mav_tasks.cli.status import status
 from mav_tasks.cli.vehicles import vehicles
@@ -36,7 +36,7 @@ app = typer.Typer(
 
 PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 
-app.command()(serve)
+app.command(cls=ServeCommand)(serve)
 app.command(cls=SimCommand, context_settings=PASSED_ON, add_help_option=False)(sim)
 app.command(cls=DemoCommand, context_settings=PASSED_ON, add_help_option=False)(demo)
 app.add_typer(submit.app, name="submit")

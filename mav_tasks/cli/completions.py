@@ -32,15 +32,6 @@ def derivations(incomplete: str) -> list[str]:
     return beginning_with(incomplete, PASSPHRASES)
 
 
-def arming(incomplete: str) -> list[str]:
-    """Return who may arm."""
-    from mav_tasks.setting_keys.shapes import Choice  # noqa: PLC0415
-    from mav_tasks.settings import KEYS  # noqa: PLC0415
-
-    shape = KEYS["rules.arming"].shape
-    return beginning_with(incomplete, shape.words if isinstance(shape, Choice) else ())
-
-
 def releases(incomplete: str) -> list[str]:
     """Return what may become of a held task."""
     from typing import get_args  # noqa: PLC0415

@@ -1,98 +1,85 @@
-"""``mav-tasks serve``: run the task server."""
+"""``mav-tasks serve``: run the task server. Its options for settings are declared with these."""
 
 import os
 import signal
-from typing import Annotated
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperOption
 
 from mav_tasks.cli import completions
 
-LINKS = (
-    "udpin:host:port and tcpin:host:port listen, udpout: and tcp: connect, "
-    "serial:/dev/ttyUSB0:57600 opens a serial port. Append ?unsigned=allow, ?unsigned=refuse or "
-    "?key=NAME to set its signing rules."
-)
+if TYPE_CHECKING:
+    from mav_tasks.setting_keys.key import Key, Option
+
+
+class ServeCommand(TyperCommand):
+    """The command with the options that the settings declare; ``ctx.obj`` has the given ones.
+
+    It makes them when they are needed: other commands must not wait for them.
+    """
+
+    @cached_property
+    def _options(self) -> "list[tuple[Key, Option, TyperOption]]":
+        from mav_tasks.settings import KEYS  # noqa: PLC0415
+
+        return [(k, option, _made(k, option)) for k in KEYS.values() for option in k.options]
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return all options."""
+        return [*(made for _, _, made in self._options), *super().get_params(ctx)]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments. Of two options for one key the one declared last counts."""
+        from mav_tasks.config.words import Flag  # noqa: PLC0415
+
+        rest = super().parse_args(ctx, args)
+        given = {}
+        for key, option, made in self._options:
+            value = ctx.params.pop(made.name, None)
+            if value is not None and value is not False and value != ():
+                plain = value if option.sets is None else option.sets
+                plain = list(plain) if isinstance(plain, tuple) else plain
+                given[key.name] = Flag(option.name, key.name, plain)
+        ctx.obj = list(given.values())
+        return rest
+
+
+def _made(key: "Key", option: "Option") -> TyperOption:
+    from mav_tasks.setting_keys.shapes import Choice, Texts  # noqa: PLC0415
+
+    is_switch = option.sets is not None
+    is_list = isinstance(key.shape, Texts) and not is_switch
+    words = key.shape.words if isinstance(key.shape, Choice) else ()
+
+    def complete(_ctx: Any, _before: Any, incomplete: str) -> list[Any]:
+        return [*completions.beginning_with(incomplete, words)]
+
+    return TyperOption(
+        param_decls=[each for each in (option.name, option.short) if each],
+        is_flag=is_switch or None,
+        default=False if is_switch else None,
+        multiple=is_list,
+        metavar=option.metavar or None,
+        autocompletion=complete,
+        help=option.help or _help(key, is_list=is_list),
+    )
+
+
+def _help(key: "Key", *, is_list: bool) -> str:
+    from mav_tasks.setting_keys.literals import literal  # noqa: PLC0415
+    from mav_tasks.settings import ServerSettings  # noqa: PLC0415
+
+    plain = key.plain_of(ServerSettings())
+    default = ", ".join(plain) if isinstance(plain, list) else literal(plain).strip('"')
+    words = f"{key.meaning[0].upper()}{key.meaning[1:]} ({key.shape.valid})"
+    words += "; repeatable." if is_list else "."
+    return f"{words} Default: {default}." if default else words
 
 
 def serve(
-    client: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="URL",
-            help=f"Link for clients; repeatable. {LINKS} Default: udpin:127.0.0.1:14560.",
-        ),
-    ] = None,
-    push: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="HOST:PORT",
-            help="UDP address where a client listens; the server sends there first; repeatable. "
-            "Default: 127.0.0.1:14550 and 127.0.0.1:14540.",
-        ),
-    ] = None,
-    no_push: Annotated[bool, typer.Option("--no-push", help="Use no push addresses.")] = False,
-    vehicle: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="URL",
-            help="Link to rovers, a URL as for --client; repeatable. "
-            "Default: udpout:127.0.0.1:14580.",
-        ),
-    ] = None,
-    arming: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHO",
-            autocompletion=completions.arming,
-            help="Who arms the rovers: server, operator, or auto (default): the server on loopback "
-            "links, else the operator.",
-        ),
-    ] = None,
-    store: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PATH|:memory:",
-            help="SQLite file of the tasks; default: mav-tasks.sqlite3 in your data folder.",
-        ),
-    ] = None,
-    keep_days: Annotated[
-        str | None,
-        typer.Option(
-            metavar="DAYS",
-            help="Delete finished tasks after this many days; 'forever': never; default: 30.",
-        ),
-    ] = None,
-    keep_tasks: Annotated[
-        str | None,
-        typer.Option(
-            metavar="COUNT",
-            help="Keep at most this many finished tasks; 'forever': all; default: 10000.",
-        ),
-    ] = None,
-    tlog: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FOLDER", help="Write telemetry logs (tlog) for ground stations to this folder."
-        ),
-    ] = None,
-    record: Annotated[
-        str | None,
-        typer.Option(metavar="FOLDER", help="Write a record for mav-tasks replay to this folder."),
-    ] = None,
-    insecure: Annotated[
-        bool, typer.Option("--insecure", help="Allow unsigned links that other machines can reach.")
-    ] = False,
-    keys: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE", help="Key ring file; default: keys.toml in your configuration folder."
-        ),
-    ] = None,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Log more details.")] = False,
-    log_json: Annotated[
-        bool, typer.Option("--log-json", help="Log JSON, one object per line.")
-    ] = False,
+    ctx: typer.Context,
     config: Annotated[
         str | None,
         typer.Option(
@@ -118,29 +105,14 @@ def serve(
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
     from mav_tasks.config.configuration import Sources  # noqa: PLC0415
     from mav_tasks.config.reload import Reload  # noqa: PLC0415
-    from mav_tasks.config.words import flag_of_set, given_flags  # noqa: PLC0415
+    from mav_tasks.config.words import flag_of_set  # noqa: PLC0415
     from mav_tasks.errors import StoreError  # noqa: PLC0415
     from mav_tasks.serve import serve as run  # noqa: PLC0415
     from mav_tasks.store.place import IN_MEMORY  # noqa: PLC0415
 
-    if store == "":
+    if any((flag.where, flag.value) == ("--store", "") for flag in ctx.obj):
         raise StoreError(f"--store: expected a path, or {IN_MEMORY}")
-    flags = given_flags(
-        ("--client", "links.clients", client or None),
-        ("--no-push" if no_push else "--push", "links.push", [] if no_push else push or None),
-        ("--vehicle", "links.vehicles", vehicle or None),
-        ("--insecure", "links.insecure", insecure or None),
-        ("--keys", "signing.keys", keys),
-        ("--arming", "rules.arming", arming),
-        ("--store", "store.path", store),
-        ("--keep-days", "store.keep_days", keep_days),
-        ("--keep-tasks", "store.keep_tasks", keep_tasks),
-        ("--tlog", "recording.tlog", tlog),
-        ("--record", "recording.decisions", record),
-        ("--verbose", "log.level", "debug" if verbose else None),
-        ("--log-json", "log.format", "json" if log_json else None),
-    )
-    flags += [flag_of_set(text) for text in set_ or ()]
+    flags = [*ctx.obj, *map(flag_of_set, set_ or ())]
     sources = Sources(config, dict(os.environ), flags)
     configuration = sources.load()
     raise typer.Exit(run(configuration.settings, reload=Reload(sources, configuration)))

@@ -69,8 +69,3 @@ def flag_of_set(text: str) -> Flag:
     """Return the flag for ``--set KEY=VALUE``; its value is None if "=" is missing."""
     name, equals, value = text.partition("=")
     return Flag(f"--set {name.strip()}", name.strip(), value.strip() if equals else None)
-
-
-def given_flags(*flags: tuple[str, str, object]) -> list[Flag]:
-    """Return the flags of (flag, key, value) triples whose value is not None."""
-    return [Flag(where, name, value) for where, name, value in flags if value is not None]

@@ -14,6 +14,21 @@ _DECLARED = "setting"  # in the metadata of a field
 
 
 @dataclass(frozen=True, slots=True)
+class Option:
+    """An option of ``mav-tasks serve`` for a key: it takes a value, or is a switch that sets one.
+
+    ``sets`` is the plain value of a switch, and ``help`` what the switch does; the help of other
+    options follows from the key.
+    """
+
+    name: str
+    metavar: str = ""
+    sets: Any = None
+    help: str = ""
+    short: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Key:
     """A setting with its name in the file, such as ``driving.speed``.
 
@@ -30,6 +45,7 @@ class Key:
     at_most: str = ""
     parameter: tuple[int, str] | None = None
     variable: str = ""
+    options: tuple[Option, ...] = ()
 
     @property
     def table(self) -> str:
@@ -59,13 +75,14 @@ def setting(
     at_most: str = "",
     parameter: tuple[int, str] | None = None,
     variable: str = "",
+    options: tuple[Option, ...] = (),
 ) -> Any:
     """Return a field of a dataclass that declares one setting; ``default`` is in kept form.
 
     All forms of the setting follow from it. ``key`` is its name in the file if that is not its
     path; ``variable`` its environment variable if that does not follow from the name.
     """
-    declared = Key(shape, meaning, key, "", is_live, at_most, parameter, variable)
+    declared = Key(shape, meaning, key, "", is_live, at_most, parameter, variable, options)
     metadata = {_DECLARED: declared}
     if isinstance(default, dict):
         return field(default_factory=default.copy, metadata=metadata)
