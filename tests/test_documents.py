@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
 from tests.kit.commands import mav_tasks
 from tests.kit.mavproxy import mavproxy
@@ -260,19 +259,6 @@ def test_every_path_and_link_leads_somewhere(name: str) -> None:
         assert target.exists(), path
         if anchor:
             assert anchor in anchors(target.read_text(encoding="utf-8")), f"{path}#{anchor}"
-
-
-def test_the_table_of_parameters_is_that_of_the_code() -> None:
-    rows = re.findall(r"^\| (TSK_\w+) \| `(.+?)` \| (\S+) \| (.*?) ?\|", CONTRACT, re.MULTILINE)
-    assert rows == [
-        (
-            each.name,
-            each.key.name,
-            f"{each.low:.7g}..{each.high:.7g}",
-            each.key.shape.unit.replace("m/s2", "m/s²"),
-        )
-        for each in PARAMETERS.values()
-    ]
 
 
 def test_the_guide_explains_each_reason_to_wait_in_the_words_of_the_command_line() -> None:

@@ -1,0 +1,29 @@
+"""Print the table of parameters into dialects/README.md; `--check` reports if it is outdated."""
+
+import sys
+
+from generated import keep_current
+from mav_tasks.services.parameter_table import NAMES, PARAMETERS, Parameter
+
+HEAD = "| parameter | key | range | unit | what it sets |\n|---|---|---|---|---|\n"
+
+
+def table() -> str:
+    """Return the table, in the order of the indices."""
+    return HEAD + "".join(map(_row, PARAMETERS.values()))
+
+
+def _row(parameter: Parameter) -> str:
+    key = parameter.key
+    about = f"{key.meaning}; at most {NAMES[key.at_most]}" if key.at_most else key.meaning
+    if parameter.choices:
+        numbered = enumerate(parameter.choices)
+        about += f": {', '.join(f'{number} {word}' for number, word in numbered)}"
+    unit = key.shape.unit.replace("s2", "s²")
+    limits = f"{parameter.low:.7g}..{parameter.high:.7g}"
+    return f"| {parameter.name} | `{key.name}` | {limits} | {unit} | {about} |\n"
+
+
+if __name__ == "__main__":
+    made = table()
+    sys.exit(keep_current("dialects/README.md", "parameter table", "parameter_table.py", made))
