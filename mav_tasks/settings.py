@@ -586,13 +586,9 @@ class Links:
     insecure: bool = setting(
         False,
         Flag(),
-        "whether to allow unsigned links that other machines can reach",
+        "allow unsigned links that other machines can reach",
         is_live=False,
-        options=(
-            Option(
-                "--insecure", sets=True, help="Allow unsigned links that other machines can reach."
-            ),
-        ),
+        options=(Option("--insecure", sets=True),),
     )
     keys: str = setting(
         "",

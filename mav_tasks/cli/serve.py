@@ -63,18 +63,20 @@ def _made(key: "Key", option: "Option") -> TyperOption:
         multiple=is_list,
         metavar=option.metavar or None,
         autocompletion=complete,
-        help=option.help or _help(key, is_list=is_list),
+        help=option.help or _help(key, is_switch=is_switch, is_list=is_list),
     )
 
 
-def _help(key: "Key", *, is_list: bool) -> str:
+def _help(key: "Key", *, is_switch: bool, is_list: bool) -> str:
     from mav_tasks.setting_keys.literals import literal  # noqa: PLC0415
     from mav_tasks.settings import ServerSettings  # noqa: PLC0415
 
+    words = f"{key.meaning[0].upper()}{key.meaning[1:]}"
+    if is_switch:
+        return f"{words}."
     plain = key.plain_of(ServerSettings())
     default = ", ".join(plain) if isinstance(plain, list) else literal(plain).strip('"')
-    words = f"{key.meaning[0].upper()}{key.meaning[1:]} ({key.shape.valid})"
-    words += "; repeatable." if is_list else "."
+    words += f" ({key.shape.valid}){'; repeatable' if is_list else ''}."
     return f"{words} Default: {default}." if default else words
 
 
