@@ -4,7 +4,6 @@ Every value is checked, because a profile changes how a rover is driven.
 """
 
 import os
-import tomllib
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -71,21 +70,18 @@ def read(place: str) -> tuple[VehicleProfile, ...]:
 
 def profile_of(text: str, *, name: str) -> VehicleProfile:
     """Return the profile of a TOML text; raise ConfigError with all faults."""
-    try:
-        table = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        words = "".join(each if each.isprintable() else "?" for each in str(error))
-        raise ConfigError(f"{name}: {words}") from error
+    found = toml_file.parsed(text, name=name)
     kept: dict[str, Any] = {}
-    faults = [f"{name}: {key} is missing" for key in _NEEDED if key not in table]
-    for key, value in table.items():
+    faults = [f"{name}: {key} is missing" for key in _NEEDED if key not in found.values]
+    for key, value in found.values.items():
+        where = found.where(key)
         if key not in _KEYS:
-            faults.append(f"{name}: {key!a}: a profile has no such key")
+            faults.append(f"{where}: {key!a}: a profile has no such key")
             continue
         try:
             kept[key] = _KEYS[key].shape.kept(value)
         except SettingError as error:
-            faults.append(f"{name}: {key}: {error}")
+            faults.append(f"{where}: {key}: {error}")
     if faults:
         raise ConfigError(*faults)
     return VehicleProfile(**kept)

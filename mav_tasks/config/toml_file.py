@@ -47,10 +47,15 @@ def decoded(data: bytes, *, name: str) -> str:
 
 
 class Parsed(NamedTuple):
-    """A parsed TOML text: its values, and the line of each key and table."""
+    """A parsed TOML text: the file's name, the values, and the line of each key and table."""
 
+    name: str
     values: Mapping[str, Any]
     lines: Mapping[toml_lines.Path, int]
+
+    def where(self, *path: str) -> str:
+        """Return the place of a key or table, for a message."""
+        return f"{self.name}:{self.lines[path]}" if path in self.lines else self.name
 
 
 def parsed(text: str, *, name: str) -> Parsed:
@@ -62,7 +67,7 @@ def parsed(text: str, *, name: str) -> Parsed:
         line = text.count("\n", 0, deep.start()) + 1
         raise ConfigError(f"{name}:{line}: a key with too many parts")
     try:
-        return Parsed(tomllib.loads(text), toml_lines.lines_of(text.replace("\r\n", "\n")))
+        return Parsed(name, tomllib.loads(text), toml_lines.lines_of(text.replace("\r\n", "\n")))
     except RecursionError:
         raise ConfigError(f"{name}: tables or lists are nested too deep") from None
     except ValueError as error:  # also from int(): a number of thousands of digits
@@ -78,24 +83,18 @@ def layer_of(text: str, *, name: str) -> Layer:
     except ConfigError as error:
         layer.faults += error.faults
     else:
-        _walk(layer, (), found.values, found.lines, name)
+        _walk(layer, (), found.values, found)
     return layer
 
 
-def _walk(
-    layer: Layer,
-    before: toml_lines.Path,
-    table: Mapping[str, Any],
-    lines: Mapping[toml_lines.Path, int],
-    name: str,
-) -> None:
+def _walk(layer: Layer, before: toml_lines.Path, table: Mapping[str, Any], found: Parsed) -> None:
     for last, value in table.items():
         if len(layer.faults) == MOST_FAULTS:
-            layer.faults.append(f"{name}: there are more errors")
+            layer.faults.append(f"{found.name}: there are more errors")
         if len(layer.faults) > MOST_FAULTS:
             return
         path = (*before, last)
-        where = f"{name}:{lines[path]}" if path in lines else name
+        where = found.where(*path)
         if path in _KEYS:
             layer.take(_KEYS[path], value, where)
         elif path not in _TABLES:
@@ -107,7 +106,7 @@ def _walk(
             words = ".".join(map(str, path))
             layer.faults.append(f"{where}: {words}: expected a table, [{words}]")
         else:
-            _walk(layer, path, value, lines, name)
+            _walk(layer, path, value, found)
 
 
 def _quoted(part: str) -> str:

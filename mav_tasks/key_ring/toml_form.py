@@ -28,20 +28,16 @@ _MOST_FAULTS = 20
 def ring_of(text: str, *, name: str) -> KeyRing:
     """Return the ring of a TOML text; raise KeyRingError with all faults. ``name``: the file's."""
     try:
-        values, lines = parsed(text, name=name)
+        found = parsed(text, name=name)
     except ConfigError as error:
         raise KeyRingError(*(_DIGITS.sub("…", fault) for fault in error.faults)) from None
     faults: list[str] = []
     ring = KeyRing()
-
-    def where(*path: str) -> str:
-        return f"{name}:{lines[path]}" if path in lines else name
-
-    tables = values.get(TABLE, {})
-    if set(values) - {TABLE} or not isinstance(tables, dict):
+    tables = found.values.get(TABLE, {})
+    if set(found.values) - {TABLE} or not isinstance(tables, dict):
         faults.append(f"{name}: expected only tables [{TABLE}.NAME]")
     for key_name, table in tables.items() if isinstance(tables, dict) else ():
-        here = where(TABLE, key_name)
+        here = found.where(TABLE, key_name)
         try:
             if not isinstance(table, dict):
                 raise KeyRingError(f"expected a table [{TABLE}.NAME]")
