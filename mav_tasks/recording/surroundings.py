@@ -5,9 +5,9 @@ Tasks have their own lines (``record_lines``): there may be a hundred thousand.
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any
 
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
@@ -29,19 +29,20 @@ def settings_to_json(settings: Any) -> Any:
 
 def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
     """Return settings from JSON values, defaults if missing; raise ValueError if unknown."""
-    hints = get_type_hints(kind)
-    unknown = sorted(set(values) - set(hints))
+    # not the type hints: compiled, a class has less of them
+    makers = {field.name: field.default_factory for field in fields(kind)}
+    unknown = sorted(set(values) - set(makers))
     if unknown:
         raise ValueError(f"{kind.__name__}.{unknown[0]} is unknown to this version")
-    return kind(**{name: _setting_of(value, hints[name]) for name, value in values.items()})
+    return kind(**{name: _setting_of(value, makers[name]) for name, value in values.items()})
 
 
-def _setting_of(value: Any, hint: Any) -> Any:
-    if is_dataclass(hint):
-        return settings_of(value, hint)
-    if get_origin(hint) is tuple:
-        (each, _) = get_args(hint)  # all are tuple[kind, ...]
-        return tuple(_setting_of(one, each) for one in value)
+def _setting_of(value: Any, maker: Any) -> Any:
+    if is_dataclass(maker):
+        return settings_of(value, maker)
+    if isinstance(value, list):  # of texts, or of profiles
+        each = [settings_of(v, VehicleProfile) if isinstance(v, dict) else v for v in value]
+        return tuple(each)
     return value
 
 
