@@ -24,7 +24,9 @@ class ServeCommand(TyperCommand):
     def _options(self) -> "list[tuple[Key, Option, TyperOption]]":
         from mav_tasks.settings import KEYS  # noqa: PLC0415
 
-        return [(k, option, _made(k, option)) for k in KEYS.values() for option in k.options]
+        return [
+            (k, option, _typer_option(k, option)) for k in KEYS.values() for option in k.options
+        ]
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return all options."""
@@ -46,7 +48,7 @@ class ServeCommand(TyperCommand):
         return rest
 
 
-def _made(key: "Key", option: "Option") -> TyperOption:
+def _typer_option(key: "Key", option: "Option") -> TyperOption:
     from mav_tasks.setting_keys.shapes import Choice, Texts  # noqa: PLC0415
 
     is_switch = option.sets is not None
