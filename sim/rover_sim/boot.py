@@ -81,6 +81,10 @@ class Boot:
         """Return whether INITIALISING is over."""
         return now - self._started >= max(self._times.initialised, self._times.mode_lost)
 
+    def tells_its_time(self, *, now: float) -> bool:
+        """Return whether messages with its clock are sent: an ArduPilot's not in INITIALISING."""
+        return self._times.is_none or self.is_initialised(now=now)
+
     def loses_mode(self, *, now: float) -> bool:
         """Return True once, when a mode that was entered early is lost."""
         if not self._mode_to_lose or now - self._started < self._times.mode_lost:

@@ -97,6 +97,8 @@ class Telemetry:
         """Return the present message; None if there is nothing to send."""
         message = self._builders[message_id](estimate, self.boot_ms(now))
         if message is not None and hasattr(message, "time_boot_ms"):
+            if not self._boot.tells_its_time(now=now):
+                return None
             message.time_boot_ms %= OVERFLOW
         return message
 
