@@ -34,6 +34,7 @@ def test_where_signatures_are_asked_for_unsigned_forged_and_replayed_ones_do_not
     assert battered.engine.signatures.counts.old > 50
 
 
+@pytest.mark.patches_core
 def test_a_server_that_takes_a_packet_twice_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(StreamTimes, "is_news", lambda *_, **__: True)
     with pytest.raises(Violation, match="it is no packet, and has changed something"):
@@ -67,6 +68,7 @@ def test_what_is_whole_is_known_without_the_server() -> None:
 # each of its rules is able to fail
 
 
+@pytest.mark.patches_core
 def test_a_decoder_that_looks_at_no_crc_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     decode = Decoder.decode
 
@@ -80,6 +82,7 @@ def test_a_decoder_that_looks_at_no_crc_is_found(monkeypatch: pytest.MonkeyPatch
         Battered(SEED).run(SOME)
 
 
+@pytest.mark.patches_core
 def test_an_exception_is_found_with_its_packet(monkeypatch: pytest.MonkeyPatch) -> None:
     packets = PacketReader.packets
 
@@ -92,6 +95,7 @@ def test_an_exception_is_found_with_its_packet(monkeypatch: pytest.MonkeyPatch) 
         Battered(SEED).run(SOME)
 
 
+@pytest.mark.patches_core
 def test_growth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     handle = Engine.handle
     monkeypatch.setattr(Engine, "leak", [], raising=False)

@@ -120,6 +120,7 @@ def test_history_outlives_a_restart_also_before_the_rover_is_heard(make_world: M
     world.run(after())
 
 
+@pytest.mark.patches_core
 def test_an_older_server_is_noticed(make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch) -> None:
     world = make_world()
     monkeypatch.setattr(translate, "is_of_finished", lambda _command: False)

@@ -43,6 +43,7 @@ def test_whatever_happens_in_any_state_what_holds_the_rover_holds(
     assert len(found.states) > 3 * MOST, "hardly anything has happened"
 
 
+@pytest.mark.patches_core
 def test_the_search_finds_a_copy_that_arms_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the rule of order it is found, so that nothing found means something."""
     for module in (dispatch, mode_requests):

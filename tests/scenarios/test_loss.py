@@ -258,6 +258,7 @@ def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: fl
     assert world.rover.autopilot.mode is Mode.HOLD
 
 
+@pytest.mark.patches_core
 def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(world: World) -> None:
     server, left = world.server, list[tuple[common.MAVLink_message, float]]()
     take_packets = server.engine.take_packets

@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 #: file -> what is added, and before which line
@@ -74,6 +76,7 @@ world.check()
 """
 
 
+@pytest.mark.patches_core
 def test_a_new_kind_of_task_is_five_files(tmp_path: Path) -> None:
     copy = tmp_path / "mav_tasks"
     shutil.copytree(ROOT / "mav_tasks", copy, ignore=shutil.ignore_patterns("__pycache__"))

@@ -195,6 +195,7 @@ class Never(set[int]):
         return False
 
 
+@pytest.mark.patches_core
 @pytest.mark.parametrize(("delay", "is_early"), [(0.0, False), (0.2, True), (9.0, False)])
 def test_an_end_that_was_told_and_that_a_restart_loses_was_told_too_early(
     world: SoakWorld, monkeypatch: pytest.MonkeyPatch, delay: float, *, is_early: bool
@@ -278,6 +279,7 @@ def test_two_sources_of_motion_are_seen(world: SoakWorld) -> None:
         world.run(1)
 
 
+@pytest.mark.patches_core
 def test_a_server_that_remembers_too_much_is_found(world: SoakWorld) -> None:
     kept = {Address(1, 1): list(range(2_000))}
     world.server.engine._vehicles.leak = kept  # type: ignore[attr-defined]

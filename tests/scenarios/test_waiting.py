@@ -175,6 +175,7 @@ def test_a_dependency_can_be_set_and_lifted_again(world: World) -> None:
     assert world.state(other)[0] is S.QUEUED
 
 
+@pytest.mark.patches_core
 def test_a_place_that_is_too_far_back_to_be_told_is_the_last_that_can_be(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:

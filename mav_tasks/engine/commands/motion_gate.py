@@ -4,8 +4,9 @@ A client that streams setpoints must not drive the instant a task ends. While a 
 vehicle, only manual control moves it.
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from math import isfinite
+from typing import Any
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.policy import Kind, Row
@@ -76,9 +77,10 @@ def _asks_to_stand(message: m.Message | None) -> bool:
 
 def _is_finite(message: m.Message) -> bool:
     """Whether all numbers are finite: others make autopilots abort, even in ignored fields."""
+    values: Iterable[Any] = message.to_dict().values()  # arrays, too, which pymavlink does not say
     return all(
         isfinite(number)
-        for value in message.to_dict().values()
+        for value in values
         for number in (value if isinstance(value, list) else [value])
         if isinstance(number, float)
     )

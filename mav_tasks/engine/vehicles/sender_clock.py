@@ -51,10 +51,8 @@ class SenderClock:
         ms = self._counted_on(message.time_boot_ms, now=now)
         if self._newest is not None and self._newest - ms >= REBOOT:
             return self._went_back(ms, now=now)
-        if self._newest is not None and self._expected(now) - ms > LATEST:
-            # it was silent for longer than it had been up before, or its clock stood still
-            if self._may_have_booted(ms % OVERFLOW / 1000, now=now):
-                return Heard.RESTART
+        if self._lost_time(ms, now=now) and self._may_have_booted(ms % OVERFLOW / 1000, now=now):
+            return Heard.RESTART  # it was silent for longer than it had been up before
         if ms <= self._latest.get(message.id, ms - 1):
             return Heard.OLD
         self._latest[message.id] = ms
@@ -85,6 +83,10 @@ class SenderClock:
     def _expected(self, now: float) -> int:
         assert self._newest is not None
         return self._newest + round(1000 * (now - self._newest_at))
+
+    def _lost_time(self, ms: int, *, now: float) -> bool:
+        """Return whether the clock is far behind: it began anew, or stood still."""
+        return self._newest is not None and self._expected(now) - ms > LATEST
 
     def _may_have_booted(self, uptime: float, *, now: float) -> bool:
         """Return whether it can have booted since the newest message was sent."""

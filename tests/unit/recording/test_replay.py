@@ -166,6 +166,7 @@ def test_an_engine_that_does_more_at_the_end_differs(
     assert "FOUND" in difference.came
 
 
+@pytest.mark.patches_core
 def test_an_engine_that_fails_differs_unless_the_run_ended_there(
     whole: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,9 +1,14 @@
 """What is compiled keeps what the store and the records read."""
 
+from pathlib import Path
+from runpy import run_path
+
 from mav_tasks.recording.record_lines import ROWS
 from mav_tasks.tasks import events, goal, server_events, task, timing
-from tools.compile_core import ROOT, STORED, sources
 
+ROOT = Path(__file__).resolve().parents[3]
+tool = run_path(str(ROOT / "tools" / "compile_core.py"))
+STORED, sources = tool["STORED"], tool["sources"]
 MODULES = (events, goal, server_events, task, timing)
 
 
