@@ -90,13 +90,10 @@ def init(
 
 def _parameters(settings: "ServerSettings") -> dict[str, float]:
     """Return the MAVLink parameters that clients have set; {} if the store cannot be read."""
-    from mav_tasks.store.place import path_of_store  # noqa: PLC0415
-    from mav_tasks.store.reading import read_parameters  # noqa: PLC0415
+    from mav_tasks.store.opening import kind_of  # noqa: PLC0415
 
     try:
-        path = path_of_store(settings.store)
-        path = None if path is None else path.expanduser().absolute()
-        return read_parameters(path) if path is not None and path.exists() else {}
-    except (StoreError, OSError, RuntimeError) as error:
+        return kind_of(settings.store).read_parameters(settings.store)
+    except StoreError as error:
         sys.stderr.write(f"mav-tasks: parameters set by clients are not shown: {error}\n")
         return {}

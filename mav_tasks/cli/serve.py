@@ -121,7 +121,7 @@ def serve(
     from mav_tasks.config.words import flag_of_set, given_flags  # noqa: PLC0415
     from mav_tasks.errors import StoreError  # noqa: PLC0415
     from mav_tasks.serve import serve as run  # noqa: PLC0415
-    from mav_tasks.store.place import IN_MEMORY  # noqa: PLC0415
+    from mav_tasks.store.opening import IN_MEMORY  # noqa: PLC0415
 
     if store == "":
         raise StoreError(f"--store: expected a path, or {IN_MEMORY}")

@@ -26,8 +26,7 @@ from mav_tasks.recording import observers
 from mav_tasks.runner import Runner
 from mav_tasks.serve import tame_collector
 from mav_tasks.settings import Clients, Limits, Log, Queueing, Recording, Roles, Settings
-from mav_tasks.store import MemoryStore
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store.opening import IN_MEMORY, open_store
 
 from .child import HOST, READY
 
@@ -72,11 +71,7 @@ def _settings(*, drives: bool, is_limited: bool) -> Settings:
 
 
 async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
-    store = (
-        SqliteStore(options.store, wall_offset=lambda: time.time() - boot_time())
-        if options.store
-        else MemoryStore()
-    )
+    store = open_store(options.store or IN_MEMORY)
     now = boot_time()
     settings = _settings(drives=options.drive, is_limited=options.default_limits)
     engine = Engine(settings, now=now)
