@@ -12,9 +12,7 @@ from collections.abc import Callable
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
 from mav_tasks.links.link_limits import TO_VEHICLES
-from mav_tasks.links.opening import open_link
-from mav_tasks.links.policy import is_nearby, unsigned_beyond
-from mav_tasks.links.udp import UdpLink
+from mav_tasks.links.policy import unsigned_beyond
 from mav_tasks.links.url import parse_url
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.mavlink.signing import Key
@@ -40,10 +38,10 @@ async def run_probe(
     InsecureLinkError if the link cannot be used.
     """
     parsed = parse_url(url)
-    if not (insecure or key is not None or is_nearby(parsed)):
+    if not (insecure or key is not None or parsed.is_nearby):
         raise unsigned_beyond(f"link {parsed}")
-    link = open_link(parsed, limits=TO_VEHICLES)
-    if isinstance(link, UdpLink) and link.note:
+    link = parsed.open(limits=TO_VEHICLES)
+    if link.note:
         on_stage(link.note)
     face = _Face(link, options, None if key is None else ClientSignatures(key), on_stage)
     try:

@@ -21,10 +21,9 @@ from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.link_keys import check_keys, in_words
 from mav_tasks.links.base import Link
 from mav_tasks.links.config_check import faults_of, links_of, pushing_url
+from mav_tasks.links.endpoint import parse_endpoint
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES, LinkLimits
-from mav_tasks.links.opening import open_link
-from mav_tasks.links.udp import UdpLink
-from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint
+from mav_tasks.links.url import LinkUrl
 from mav_tasks.logs.field_notes import FieldNotes
 from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
@@ -80,7 +79,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             waiting = "" if link.side == "clients" else ", waiting for the first heartbeat"
             say(f"{link.side} on {link.url}{signatures}{waiting}")
         for opened_link in vehicle_links:
-            if isinstance(opened_link, UdpLink) and opened_link.note:
+            if opened_link.note:
                 say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
             say("no push: no link for clients is UDP")
@@ -121,9 +120,9 @@ def _watched_ring(links: Links) -> RingWatch:
 
 
 def _open(
-    opened: ExitStack, url: LinkUrl | SerialUrl, limits: LinkLimits, *, push: tuple[Any, ...] = ()
+    opened: ExitStack, url: LinkUrl, limits: LinkLimits, *, push: tuple[Any, ...] = ()
 ) -> Link:
-    link = open_link(url, limits=limits, push=push)
+    link = url.open(limits=limits, push=push)
     opened.callback(link.close)
     return link
 

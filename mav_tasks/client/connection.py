@@ -10,7 +10,6 @@ from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.errors import LinkUrlError
 from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
 from mav_tasks.links.link_limits import TO_CLIENTS
-from mav_tasks.links.opening import open_link
 from mav_tasks.links.url import parse_url
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.mavlink.stream import StreamSplitter
@@ -131,6 +130,6 @@ class Connection:
 
 def _open(link: str) -> Link:
     url = parse_url(link)
-    if url.key or url.unsigned is not None:
+    if url.options.key or url.options.unsigned is not None:
         raise LinkUrlError(f"link {link!r}: options after ? are for servers only")
-    return open_link(url, limits=TO_CLIENTS)
+    return url.open(limits=TO_CLIENTS)

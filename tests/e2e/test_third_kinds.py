@@ -45,3 +45,12 @@ def test_a_third_kind_of_store_outlives_its_server_and_is_read_by_every_command(
         assert (
             lines_of("log", "--task", "1", folder=tmp_path) == journal
         )  # the store of the latest server
+
+
+def test_a_third_kind_of_link_is_served_and_dialled(tmp_path: Path) -> None:
+    path = tmp_path / "server"
+    options = "--client", f"unixin:{path}"
+    with stand(tmp_path, *options, module=(MODULE,)) as running:
+        running.server.wait_for(f"clients on unixin:{path}\n")
+        shown = lines_of("vehicles", "--json", "--server", f"unix:{path}", folder=tmp_path)
+        assert '"vehicle": 1' in shown[0]

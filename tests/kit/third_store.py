@@ -1,4 +1,4 @@
-"""A third kind of store, ``shelf:FOLDER``. It has the methods of ``Store`` and no others."""
+"""Another kind of store, ``shelf:FOLDER``. It has the methods of ``Store`` and no others."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path

@@ -157,6 +157,7 @@ class Flood:
     peers: tuple[object, ...] = ()
     is_local = True
     is_stream = False
+    note = ""
 
     def __init__(self, count: int) -> None:
         self.left = [(("127.0.0.1", 1), b"x")] * count
@@ -218,6 +219,7 @@ class FakeStream:
     peers: tuple[object, ...] = ()
     is_local = True
     is_stream = True
+    note = ""
 
     def __init__(self) -> None:
         self.told: list[PeerChange] = []  # before anything is read

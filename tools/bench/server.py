@@ -18,8 +18,7 @@ import time
 from mav_tasks.clock import boot_time
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Peer
-from mav_tasks.links.udp import UdpLink
-from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.udp import UdpLink, UdpUrl
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink import messages as m
 from mav_tasks.recording import observers
@@ -40,7 +39,7 @@ MOVING = 2 * PERIOD  # s; after a longer interval the stream had ended
 class TimedLink(UdpLink):
     """A vehicle link that measures the intervals of setpoints."""
 
-    def __init__(self, url: LinkUrl) -> None:
+    def __init__(self, url: UdpUrl) -> None:
         super().__init__(url)
         self._last: dict[int, float] = {}
         self.errors: list[float] = []
@@ -78,7 +77,7 @@ async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
     recording = Recording(tlog=options.tlog, decisions=options.record)
     recorders = observers(recording, settings, None, now=now)
     tame_collector()
-    clients = [UdpLink(LinkUrl("udpin", HOST, options.client_port))]
+    clients = [UdpLink(UdpUrl("udpin", HOST, options.client_port))]
     print(READY, flush=True)
     return await Runner(
         engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders
@@ -97,7 +96,7 @@ def main() -> int:
     parser.add_argument("--drive", action="store_true")
     parser.add_argument("--default-limits", action="store_true")
     options = parser.parse_args()
-    link = TimedLink(LinkUrl("udpout", HOST, options.vehicle_port))
+    link = TimedLink(UdpUrl("udpout", HOST, options.vehicle_port))
     with log_to_stderr(Log()):
         if options.profile is None:
             code = asyncio.run(_serve(options, link))
