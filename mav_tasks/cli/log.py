@@ -3,15 +3,19 @@
 import os
 import select
 import sys
-from typing import TYPE_CHECKING, Annotated
+import time
+from contextlib import closing
+from typing import Annotated
 
 import typer
 
+from mav_tasks.config.configuration import Sources
 from mav_tasks.errors import StoreError, UsageError
-
-if TYPE_CHECKING:
-    from mav_tasks.logs.export import EntryOf
-    from mav_tasks.store.base import JournalReader
+from mav_tasks.logs import export
+from mav_tasks.logs.export import EntryOf
+from mav_tasks.store.base import JournalReader, Which
+from mav_tasks.store.latest import latest_store
+from mav_tasks.store.opening import kind_of
 
 MOST = 1 << 63  # the first number beyond SQLite's integers
 LOOK = 0.5  # s between two checks for new events
@@ -51,13 +55,6 @@ def log(
 
     Reads the store file; the server need not run.
     """
-    import time  # noqa: PLC0415
-    from contextlib import closing  # noqa: PLC0415
-
-    from mav_tasks.logs import export  # noqa: PLC0415
-    from mav_tasks.store.base import Which  # noqa: PLC0415
-    from mav_tasks.store.opening import kind_of  # noqa: PLC0415
-
     if as_json and as_csv:
         raise UsageError("--json and --csv: choose one of them")
     for flag, number in (("--task", task), ("--vehicle", vehicle)):
@@ -86,13 +83,13 @@ def log(
             raise UsageError(f"standard output: {error.strerror}") from error
 
 
-def _print(journal: "JournalReader", entry_of: "EntryOf") -> None:
+def _print(journal: JournalReader, entry_of: EntryOf) -> None:
     for number, event in journal.take(offset=0.0):
         sys.stdout.write(entry_of(number, event))
     sys.stdout.flush()
 
 
-def _is_written_to(journal: "JournalReader", seen: int) -> bool:
+def _is_written_to(journal: JournalReader, seen: int) -> bool:
     """Wait until the store changes. Return False if the reader of our output ended first."""
     poller = select.poll()
     poller.register(sys.stdout.fileno(), 0)  # errors only: the other end has closed
@@ -104,8 +101,5 @@ def _is_written_to(journal: "JournalReader", seen: int) -> bool:
 
 def _store_of_server() -> str:
     """Return the configured store, else the store of the server that was started last."""
-    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
-    from mav_tasks.store.latest import latest_store  # noqa: PLC0415
-
     configured = Sources(None, dict(os.environ)).load().settings.store
     return configured or latest_store() or ""

@@ -1,12 +1,12 @@
 """``mav-tasks serve``: run the task server."""
 
-import os
 import signal
 from typing import Annotated
 
 import typer
 
-from mav_tasks.cli import completions
+from mav_tasks.cli.lazy import completing
+from mav_tasks.errors import StoreError
 
 LINKS = (
     "udpin:host:port and tcpin:host:port listen, udpout: and tcp: connect, "
@@ -44,7 +44,7 @@ def serve(
         str | None,
         typer.Option(
             metavar="WHO",
-            autocompletion=completions.arming,
+            autocompletion=completing("mav_tasks.settings:ARMING"),
             help="Who arms the rovers: server, operator, or auto (default): the server on loopback "
             "links, else the operator.",
         ),
@@ -105,7 +105,7 @@ def serve(
         typer.Option(
             "--set",
             metavar="KEY=VALUE",
-            autocompletion=completions.settings,
+            autocompletion=completing("mav_tasks.cli.config:assignments"),
             help="Set any key of the configuration; repeatable.",
         ),
     ] = None,
@@ -114,18 +114,13 @@ def serve(
 
     By default clients connect to UDP 14560, and the server connects to the rover on UDP 14580.
     """
+    if store == "":
+        raise StoreError("--store: expected a path, or :memory:")
     # Ignore SIGHUP until the configuration is read; by default it would end the process.
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
-    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
-    from mav_tasks.config.reload import Reload  # noqa: PLC0415
-    from mav_tasks.config.words import flag_of_set, given_flags  # noqa: PLC0415
-    from mav_tasks.errors import StoreError  # noqa: PLC0415
-    from mav_tasks.serve import serve as run  # noqa: PLC0415
-    from mav_tasks.store.opening import IN_MEMORY  # noqa: PLC0415
+    from mav_tasks.cli.serving import serve_with  # noqa: PLC0415  # takes long: after that
 
-    if store == "":
-        raise StoreError(f"--store: expected a path, or {IN_MEMORY}")
-    flags = given_flags(
+    given = (
         ("--client", "links.clients", client or None),
         ("--no-push" if no_push else "--push", "links.push", [] if no_push else push or None),
         ("--vehicle", "links.vehicles", vehicle or None),
@@ -140,7 +135,4 @@ def serve(
         ("--verbose", "log.level", "debug" if verbose else None),
         ("--log-json", "log.format", "json" if log_json else None),
     )
-    flags += [flag_of_set(text) for text in set_ or ()]
-    sources = Sources(config, dict(os.environ), flags)
-    configuration = sources.load()
-    raise typer.Exit(run(configuration.settings, reload=Reload(sources, configuration)))
+    raise typer.Exit(serve_with(given, set_=set_ or (), config=config))
