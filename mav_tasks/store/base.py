@@ -53,7 +53,7 @@ class Store(Protocol):
 
     #: what people call the store
     name: str
-    #: where ``opening.kind_of`` finds the store from any folder
+    #: where ``opening.kind_of`` finds the store from any folder; a note on the disk names it
     place: str
 
     def load(self) -> Restored | None:
