@@ -3,7 +3,7 @@
 from mav_tasks.errors import InsecureLinkError, KeyRingError, UsageError
 from mav_tasks.key_ring.ring import KeyRing
 from mav_tasks.links.config_check import ConfiguredLink, links_of
-from mav_tasks.links.policy import MEANT, is_nearby
+from mav_tasks.links.policy import MEANT
 from mav_tasks.settings import Links
 
 
@@ -15,7 +15,7 @@ def check_keys(links: Links, ring: KeyRing | None, *, where: str) -> None:
     for link in links_of(links):
         if link.policy.key:
             _check_key(link, ring or KeyRing(), where)
-        is_far = not is_nearby(link.url) or link.pushes_far
+        is_far = not link.url.is_nearby or link.pushes_far
         is_for_none = not any(key.role for key in (ring or KeyRing()).usable)
         if link.side == "clients" and is_far and is_for_none and not links.insecure:
             raise InsecureLinkError(

@@ -21,10 +21,9 @@ from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.link_keys import check_keys, in_words
 from mav_tasks.links.base import Link
 from mav_tasks.links.config_check import faults_of, links_of, pushing_url
+from mav_tasks.links.endpoint import parse_endpoint
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES, LinkLimits
-from mav_tasks.links.opening import open_link
-from mav_tasks.links.udp import UdpLink
-from mav_tasks.links.url import LinkUrl, SerialUrl, parse_endpoint
+from mav_tasks.links.url import LinkUrl
 from mav_tasks.logs.field_notes import FieldNotes
 from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
@@ -32,10 +31,10 @@ from mav_tasks.logs.vehicle_texts import VehicleTexts
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
 from mav_tasks.runner import Runner
-from mav_tasks.settings import Links, Retention, ServerSettings
-from mav_tasks.store import MemoryStore
-from mav_tasks.store.place import note_latest, path_of_store
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.settings import Links, ServerSettings
+from mav_tasks.store import Store
+from mav_tasks.store.latest import note_latest
+from mav_tasks.store.opening import open_store
 from mav_tasks.tasks.restored import Restored
 
 
@@ -44,7 +43,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
 
     With ``reload``, SIGHUP reads the configuration again.
     """
-    links, retention = settings.links, settings.engine.retention
+    links = settings.links
     for _, fault in faults_of(links):
         raise fault
     asked, pushing = links_of(links), pushing_url(links)
@@ -66,10 +65,10 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             _open(opened, link.url, TO_VEHICLES) for link in asked if link.side == "vehicles"
         ]
         gc.disable()  # many tasks are loaded: each collection would scan them
-        journal = open_store(settings.store or None, retention)
-        opened.callback(journal.close)
-        note_latest(path_of_store(settings.store or None))
-        restored = journal.load() if isinstance(journal, SqliteStore) else None
+        store = open_store(settings.store, settings.engine.retention)
+        opened.callback(store.close)
+        note_latest(store.place)
+        restored = store.load()
         if reload is not None and reload.file is not None:
             say(f"configuration {reload.file}")
         if keys.keys is not None:
@@ -80,14 +79,14 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             waiting = "" if link.side == "clients" else ", waiting for the first heartbeat"
             say(f"{link.side} on {link.url}{signatures}{waiting}")
         for opened_link in vehicle_links:
-            if isinstance(opened_link, UdpLink) and opened_link.note:
+            if opened_link.note:
                 say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
             say("links.push not used: no link for clients is UDP")
-        say(f"store {journal.name}, {len(restored.tasks) if restored else 0} tasks")
+        say(f"store {store.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
             say(f"parameters of an earlier run: {_in_words(restored.parameters)}")
-        running = _run(settings, journal, restored, client_links, vehicle_links, reload, keys, say)
+        running = _run(settings, store, restored, client_links, vehicle_links, reload, keys, say)
         return asyncio.run(running)
 
 
@@ -107,18 +106,6 @@ def tame_collector() -> None:
     gc.enable()
 
 
-def open_store(path: str | None, retention: Retention | None = None) -> SqliteStore | MemoryStore:
-    """Open the store at a path, or in the user's data folder if None; raise StoreError."""
-    chosen = path_of_store(path)
-    if chosen is None:
-        return MemoryStore()
-    return SqliteStore(
-        chosen,
-        wall_offset=lambda: time.time() - boot_time(),
-        retention=retention,
-    )
-
-
 def _watched_ring(links: Links) -> RingWatch:
     """Return a watch on the key ring; raise UsageError if the links need other keys.
 
@@ -133,16 +120,16 @@ def _watched_ring(links: Links) -> RingWatch:
 
 
 def _open(
-    opened: ExitStack, url: LinkUrl | SerialUrl, limits: LinkLimits, *, push: tuple[Any, ...] = ()
+    opened: ExitStack, url: LinkUrl, limits: LinkLimits, *, push: tuple[Any, ...] = ()
 ) -> Link:
-    link = open_link(url, limits=limits, push=push)
+    link = url.open(limits=limits, push=push)
     opened.callback(link.close)
     return link
 
 
 async def _run(
     settings: ServerSettings,
-    store: SqliteStore | MemoryStore,
+    store: Store,
     restored: Restored | None,
     clients: Sequence[Link],
     vehicles: Sequence[Link],

@@ -1,4 +1,4 @@
-"""The ``mav-tasks`` command: composes all commands."""
+"""The ``mav-tasks`` command: runs one of ``commands``, and reports errors."""
 
 import os
 import sys
@@ -7,22 +7,8 @@ from io import TextIOWrapper
 
 import typer
 
-from mav_tasks.cli import config, control, exit_codes, halts, keys, plans, submit
-from mav_tasks.cli.completions import DemoCommand, SimCommand
-from mav_tasks.cli.demo import demo
-from mav_tasks.cli.dialect import dialect
-from mav_tasks.cli.history import history
-from mav_tasks.cli.log import log
-from mav_tasks.cli.probe import probe
-from mav_tasks.cli.qgc_actions import qgc_actions
-from mav_tasks.cli.queue import queue
-from mav_tasks.cli.ready import ready
-from mav_tasks.cli.replay import replay
+from mav_tasks.cli import exit_codes
 from mav_tasks.cli.root import Root, root
-from mav_tasks.cli.serve import ServeCommand, serve
-from mav_tasks.cli.sim import sim
-from mav_tasks.cli.status import status
-from mav_tasks.cli.vehicles import vehicles
 
 app = typer.Typer(
     cls=Root,
@@ -33,35 +19,6 @@ app = typer.Typer(
     epilog=exit_codes.TABLE,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
-
-app.command(cls=ServeCommand)(serve)
-app.command(cls=SimCommand, context_settings=PASSED_ON, add_help_option=False)(sim)
-app.command(cls=DemoCommand, context_settings=PASSED_ON, add_help_option=False)(demo)
-app.add_typer(submit.app, name="submit")
-app.command()(status)
-app.command()(queue)
-app.command()(history)
-app.command()(control.cancel)
-app.command()(control.clear)
-app.command()(halts.stop)
-app.command()(halts.pause)
-app.command()(halts.resume)
-app.command()(control.modify)
-app.command()(control.release)
-app.command()(vehicles)
-app.command()(ready)
-app.command()(probe)
-app.add_typer(plans.mission, name="mission")
-app.add_typer(plans.fence, name="fence")
-app.add_typer(plans.rally, name="rally")
-app.command()(log)
-app.command()(replay)
-app.add_typer(config.app, name="config")
-app.add_typer(keys.app, name="keys")
-app.command("qgc-actions")(qgc_actions)
-app.command()(dialect)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

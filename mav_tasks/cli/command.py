@@ -4,9 +4,11 @@ A group is a frozen dataclass with Typer annotations. A parameter of that type s
 of the group as options.
 """
 
+import asyncio
 import dataclasses
 import inspect
 from collections.abc import Callable, Coroutine
+from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any
 
@@ -38,8 +40,6 @@ def _is_number(text: str) -> bool:
 
 
 def _similar(name: str, known: list[str]) -> str:
-    from difflib import get_close_matches  # noqa: PLC0415
-
     close = get_close_matches(name, known)
     return f" (Possible options: {', '.join(sorted(close))})" if close else ""
 
@@ -53,8 +53,6 @@ def command(body: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., Non
     }
 
     def run(**values: Any) -> None:
-        import asyncio  # noqa: PLC0415
-
         for name, group in groups.items():
             fields = [field.name for field in dataclasses.fields(group)]
             values[name] = group(**{field: values.pop(field) for field in fields})

@@ -3,14 +3,17 @@
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from mav_tasks.config import configuration, report, toml_file
+from mav_tasks.config.configuration import Sources
+from mav_tasks.config.sample import sample
 from mav_tasks.errors import StoreError, UsageError
-
-if TYPE_CHECKING:
-    from mav_tasks.settings import ServerSettings
+from mav_tasks.settings import KEYS
+from mav_tasks.settings import ServerSettings
+from mav_tasks.store.opening import kind_of
 
 app = typer.Typer(
     help="Show, check and create the configuration of the server.",
@@ -35,9 +38,6 @@ def show(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Print each key with its value and the source of the value."""
-    from mav_tasks.config import report  # noqa: PLC0415
-    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
-
     names = report.chosen(keys or ())
     configuration = Sources(config, dict(os.environ)).load()
     shown = report.Report(configuration, _parameters(configuration.settings))
@@ -53,8 +53,6 @@ def check(
     ],
 ) -> None:
     """Check a file: print "ok", or each error with its line and exit with 2."""
-    from mav_tasks.config import configuration, toml_file  # noqa: PLC0415
-
     if file == STANDARD_INPUT:
         data = sys.stdin.buffer.read(toml_file.LARGEST + 1)
         text = toml_file.decoded(data, name="standard input")
@@ -75,8 +73,6 @@ def init(
 
     The sample lists each key with its meaning, range and default.
     """
-    from mav_tasks.config.sample import sample  # noqa: PLC0415
-
     if path in (None, STANDARD_OUTPUT):
         sys.stdout.write(sample())
         return
@@ -88,15 +84,15 @@ def init(
     sys.stdout.write(f"wrote {path}\n")
 
 
-def _parameters(settings: "ServerSettings") -> dict[str, float]:
-    """Return the MAVLink parameters that clients have set; {} if the store cannot be read."""
-    from mav_tasks.store.place import path_of_store  # noqa: PLC0415
-    from mav_tasks.store.reading import read_parameters  # noqa: PLC0415
+def assignments() -> list[str]:
+    """Return the keys as ``serve --set`` takes them, for completion."""
+    return [f"{name}=" for name in KEYS]
 
+
+def _parameters(settings: ServerSettings) -> dict[str, float]:
+    """Return the MAVLink parameters that clients have set; {} if the store cannot be read."""
     try:
-        path = path_of_store(settings.store)
-        path = None if path is None else path.expanduser().absolute()
-        return read_parameters(path) if path is not None and path.exists() else {}
-    except (StoreError, OSError, RuntimeError) as error:
+        return kind_of(settings.store).read_parameters(settings.store)
+    except StoreError as error:
         sys.stderr.write(f"mav-tasks: parameters set by clients are not shown: {error}\n")
         return {}

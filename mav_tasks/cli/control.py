@@ -5,9 +5,13 @@ from typing import Annotated, get_args
 
 import typer
 
-from mav_tasks.cli import completions, output
+from mav_tasks.cli import output
 from mav_tasks.cli.command import command
+from mav_tasks.cli.lazy import completing
 from mav_tasks.cli.options import Common, Deadline, StartAt, StartIn, TaskId, seconds_of, start_of
+from mav_tasks.cli.session import find_task, opened, values_checked
+from mav_tasks.cli.typed_words import in_typed_words
+from mav_tasks.client.handle import Release
 from mav_tasks.errors import UsageError
 
 RELEASED = {
@@ -31,8 +35,6 @@ async def cancel(
     ] = False,
 ) -> None:
     """Cancel a task, by default the running one."""
-    from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
-
     async with opened(common) as client:
         if task_id is not None:
             task = await find_task(client, common, task_id)
@@ -56,8 +58,6 @@ async def clear(
     """Cancel all waiting tasks of a rover."""
     if everything and not yes:
         _confirm("Cancel all tasks, including the running one?")
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-
     async with opened(common) as client:
         rover = client.vehicle
         await client.clear(running_too=everything)
@@ -105,9 +105,6 @@ async def modify(
     wishes = (priority, start.delay, start.at, until, after, preemptible, preemptive, label)
     if all(wish is None for wish in wishes):
         raise UsageError(f"modify {task_id}: nothing to change; give --priority or another option")
-    from mav_tasks.cli.session import find_task, opened, values_checked  # noqa: PLC0415
-    from mav_tasks.cli.typed_words import in_typed_words  # noqa: PLC0415
-
     async with opened(common) as client:
         task = await find_task(client, common, task_id)
         with values_checked(), in_typed_words():
@@ -132,7 +129,7 @@ async def release(
         list[str],
         typer.Argument(
             metavar="[ID] again|remainder|skip",
-            autocompletion=completions.releases,
+            autocompletion=completing("mav_tasks.cli.control:RELEASED"),
             help="Id of the task (default: the held task), then what to do with it.",
         ),
     ],
@@ -141,8 +138,6 @@ async def release(
 
     "again" restarts the task here, "remainder" finishes it, "skip" drops it.
     """
-    from mav_tasks.client.handle import Release  # noqa: PLC0415
-
     *named, how = wish
     choices: tuple[Release, ...] = get_args(Release)
     if how not in choices or len(named) > 1:
@@ -150,8 +145,6 @@ async def release(
     if named and not (named[0].isascii() and named[0].isdigit()):
         raise UsageError(f"release {named[0]}: expected the id of a task")
     chosen = choices[choices.index(how)]
-    from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
-
     async with opened(common) as client:
         if named:
             task = await find_task(client, common, int(named[0]))

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mav_tasks.errors import UsageError
+from mav_tasks.mavlink.definitions import DIALECT, folder_of_definitions
 
 
 def dialect(
@@ -17,8 +18,6 @@ def dialect(
 
     The file includes common.xml, which every MAVLink generator has.
     """
-    from mav_tasks.mavlink.definitions import DIALECT, folder_of_definitions  # noqa: PLC0415
-
     try:
         folder = folder_of_definitions()
     except FileNotFoundError as error:

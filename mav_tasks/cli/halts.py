@@ -1,18 +1,20 @@
 """Commands that stop and resume rovers: stop, pause, resume."""
 
+import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
+from mav_tasks.cli.session import is_alone, opened, unfound
+from mav_tasks.cli.words import line_of, resume_command
+from mav_tasks.client.aio import Client
 from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
-
-if TYPE_CHECKING:
-    from mav_tasks.client.aio import Client
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
 Everywhere = Annotated[bool, typer.Option("--all", help="Apply to every rover of the server.")]
 
@@ -29,9 +31,6 @@ async def stop(
 
     Stops every rover unless you give --vehicle. Here --timeout limits the wait for confirmation.
     """
-    from mav_tasks.cli.session import unfound  # noqa: PLC0415
-    from mav_tasks.tasks.lifecycle import TaskReason  # noqa: PLC0415
-
     _require_one_choice(common, everywhere=everywhere)
     async with unfound(common) as client:  # do not wait for discovery
         try:
@@ -59,9 +58,6 @@ async def stop(
 @command
 async def pause(common: Common, everywhere: Everywhere = False) -> None:
     """Stop a rover, and pause its task and queue until you resume."""
-    from mav_tasks.cli.session import is_alone, opened  # noqa: PLC0415
-    from mav_tasks.cli.words import resume_command  # noqa: PLC0415
-
     async with opened(common) as client:
         rovers = _chosen(client, common, everywhere=everywhere)
         alone = is_alone(client, common)
@@ -87,10 +83,6 @@ async def resume(
     ] = None,
 ) -> None:
     """Resume tasks after a pause, a STOP or a takeover."""
-    from mav_tasks.cli.session import is_alone, opened  # noqa: PLC0415
-    from mav_tasks.cli.words import line_of  # noqa: PLC0415
-    from mav_tasks.tasks.lifecycle import TaskState  # noqa: PLC0415
-
     if everywhere and epoch is not None:
         raise UsageError("--epoch needs one rover: use --vehicle N instead of --all")
     async with opened(common) as client:
@@ -114,7 +106,7 @@ def _require_one_choice(common: Common, *, everywhere: bool) -> None:
         raise UsageError(f"--all and --vehicle {common.vehicle}: choose one of them")
 
 
-def _chosen(client: "Client", common: Common, *, everywhere: bool) -> list[int]:
+def _chosen(client: Client, common: Common, *, everywhere: bool) -> list[int]:
     """Return the named rover, all rovers or the only one. Raise UsageError if ambiguous."""
     _require_one_choice(common, everywhere=everywhere)
     if common.vehicle is not None:
@@ -136,8 +128,6 @@ async def _each(
 
     Raise Refused or NoAnswer if any of them failed.
     """
-    import asyncio  # noqa: PLC0415
-
     answers = await asyncio.gather(*map(ask, rovers), return_exceptions=True)
     failed: list[tuple[int, ClientError]] = []
     for rover, answer in zip(rovers, answers, strict=True):

@@ -1,16 +1,15 @@
 """``mav-tasks history``: list the finished tasks."""
 
-from typing import TYPE_CHECKING, Annotated
+from datetime import datetime
+from typing import Annotated
 
 import typer
 
+from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
-
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from mav_tasks.client.values import TaskStatus
+from mav_tasks.cli.session import opened
+from mav_tasks.client.values import TaskStatus
 
 
 @command
@@ -25,10 +24,6 @@ async def history(
     Lists the tasks of all rovers unless you give --vehicle; times are local. 'mav-tasks log' prints
     all events.
     """
-    from datetime import datetime  # noqa: PLC0415
-
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-
     async with opened(common) as client:
         rovers = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
         found = {rover: await client.history(vehicle=rover, limit=limit) for rover in rovers}
@@ -37,9 +32,7 @@ async def history(
         _show(rover, tasks, now=now, as_json=common.json)
 
 
-def _show(rover: int, tasks: "tuple[TaskStatus, ...]", *, now: "datetime", as_json: bool) -> None:
-    from mav_tasks.cli import output, words  # noqa: PLC0415
-
+def _show(rover: int, tasks: tuple[TaskStatus, ...], *, now: "datetime", as_json: bool) -> None:
     if as_json:
         for each in tasks:
             output.say_json(words.history_json(each, now=now))

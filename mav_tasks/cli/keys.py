@@ -5,15 +5,19 @@ a command line.
 """
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from datetime import UTC, datetime
+from getpass import getpass
+from typing import Annotated, Any
 
 import typer
 
-from mav_tasks.cli import completions, output
+from mav_tasks.cli import output
+from mav_tasks.cli.lazy import completing
+from mav_tasks.cli.ring import ring_path
 from mav_tasks.errors import KeyRingError, UsageError
-
-if TYPE_CHECKING:
-    from mav_tasks.key_ring.ring import Entry
+from mav_tasks.key_ring import derivation as how
+from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
+from mav_tasks.key_ring.ring_file import change, load
 
 app = typer.Typer(
     help="Add, list and revoke signing keys.",
@@ -38,7 +42,7 @@ def add(
         str,
         typer.Option(
             metavar="ROLE",
-            autocompletion=completions.roles,
+            autocompletion=completing("mav_tasks.key_ring.ring:KINDS"),
             help="Role of the client: observer, submitter, operator or safety; "
             "or vehicle, for the link to a rover.",
         ),
@@ -52,7 +56,7 @@ def add(
         str | None,
         typer.Option(
             metavar="HOW",
-            autocompletion=completions.derivations,
+            autocompletion=completing("mav_tasks.key_ring.derivation:PASSPHRASES"),
             help="How the key is derived from the passphrase: sha256 (default; QGroundControl 5.0, "
             "MAVProxy) or pbkdf2 (later QGroundControl).",
         ),
@@ -63,13 +67,6 @@ def add(
 
     If standard input is not a terminal, its first line must be the passphrase or the digits.
     """
-    from datetime import UTC, datetime  # noqa: PLC0415
-
-    from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
-    from mav_tasks.key_ring import derivation as how  # noqa: PLC0415
-    from mav_tasks.key_ring.ring import Entry, KeyRing, key_of  # noqa: PLC0415
-    from mav_tasks.key_ring.ring_file import change  # noqa: PLC0415
-
     if passphrase + hex_ + generate > 1:
         raise UsageError("--passphrase, --hex and --generate: choose one of them")
     if derivation is not None and (not passphrase or derivation not in how.PASSPHRASES):
@@ -106,9 +103,6 @@ def list_(
     keys: File = "",
 ) -> None:
     """List the keys with their fingerprints, without the secrets."""
-    from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
-    from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
-
     path = ring_path(keys)
     entries = load(path).ring.entries
     if as_json:
@@ -137,12 +131,6 @@ def revoke(
 
     The key ring keeps the secret only to replay old records.
     """
-    from datetime import UTC, datetime  # noqa: PLC0415
-
-    from mav_tasks.cli.ring import ring_path  # noqa: PLC0415
-    from mav_tasks.key_ring.ring import KeyRing  # noqa: PLC0415
-    from mav_tasks.key_ring.ring_file import change, load  # noqa: PLC0415
-
     path = ring_path(keys)
     load(path)  # raises if there is none: do not create one
 
@@ -161,8 +149,6 @@ def _asked(what: str, *, is_new: bool = False) -> str:
         raise UsageError(f"{what.lower()}: standard input is closed")
     if not sys.stdin.isatty():
         return sys.stdin.readline(LONGEST).removesuffix("\n").removesuffix("\r")
-    from getpass import getpass  # noqa: PLC0415
-
     try:
         text = getpass(f"{what}: ")
         if is_new and getpass("Repeat it: ") != text:
@@ -172,7 +158,7 @@ def _asked(what: str, *, is_new: bool = False) -> str:
     return text
 
 
-def _as_json(entry: "Entry") -> dict[str, Any]:
+def _as_json(entry: Entry) -> dict[str, Any]:
     dates = {"created": entry.created, "revoked": entry.revoked}
     return {
         "name": entry.name,
@@ -184,19 +170,18 @@ def _as_json(entry: "Entry") -> dict[str, Any]:
     }
 
 
-def _show(entries: "tuple[Entry, ...]") -> None:
-    from rich.table import Table  # noqa: PLC0415
-    from rich.text import Text  # noqa: PLC0415
+def _show(entries: tuple[Entry, ...]) -> None:
+    from rich import table, text  # noqa: PLC0415
 
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
+    shown = table.Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
     for name in ("key", "role", "fingerprint", "derivation", "created", "revoked"):
-        table.add_column(name)
+        shown.add_column(name)
     for entry in entries:
         made, revoked = (
             "" if at is None else f"{at:%Y-%m-%d}" for at in (entry.created, entry.revoked)
         )
-        table.add_row(
+        shown.add_row(
             *(entry.name, entry.kind, entry.key.fingerprint, entry.derivation, made),
-            Text(revoked, style="red"),
+            text.Text(revoked, style="red"),
         )
-    output.show(table)
+    output.show(shown)

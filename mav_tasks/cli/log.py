@@ -3,15 +3,20 @@
 import os
 import select
 import sys
-from typing import TYPE_CHECKING, Annotated
+import time
+from contextlib import closing
+from typing import Annotated
 
 import typer
 
+from mav_tasks.cli import output
+from mav_tasks.config.configuration import Sources
 from mav_tasks.errors import StoreError, UsageError
-
-if TYPE_CHECKING:
-    from mav_tasks.logs.export import EntryOf
-    from mav_tasks.store.journal import Journal
+from mav_tasks.logs import export
+from mav_tasks.logs.export import EntryOf
+from mav_tasks.store.base import JournalReader, Which
+from mav_tasks.store.latest import latest_store
+from mav_tasks.store.opening import kind_of
 
 MOST = 1 << 63  # the first number beyond SQLite's integers
 LOOK = 0.5  # s between two checks for new events
@@ -51,37 +56,28 @@ def log(
 
     Reads the store file; the server need not run. On a terminal, long lines wrap at words.
     """
-    import time  # noqa: PLC0415
-    from contextlib import closing  # noqa: PLC0415
-
-    from mav_tasks.logs import export  # noqa: PLC0415
-    from mav_tasks.store.journal import Journal, Which  # noqa: PLC0415
-    from mav_tasks.store.place import path_of_store  # noqa: PLC0415
-
     if as_json and as_csv:
         raise UsageError("--json and --csv: choose one of them")
     for flag, number in (("--task", task), ("--vehicle", vehicle)):
         if number is not None and not 0 <= number < MOST:
             raise UsageError(f"{flag} {number}: not a valid id")
     begin = None if since is None else export.parse_since(since, now=time.time())
-    path = path_of_store(_store_of_server() if store is None else store)
-    if path is None and store is None:
-        words = "the server that was started last keeps its tasks in memory, so it has no journal"
-        raise StoreError(f"{words}; choose another store with --store")
-    if path is None or store == "":
+    if store == "":
         raise StoreError("--store: expected the path of a store file")
+    place = _store_of_server() if store is None else store
     which = Which(task=task, vehicle=vehicle, since=begin)
     entry_of = export.json_entry if as_json else export.csv_entry if as_csv else export.text_entry
-    wraps = not as_json and not as_csv and sys.stdout.isatty()  # a program gets whole lines
-    with closing(Journal(path, which)) as journal:
+    # a program gets whole lines
+    columns = output.columns() if not as_json and not as_csv and sys.stdout.isatty() else None
+    with closing(kind_of(place).open_journal(place, which)) as journal:
         try:
             if as_csv:
                 sys.stdout.write(export.csv_row(export.COLUMNS))
             seen = journal.version()
-            _print(journal, entry_of, wraps=wraps)
+            _print(journal, entry_of, columns)
             while follow and _is_written_to(journal, seen):
                 seen = journal.version()
-                _print(journal, entry_of, wraps=wraps)
+                _print(journal, entry_of, columns)
         except BrokenPipeError:  # the reader has ended, as ``head`` does
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         except KeyboardInterrupt:
@@ -90,17 +86,14 @@ def log(
             raise UsageError(f"standard output: {error.strerror}") from error
 
 
-def _print(journal: "Journal", entry_of: "EntryOf", *, wraps: bool) -> None:
-    from mav_tasks.cli import output  # noqa: PLC0415
-
-    columns = output.columns() if wraps else None
+def _print(journal: JournalReader, entry_of: EntryOf, columns: int | None) -> None:
     for number, event in journal.take(offset=0.0):
         entry = entry_of(number, event)
         sys.stdout.write(output.wrapped(entry, columns) if columns else entry)
     sys.stdout.flush()
 
 
-def _is_written_to(journal: "Journal", seen: int) -> bool:
+def _is_written_to(journal: JournalReader, seen: int) -> bool:
     """Wait until the store changes. Return False if the reader of our output ended first."""
     poller = select.poll()
     poller.register(sys.stdout.fileno(), 0)  # errors only: the other end has closed
@@ -112,8 +105,5 @@ def _is_written_to(journal: "Journal", seen: int) -> bool:
 
 def _store_of_server() -> str:
     """Return the configured store, else the store of the server that was started last."""
-    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
-    from mav_tasks.store.place import latest_store  # noqa: PLC0415
-
     configured = Sources(None, dict(os.environ)).load().settings.store
     return configured or latest_store() or ""

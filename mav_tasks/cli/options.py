@@ -1,15 +1,14 @@
 """Options that many commands share, as groups for ``command``."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from datetime import UTC, datetime
+from typing import Annotated
 
 import typer
 
-from mav_tasks.cli import completions
+from mav_tasks.cli.lazy import completing
+from mav_tasks.cli.times import parse_duration, parse_moment
 from mav_tasks.errors import UsageError
-
-if TYPE_CHECKING:
-    from datetime import datetime
 
 DEFAULT_SERVER = "udpout:127.0.0.1:14560"
 PRIORITY = 5
@@ -70,7 +69,7 @@ class Common:
         typer.Option(
             metavar="NAME",
             envvar="MAV_TASKS_SIGN",
-            autocompletion=completions.key_names,
+            autocompletion=completing("mav_tasks.cli.ring:key_names"),
             help="Sign with this key of the key ring.",
         ),
     ] = ""
@@ -122,10 +121,6 @@ def start_of(start_in: str, start_at: str) -> Start:
         raise UsageError("--in and --at: choose one of them")
     if not start_at:
         return Start(seconds_of("--in", start_in), None)
-    from datetime import UTC, datetime  # noqa: PLC0415
-
-    from mav_tasks.cli.times import parse_moment  # noqa: PLC0415
-
     return Start(None, parse_moment("--at", start_at, now=datetime.now(UTC)))
 
 
@@ -133,6 +128,4 @@ def seconds_of(name: str, text: str) -> float | None:
     """Return the parsed duration of an option, s; None if it is not given."""
     if not text:
         return None
-    from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
-
     return parse_duration(name, text)

@@ -1,5 +1,6 @@
 """Standard output: lines, JSON objects and tables, adapted to the terminal."""
 
+import json
 import os
 import shutil
 import sys
@@ -49,8 +50,6 @@ def warn(text: str) -> None:
 
 def say_json(value: dict[str, Any]) -> None:
     """Write a JSON object as one line and flush."""
-    import json  # noqa: PLC0415
-
     say(json.dumps(value))
 
 

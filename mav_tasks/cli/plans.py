@@ -3,18 +3,17 @@
 import sys
 from collections.abc import Sized
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common, TaskOptions, Wait
+from mav_tasks.cli.session import opened, read, values_checked
 from mav_tasks.cli.submit import tell_submitted
-from mav_tasks.errors import UsageError
-
-if TYPE_CHECKING:
-    from mav_tasks.plan_files import PlanFile
+from mav_tasks.errors import Refused, UsageError
+from mav_tasks.plan_files import PlanFile, format_plan, read_plan, write_plan
 
 STANDARD_OUTPUT = "-"
 
@@ -60,9 +59,6 @@ async def upload_mission(
     ] = False,
 ) -> None:
     """Upload a mission and queue it as one task."""
-    from mav_tasks.cli.session import opened, read, values_checked  # noqa: PLC0415
-    from mav_tasks.plan_files import read_plan  # noqa: PLC0415
-
     wished = read(terms)
     if stage and terms != TaskOptions(wait=terms.wait):
         raise UsageError(
@@ -86,8 +82,6 @@ async def start_mission(common: Common, wait: Wait = False) -> None:
 
     A ground station's upload or 'mission upload --stage' stages a mission.
     """
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-
     async with opened(common) as client:
         task = await client.start_mission()
         await tell_submitted(client, task, common, is_awaited=wait)
@@ -101,8 +95,6 @@ async def download_mission(file: FileOut, common: Common, force: Force = False) 
     A ground station's upload or 'mission upload --stage' stages a mission. A mission that
     'mission upload' queued is a task and cannot be downloaded.
     """
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-
     _check_place(file, force=force)
     async with opened(common) as client:
         plan = await client.mission_file()
@@ -114,9 +106,6 @@ async def download_mission(file: FileOut, common: Common, force: Force = False) 
 @command
 async def upload_fence(file: PlanIn, common: Common, empty: EmptyFence = False) -> None:
     """Upload the fence from a file to the rover."""
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-    from mav_tasks.plan_files import read_plan  # noqa: PLC0415
-
     plan = read_plan(file)
     if not plan.fence and not empty:
         raise UsageError(f"{file} has no fence; use --empty to remove the rover's fence")
@@ -129,8 +118,6 @@ async def upload_fence(file: PlanIn, common: Common, empty: EmptyFence = False) 
 @command
 async def download_fence(file: PlanOut, common: Common, force: Force = False) -> None:
     """Save the rover's fence to a file."""
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-
     _check_place(file, force=force)
     async with opened(common) as client:
         plan = await client.fence_file()
@@ -142,9 +129,6 @@ async def download_fence(file: PlanOut, common: Common, force: Force = False) ->
 @command
 async def upload_rally_points(file: PlanIn, common: Common, empty: EmptyRally = False) -> None:
     """Upload the rally points from a file to the rover."""
-    from mav_tasks.cli.session import opened  # noqa: PLC0415
-    from mav_tasks.plan_files import read_plan  # noqa: PLC0415
-
     plan = read_plan(file)
     if not plan.rally and not empty:
         raise UsageError(f"{file} has no rally points; use --empty to remove the rover's")
@@ -161,15 +145,11 @@ def _check_place(file: str, *, force: bool) -> None:
 def _check_there(parts: Sized, kind: str, *, note: str = "") -> None:
     """Raise Refused if there is nothing to write: an empty file would be misleading."""
     if not parts:
-        from mav_tasks.errors import Refused  # noqa: PLC0415
-
         words = f"the rover has no {kind}{note}; nothing written"
         raise Refused(words, result=0, reason=0)
 
 
-def _write(plan: "PlanFile", file: str, what: str, common: Common) -> None:
-    from mav_tasks.plan_files import format_plan, write_plan  # noqa: PLC0415
-
+def _write(plan: PlanFile, file: str, what: str, common: Common) -> None:
     if file == STANDARD_OUTPUT:
         sys.stdout.write(format_plan(plan))
         return

@@ -1,14 +1,23 @@
 """``mav-tasks probe``: test one rover directly, without a server, and write its profile."""
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from datetime import UTC, datetime
+from typing import Annotated
 
 import typer
 
+from mav_tasks.cli import output as out
 from mav_tasks.cli.command import command
-
-if TYPE_CHECKING:
-    from mav_tasks.probe.probe import Probe
+from mav_tasks.cli.options import DEFAULT_SERVER
+from mav_tasks.cli.ring import key_to_sign_with
+from mav_tasks.config import profiles
+from mav_tasks.errors import ConfigError, NoAnswer, UsageError
+from mav_tasks.probe import report
+from mav_tasks.probe.failsafe import NotSet
+from mav_tasks.probe.probe import NothingHeard, Occupied, Options, Probe
+from mav_tasks.probe.profile import profile_of, why_none
+from mav_tasks.probe.report import as_json as values_of
+from mav_tasks.probing import run_probe
 
 Url = Annotated[
     str | None,
@@ -104,13 +113,6 @@ async def probe(
 
     Nothing moves and nothing stays changed unless you give --set-failsafe or --drive.
     """
-    from mav_tasks.cli.options import DEFAULT_SERVER  # noqa: PLC0415
-    from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415
-    from mav_tasks.errors import NoAnswer, UsageError  # noqa: PLC0415
-    from mav_tasks.probe.failsafe import NotSet  # noqa: PLC0415
-    from mav_tasks.probe.probe import NothingHeard, Occupied, Options  # noqa: PLC0415
-    from mav_tasks.probing import run_probe  # noqa: PLC0415
-
     if set_failsafe and drive:
         raise UsageError("--set-failsafe and --drive: use one, then the other")
     if url is None and not set_failsafe:
@@ -144,8 +146,6 @@ async def probe(
 
 
 def _confirm(speed: float) -> None:
-    from mav_tasks.errors import UsageError  # noqa: PLC0415
-
     if not sys.stdin.isatty():
         raise UsageError("--drive moves the rover: without a terminal, add --yes")
     sys.stderr.write(QUESTION.format(speed=speed))
@@ -154,11 +154,8 @@ def _confirm(speed: float) -> None:
         raise UsageError("not driven: the answer was not yes")
 
 
-def _show_failsafe(done: "Probe", *, as_json: bool) -> None:
+def _show_failsafe(done: Probe, *, as_json: bool) -> None:
     """Print the parameters set, and what the rover does now when setpoints stop."""
-    from mav_tasks.cli import output as out  # noqa: PLC0415
-    from mav_tasks.probe.report import as_json as values_of  # noqa: PLC0415
-
     found = done.findings
     if as_json:
         out.say_json(values_of(found))
@@ -166,13 +163,8 @@ def _show_failsafe(done: "Probe", *, as_json: bool) -> None:
         out.say(f"rover {found.system_id}: {found.failsafe_set}; {found.loss_by_parameters}")
 
 
-def _show(done: "Probe", output: str | None, *, as_json: bool) -> None:
+def _show(done: Probe, output: str | None, *, as_json: bool) -> None:
     """Write the profile and print the report. Raise ConfigError last if writing failed."""
-    from mav_tasks.cli import output as out  # noqa: PLC0415
-    from mav_tasks.errors import ConfigError  # noqa: PLC0415
-    from mav_tasks.probe import report  # noqa: PLC0415
-    from mav_tasks.probe.profile import why_none  # noqa: PLC0415
-
     why, path, fault = why_none(done.findings), "", None
     if not why:
         try:
@@ -191,13 +183,8 @@ def _show(done: "Probe", output: str | None, *, as_json: bool) -> None:
         raise fault
 
 
-def _keep(done: "Probe", output: str | None) -> str:
+def _keep(done: Probe, output: str | None) -> str:
     """Write the profile. Return its path."""
-    from datetime import UTC, datetime  # noqa: PLC0415
-
-    from mav_tasks.config import profiles  # noqa: PLC0415
-    from mav_tasks.probe.profile import profile_of  # noqa: PLC0415
-
     profile = profile_of(done.findings, probed=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")
     return str(profiles.write(profile, output))
 

@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from platformdirs import user_documents_path
 
+from mav_tasks import qgc_actions as files
 from mav_tasks.errors import UsageError
 
 
@@ -36,8 +38,6 @@ def qgc_actions(
     ] = None,
 ) -> None:
     """Print or install action buttons for QGroundControl."""
-    from mav_tasks import qgc_actions as files  # noqa: PLC0415
-
     actions = [] if only else list(files.ACTIONS)
     actions += [files.parse_action(text) for text in action or []]
     if not actions:
@@ -54,6 +54,4 @@ def qgc_actions(
 def _documents(folder: str | None) -> Path:
     if folder is not None:
         return Path(folder)
-    from platformdirs import user_documents_path  # noqa: PLC0415
-
     return user_documents_path()

@@ -1,15 +1,15 @@
 """``mav-tasks queue``: show the running and the waiting tasks."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
-
-if TYPE_CHECKING:
-    from mav_tasks.client.aio import Client
-    from mav_tasks.client.values import QueueStatus
+from mav_tasks.cli.session import is_alone, opened
+from mav_tasks.client.aio import Client
+from mav_tasks.client.values import QueueStatus
 
 
 @command
@@ -29,8 +29,6 @@ async def queue(
 
     Shows the queues of all rovers unless you give --vehicle.
     """
-    from mav_tasks.cli.session import is_alone, opened  # noqa: PLC0415
-
     async with opened(common) as client:
         if watch:
             from mav_tasks.cli.watch import watch_queues  # noqa: PLC0415
@@ -41,16 +39,14 @@ async def queue(
         show(queues, common, is_alone=is_alone(client, common))
 
 
-async def fetch(client: "Client", common: Common, *, limit: int) -> list["QueueStatus"]:
+async def fetch(client: Client, common: Common, *, limit: int) -> list[QueueStatus]:
     """Return the queue of the named rover, or of all rovers."""
     meant = [each.id for each in client.vehicles() if common.vehicle in (None, each.id)]
     return [await client.queue(vehicle=vehicle, limit=limit) for vehicle in meant]
 
 
-def show(queues: list["QueueStatus"], common: Common, *, is_alone: bool) -> None:
+def show(queues: list[QueueStatus], common: Common, *, is_alone: bool) -> None:
     """Print queues as tables, or as JSON."""
-    from mav_tasks.cli import output, words  # noqa: PLC0415
-
     if common.json:
         for each in queues:
             output.say_json(words.queue_json(each))

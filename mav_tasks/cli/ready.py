@@ -1,15 +1,16 @@
 """``mav-tasks ready``: the health check of a server, for a service manager or a container."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
-
-if TYPE_CHECKING:
-    from mav_tasks.client.values import VehicleStatus
+from mav_tasks.cli.session import all_show, opened
+from mav_tasks.client.values import VehicleStatus
+from mav_tasks.errors import Refused
 
 WITHIN = 2.0  # s to wait for an answer
 
@@ -31,10 +32,6 @@ async def ready(
 
     Exit status 0: ready; 1: a rover is silent; 3: no server answered, or it has heard no rover.
     """
-    from mav_tasks.cli import output, words  # noqa: PLC0415
-    from mav_tasks.cli.session import all_show, opened  # noqa: PLC0415
-    from mav_tasks.errors import Refused  # noqa: PLC0415
-
     async with opened(replace(common, timeout=wait_for)) as client:
         await all_show(client, lambda each: each.is_heard)
         rovers = [each for each in client.vehicles() if common.vehicle in (None, each.id)]
@@ -51,7 +48,5 @@ async def ready(
         output.say(f"ready: the server hears rover{'s' if len(rovers) > 1 else ''} {ids}")
 
 
-def _silence(rover: "VehicleStatus") -> str:
-    from mav_tasks.cli import words  # noqa: PLC0415
-
+def _silence(rover: VehicleStatus) -> str:
     return f"rover {rover.id} ({words.silence_of(rover.heartbeat_age) or 'silent'})"

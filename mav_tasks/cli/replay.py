@@ -7,6 +7,10 @@ from typing import Annotated
 import typer
 
 from mav_tasks.cli import exit_codes
+from mav_tasks.key_ring.ring_file import load, path_of_ring
+from mav_tasks.recording.reading import read
+from mav_tasks.recording.replay import Replay
+from mav_tasks.recording.report import Report
 
 
 def replay(
@@ -28,11 +32,6 @@ def replay(
 
     Exit status 0: identical, bit for bit; 1: different; 2: the file cannot be read.
     """
-    from mav_tasks.key_ring.ring_file import load, path_of_ring  # noqa: PLC0415
-    from mav_tasks.recording.reading import read  # noqa: PLC0415
-    from mav_tasks.recording.replay import Replay  # noqa: PLC0415
-    from mav_tasks.recording.report import Report  # noqa: PLC0415
-
     path = path_of_ring(keys)
     secrets = load(path).ring.secrets if keys or path.exists() else {}
     record = read(file)

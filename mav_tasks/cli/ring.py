@@ -2,29 +2,32 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from mav_tasks.errors import KeyRingError
-
-if TYPE_CHECKING:
-    from mav_tasks.mavlink.signing import Key
+from mav_tasks.config.configuration import Sources
+from mav_tasks.errors import KeyRingError, MavTasksError
+from mav_tasks.key_ring.ring_file import load, path_of_ring
+from mav_tasks.mavlink.signing import Key
 
 
 def ring_path(asked: str) -> Path:
     """Return the file of ``--keys``; if "", the configured key ring, or the user's own."""
-    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
-    from mav_tasks.key_ring.ring_file import path_of_ring  # noqa: PLC0415
-
     return path_of_ring(asked or Sources(None, dict(os.environ)).load().settings.links.keys)
 
 
-def key_to_sign_with(name: str, asked: str) -> "Key":
+def key_to_sign_with(name: str, asked: str) -> Key:
     """Return a key by its name. Raise KeyRingError if there is none that is usable."""
-    from mav_tasks.key_ring.ring_file import load  # noqa: PLC0415
-
     path = ring_path(asked)
     ring = load(path).ring
     try:
         return ring.usable_key(name)
     except KeyRingError as error:
         raise KeyRingError(f"--sign: {error}, in {path}") from None
+
+
+def key_names() -> list[str]:
+    """Return the names of the usable keys of the key ring; none if it cannot be read."""
+    try:
+        ring = load(ring_path("")).ring
+    except MavTasksError:
+        return []
+    return [entry.name for entry in ring.entries if entry.is_usable]

@@ -7,10 +7,16 @@ import typer
 from typer.core import TyperGroup
 
 from mav_tasks.cli import exit_codes
+from mav_tasks.cli.commands import COMMANDS
 
 
 class Root(TyperGroup):
     """The group of all commands."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        for each in COMMANDS:
+            self.add_command(each)
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command. Raise Exit with our status after Ctrl-C or a closed pipe."""

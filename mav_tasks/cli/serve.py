@@ -1,29 +1,25 @@
 """``mav-tasks serve``: run the task server. Its options for settings are declared with these."""
 
-import os
 import signal
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperOption
 
-from mav_tasks.cli import completions
-
-if TYPE_CHECKING:
-    from mav_tasks.setting_keys.key import Key, Option
+from mav_tasks.cli.lazy import beginning_with, completing
+from mav_tasks.config.words import Flag
+from mav_tasks.setting_keys.key import Key, Option
+from mav_tasks.setting_keys.literals import literal
+from mav_tasks.setting_keys.shapes import Choice, Texts
+from mav_tasks.settings import KEYS, ServerSettings
 
 
 class ServeCommand(TyperCommand):
-    """The command with the options that the settings declare; ``ctx.obj`` has the given ones.
-
-    It makes them when they are needed: other commands must not wait for them.
-    """
+    """The command with the options that the settings declare; ``ctx.obj`` has the given ones."""
 
     @cached_property
-    def _options(self) -> "list[tuple[Key, Option, TyperOption]]":
-        from mav_tasks.settings import KEYS  # noqa: PLC0415
-
+    def _options(self) -> list[tuple[Key, Option, TyperOption]]:
         return [
             (k, option, _typer_option(k, option)) for k in KEYS.values() for option in k.options
         ]
@@ -34,8 +30,6 @@ class ServeCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments. Of two options for one key the one declared last counts."""
-        from mav_tasks.config.words import Flag  # noqa: PLC0415
-
         rest = super().parse_args(ctx, args)
         given = {}
         for key, option, made in self._options:
@@ -48,15 +42,13 @@ class ServeCommand(TyperCommand):
         return rest
 
 
-def _typer_option(key: "Key", option: "Option") -> TyperOption:
-    from mav_tasks.setting_keys.shapes import Choice, Texts  # noqa: PLC0415
-
+def _typer_option(key: Key, option: Option) -> TyperOption:
     is_switch = option.sets is not None
     is_list = isinstance(key.shape, Texts) and not is_switch
     words = key.shape.words if isinstance(key.shape, Choice) else ()
 
     def complete(_ctx: Any, _before: Any, incomplete: str) -> list[Any]:
-        return [*completions.beginning_with(incomplete, words)]
+        return [*beginning_with(incomplete, words)]
 
     return TyperOption(
         param_decls=[each for each in (option.name, option.short) if each],
@@ -69,10 +61,7 @@ def _typer_option(key: "Key", option: "Option") -> TyperOption:
     )
 
 
-def _help(key: "Key", *, is_switch: bool, is_list: bool) -> str:
-    from mav_tasks.setting_keys.literals import literal  # noqa: PLC0415
-    from mav_tasks.settings import ServerSettings  # noqa: PLC0415
-
+def _help(key: Key, *, is_switch: bool, is_list: bool) -> str:
     words = f"{key.meaning[0].upper()}{key.meaning[1:]}"
     if is_switch:
         return f"{words}."
@@ -96,7 +85,7 @@ def serve(
         typer.Option(
             "--set",
             metavar="KEY=VALUE",
-            autocompletion=completions.settings,
+            autocompletion=completing("mav_tasks.cli.config:assignments"),
             help="Set any key of the configuration; repeatable.",
         ),
     ] = None,
@@ -107,16 +96,6 @@ def serve(
     """
     # Ignore SIGHUP until the configuration is read; by default it would end the process.
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
-    from mav_tasks.config.configuration import Sources  # noqa: PLC0415
-    from mav_tasks.config.reload import Reload  # noqa: PLC0415
-    from mav_tasks.config.words import flag_of_set  # noqa: PLC0415
-    from mav_tasks.errors import StoreError  # noqa: PLC0415
-    from mav_tasks.serve import serve as run  # noqa: PLC0415
-    from mav_tasks.store.place import IN_MEMORY  # noqa: PLC0415
+    from mav_tasks.cli.serving import serve_with  # noqa: PLC0415  # takes long: after that
 
-    if any((flag.where, flag.value) == ("--store", "") for flag in ctx.obj):
-        raise StoreError(f"--store: expected a path, or {IN_MEMORY}")
-    flags = [*ctx.obj, *map(flag_of_set, set_ or ())]
-    sources = Sources(config, dict(os.environ), flags)
-    configuration = sources.load()
-    raise typer.Exit(run(configuration.settings, reload=Reload(sources, configuration)))
+    raise typer.Exit(serve_with(ctx.obj, set_=set_ or (), config=config))

@@ -7,7 +7,6 @@ from datetime import datetime
 from typing import NamedTuple
 
 from mav_tasks.cli.options import Common, TaskOptions, seconds_of, start_of
-from mav_tasks.cli.ring import key_to_sign_with
 from mav_tasks.cli.words import silence_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
@@ -51,12 +50,12 @@ async def unfound(common: Common) -> AsyncIterator[Client]:
     """Yield a client whose link is open, without waiting for the server."""
     if common.keys and not common.sign:
         raise UsageError("--keys needs --sign NAME")
-    client = Client(
-        common.server,
-        vehicle=common.vehicle,
-        timeout=common.timeout,
-        key=key_to_sign_with(common.sign, common.keys) if common.sign else None,
-    )
+    key = None
+    if common.sign:
+        from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415  # only to sign
+
+        key = key_to_sign_with(common.sign, common.keys)
+    client = Client(common.server, vehicle=common.vehicle, timeout=common.timeout, key=key)
     client.open()
     try:
         yield client

@@ -1,22 +1,21 @@
 """``mav-tasks status``: show one task."""
 
-from typing import TYPE_CHECKING
+from datetime import datetime
 
+from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common, TaskId, Wait
-
-if TYPE_CHECKING:
-    from mav_tasks.client.aio import Client
-    from mav_tasks.client.handle import Task
-    from mav_tasks.client.values import TaskStatus, TaskTiming
+from mav_tasks.cli.session import find_task, is_alone, opened
+from mav_tasks.cli.times import moment_ago, spoken_duration
+from mav_tasks.client.aio import Client
+from mav_tasks.client.handle import Task
+from mav_tasks.client.values import TaskStatus, TaskTiming
+from mav_tasks.errors import Refused
 
 
 @command
 async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
     """Show a task, and what to do if it waits for you."""
-    from mav_tasks.cli import output, words  # noqa: PLC0415
-    from mav_tasks.cli.session import find_task, opened  # noqa: PLC0415
-
     async with opened(common) as client:
         task = await find_task(client, common, task_id)
         if wait:
@@ -35,11 +34,8 @@ async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
                 output.say(f"{name:<14}{value}")
 
 
-async def _to_do(client: "Client", common: Common, status: "TaskStatus") -> str:
+async def _to_do(client: Client, common: Common, status: TaskStatus) -> str:
     """Return what a person can do so that the task runs; "" if nothing."""
-    from mav_tasks.cli import words  # noqa: PLC0415
-    from mav_tasks.cli.session import is_alone  # noqa: PLC0415
-
     alone = is_alone(client, common)
     if words.starts_by_itself(status):
         return words.way_on_of(status, is_alone=alone)
@@ -47,24 +43,20 @@ async def _to_do(client: "Client", common: Common, status: "TaskStatus") -> str:
     return words.obstacle_of(status, queue, is_alone=alone)[1]
 
 
-async def _timing_of(task: "Task") -> "TaskTiming | None":
-    from mav_tasks.errors import Refused  # noqa: PLC0415
-
+async def _timing_of(task: Task) -> TaskTiming | None:
     try:
         return await task.timing()
     except Refused:  # an older server does not support the request
         return None
 
 
-def _heartbeat_age(client: "Client", vehicle: int) -> float | None:
+def _heartbeat_age(client: Client, vehicle: int) -> float | None:
     return next((each.heartbeat_age for each in client.vehicles() if each.id == vehicle), None)
 
 
 def _fields(
-    status: "TaskStatus", timing: "TaskTiming | None", silence: str, to_do: str
+    status: TaskStatus, timing: TaskTiming | None, silence: str, to_do: str
 ) -> list[tuple[str, str]]:
-    from mav_tasks.cli import words  # noqa: PLC0415
-
     ahead = "" if not status.is_waiting or status.position is None else str(status.position)
     return [
         ("task", str(status.id)),
@@ -89,11 +81,7 @@ def _fields(
     ]
 
 
-def _ended(status: "TaskStatus") -> str:
-    from datetime import datetime  # noqa: PLC0415
-
-    from mav_tasks.cli.times import moment_ago, spoken_duration  # noqa: PLC0415
-
+def _ended(status: TaskStatus) -> str:
     if status.ended_ago is None:
         return ""
     now = datetime.now().astimezone()

@@ -1,17 +1,24 @@
 """``mav-tasks submit``: submit a goal as a task."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from math import radians
+from typing import Annotated
 
 import typer
 
+from mav_tasks.cli import output, words
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
 from mav_tasks.cli.options import Common, TaskOptions
-
-if TYPE_CHECKING:
-    from mav_tasks.client.aio import Client
-    from mav_tasks.client.handle import Task
-    from mav_tasks.client.wire import Goal
+from mav_tasks.cli.places import parse_place
+from mav_tasks.cli.session import is_alone, opened, read, values_checked
+from mav_tasks.cli.times import parse_duration
+from mav_tasks.cli.typed_words import in_typed_words
+from mav_tasks.cli.words import task_json
+from mav_tasks.client.aio import Client
+from mav_tasks.client.handle import Task
+from mav_tasks.client.wire import Goal
+from mav_tasks.errors import ClientError
+from mav_tasks.tasks.goal import Drive, Face, GoTo, Move, Rotate, Wait
 
 EPILOG = """\b
 Examples:
@@ -41,8 +48,6 @@ async def move(
     speed: Speed = None,
 ) -> None:
     """Drive straight along the heading."""
-    from mav_tasks.tasks.goal import Move  # noqa: PLC0415
-
     await _submit([Move(distance, speed)], terms, common)
 
 
@@ -55,8 +60,6 @@ async def rotate(
     rate: Rate = None,
 ) -> None:
     """Turn on the spot by an angle."""
-    from mav_tasks.tasks.goal import Rotate  # noqa: PLC0415
-
     await _submit([Rotate(_radians(angle), _maybe_radians(rate))], terms, common)
 
 
@@ -72,9 +75,6 @@ async def drive(
     common: Common,
 ) -> None:
     """Drive at a constant velocity for some time."""
-    from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
-    from mav_tasks.tasks.goal import Drive  # noqa: PLC0415
-
     seconds = parse_duration("DURATION", duration)
     await _submit([Drive(forward, _radians(yaw_rate), seconds)], terms, common)
 
@@ -110,9 +110,6 @@ async def goto(
     The numbers are metres unless you give --global. If they look like degrees, --local or --global
     is required.
     """
-    from mav_tasks.cli.places import parse_place  # noqa: PLC0415
-    from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
-
     place = parse_place(north, east, is_global=is_global, is_local=is_local)
     way = GoTo(place, speed=speed, radius=radius, yaw=_maybe_radians(heading))
     await _submit([way], terms, common)
@@ -129,8 +126,6 @@ async def face(
     rate: Rate = None,
 ) -> None:
     """Turn on the spot to a heading."""
-    from mav_tasks.tasks.goal import Face  # noqa: PLC0415
-
     await _submit([Face(_radians(heading), rate=_maybe_radians(rate))], terms, common)
 
 
@@ -144,9 +139,6 @@ async def wait(
     common: Common,
 ) -> None:
     """Stand still for some time."""
-    from mav_tasks.cli.times import parse_duration  # noqa: PLC0415
-    from mav_tasks.tasks.goal import Wait  # noqa: PLC0415
-
     await _submit([Wait(parse_duration("DURATION", duration))], terms, common)
 
 
@@ -154,15 +146,10 @@ async def wait(
 @command
 async def home(terms: TaskOptions, common: Common, speed: Speed = None) -> None:
     """Return to the rover's home."""
-    from mav_tasks.tasks.goal import GoTo  # noqa: PLC0415
-
     await _submit([GoTo(None, speed=speed)], terms, common)
 
 
-async def _submit(goals: "Sequence[Goal]", terms: TaskOptions, common: Common) -> None:
-    from mav_tasks.cli.session import opened, read, values_checked  # noqa: PLC0415
-    from mav_tasks.cli.typed_words import in_typed_words  # noqa: PLC0415
-
+async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> None:
     wished = read(terms)
     async with opened(common) as client:
         with values_checked(), in_typed_words():
@@ -171,11 +158,9 @@ async def _submit(goals: "Sequence[Goal]", terms: TaskOptions, common: Common) -
 
 
 async def tell_submitted(
-    client: "Client", task: "Task", common: Common, *, is_awaited: bool, hint: str = ""
+    client: Client, task: Task, common: Common, *, is_awaited: bool, hint: str = ""
 ) -> None:
     """Print the new task; follow it if ``is_awaited``."""
-    from mav_tasks.cli import output  # noqa: PLC0415
-
     if not common.json:
         output.say(f"rover {task.vehicle}: task {task.id}{hint}")
         if not is_awaited:  # ``follow`` shows each reason
@@ -185,21 +170,14 @@ async def tell_submitted(
 
         await follow(client, task, common)
     elif common.json:
-        from mav_tasks.cli.words import task_json  # noqa: PLC0415
-        from mav_tasks.errors import ClientError  # noqa: PLC0415
-
         try:
             output.say_json(task_json(await task.refresh()))
         except ClientError:  # the task exists: do not lose its id
             output.say_json({"id": task.id, "vehicle": task.vehicle})
 
 
-async def _why_it_waits(client: "Client", task: "Task", common: Common) -> str:
+async def _why_it_waits(client: Client, task: Task, common: Common) -> str:
     """Return why the task does not start, and what to do; "" if it starts by itself."""
-    from mav_tasks.cli import words  # noqa: PLC0415
-    from mav_tasks.cli.session import is_alone  # noqa: PLC0415
-    from mav_tasks.errors import ClientError  # noqa: PLC0415
-
     try:
         status = await task.refresh()
         queue = await client.queue(vehicle=task.vehicle, limit=0)
@@ -209,8 +187,6 @@ async def _why_it_waits(client: "Client", task: "Task", common: Common) -> str:
 
 
 def _radians(angle: float) -> float:
-    from math import radians  # noqa: PLC0415
-
     return radians(angle)
 
 

@@ -1,15 +1,14 @@
 """``mav-tasks vehicles``: show the rovers of the server."""
 
+from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
+from mav_tasks.cli.session import all_show, opened
 
 
 @command
 async def vehicles(common: Common) -> None:
     """Show the rovers of the server."""
-    from mav_tasks.cli import output, words  # noqa: PLC0415
-    from mav_tasks.cli.session import all_show, opened  # noqa: PLC0415
-
     async with opened(common) as client:
         if not common.json:  # the slow import of Rich, while the first telemetry is on its way
             from mav_tasks.cli.tables import vehicle_table  # noqa: PLC0415

@@ -79,8 +79,9 @@ class Client:
     server has not signed with this key. ``link_id``, 0 to 255, goes into the signatures; None: a
     random one. Raise ValueError if the key is invalid.
 
-    Every method may raise NoAnswer, Refused and NoSuchVehicle. Use a client only on the event loop
-    on which it was opened.
+    Every method may raise NoAnswer, Refused and NoSuchVehicle.
+
+    Use a client only on the event loop on which it was opened.
     """
 
     def __init__(

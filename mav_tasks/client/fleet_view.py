@@ -12,7 +12,7 @@ from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatMonitor
-from mav_tasks.services.persona import PERSONAS, Persona
+from mav_tasks.services.persona import Persona, persona_of
 
 SILENT_AFTER = 3.5  # s without a heartbeat; same as in the server
 GAP = 1.7  # s without a heartbeat, after which the server may be another process
@@ -89,7 +89,7 @@ class VehicleView:
 
     @property
     def _persona(self) -> Persona | None:
-        return None if self._monitor is None else PERSONAS.get(self._monitor.latest.autopilot)
+        return None if self._monitor is None else persona_of(self._monitor.latest)
 
     @property
     def _kind(self) -> str:

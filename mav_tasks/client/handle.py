@@ -91,7 +91,7 @@ class Task:
     async def cancel(self) -> None:
         """Cancel the task; if it is being driven, the rover stops at once.
 
-        Await ``done`` to wait for standstill. Raise Refused if the task has ended.
+        ``done`` waits for standstill. Raise Refused if the task has ended.
         """
         await self._client.cancel(self.id, vehicle=self.vehicle)
 

@@ -1,155 +1,68 @@
 """The blocking client: the calls of the asyncio client, each waiting for its answer.
 
-The asyncio client runs on an event loop in its own thread, or where a given Portal runs it. It
-sends heartbeats and receives statuses while the script does other things.
+Made by tools/sync_client.py: change aio.py, handle.py or blocking.py instead.
 """
 
-import asyncio
-import threading
-from collections.abc import AsyncIterator, Callable, Coroutine, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Protocol, Self, TypeVar
 
-from mav_tasks.client.aio import (
-    DEFAULT_LINK,
-    FIND_WITHIN,
-    SCRIPT,
-    STOP_WITHIN,
-    Client,
-)
-from mav_tasks.client.handle import Release, Task
+from mav_tasks.client.aio import DEFAULT_LINK, FIND_WITHIN, SCRIPT, STOP_WITHIN, Client
+from mav_tasks.client.blocking import BlockingClient, BlockingTask, Portal, called, id_of
+from mav_tasks.client.handle import Release
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Text, VehicleStatus
 from mav_tasks.client.wire import Goal
-from mav_tasks.errors import ClientError, MavTasksError
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import PlanFile
 from mav_tasks.services.mission_item import Item
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
-T = TypeVar("T")
 
-ENDS_BY_ITSELF = 0.2  # s until ``close`` cancels a coroutine
-
-
-class Portal(Protocol):
-    """Runs coroutines for a caller that blocks."""
-
-    def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run a coroutine to its end. Return its result, or raise its exception."""
-        ...
-
-    def close(self) -> None:
-        """Free the portal's resources."""
-        ...
-
-
-class ThreadPortal:
-    """An event loop in its own daemon thread."""
-
-    def __init__(self) -> None:
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(
-            target=self._loop.run_forever, name="mav_tasks client", daemon=True
-        )
-        self._thread.start()
-
-    def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Run a coroutine; Ctrl-C cancels it. Raise ClientError if the portal is closed."""
-        if self._loop.is_closed():
-            coroutine.close()
-            raise ClientError("the client was closed")
-        future = asyncio.run_coroutine_threadsafe(coroutine, self._loop)
-        try:
-            return future.result()
-        except BaseException:
-            future.cancel()
-            raise
-
-    def close(self) -> None:
-        """End the running coroutines, which other threads may wait for, and the thread."""
-        asyncio.run_coroutine_threadsafe(self._end_tasks(), self._loop).result()
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
-        self._loop.close()
-
-    async def _end_tasks(self) -> None:
-        await self._loop.shutdown_asyncgens()
-        others = asyncio.all_tasks() - {asyncio.current_task()}
-        if others:
-            await asyncio.wait(others, timeout=ENDS_BY_ITSELF)  # the client has told them to end
-        for task in others:
-            task.cancel()
-        await asyncio.gather(*others, return_exceptions=True)
-        await asyncio.sleep(0)  # the next iteration wakes the waiting threads
-
-
-class SyncTask:
-    """A blocking handle of one task; see ``Task``."""
-
-    def __init__(self, task: Task, portal: Portal) -> None:
-        self._task = task
-        self._portal = portal
-
-    def __repr__(self) -> str:
-        return f"Sync{self._task!r}"
+class SyncTask(BlockingTask):
+    """A handle of one task, valid while the client is open, even if the server restarts."""
 
     @property
     def id(self) -> int:
         """The task id. The server does not reuse it while the task can be queried."""
-        return self._task.id
+        return self._aio.id
 
     @property
     def vehicle(self) -> int:
         """The system id of its rover."""
-        return self._task.vehicle
+        return self._aio.vehicle
 
     @property
     def status(self) -> TaskStatus | None:
         """The last status received; None before the first."""
-        return self._task.status
-
-    def done(self, *, timeout: float | None = None) -> TaskStatus:
-        """Wait until the task has ended. Return its final status.
-
-        Raise TaskFailed unless it completed. Raise TimeoutError after ``timeout`` seconds; the
-        task continues.
-        """
-
-        async def within() -> TaskStatus:
-            try:
-                async with asyncio.timeout(timeout):
-                    return await self._task.done()
-            except TimeoutError:
-                now = "not heard of" if self.status is None else self.status.words
-                words = f"task {self.id} has not ended after {timeout:g} s: {now}"
-                raise TimeoutError(words) from None
-
-        return self._portal.call(within())
+        return self._aio.status
 
     def updates(self, *, interval: float = 0.5) -> Iterator[TaskStatus]:
-        """Yield the status now, at each change, and every ``interval`` s while it is driven."""
-        return _each(self._task.updates(interval=interval), self._portal)
+        """Yield the status now, at each change, and every ``interval`` seconds while it is driven.
+
+        The final status is the last one. A slow reader gets only the latest status.
+        """
+        return self._each(self._aio.updates(interval=interval))
 
     def refresh(self) -> TaskStatus:
-        """Request and return the status."""
-        return self._portal.call(self._task.refresh())
+        """Request and return the status. Raise Refused (NOT_FOUND) if the server lacks the task."""
+        return self._call(self._aio.refresh())
 
     def timing(self) -> TaskTiming:
         """Return how evenly its setpoints have left so far; also works after the end."""
-        return self._portal.call(self._task.timing())
+        return self._call(self._aio.timing())
 
     def cancel(self) -> None:
-        """Cancel the task; see ``Task.cancel``."""
-        self._portal.call(self._task.cancel())
+        """Cancel the task; if it is being driven, the rover stops at once.
+
+        ``done`` waits for standstill. Raise Refused if the task has ended.
+        """
+        self._call(self._aio.cancel())
 
     def kill(self) -> None:
-        """Cancel the task and put the rover into HOLD."""
-        self._portal.call(self._task.kill())
+        """Cancel the task and put the rover into HOLD; no task starts until it stands still."""
+        self._call(self._aio.kill())
 
     def modify(
         self,
@@ -163,13 +76,13 @@ class SyncTask:
         at: datetime | None = None,
         label: str | None = None,
     ) -> None:
-        """Change the task: see ``Client.modify``."""
-        self._portal.call(
-            self._task.modify(
+        """Change the task: see ``SyncClient.modify``."""
+        self._call(
+            self._aio.modify(
                 priority=priority,
                 delay=delay,
                 deadline=deadline,
-                after=None if after is None else _id_of(after),
+                after=None if after is None else id_of(after),
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=at,
@@ -178,12 +91,23 @@ class SyncTask:
         )
 
     def release(self, how: Release) -> None:
-        """Release the held task: see ``Task.release``."""
-        self._portal.call(self._task.release(how))
+        """Release the task: "again" restarts it here, "remainder" finishes it, "skip" drops it."""
+        self._call(self._aio.release(how))
 
 
-class SyncClient:
-    """A connection to a task server, with the methods of ``Client``.
+class SyncClient(BlockingClient):
+    """A connection to a task server and, through the server, to its rovers.
+
+    ``link`` is a URL of the server (``udpout:host:port``, ``tcp:host:port``,
+    ``serial:device:baud``, or ``udpin:host:port`` if the server pushes), or an open Link.
+    ``vehicle`` is the system id of the default rover; it can be left out if there is only one.
+    ``timeout``: seconds to wait for a server and a rover.
+
+    With a ``key`` of 32 bytes the client signs all packets (MAVLink 2) and drops packets that the
+    server has not signed with this key. ``link_id``, 0 to 255, goes into the signatures; None: a
+    random one. Raise ValueError if the key is invalid.
+
+    Every method may raise NoAnswer, Refused and NoSuchVehicle.
 
     It is open within a ``with`` block. ``portal`` runs its asyncio part.
     """
@@ -200,64 +124,33 @@ class SyncClient:
         link_id: int | None = None,
         portal: Portal | None = None,
     ) -> None:
-        self._make: Callable[[], Client] = lambda: Client(
-            link,
-            vehicle=vehicle,
-            timeout=timeout,
-            system_id=system_id,
-            component_id=component_id,
-            key=key,
-            link_id=link_id,
+        super().__init__(
+            lambda: Client(
+                link,
+                vehicle=vehicle,
+                timeout=timeout,
+                system_id=system_id,
+                component_id=component_id,
+                key=key,
+                link_id=link_id,
+            ),
+            portal,
         )
-        self._given = portal
-        self._portal: Portal | None = None
-        self._client: Client | None = None
-
-    def __repr__(self) -> str:
-        return f"Sync{self._client!r}" if self._client else "SyncClient(closed)"
-
-    def __enter__(self) -> Self:
-        self.open()
-        try:
-            self.found()
-        except BaseException:
-            self.close()
-            raise
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def open(self) -> None:
-        """Open the link without waiting."""
-        if self._portal is not None:
-            raise MavTasksError(f"{self!r}: it is open already")
-        portal = self._portal = self._given or ThreadPortal()
-        try:
-            self._client = portal.call(self._opened())
-        except BaseException:
-            self.close()
-            raise
+        """Open the link without waiting. Raise LinkUrlError or LinkOpenError if that fails."""
+        self._begin()
 
     def found(self) -> None:
-        """Wait for the task server: see ``Client.found``."""
-        self._call(lambda client: client.found())
+        """Wait until the task server of the default rover, or of each rover heard, has answered.
+
+        Raise NoAnswer after ``timeout``; without a default rover only if none has answered.
+        """
+        self._call(self._aio.found())
 
     def close(self) -> None:
         """Close the link. The server continues the tasks."""
-        client, self._client = self._client, None
-        portal, self._portal = self._portal, None
-        if portal is None:
-            return
-        if client is not None:
-            portal.call(client.close())
-        if portal is not self._given:
-            portal.close()
+        self._end()
 
     def submit(
         self,
@@ -272,44 +165,56 @@ class SyncClient:
         nonce: int = 0,
         label: str = "",
     ) -> SyncTask:
-        """Submit a goal, or several as one task: see ``Client.submit``."""
-        return self._task(
-            lambda client: client.submit(
+        """Submit a goal, or several goals in order as one task. Return once the task is durable.
+
+        ``priority``: 0 to 10, 10 runs first. ``after``: a task that must complete first. The task
+        starts no earlier than in ``delay`` seconds, and expires if it has not started within
+        ``deadline`` seconds (0: neither). ``at``: start time, with a time zone. The client repeats
+        the submission until it is answered; the server creates one task per ``nonce`` (1 to
+        1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
+        ``label``: a name of up to 24 bytes, shown with the task.
+        """
+        return self._handle(
+            SyncTask,
+            self._aio.submit(
                 goal,
                 priority=priority,
-                after=_id_of(after),
+                after=id_of(after),
                 delay=delay,
                 deadline=deadline,
                 at=at,
                 vehicle=vehicle,
                 nonce=nonce,
                 label=label,
-            )
+            ),
         )
 
     def task(self, task_id: int, *, vehicle: int | None = None) -> SyncTask:
-        """Return the handle of any client's task."""
-        return self._task(lambda client: client.task(task_id, vehicle=vehicle))
+        """Return the handle of any client's task. Raise Refused (NOT_FOUND) for an unknown id."""
+        return self._handle(SyncTask, self._aio.task(task_id, vehicle=vehicle))
 
     def status(self, task_id: int, *, vehicle: int | None = None) -> TaskStatus:
-        """Return the status of a task."""
-        return self._call(lambda client: client.status(task_id, vehicle=vehicle))
+        """Return the status of a task. Raise Refused (NOT_FOUND) if there is no task of this id."""
+        return self._call(self._aio.status(task_id, vehicle=vehicle))
 
     def timing(self, task_id: int | None = None, *, vehicle: int | None = None) -> TaskTiming:
-        """Return how evenly the setpoints of a task left; None: of the running task."""
-        return self._call(lambda client: client.timing(task_id, vehicle=vehicle))
+        """Return how evenly the setpoints of a task left; None: of the running task.
+
+        Raise Refused (NOT_FOUND) if there is no task of this id, or no task is running.
+        """
+        return self._call(self._aio.timing(task_id, vehicle=vehicle))
 
     def cancel(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """Cancel a task, None: the running one. Return its id."""
-        return self._call(lambda client: client.cancel(task_id, vehicle=vehicle))
+        """Cancel a task, None: the running one. Return its id. Raise Refused if there is none."""
+        return self._call(self._aio.cancel(task_id, vehicle=vehicle))
 
     def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
         """Cancel a task and put the rover into HOLD at once. Return the task's id."""
-        return self._call(lambda client: client.kill(task_id, vehicle=vehicle))
+        return self._call(self._aio.kill(task_id, vehicle=vehicle))
 
     def clear(self, *, running_too: bool = False, vehicle: int | None = None) -> None:
         """Cancel all waiting tasks; ``running_too``: the running one, too."""
-        self._call(lambda client: client.clear(running_too=running_too, vehicle=vehicle))
+        self._call(self._aio.clear(running_too=running_too, vehicle=vehicle))
 
     def modify(
         self,
@@ -325,14 +230,18 @@ class SyncClient:
         label: str | None = None,
         vehicle: int | None = None,
     ) -> None:
-        """Change a task: see ``Client.modify``."""
+        """Change a task that has not ended; an argument of None changes nothing.
+
+        Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
+        it may interrupt other tasks.
+        """
         self._call(
-            lambda client: client.modify(
+            self._aio.modify(
                 task_id,
                 priority=priority,
                 delay=delay,
                 deadline=deadline,
-                after=None if after is None else _id_of(after),
+                after=None if after is None else id_of(after),
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=at,
@@ -349,43 +258,54 @@ class SyncClient:
         epoch: int | None = None,
         vehicle: int | None = None,
     ) -> int:
-        """Release a held task: see ``Client.release``."""
-        return self._call(lambda client: client.release(task_id, how, epoch=epoch, vehicle=vehicle))
+        """Release a held task, None: the held one. Return its id.
+
+        "again" restarts the task here, "remainder" finishes it, "skip" drops it. ``epoch`` as in
+        ``resume``. If the queue is paused, the task continues on resume.
+        """
+        return self._call(self._aio.release(task_id, how, epoch=epoch, vehicle=vehicle))
 
     def queue(self, *, vehicle: int | None = None, limit: int = 100) -> QueueStatus:
-        """Return the running and the waiting tasks of a rover."""
-        return self._call(lambda client: client.queue(vehicle=vehicle, limit=limit))
+        """Return the running task of a rover and up to ``limit`` of its waiting tasks."""
+        return self._call(self._aio.queue(vehicle=vehicle, limit=limit))
 
     def history(self, *, vehicle: int | None = None, limit: int = 20) -> tuple[TaskStatus, ...]:
-        """Return finished tasks of a rover, newest first: see ``Client.history``."""
-        return self._call(lambda client: client.history(vehicle=vehicle, limit=limit))
+        """Return up to ``limit`` finished tasks of a rover, newest first.
+
+        ``ended_ago`` says when each ended. Raise Refused if the server is too old to list them.
+        """
+        return self._call(self._aio.history(vehicle=vehicle, limit=limit))
 
     def stop(
         self, *, clear: bool = False, vehicle: int | None = None, within: float = STOP_WITHIN
     ) -> None:
-        """Stop all rovers, or only ``vehicle``, at once: see ``Client.stop``."""
-        self._call(lambda client: client.stop(clear=clear, vehicle=vehicle, within=within))
+        """Stop all rovers, or only ``vehicle``, at once; no task runs until ``resume``.
+
+        This ignores the client's default rover, and needs no ``found``. ``clear`` also cancels the
+        waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds.
+        After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard.
+        """
+        self._call(self._aio.stop(clear=clear, vehicle=vehicle, within=within))
 
     def pause(self, *, vehicle: int | None = None) -> None:
         """Stop the rover; its task can continue from there."""
-        self._call(lambda client: client.pause(vehicle=vehicle))
+        self._call(self._aio.pause(vehicle=vehicle))
 
     def resume(self, *, epoch: int | None = None, vehicle: int | None = None) -> None:
-        """Resume after a pause, a STOP or a takeover."""
-        self._call(lambda client: client.resume(epoch=epoch, vehicle=vehicle))
+        """Resume after a pause, a STOP or a takeover. Raise Refused, with the reason, if blocked.
+
+        ``epoch`` is the ``halt_epoch`` of the status that you have seen, None: the present one. If
+        anything has halted the rover since then, raise Refused (STALE), however late this arrives.
+        """
+        self._call(self._aio.resume(epoch=epoch, vehicle=vehicle))
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
         """Return the last known state of the server's rovers."""
-
-        async def vehicles(client: Client) -> tuple[VehicleStatus, ...]:
-            return client.vehicles()
-
-        return self._call(vehicles)
+        return self._call(called(self._aio.vehicles))
 
     def texts(self) -> Iterator[Text]:
         """Yield each STATUSTEXT of rovers and task servers from now on."""
-        client, portal = self._opened_here()
-        return _each(client.texts(), portal)
+        return self._each(self._aio.texts())
 
     def submit_mission(
         self,
@@ -400,89 +320,59 @@ class SyncClient:
         nonce: int = 0,
         label: str = "",
     ) -> SyncTask:
-        """Queue a mission as one task: see ``Client.submit_mission``."""
-        return self._task(
-            lambda client: client.submit_mission(
+        """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
+
+        Raise PlanFileError if a file is invalid. Other arguments as in ``submit``.
+        """
+        return self._handle(
+            SyncTask,
+            self._aio.submit_mission(
                 plan,
                 priority=priority,
-                after=_id_of(after),
+                after=id_of(after),
                 delay=delay,
                 deadline=deadline,
                 at=at,
                 vehicle=vehicle,
                 nonce=nonce,
                 label=label,
-            )
+            ),
         )
 
     def stage_mission(self, plan: Plan, *, vehicle: int | None = None) -> SyncTask:
-        """Stage a mission: see ``Client.stage_mission``."""
-        return self._task(lambda client: client.stage_mission(plan, vehicle=vehicle))
+        """Stage a mission: upload it to the autopilot's address, to wait for ``start_mission``.
+
+        It replaces the mission staged before.
+        """
+        return self._handle(SyncTask, self._aio.stage_mission(plan, vehicle=vehicle))
 
     def start_mission(self, *, epoch: int | None = None, vehicle: int | None = None) -> SyncTask:
-        """Start the staged mission, or the last one again."""
-        return self._task(lambda client: client.start_mission(epoch=epoch, vehicle=vehicle))
+        """Start the staged mission, or the last one again, as a new task.
+
+        ``epoch`` as in ``resume``.
+        """
+        return self._handle(SyncTask, self._aio.start_mission(epoch=epoch, vehicle=vehicle))
 
     def mission(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
         """Return the staged mission, as it was uploaded."""
-        return self._call(lambda client: client.mission(vehicle=vehicle))
+        return self._call(self._aio.mission(vehicle=vehicle))
 
     def mission_file(self, *, vehicle: int | None = None) -> PlanFile:
-        """Return the staged mission for ``write_plan``."""
-        return self._call(lambda client: client.mission_file(vehicle=vehicle))
+        """Return the staged mission for ``write_plan``; a home item becomes ``PlanFile.home``."""
+        return self._call(self._aio.mission_file(vehicle=vehicle))
 
     def fence_file(self, *, vehicle: int | None = None) -> PlanFile:
-        """Return the fence for ``write_plan``."""
-        return self._call(lambda client: client.fence_file(vehicle=vehicle))
+        """Return the fence for ``write_plan``. Raise PlanFileError if a file cannot hold it."""
+        return self._call(self._aio.fence_file(vehicle=vehicle))
 
     def fence(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
         """Return the items of the fence."""
-        return self._call(lambda client: client.fence(vehicle=vehicle))
+        return self._call(self._aio.fence(vehicle=vehicle))
 
     def set_fence(self, plan: PlanFile | Path | str, *, vehicle: int | None = None) -> int:
-        """Upload the fence of a .plan file. Return the number of items."""
-        return self._call(lambda client: client.set_fence(plan, vehicle=vehicle))
+        """Upload the fence of a .plan file, which may be empty. Return the number of items."""
+        return self._call(self._aio.set_fence(plan, vehicle=vehicle))
 
     def set_rally_points(self, plan: PlanFile | Path | str, *, vehicle: int | None = None) -> int:
         """Upload the rally points of a .plan file. Return their number."""
-        return self._call(lambda client: client.set_rally_points(plan, vehicle=vehicle))
-
-    async def _opened(self) -> Client:
-        client = self._make()
-        client.open()
-        return client
-
-    def _call(self, what: Callable[[Client], Coroutine[Any, Any, T]]) -> T:
-        client, portal = self._opened_here()
-        return portal.call(what(client))
-
-    def _opened_here(self) -> tuple[Client, Portal]:
-        if self._client is None or self._portal is None:
-            raise MavTasksError(f"{self!r}: open it first, by 'with'")
-        return self._client, self._portal
-
-    def _task(self, what: Callable[[Client], Coroutine[Any, Any, Task]]) -> SyncTask:
-        task = self._call(what)
-        assert self._portal is not None, "it has just been used"
-        return SyncTask(task, self._portal)
-
-
-def _each(generator: AsyncIterator[T], portal: Portal) -> Iterator[T]:
-    """Yield the values of an async generator as they arrive."""
-
-    async def following() -> T | None:
-        return await anext(generator, None)
-
-    async def closed() -> None:
-        await generator.aclose()  # type: ignore[attr-defined]  # all callers pass generators
-
-    try:
-        while (value := portal.call(following())) is not None:
-            yield value
-    finally:
-        with suppress(ClientError):  # the portal is closed: nothing is left to end
-            portal.call(closed())
-
-
-def _id_of(task: int | SyncTask) -> int:
-    return task.id if isinstance(task, SyncTask) else task
+        return self._call(self._aio.set_rally_points(plan, vehicle=vehicle))

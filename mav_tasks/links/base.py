@@ -21,6 +21,8 @@ class Link(Protocol):
     is_local: bool
     #: whether the link is a StreamLink: received data may be cut anywhere
     is_stream: bool
+    #: a warning for the operator about how the link was opened; else ""
+    note: str
 
     def fileno(self) -> int:
         """Return the descriptor to wait on for reading; it never changes while the link is open."""

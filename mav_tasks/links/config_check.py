@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from typing import NamedTuple, Protocol
 
 from mav_tasks.errors import UsageError
+from mav_tasks.links.endpoint import is_loopback, parse_endpoint
 from mav_tasks.links.policy import LinkPolicy, Side, check, policy_of, unsigned_beyond
-from mav_tasks.links.url import LinkUrl, SerialUrl, is_loopback, parse_endpoint, parse_url
+from mav_tasks.links.url import LinkUrl, parse_url
 
 SIDES: tuple[Side, ...] = ("clients", "vehicles")
 
@@ -41,7 +42,7 @@ class ConfiguredLink(NamedTuple):
     """One link of the configuration."""
 
     side: Side
-    url: LinkUrl | SerialUrl
+    url: LinkUrl
     policy: LinkPolicy
     pushes_far: bool = False  # whether it pushes to other machines
 
@@ -60,10 +61,10 @@ def links_of(asked: LinkSettings) -> list[ConfiguredLink]:
     return links
 
 
-def pushing_url(asked: LinkSettings) -> LinkUrl | SerialUrl | None:
-    """Return the URL of the link that pushes to clients: the first UDP one; None if none is."""
+def pushing_url(asked: LinkSettings) -> LinkUrl | None:
+    """Return the URL of the link that pushes to clients: the first that can; None if none can."""
     urls = map(parse_url, asked.clients)
-    return next((url for url in urls if isinstance(url, LinkUrl) and url.is_udp), None)
+    return next((url for url in urls if url.can_push), None)
 
 
 def faults_of(asked: LinkSettings) -> list[tuple[str, UsageError]]:
@@ -73,7 +74,7 @@ def faults_of(asked: LinkSettings) -> list[tuple[str, UsageError]]:
 
 
 def _faults_of_words(asked: LinkSettings) -> Iterator[tuple[str, UsageError]]:
-    seen: set[LinkUrl | SerialUrl] = set()
+    seen: set[LinkUrl] = set()
     for side in SIDES:
         for text in getattr(asked, side):
             try:

@@ -135,6 +135,7 @@ class MemoryLink:
 
     is_local = True
     is_stream = False
+    note = ""
 
     def __init__(self, net: MemoryNet, name: str, peers: tuple[Peer, ...], number: int) -> None:
         self._net = net

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from mav_tasks.errors import InsecureLinkError, UsageError
-from mav_tasks.links.url import LinkUrl, SerialUrl
+from mav_tasks.links.url import LinkUrl
 
 Side = Literal["clients", "vehicles"]
 
@@ -32,34 +32,23 @@ class Rules(Protocol):
         """Where unsigned packets are accepted: "loopback" or "nowhere"."""
 
 
-def is_nearby(url: LinkUrl | SerialUrl) -> bool:
-    """Whether no other machine can dial a link.
-
-    A serial line counts as nearby: the operator chose the wire. The server cannot see a radio at
-    its end; ``?unsigned=refuse``, and ``?key=`` on a link to vehicles, are for radios.
-    """
-    return isinstance(url, SerialUrl) or url.is_loopback
-
-
-def policy_of(
-    url: LinkUrl | SerialUrl, side: Side, rules: Rules, *, pushes_far: bool = False
-) -> LinkPolicy:
+def policy_of(url: LinkUrl, side: Side, rules: Rules, *, pushes_far: bool = False) -> LinkPolicy:
     """Return the signing policy of a link; ``pushes_far``: it pushes to other machines.
 
     A link to vehicles that has a key accepts only packets signed with that key, unless its URL
     allows unsigned packets.
     """
-    if url.unsigned is not None:
-        return LinkPolicy(url.unsigned, url.key)
-    if side == "vehicles" and url.key:
-        return LinkPolicy(takes_unsigned=False, key=url.key)
-    is_taken_here = rules.insecure or (is_nearby(url) and not pushes_far)
-    return LinkPolicy(rules.unsigned == NEARBY and is_taken_here, url.key)
+    if url.options.unsigned is not None:
+        return LinkPolicy(url.options.unsigned, url.options.key)
+    if side == "vehicles" and url.options.key:
+        return LinkPolicy(takes_unsigned=False, key=url.options.key)
+    is_taken_here = rules.insecure or (url.is_nearby and not pushes_far)
+    return LinkPolicy(rules.unsigned == NEARBY and is_taken_here, url.options.key)
 
 
-def check(url: LinkUrl | SerialUrl, side: Side, policy: LinkPolicy, rules: Rules) -> None:
+def check(url: LinkUrl, side: Side, policy: LinkPolicy, rules: Rules) -> None:
     """Raise UsageError for a link that could accept no packet, or packets from anybody."""
-    is_open = rules.insecure or is_nearby(url)
+    is_open = rules.insecure or url.is_nearby
     if side == "vehicles" and not policy.key and not is_open:
         raise InsecureLinkError(
             f"link {url} reaches beyond this machine and has no signing key: "

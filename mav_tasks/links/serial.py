@@ -9,18 +9,21 @@ import os
 import selectors
 import termios
 from contextlib import suppress
+from dataclasses import dataclass, field
 from errno import EIO, ENODEV, ENOENT, ENXIO
 
 from serial import Serial, SerialException
 
 from mav_tasks.clock import boot_time
-from mav_tasks.errors import LinkOpenError
+from mav_tasks.errors import LinkOpenError, LinkUrlError
 from mav_tasks.links.attempts import Attempts
-from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
+from mav_tasks.links.endpoint import number_in
 from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.out_queue import OutQueue
-from mav_tasks.links.url import SerialUrl
+from mav_tasks.links.url import NO_OPTIONS, UrlOptions
 
+BAUD_RATES = range(1_200, 12_000_001)
 PIECE = 280  # bytes read at once, a MAVLink packet
 LEAD = 0.1  # s of line time that may be written ahead; two TEND_PERIODs
 BITS = 10  # per byte on the line, with a start and a stop bit
@@ -30,11 +33,52 @@ FAILURES = (OSError, ValueError, termios.error)  # pySerial raises these or lets
 NOT_THERE = frozenset({ENOENT, ENODEV, ENXIO, EIO})
 
 
+@dataclass(frozen=True, slots=True)
+class SerialUrl:
+    """The URL of a serial line: ``serial:device:baud``."""
+
+    device: str
+    baud: int  # bits per second; a byte takes ten
+    options: UrlOptions = field(default=NO_OPTIONS, compare=False)
+
+    def __str__(self) -> str:
+        return f"serial:{self.device}:{self.baud}"
+
+    @property
+    def is_nearby(self) -> bool:
+        """Return True: the operator chose the wire.
+
+        The server cannot see a radio at its end; ``?unsigned=refuse``, and ``?key=`` on a link to
+        vehicles, are for radios.
+        """
+        return True
+
+    @property
+    def can_push(self) -> bool:
+        """Return False: a line has one other end."""
+        return False
+
+    def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
+        """Open the device; ``push`` must be empty."""
+        assert not push, "only a link that can push gets addresses"
+        return SerialLink(self, limits=limits)
+
+
+def parse(_kind: str, rest: str, options: UrlOptions, *, what: str) -> SerialUrl:
+    """Return the URL; raise LinkUrlError, which names ``what``."""
+    device, _, baud = rest.rpartition(":")
+    if not device or number_in(baud, BAUD_RATES) is None:
+        rates = f"from {BAUD_RATES[0]} to {BAUD_RATES[-1]}"
+        raise LinkUrlError(f"{what}: expected serial:device:baud with a baud rate {rates}")
+    return SerialUrl(device, int(baud), options)
+
+
 class SerialLink:
     """A serial device as a link with one peer, the device's name."""
 
     peers: tuple[Peer, ...] = ()
     is_stream = True
+    note = ""
     #: the device may be a radio, with anybody at its other end
     is_local = False
 

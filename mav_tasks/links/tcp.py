@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 from mav_tasks.clock import boot_time
 from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.endpoint import HostUrl
 from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.out_queue import OutQueue
-from mav_tasks.links.url import LinkUrl
 
 PIECE = 280  # bytes read at once, a MAVLink packet: a piece takes no longer to handle than one
 KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}  # s, s, times
@@ -191,10 +191,11 @@ class TcpLink:
 
     peers: tuple[Peer, ...] = ()
     is_stream = True
+    note = ""
 
-    def __init__(self, url: LinkUrl, connections: Connections) -> None:
+    def __init__(self, url: HostUrl, connections: Connections) -> None:
         self.name = str(url)
-        self.is_local = url.is_loopback
+        self.is_local = url.is_nearby
         self._connections = connections
 
     @property

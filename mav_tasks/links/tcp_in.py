@@ -4,17 +4,35 @@ import selectors
 import socket
 
 from mav_tasks.errors import LinkOpenError
+from mav_tasks.links.base import Link
+from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
-from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.url import UrlOptions
 
 BACKLOG = 64  # connections that the system queues until they are accepted
+
+
+class TcpInUrl(HostUrl):
+    """The URL of a link that listens: ``tcpin:host:port``."""
+
+    __slots__ = ()
+
+    def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
+        """Open the link; ``push`` must be empty."""
+        assert not push, "only a link that can push gets addresses"
+        return TcpInLink(self, limits=limits)
+
+
+def parse(kind: str, rest: str, options: UrlOptions, *, what: str) -> TcpInUrl:
+    """Return the URL; raise LinkUrlError, which names ``what``."""
+    return TcpInUrl(kind, *parse_endpoint(rest, what=what), options)
 
 
 class TcpInLink(TcpLink):
     """A listening TCP socket and its connections."""
 
-    def __init__(self, url: LinkUrl, *, limits: LinkLimits) -> None:
+    def __init__(self, url: HostUrl, *, limits: LinkLimits) -> None:
         self.refused = 0  # connections
         try:
             family, address = resolve(url.host, url.port)[0]

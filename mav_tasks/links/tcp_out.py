@@ -6,12 +6,29 @@ from time import monotonic
 
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.attempts import Attempts
-from mav_tasks.links.base import Peer, PeerChange, PeerState
+from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
+from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
-from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.url import UrlOptions
 
 CONNECT_LIMIT = 3.0  # s for the other end to answer
+
+
+class TcpOutUrl(HostUrl):
+    """The URL of a link that dials: ``tcp:host:port``."""
+
+    __slots__ = ()
+
+    def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
+        """Open the link; ``push`` must be empty."""
+        assert not push, "only a link that can push gets addresses"
+        return TcpOutLink(self, limits=limits)
+
+
+def parse(kind: str, rest: str, options: UrlOptions, *, what: str) -> TcpOutUrl:
+    """Return the URL; raise LinkUrlError, which names ``what``."""
+    return TcpOutUrl(kind, *parse_endpoint(rest, what=what), options)
 
 
 class TcpOutLink(TcpLink):
@@ -20,7 +37,7 @@ class TcpOutLink(TcpLink):
     The host name is resolved once, at start: another look-up could block for seconds.
     """
 
-    def __init__(self, url: LinkUrl, *, limits: LinkLimits) -> None:
+    def __init__(self, url: HostUrl, *, limits: LinkLimits) -> None:
         self._peer: Peer = (url.host, url.port)
         try:
             self._addresses = resolve(url.host, url.port)

@@ -3,15 +3,46 @@
 import socket
 import time
 
-from mav_tasks.errors import LinkOpenError
-from mav_tasks.links.base import Peer
+from mav_tasks.errors import LinkOpenError, LinkUrlError
+from mav_tasks.links.base import Link, Peer
+from mav_tasks.links.endpoint import PORTS, HostUrl, is_loopback, number_in, parse_endpoint
+from mav_tasks.links.link_limits import TO_VEHICLES, LinkLimits
+from mav_tasks.links.local_port import port_for
 from mav_tasks.links.stamps import ROOM, ask_for_stamps, stamp_in
-from mav_tasks.links.url import LinkUrl, is_loopback
+from mav_tasks.links.url import UrlOptions
 
 RECEIVE_BUFFER = 1 << 20  # bytes; a burst of telemetry waits here while the disk is slow
 MAX_DATAGRAM = 65536
 ANY = {socket.AF_INET: "0.0.0.0", socket.AF_INET6: "::"}
 LOOPBACK = {socket.AF_INET: "127.0.0.1", socket.AF_INET6: "::1"}
+
+
+class UdpUrl(HostUrl):
+    """The URL of a UDP socket: ``udpin:host:port`` listens, ``udpout:host:port`` dials.
+
+    The option ``local=PORT`` is the port from which ``udpout`` dials.
+    """
+
+    __slots__ = ()
+
+    @property
+    def can_push(self) -> bool:
+        """Return True: a datagram needs no connection."""
+        return True
+
+    def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
+        """Open the socket; a rover is dialled from a port of its own."""
+        is_rover_dialled = self.kind == "udpout" and limits is TO_VEHICLES
+        local_port = port_for(self.host, self.port) if is_rover_dialled else 0
+        return UdpLink(self, push=push, local_port=local_port)
+
+
+def parse(kind: str, rest: str, options: UrlOptions, *, what: str) -> UdpUrl:
+    """Return the URL; raise LinkUrlError, which names ``what``."""
+    local = options.others.get("local")
+    if local is not None and number_in(local, PORTS) is None:
+        raise LinkUrlError(f"{what}: local: expected a port from 1 to 65535")
+    return UdpUrl(kind, *parse_endpoint(rest, what=what), options)
 
 
 class UdpLink:
@@ -20,7 +51,7 @@ class UdpLink:
     is_stream = False
 
     def __init__(
-        self, url: LinkUrl, *, push: tuple[tuple[str, int], ...] = (), local_port: int = 0
+        self, url: UdpUrl, *, push: tuple[tuple[str, int], ...] = (), local_port: int = 0
     ) -> None:
         """Open the socket; raise LinkOpenError if that fails.
 
@@ -28,13 +59,12 @@ class UdpLink:
         names must be free.
         """
         self.name = str(url)
-        #: a warning for the operator, if ``local_port`` was taken; else ""
         self.note = ""
         self.lost = 0  # datagrams that the system refused
         try:
             family, address = _resolve(url.host, url.port)
             pushed = tuple(_resolve(host, port)[1] for host, port in push)
-            self.is_local = url.is_loopback and all(is_loopback(host) for host, _ in push)
+            self.is_local = url.is_nearby and all(is_loopback(host) for host, _ in push)
             if url.kind == "udpin":
                 self._socket = _open(family, address)
             else:
@@ -48,11 +78,11 @@ class UdpLink:
     def __repr__(self) -> str:
         return f"UdpLink({self.name})"
 
-    def _dial(self, family: socket.AddressFamily, url: LinkUrl, preferred: int) -> socket.socket:
+    def _dial(self, family: socket.AddressFamily, url: UdpUrl, preferred: int) -> socket.socket:
         """Open a dialling socket, bound to loopback if all its peers are local."""
         host = LOOPBACK[family] if self.is_local else ANY[family]
-        if url.local is not None:
-            return _open(family, (host, url.local))
+        if "local" in url.options.others:
+            return _open(family, (host, int(url.options.others["local"])))
         try:
             return _open(family, (host, preferred))
         except OSError:

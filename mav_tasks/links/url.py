@@ -1,125 +1,112 @@
 """Link URLs: ``udpin`` and ``tcpin`` listen, ``udpout`` and ``tcp`` dial, ``serial`` is a line.
 
 The form is ``kind:host:port``, or ``serial:/dev/ttyUSB0:57600`` with the baud rate. Options follow
-a question mark: ``unsigned=allow`` or ``refuse`` and ``key=NAME`` for signing, and ``local=PORT``
-for the local port of ``udpout``.
+a question mark: ``unsigned=allow`` or ``refuse`` and ``key=NAME`` for signing, and those of a kind.
 """
 
-import ipaddress
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
+from typing import NamedTuple, Protocol, cast
 
 from mav_tasks.errors import LinkUrlError
+from mav_tasks.links.base import Link
+from mav_tasks.links.link_limits import LinkLimits
 
-KINDS = ("udpin", "udpout", "tcpin", "tcp")
-SERIAL = "serial"
-BAUD_RATES = range(1_200, 12_000_001)
-EXPECTED = "expected " + ", ".join(f"{kind}:host:port" for kind in KINDS)
-EXPECTED += f" or {SERIAL}:device:baud"
-OPTIONS = "unsigned=allow, unsigned=refuse, key=NAME and local=PORT"
+
+class Kind(NamedTuple):
+    """A kind of link."""
+
+    form: str  # of what follows the kind and a colon
+    module: str  # has the function of ``KindModule``; it is imported when it is used
+    options: tuple[str, ...] = ()  # of this kind only
+
+
+KINDS = {
+    "udpin": Kind("host:port", "mav_tasks.links.udp"),
+    "udpout": Kind("host:port", "mav_tasks.links.udp", ("local=PORT",)),
+    "tcpin": Kind("host:port", "mav_tasks.links.tcp_in"),
+    "tcp": Kind("host:port", "mav_tasks.links.tcp_out"),
+    "serial": Kind("device:baud", "mav_tasks.links.serial"),
+}
+SIGNING = ("unsigned=allow", "unsigned=refuse", "key=NAME")
 UNSIGNED = {"allow": True, "refuse": False}
 
 
 @dataclass(frozen=True, slots=True)
-class LinkUrl:
-    """A parsed link URL of UDP or TCP."""
+class UrlOptions:
+    """The options of a URL; they do not affect its equality."""
 
-    kind: str
-    host: str
-    port: int
-    #: whether unsigned packets are accepted; None if not given. Options do not affect equality
-    unsigned: bool | None = field(default=None, compare=False)
-    key: str = field(default="", compare=False)
-    #: the local port of a dialling link; None if not given
-    local: int | None = field(default=None, compare=False)
+    unsigned: bool | None = None  # whether unsigned packets are accepted; None: not given
+    key: str = ""
+    others: Mapping[str, str] = field(default_factory=dict)  # of the kind
 
-    def __str__(self) -> str:
-        return f"{self.kind}:{self.host}:{self.port}"
 
-    @property
-    def is_loopback(self) -> bool:
-        """Whether only this machine can be the other end."""
-        return is_loopback(self.host)
+NO_OPTIONS = UrlOptions()
+
+
+class LinkUrl(Protocol):
+    """A parsed link URL; ``str`` returns it without its options. Equal ones are the same link."""
 
     @property
-    def is_udp(self) -> bool:
-        """Whether the link uses UDP."""
-        return self.kind.startswith("udp")
+    def options(self) -> UrlOptions:
+        """The options."""
+
+    @property
+    def is_nearby(self) -> bool:
+        """Whether no other machine can dial the link."""
+
+    @property
+    def can_push(self) -> bool:
+        """Whether the link can send to clients that it has not heard."""
+
+    def __hash__(self) -> int: ...
+
+    def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
+        """Open the link; raise LinkOpenError if that fails. ``push``: only if ``can_push``.
+
+        A link that dials is open before its peer exists, and tries until it connects.
+        """
+        ...
 
 
-@dataclass(frozen=True, slots=True)
-class SerialUrl:
-    """A parsed link URL of a serial line."""
+class KindModule(Protocol):
+    """The interface of a module in KINDS."""
 
-    device: str
-    baud: int  # bits per second; a byte takes ten
-    unsigned: bool | None = field(default=None, compare=False)  # as in LinkUrl
-    key: str = field(default="", compare=False)
-
-    def __str__(self) -> str:
-        return f"{SERIAL}:{self.device}:{self.baud}"
+    def parse(self, kind: str, rest: str, options: UrlOptions, /, *, what: str) -> LinkUrl:
+        """Return the URL; raise LinkUrlError, which names ``what``."""
+        ...
 
 
-def parse_url(text: str) -> LinkUrl | SerialUrl:
+def parse_url(text: str) -> LinkUrl:
     """Return the parts of a link URL; raise LinkUrlError if it is malformed."""
     where, _, options = text.partition("?")
-    unsigned, key, local = _parse_options(options, what=f"link {text!r}")
-    kind, _, rest = where.partition(":")
-    if local is not None and kind != "udpout":
-        raise LinkUrlError(f"link {text!r}: local: only udpout has a local port")
-    if kind == SERIAL:
-        device, baud = _parse_serial(rest, what=f"link {text!r}")
-        return SerialUrl(device, baud, unsigned, key)
-    if kind not in KINDS:
-        raise LinkUrlError(f"link {text!r}: {EXPECTED}")
-    host, port = parse_endpoint(rest, what=f"link {text!r}")
-    return LinkUrl(kind, host, port, unsigned, key, local)
+    name, _, rest = where.partition(":")
+    what = f"link {text!r}"
+    kind = KINDS.get(name)
+    if kind is None:
+        forms = [f"{name}:{kind.form}" for name, kind in KINDS.items()]
+        raise LinkUrlError(f"{what}: expected {_listed(forms, 'or')}")
+    parsed = _parse_options(options, kind, what=what)
+    module = cast(KindModule, import_module(kind.module))
+    return module.parse(name, rest, parsed, what=what)
 
 
-def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
-    """Return (host, port) of ``host:port``; raise LinkUrlError, which names ``what``."""
-    host, _, port = text.removeprefix("//").rpartition(":")
-    host = host.strip("[]")
-    if not host or not _is_number(port) or not 0 < int(port) < 65536:
-        raise LinkUrlError(f"{what}: expected host:port with a port from 1 to 65535")
-    return host, int(port)
-
-
-def _parse_options(text: str, *, what: str) -> tuple[bool | None, str, int | None]:
+def _parse_options(text: str, kind: Kind, *, what: str) -> UrlOptions:
+    known = (*SIGNING, *kind.options)
     options: dict[str, str] = {}
     for each in text.split("&") if text else ():
         name, _, value = each.partition("=")
         if name in options:
             raise LinkUrlError(f"{what}: {name} is given twice")
-        if name not in ("unsigned", "key", "local"):
-            raise LinkUrlError(f"{what}: unknown option {name!r}: expected {OPTIONS}")
+        if name not in {form.partition("=")[0] for form in known}:
+            raise LinkUrlError(f"{what}: unknown option {name!r}: expected {_listed(known, 'and')}")
         if not value or (name == "unsigned" and value not in UNSIGNED):
-            raise LinkUrlError(f"{what}: {name}: expected one of {OPTIONS}")
+            raise LinkUrlError(f"{what}: {name}: expected one of {_listed(known, 'and')}")
         options[name] = value
-    unsigned = UNSIGNED[options["unsigned"]] if "unsigned" in options else None
-    local = options.get("local")
-    if local is not None and not (_is_number(local) and 0 < int(local) < 65536):
-        raise LinkUrlError(f"{what}: local: expected a port from 1 to 65535")
-    return unsigned, options.get("key", ""), None if local is None else int(local)
+    unsigned, key = options.pop("unsigned", ""), options.pop("key", "")
+    return UrlOptions(UNSIGNED.get(unsigned), key, options)
 
 
-def _parse_serial(text: str, *, what: str) -> tuple[str, int]:
-    device, _, baud = text.rpartition(":")
-    if not device or not _is_number(baud) or int(baud) not in BAUD_RATES:
-        rates = f"from {BAUD_RATES[0]} to {BAUD_RATES[-1]}"
-        raise LinkUrlError(f"{what}: expected {SERIAL}:device:baud with a baud rate {rates}")
-    return device, int(baud)
-
-
-def _is_number(text: str) -> bool:
-    """Whether the text is a whole number of at most 8 digits, which ``int`` always accepts."""
-    return text.isdecimal() and len(text) <= 8
-
-
-def is_loopback(host: str) -> bool:
-    """Whether a host is a loopback address or "localhost"."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+def _listed(words: "list[str] | tuple[str, ...]", last: str) -> str:
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"

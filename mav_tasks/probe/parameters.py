@@ -3,7 +3,6 @@
 MAVLink guide, "Parameter Protocol": an integer stands in a float by its bytes, or cast to one.
 """
 
-from collections.abc import Mapping
 from math import isnan
 from struct import pack, unpack
 
@@ -11,42 +10,30 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.probe.conversation import Conversation
 from mav_tasks.probe.findings import Findings
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services import turning_kind
 from mav_tasks.services.loss_failsafe import AFTER, LossFailsafe
+from mav_tasks.services.turning_kind import TurningKind
 
 BYTEWISE = 16  # MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 FORMATS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}  # by MAV_PARAM_TYPE
 ASKS, ASK_AGAIN = 3, 0.4  # s
-#: of ArduPilot; the newest names too (4.7), of which a rover has the one or the other
-ARDUPILOT = (
-    *("SYSID_MYGCS", "SYSID_ENFORCE", "MAV_GCS_SYSID", "MAV_OPTIONS"),
-    *("FS_ACTION", "FS_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_THR_ENABLE"),
-    *("FS_EKF_ACTION", "FS_CRASH_CHECK", "GUID_OPTIONS", "FENCE_ENABLE", "FENCE_ACTION"),
-    *("ARMING_CHECK", "ARMING_REQUIRE", "WP_SPEED", "CRUISE_SPEED", "ATC_DECEL_MAX"),
-    *turning_kind.ARDUPILOT,
-)
-PX4 = (
-    *("COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_IN_MODE", "COM_RC_LOSS_T", "COM_DL_LOSS_T"),
-    *("NAV_RCL_ACT", "COM_RCL_EXCEPT", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),
-    *("COM_DISARM_PRFLT", "RO_SPEED_LIM"),
-    *turning_kind.PX4,
-)
-BY_PERSONA: Mapping[str, tuple[str, ...]] = {"ardupilot": ARDUPILOT, "px4": PX4, "generic": PX4}
 #: what an ArduPilot Rover does, whatever its parameters say
 FIXED = "stops 3 s after the last setpoint, as ArduPilot does (fixed; observed on 4.6.3)"
 
 
 def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
     """Read those that matter for the rover's make; who lacks one does not answer."""
-    names = BY_PERSONA.get(findings.autopilot, ())
+    persona = talk.persona
+    if persona is None:
+        return
+    names = persona.probed_parameters + persona.turning_parameters
     for _ in range(ASKS):
         missing = [name for name in names if name not in talk.parameters]
         for name in missing:
             talk.send(m.ParamRequestRead(*talk.target, name.encode(), -1))
         yield Wait(lambda: all(name in talk.parameters for name in names), ASK_AGAIN)
-    unsaid = 0 if findings.autopilot == "ardupilot" else BYTEWISE
-    flags = unsaid if findings.capabilities is None else findings.capabilities
-    is_bytewise = bool(flags & BYTEWISE)
+    is_bytewise = persona.has_bytewise_parameters
+    if findings.capabilities is not None:
+        is_bytewise = bool(findings.capabilities & BYTEWISE)
     for name in names:
         value = talk.parameters.get(name)
         if value is None:
@@ -54,12 +41,15 @@ def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
         else:
             findings.parameters[name] = value_of(value, is_bytewise=is_bytewise)
     findings.loss_by_parameters = _loss_of(talk)
-    if talk.persona is not None:
-        kind = turning_kind.TurningKind(talk.target, talk.persona)
-        for message in talk.parameters.values():
-            kind.receive(message)
-        findings.turning = "" if kind.turning is None else kind.turning.value
-        findings.turning_radius = kind.radius
+    kind = TurningKind(
+        talk.target,
+        persona.turning_parameters,
+        is_bytewise=persona.has_bytewise_parameters,
+    )
+    for message in talk.parameters.values():
+        kind.receive(message)
+    findings.turning = "" if kind.turning is None else kind.turning.value
+    findings.turning_radius = kind.radius
 
 
 def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:

@@ -9,7 +9,7 @@ from mav_tasks.probe.drive_controller import DriveController, DriveEnded
 from mav_tasks.probe.findings import Drive
 from mav_tasks.probe.steps import Steps
 from mav_tasks.services.orders import STANDING, Speeds
-from mav_tasks.services.persona import ARDUPILOT, PX4, Persona
+from mav_tasks.services.persona import BY_COURSE, WITH_YAW_RATE, Persona
 from mav_tasks.tasks.driving.guidance import wrap
 from mav_tasks.tasks.task import Pose
 
@@ -58,9 +58,9 @@ class Kind:
 def kinds_of(persona: Persona) -> list[Kind]:
     """Return all that the server could use, the persona's own first."""
     kinds = [
-        Kind(persona, PX4.setpoint_mask, MavFrame.LOCAL_NED, by_course=True),
-        Kind(persona, PX4.setpoint_mask, MavFrame.BODY_NED, by_course=False),
-        Kind(persona, ARDUPILOT.setpoint_mask, MavFrame.BODY_NED, by_course=False),
+        Kind(persona, BY_COURSE, MavFrame.LOCAL_NED, by_course=True),
+        Kind(persona, BY_COURSE, MavFrame.BODY_NED, by_course=False),
+        Kind(persona, WITH_YAW_RATE, MavFrame.BODY_NED, by_course=False),
     ]
     return sorted(
         kinds,
@@ -138,7 +138,7 @@ class Trials:
 
     @property
     def _rate_kind(self) -> Kind | None:
-        rate = Kind(self._persona, ARDUPILOT.setpoint_mask, MavFrame.BODY_NED, by_course=False)
+        rate = Kind(self._persona, WITH_YAW_RATE, MavFrame.BODY_NED, by_course=False)
         return rate if rate.name in self._drive.accepted else None
 
     def _look_at_standing(self) -> Steps[None]:

@@ -9,6 +9,7 @@ from math import isnan
 
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, MavModeFlag, PositionTargetTypemask
 from mav_tasks.mavlink.messages import Heartbeat
+from mav_tasks.services import turning_kind
 from mav_tasks.settings import Turning
 
 T = PositionTargetTypemask
@@ -16,6 +17,8 @@ T = PositionTargetTypemask
 NO_MODE = -1
 MAIN_BITS, SUB_BITS = 16, 24  # where PX4's custom_mode has its main and its sub mode
 VELOCITY_ONLY = int(T.X_IGNORE | T.Y_IGNORE | T.Z_IGNORE | T.AX_IGNORE | T.AY_IGNORE | T.AZ_IGNORE)
+WITH_YAW_RATE = VELOCITY_ONLY | int(T.YAW_IGNORE)
+BY_COURSE = VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +26,7 @@ class Persona:
     """The conventions of one family of autopilots."""
 
     name: str
+    autopilot: int  # MAV_AUTOPILOT of its heartbeat
     control_mode: int  # custom_mode in which setpoints are followed
     hold_mode: int  # custom_mode in which the vehicle stands
     manual_modes: frozenset[int]  # a person drives
@@ -53,7 +57,11 @@ class Persona:
     #: in our mode it drives as fast as set-point or throttle stick asks, whichever is more; a stick
     #: against the direction that is asked for does not count
     heeds_throttle_stick: bool
+    #: an integer's bytes stand in a PARAM_VALUE's float; else the integer is cast
+    has_bytewise_parameters: bool
     cruise_parameters: tuple[str, ...]  # m/s, of what names no speed
+    turning_parameters: tuple[str, ...]  # those that TurningKind reads
+    probed_parameters: tuple[str, ...]  # others that the probe reads: failsafes and limits
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
     turning: Turning = Turning.ON_SPOT  # whichever way its set-points are read
@@ -124,6 +132,7 @@ def _whole(value: float, *, high: int) -> int | None:
 #: velocity would turn the vehicle round instead (observed on 4.6.3). Mask 0x05C7.
 ARDUPILOT = Persona(
     name="ardupilot",
+    autopilot=MavAutopilot.ARDUPILOTMEGA,
     control_mode=15,  # GUIDED
     hold_mode=4,
     manual_modes=frozenset({0}),
@@ -157,8 +166,16 @@ ARDUPILOT = Persona(
     has_loss_failsafe=False,  # it stops after 3 s (observed on 4.6.3)
     honours_yaw_rate=True,
     heeds_throttle_stick=True,  # 4.6.3
+    has_bytewise_parameters=False,
     cruise_parameters=("WP_SPEED", "CRUISE_SPEED"),
-    setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE),
+    turning_parameters=turning_kind.ARDUPILOT,
+    probed_parameters=(  # the newest names too (4.7); a rover has either the one or the other
+        *("SYSID_MYGCS", "SYSID_ENFORCE", "MAV_GCS_SYSID", "MAV_OPTIONS"),
+        *("FS_ACTION", "FS_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_THR_ENABLE"),
+        *("FS_EKF_ACTION", "FS_CRASH_CHECK", "GUID_OPTIONS", "FENCE_ENABLE", "FENCE_ACTION"),
+        *("ARMING_CHECK", "ARMING_REQUIRE", "WP_SPEED", "CRUISE_SPEED", "ATC_DECEL_MAX"),
+    ),
+    setpoint_mask=WITH_YAW_RATE,
     setpoint_frame=MavFrame.BODY_NED,
 )
 
@@ -171,6 +188,7 @@ def _px4(main: int, sub: int = 0) -> int:
 #: itself; yaw and yaw rate are passed over. Mask 0x0DC7.
 PX4 = Persona(
     name="px4",
+    autopilot=MavAutopilot.PX4,
     control_mode=_px4(6),  # OFFBOARD
     hold_mode=_px4(4, 3),
     manual_modes=frozenset(map(_px4, (1, 2, 3, 5, 7, 8, 9))),
@@ -203,19 +221,30 @@ PX4 = Persona(
     has_loss_failsafe=True,
     honours_yaw_rate=False,
     heeds_throttle_stick=False,
+    has_bytewise_parameters=True,
     cruise_parameters=("RO_SPEED_LIM",),
-    setpoint_mask=VELOCITY_ONLY | int(T.YAW_IGNORE | T.YAW_RATE_IGNORE),
+    turning_parameters=turning_kind.PX4,
+    probed_parameters=(
+        *("COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_IN_MODE", "COM_RC_LOSS_T", "COM_DL_LOSS_T"),
+        *("NAV_RCL_ACT", "COM_RCL_EXCEPT", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),
+        *("COM_DISARM_PRFLT", "RO_SPEED_LIM"),
+    ),
+    setpoint_mask=BY_COURSE,
     setpoint_frame=MavFrame.LOCAL_NED,
 )
 
 #: speaks as PX4 does; what else is in it nobody knows
-GENERIC = replace(PX4, name="generic", stop_disarms=True, is_held_before_places=False)
+GENERIC = replace(
+    PX4,
+    name="generic",
+    autopilot=MavAutopilot.GENERIC,
+    stop_disarms=True,
+    is_held_before_places=False,
+)
 
-PERSONAS: Mapping[int, Persona] = {
-    MavAutopilot.ARDUPILOTMEGA: ARDUPILOT,
-    MavAutopilot.PX4: PX4,
-    MavAutopilot.GENERIC: GENERIC,
-}
+#: by name
+PERSONAS: Mapping[str, Persona] = {each.name: each for each in (ARDUPILOT, PX4, GENERIC)}
+_BY_AUTOPILOT = {each.autopilot: each for each in PERSONAS.values()}
 
 
 def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Persona | None:
@@ -223,7 +252,7 @@ def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Perso
 
     ``honours_yaw_rate``: one that need not, turns at a yaw rate all the same.
     """
-    persona = PERSONAS.get(heartbeat.autopilot)
+    persona = _BY_AUTOPILOT.get(heartbeat.autopilot)
     if persona is None or persona.honours_yaw_rate or not honours_yaw_rate:
         return persona
     return with_yaw_rate(persona, is_honoured=True)
@@ -231,12 +260,11 @@ def persona_of(heartbeat: Heartbeat, *, honours_yaw_rate: bool = False) -> Perso
 
 def with_yaw_rate(persona: Persona, *, is_honoured: bool) -> Persona:
     """Return the persona as one that follows yaw rates and reverses, or is steered by course."""
-    like = ARDUPILOT if is_honoured else PX4
     return replace(
         persona,
         honours_yaw_rate=is_honoured,
-        setpoint_mask=like.setpoint_mask,
-        setpoint_frame=like.setpoint_frame,
+        setpoint_mask=WITH_YAW_RATE if is_honoured else BY_COURSE,
+        setpoint_frame=MavFrame.BODY_NED if is_honoured else MavFrame.LOCAL_NED,
     )
 
 

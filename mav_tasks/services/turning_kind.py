@@ -12,7 +12,6 @@ from struct import pack, unpack
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.messages import ParamRequestRead, ParamValue
-from mav_tasks.services.persona import Persona
 from mav_tasks.settings import DEFAULT_TURNING_RADIUS, Turning
 
 OUTPUTS = 8  # of which a rover's steering and throttles are some
@@ -32,10 +31,11 @@ REAL32 = 9  # MAV_PARAM_TYPE
 class TurningKind:
     """What is known of one vehicle's way of turning."""
 
-    def __init__(self, target: Address, persona: Persona) -> None:
+    def __init__(self, target: Address, names: tuple[str, ...], *, is_bytewise: bool) -> None:
+        """``is_bytewise``: an integer's bytes stand in the float of a PARAM_VALUE."""
         self._target = target
-        self._is_bytewise = persona.has_main_modes  # PX4: an integer's bytes stand in the float
-        self._names = PX4 if persona.has_main_modes else ARDUPILOT
+        self._is_bytewise = is_bytewise
+        self._names = names
         self._values: dict[str, float] = {}
         self._asked = 0
 
@@ -45,12 +45,10 @@ class TurningKind:
     @property
     def turning(self) -> Turning | None:
         """Return how it turns; None: it has not said so."""
-        if self._is_bytewise:
-            return self._by_airframe()
         functions = {int(self._values[name]) for name in FUNCTIONS if name in self._values}
         if {LEFT, RIGHT} <= functions:
             return Turning.ON_SPOT
-        return Turning.STEERED if STEERING in functions else None
+        return Turning.STEERED if STEERING in functions else self._by_airframe()
 
     @property
     def radius(self) -> float | None:

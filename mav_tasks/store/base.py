@@ -3,11 +3,12 @@
 Events are numbered in the order of ``append``; the count begins at 1 in each process.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.restored import Restored
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +36,36 @@ class HaltNotKept:
 Outcome = Kept | NotKept | HaltNotKept
 
 
+@dataclass(frozen=True, slots=True)
+class Which:
+    """A filter of events; None matches all. ``since`` is in UTC seconds."""
+
+    task: int | None = None
+    vehicle: int | None = None
+    since: float | None = None
+
+
 class Store(Protocol):
-    """The interface between runner and disk. Disk failures are outcomes, never exceptions."""
+    """The interface between runner and disk. Disk failures are outcomes, never exceptions.
+
+    Only ``load`` and ``journal`` raise: StoreError.
+    """
+
+    #: what people call the store
+    name: str
+    #: where ``opening.kind_of`` finds the store from any folder; a note on the disk names it
+    place: str
+
+    def load(self) -> Restored | None:
+        """Return the state of earlier runs, times in this process's monotonic seconds.
+
+        None: the store keeps no state over runs.
+        """
+        ...
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        """Yield every stored event, numbered over the life of the store."""
+        ...
 
     def append(self, events: Sequence[Event]) -> None:
         """Queue events to be made durable, in order; return at once."""
@@ -52,4 +81,23 @@ class Store(Protocol):
 
     def close(self) -> None:
         """Finish pending writes and close the store."""
+        ...
+
+
+class JournalReader(Protocol):
+    """Reads the journal of a store, also while a server writes it. Methods raise StoreError."""
+
+    def take(self, *, offset: float) -> Iterator[tuple[int, Event]]:
+        """Yield the events after those yielded before, numbered over the life of the store.
+
+        ``offset``, UTC minus monotonic seconds, is subtracted from times; 0 leaves them in UTC.
+        """
+        ...
+
+    def version(self) -> int:
+        """Return a number that changes when the store was written to."""
+        ...
+
+    def close(self) -> None:
+        """Close the journal."""
         ...

@@ -7,13 +7,13 @@ checkpointing the WAL, and a store that recovers from a full disk needs a full c
 
 import sqlite3
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 from mav_tasks.errors import StoreError
 from mav_tasks.store import schema
+from mav_tasks.store.base import Which
 from mav_tasks.store.codec import Unreadable
 from mav_tasks.store.reading import Rows, in_one_line
 from mav_tasks.tasks.events import Event
@@ -23,17 +23,8 @@ PAGE = 500  # rows of each table per page
 _KINDS = {kind.__name__: kind for kind in Event.__args__}
 
 
-@dataclass(frozen=True, slots=True)
-class Which:
-    """A filter of events; None matches all. ``since`` is in UTC seconds."""
-
-    task: int | None = None
-    vehicle: int | None = None
-    since: float | None = None
-
-
 class Journal:
-    """The events of a file, in order. All methods raise StoreError if the file is unreadable."""
+    """Implements ``JournalReader`` for a file."""
 
     def __init__(self, path: Path, which: Which | None = None) -> None:
         self._path = path.expanduser().absolute()
@@ -49,10 +40,7 @@ class Journal:
         return f"Journal({self._path.name}, event {self._number})"
 
     def take(self, *, offset: float) -> Iterator[tuple[int, Event]]:
-        """Yield the events after those yielded before, numbered over the life of the file.
-
-        ``offset``, UTC minus monotonic seconds, is subtracted from times; 0 leaves them in UTC.
-        """
+        """Yield the events after those yielded before, as JournalReader says."""
         while True:
             with in_one_line(self._path):
                 page, has_more = self._page(offset)

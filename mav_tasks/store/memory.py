@@ -1,8 +1,11 @@
 """A store in memory, lost with the process."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 
-from mav_tasks.store.base import Kept, Outcome
+from mav_tasks.errors import StoreError
+from mav_tasks.settings import Retention
+from mav_tasks.store.base import JournalReader, Kept, Outcome, Which
+from mav_tasks.store.opening import IN_MEMORY
 from mav_tasks.tasks.events import Event
 
 
@@ -10,6 +13,7 @@ class MemoryStore:
     """A journal that is lost with the process. Bounded: the oldest events are dropped first."""
 
     name = "in memory, lost with the process"
+    place = IN_MEMORY
 
     def __init__(self, *, capacity: int = 100_000) -> None:
         self._capacity = capacity
@@ -19,6 +23,13 @@ class MemoryStore:
 
     def __repr__(self) -> str:
         return f"MemoryStore({self._count} events)"
+
+    def load(self) -> None:
+        """Return None: nothing is kept over runs."""
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        """Yield the events that have not been dropped."""
+        yield from enumerate(self.events, 1 + self._count - len(self.events))
 
     def append(self, events: Sequence[Event]) -> None:
         """Add events."""
@@ -39,3 +50,23 @@ class MemoryStore:
 
     def close(self) -> None:
         """Do nothing: there is nothing to close."""
+
+
+def open_store(
+    _place: str, _wall_offset: Callable[[], float], _retention: Retention
+) -> MemoryStore:
+    """Return an empty store."""
+    return MemoryStore()
+
+
+def open_journal(_place: str, _which: Which) -> JournalReader:
+    """Raise StoreError: no other process can read it."""
+    raise StoreError(
+        "the server keeps its tasks in memory, so it has no journal; choose another store with "
+        "--store"
+    )
+
+
+def read_parameters(_place: str) -> dict[str, float]:
+    """Return {}: nothing is kept over runs."""
+    return {}

@@ -6,23 +6,26 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 
+from platformdirs import user_data_path
+
 from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.folders import make_private
 from mav_tasks.settings import Retention
-from mav_tasks.store.base import Outcome
+from mav_tasks.store import reading
+from mav_tasks.store.base import Outcome, Which
 from mav_tasks.store.database import Database
 from mav_tasks.store.halt_keeper import HaltKeeper
 from mav_tasks.store.halt_record import HaltRecord, event_of, word_of
 from mav_tasks.store.journal import Journal
 from mav_tasks.store.lock import Lock
 from mav_tasks.store.mailbox import Mailbox
-from mav_tasks.store.reading import read_restored
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.writer import Writer
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
 
+DEFAULT_STORE = "mav-tasks.sqlite3"
 HALTS_LIMIT = 1.0  # s at shutdown for writing the last halts
 CLOSE_LIMIT = 3.0  # s at shutdown for writing the remaining events
 TRIM_AT_OPEN = 0.5  # s of deleting expired rows at start; the rest is done while serving
@@ -45,7 +48,7 @@ class SqliteStore:
     ) -> None:
         self._wall_offset = wall_offset
         self._path = _real_path(Path(path))
-        self.name = str(self._path)
+        self.name = self.place = str(self._path)
         with ExitStack() as opened:
             opened.callback(Lock(self._path).release)
             record = HaltRecord(self._path)
@@ -81,7 +84,7 @@ class SqliteStore:
 
     def load(self) -> Restored:
         """Return the stored state, times in this process's monotonic seconds; raise StoreError."""
-        return read_restored(
+        return reading.read_restored(
             self._path, offset=self._wall_offset(), ended_well=self._ended_well, idle=self._idle
         )
 
@@ -139,6 +142,29 @@ class SqliteStore:
             offset=offset,
         )
         return False
+
+
+def open_store(place: str, wall_offset: Callable[[], float], retention: Retention) -> SqliteStore:
+    """Open a file; create it if it does not exist."""
+    return SqliteStore(_path_of(place), wall_offset=wall_offset, retention=retention)
+
+
+def open_journal(place: str, which: Which) -> Journal:
+    """Open the journal of a file."""
+    return Journal(_path_of(place), which)
+
+
+def read_parameters(place: str) -> dict[str, float]:
+    """Return the parameters in a file; {} if it does not exist."""
+    try:
+        path = _path_of(place).expanduser().absolute()
+        return reading.read_parameters(path) if path.exists() else {}
+    except (OSError, RuntimeError) as error:
+        raise StoreError(f"store {place}: {error}") from error
+
+
+def _path_of(place: str) -> Path:
+    return Path(place or user_data_path("mav-tasks", appauthor=False) / DEFAULT_STORE)
 
 
 def _real_path(path: Path) -> Path:

@@ -259,7 +259,7 @@ def test_a_full_disk_is_told(full: Path) -> None:
     ("options", "words"),
     [
         (("--store", "/nowhere/at.all"), "does not exist"),
-        (("--store", ":memory:"), "expected the path"),
+        (("--store", ":memory:"), "no journal"),
         (("--json", "--csv"), "choose one"),
         (("--since", "yesterday"), "--since yesterday"),
         (("--task", "9" * 30), "not a valid id"),

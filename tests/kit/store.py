@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from select import select
 
-from mav_tasks.store import Kept, NotKept, Outcome
+from mav_tasks.store import Kept, MemoryStore, NotKept, Outcome
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import Event
 
@@ -36,13 +36,13 @@ class PromptSqliteStore(SqliteStore):
         return outcomes
 
 
-class LateStore:
-    """Implements ``Store``: commits ``delay`` seconds after the append; ``inf``: never."""
+class LateStore(MemoryStore):
+    """Commits ``delay`` seconds after the append; ``inf``: never."""
 
     def __init__(self, *, delay: float = 0.0) -> None:
+        super().__init__()
         self.delay = delay
         self.clock: Callable[[], float] = lambda: 0.0  # the world sets its own clock
-        self.events: list[Event] = []
         self._under_way: deque[tuple[float, int]] = deque()
         self._failure: str | None = None
 
@@ -54,8 +54,8 @@ class LateStore:
         self._failure = text
 
     def append(self, events: Sequence[Event]) -> None:
-        self.events += events
-        self._under_way.append((self.clock(), len(self.events)))
+        super().append(events)
+        self._under_way.append((self.clock(), self._count))
 
     def take_outcomes(self) -> list[Outcome]:
         outcomes: list[Outcome] = []
@@ -65,9 +65,3 @@ class LateStore:
         while self._under_way and self._under_way[0][0] + self.delay <= self.clock():
             outcomes.append(Kept(self._under_way.popleft()[1]))
         return outcomes
-
-    def fileno(self) -> None:
-        """Return None: the world polls at every step."""
-
-    def close(self) -> None:
-        """Do nothing: nothing is open."""

@@ -12,6 +12,7 @@ from mav_tasks import probing
 from mav_tasks.cli import probe as command
 from mav_tasks.errors import UsageError
 from mav_tasks.links.base import Peer
+from mav_tasks.links.udp import UdpUrl
 from mav_tasks.probe.probe import Options, Probe
 
 URL = "udpout:127.0.0.1:14580"
@@ -24,6 +25,7 @@ class FakeLink:
     peers: tuple[Peer, ...] = ("rover",)
     is_local = True
     is_stream = False
+    note = ""
 
     def __init__(self) -> None:
         self.ends = os.pipe()
@@ -83,7 +85,7 @@ class Stubborn(Driving):
 @pytest.fixture
 def link(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeLink]:
     made = FakeLink()
-    monkeypatch.setattr(probing, "open_link", lambda *_, **__: made)
+    monkeypatch.setattr(UdpUrl, "open", lambda *_, **__: made)
     yield made
     assert made.is_closed
 

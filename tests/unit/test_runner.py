@@ -29,9 +29,9 @@ from mav_tasks.engine.inputs import (
 from mav_tasks.links.base import PeerChange, PeerState
 from mav_tasks.pump import Pump
 from mav_tasks.runner import EXIT_FAILED, Runner
-from mav_tasks.serve import open_store
 from mav_tasks.settings import Driving, Queueing, Settings
 from mav_tasks.store import MemoryStore
+from mav_tasks.store.opening import open_store
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.restored import Restored
@@ -144,7 +144,7 @@ def test_where_the_store_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert isinstance(open_store(":memory:"), MemoryStore)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     monkeypatch.setenv("HOME", str(tmp_path))
-    with contextlib.closing(open_store(None)) as store:
+    with contextlib.closing(open_store("")) as store:
         assert isinstance(store, SqliteStore)
         assert Path(store.name).is_relative_to(tmp_path.resolve())
         assert store.name.endswith("mav-tasks/mav-tasks.sqlite3")
@@ -157,6 +157,7 @@ class Flood:
     peers: tuple[object, ...] = ()
     is_local = True
     is_stream = False
+    note = ""
 
     def __init__(self, count: int) -> None:
         self.left = [(("127.0.0.1", 1), b"x")] * count
@@ -218,6 +219,7 @@ class FakeStream:
     peers: tuple[object, ...] = ()
     is_local = True
     is_stream = True
+    note = ""
 
     def __init__(self) -> None:
         self.told: list[PeerChange] = []  # before anything is read

@@ -19,8 +19,7 @@ from mav_tasks.clock import boot_time
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import AtOnce, Backlog, Packets, Peer
 from mav_tasks.links.base import Link, PeerChange, PeerState
-from mav_tasks.links.udp import UdpLink
-from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.udp import UdpLink, UdpUrl
 from mav_tasks.runner import Runner
 from mav_tasks.settings import Settings
 from mav_tasks.store import MemoryStore
@@ -97,7 +96,7 @@ class Pair:
     """A UDP link, and somebody who sends to it."""
 
     def __init__(self, opened: ExitStack) -> None:
-        self.link = UdpLink(LinkUrl("udpin", HOST, 0))
+        self.link = UdpLink(UdpUrl("udpin", HOST, 0))
         opened.callback(self.link.close)
         self.link.name = f"udpin:{self.link.fileno()}"
         self._sender = opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))

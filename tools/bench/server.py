@@ -18,16 +18,14 @@ import time
 from mav_tasks.clock import boot_time
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Peer
-from mav_tasks.links.udp import UdpLink
-from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.udp import UdpLink, UdpUrl
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink import messages as m
 from mav_tasks.recording import observers
 from mav_tasks.runner import Runner
 from mav_tasks.serve import tame_collector
 from mav_tasks.settings import Clients, Limits, Log, Queueing, Recording, Roles, Settings
-from mav_tasks.store import MemoryStore
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store.opening import IN_MEMORY, open_store
 
 from .child import HOST, READY
 
@@ -41,7 +39,7 @@ MOVING = 2 * PERIOD  # s; after a longer interval the stream had ended
 class TimedLink(UdpLink):
     """A vehicle link that measures the intervals of setpoints."""
 
-    def __init__(self, url: LinkUrl) -> None:
+    def __init__(self, url: UdpUrl) -> None:
         super().__init__(url)
         self._last: dict[int, float] = {}
         self.errors: list[float] = []
@@ -72,18 +70,14 @@ def _settings(*, drives: bool, is_limited: bool) -> Settings:
 
 
 async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
-    store = (
-        SqliteStore(options.store, wall_offset=lambda: time.time() - boot_time())
-        if options.store
-        else MemoryStore()
-    )
+    store = open_store(options.store or IN_MEMORY)
     now = boot_time()
     settings = _settings(drives=options.drive, is_limited=options.default_limits)
     engine = Engine(settings, now=now)
     recording = Recording(tlog=options.tlog, decisions=options.record)
     recorders = observers(recording, settings, None, now=now)
     tame_collector()
-    clients = [UdpLink(LinkUrl("udpin", HOST, options.client_port))]
+    clients = [UdpLink(UdpUrl("udpin", HOST, options.client_port))]
     print(READY, flush=True)
     return await Runner(
         engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders
@@ -102,7 +96,7 @@ def main() -> int:
     parser.add_argument("--drive", action="store_true")
     parser.add_argument("--default-limits", action="store_true")
     options = parser.parse_args()
-    link = TimedLink(LinkUrl("udpout", HOST, options.vehicle_port))
+    link = TimedLink(UdpUrl("udpout", HOST, options.vehicle_port))
     with log_to_stderr(Log()):
         if options.profile is None:
             code = asyncio.run(_serve(options, link))

@@ -62,7 +62,11 @@ class VehicleRequests:
         self.intervals = IntervalRequester(now=now)
         self.cruise = CruiseSpeed(target, persona.cruise_parameters)
         self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
-        self.turning = TurningKind(target, persona)
+        self.turning = TurningKind(
+            target,
+            persona.turning_parameters,
+            is_bytewise=persona.has_bytewise_parameters,
+        )
         self._shows = ASK_TO_SHOW  # how many more times it is asked for a heartbeat
         self._versions_asked = 0
         self._ask_version_at = now

@@ -12,7 +12,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from mav_tasks.client.aio import Client
 from mav_tasks.links.base import Link
 from mav_tasks.links.link_limits import TO_VEHICLES
-from mav_tasks.links.opening import open_link
 from mav_tasks.links.url import parse_url
 from rover_sim.field_trial.endpoint import Endpoint
 from rover_sim.field_trial.track import Track
@@ -95,7 +94,7 @@ class RealGround:
 
     def rover_link(self) -> Link | None:
         """Return a link to the rover's URL."""
-        return open_link(parse_url(self._url), limits=TO_VEHICLES)
+        return parse_url(self._url).open(limits=TO_VEHICLES)
 
     @property
     def can_reboot(self) -> bool:

@@ -11,7 +11,6 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from mav_tasks.links.link_limits import TO_CLIENTS
-from mav_tasks.links.opening import open_link
 from mav_tasks.links.url import parse_url
 from rover_sim.field_trial.endpoint import Endpoint
 from rover_sim.field_trial.track import Place, Track
@@ -69,7 +68,7 @@ class LinkTruth:
         self.track = Track()
         self._zero: tuple[int, int] | None = None
         self._loop = asyncio.get_running_loop()
-        link = open_link(parse_url(url), limits=TO_CLIENTS)
+        link = parse_url(url).open(limits=TO_CLIENTS)
         self.endpoint = Endpoint(link, self._take)
         self._asking = asyncio.ensure_future(self._ask())
 

@@ -17,7 +17,7 @@ from time import process_time
 from unittest import mock
 
 from mav_tasks.settings import Clients, Retention, Settings
-from mav_tasks.store import Kept, Outcome
+from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.events import Event
 from tests.kit.client import FakeClient
 from tests.kit.soak.bounds import reachable
@@ -42,31 +42,18 @@ class HourSettings:
     kept: int = KEPT_TASKS
 
 
-class Drain:
-    """Implements ``Store``: writes everything to the disk at once, and keeps nothing."""
+class Drain(MemoryStore):
+    """Writes everything to the disk at once, and keeps nothing."""
 
     def __init__(self, disk: Disk) -> None:
+        super().__init__()
         self._disk = disk
-        self._count = self._told = 0
         self.now: Callable[[], float] = lambda: 0.0
 
     def append(self, events: Sequence[Event]) -> None:
         """Write events."""
         self._disk.write(events, now=self.now())
         self._count += len(events)
-
-    def take_outcomes(self) -> list[Outcome]:
-        """Return the number of durable events, if it has changed."""
-        if self._told == self._count:
-            return []
-        self._told = self._count
-        return [Kept(self._count)]
-
-    def fileno(self) -> None:
-        """Return None: the world polls at every step."""
-
-    def close(self) -> None:
-        """Do nothing: the disk belongs to the caller."""
 
 
 class Hour:

@@ -11,7 +11,9 @@ from fastcrc.crc16 import mcrf4xx
 from mav_tasks.config.configuration import merged
 from mav_tasks.config.toml_file import decoded, layer_of
 from mav_tasks.errors import ConfigError, LinkUrlError, PlanFileError
-from mav_tasks.links.url import LinkUrl, parse_url
+from mav_tasks.links.endpoint import HostUrl
+from mav_tasks.links.serial import SerialUrl
+from mav_tasks.links.url import parse_url
 from mav_tasks.mavlink import _dialect
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -141,10 +143,11 @@ def link_url(data: bytes) -> None:
     except LinkUrlError as error:
         assert str(error).isprintable() or not text.isprintable()
         return
-    if isinstance(found, LinkUrl):
+    if isinstance(found, HostUrl):
         assert found.host
         assert 0 < found.port < 65536
     else:
+        assert isinstance(found, SerialUrl)
         assert found.device
         assert parse_url(str(found)) == found
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 from mav_tasks import SyncClient
-from mav_tasks.client import sync
-from mav_tasks.client.sync import ThreadPortal
+from mav_tasks.client import blocking
+from mav_tasks.client.blocking import ThreadPortal
 from mav_tasks.errors import ClientError, MavTasksError
 
 SOON = 5.0  # s on a very busy machine
@@ -67,7 +67,7 @@ def test_what_is_asked_after_the_end_is_said_so() -> None:
 
 
 def test_what_never_ends_by_itself_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sync, "ENDS_BY_ITSELF", 0.0)
+    monkeypatch.setattr(blocking, "ENDS_BY_ITSELF", 0.0)
     portal = ThreadPortal()
     told: list[str] = []
 

@@ -15,9 +15,7 @@ from mav_tasks.links.attempts import RETRY
 from mav_tasks.links.base import PeerChange, PeerState, StreamLink
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
 from mav_tasks.links.memory import MemoryNet
-from mav_tasks.links.opening import open_link
-from mav_tasks.links.serial import LEAD, USED, SerialLink
-from mav_tasks.links.url import SerialUrl
+from mav_tasks.links.serial import LEAD, USED, SerialLink, SerialUrl
 from mav_tasks.runner import link_changed
 from tests.kit.lines import Device, device, read_from
 
@@ -225,11 +223,11 @@ def test_it_is_unplugged_while_something_is_sent(
 )
 def test_what_is_no_serial_device_is_one_clear_error(path: str, words: str) -> None:
     with pytest.raises(LinkOpenError, match=rf"^link serial:{path}:{BAUD} cannot be .*{words}"):
-        open_link(SerialUrl(path, BAUD), limits=TO_VEHICLES)
+        SerialUrl(path, BAUD).open(limits=TO_VEHICLES)
 
 
 def test_a_plain_file_is_one_clear_error(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"")
     with pytest.raises(LinkOpenError, match="not a serial device"):
-        open_link(SerialUrl(str(path), BAUD), limits=TO_VEHICLES)
+        SerialUrl(str(path), BAUD).open(limits=TO_VEHICLES)

@@ -14,10 +14,9 @@ from mav_tasks.links import tcp_out
 from mav_tasks.links.attempts import RETRY
 from mav_tasks.links.base import Peer, PeerChange, PeerState, StreamLink
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES, LinkLimits
-from mav_tasks.links.opening import open_link
-from mav_tasks.links.tcp_in import TcpInLink
-from mav_tasks.links.tcp_out import TcpOutLink
-from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.tcp_in import TcpInLink, TcpInUrl
+from mav_tasks.links.tcp_out import TcpOutLink, TcpOutUrl
+from mav_tasks.links.url import parse_url
 
 HOST = "127.0.0.1"
 LIMIT = 10.0  # s
@@ -43,7 +42,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 @pytest.fixture
 def listening() -> Iterator[TcpInLink]:
-    link = TcpInLink(LinkUrl("tcpin", HOST, 0), limits=TO_CLIENTS)
+    link = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=TO_CLIENTS)
     yield link
     link.close()
 
@@ -201,7 +200,7 @@ def test_one_that_comes_again_from_the_same_place_does_so_after_it_has_gone(
 
 
 def test_connections_are_bounded() -> None:
-    listening = TcpInLink(LinkUrl("tcpin", HOST, 0), limits=replace(TO_CLIENTS, connections=3))
+    listening = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=replace(TO_CLIENTS, connections=3))
     watched, clients = up(listening, 3)
     with dial(listening) as late:
         watched.until(lambda: listening.refused == 1)
@@ -218,7 +217,7 @@ def test_connections_are_bounded() -> None:
 
 @pytest.mark.parametrize("limits", [TO_VEHICLES, TO_CLIENTS])
 def test_a_connection_sends_at_once_and_notices_when_nobody_is_there(limits: LinkLimits) -> None:
-    listening = TcpInLink(LinkUrl("tcpin", HOST, 0), limits=limits)
+    listening = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=limits)
     _, (client,) = up(listening, 1)
     (connection,) = listening._connections._by_peer.values()
     option = connection.socket.getsockopt
@@ -254,7 +253,7 @@ def test_without_descriptors_it_waits_for_some(
 
 def test_a_port_in_use_is_one_clear_error(listening: TcpInLink) -> None:
     with pytest.raises(LinkOpenError) as error:
-        TcpInLink(LinkUrl("tcpin", HOST, listening.port), limits=TO_CLIENTS)
+        TcpInLink(TcpInUrl("tcpin", HOST, listening.port), limits=TO_CLIENTS)
     words = f"link tcpin:{HOST}:{listening.port} cannot be opened: Address already in use"
     assert str(error.value) == words
 
@@ -262,7 +261,7 @@ def test_a_port_in_use_is_one_clear_error(listening: TcpInLink) -> None:
 @pytest.mark.parametrize("kind", ["tcpin", "tcp"])
 def test_a_host_that_is_none_is_one_clear_error(kind: str) -> None:
     with pytest.raises(LinkOpenError, match=rf"^link {kind}:no host:1 cannot be opened: "):
-        open_link(LinkUrl(kind, "no host", 1), limits=TO_CLIENTS)
+        parse_url(f"{kind}:no host:1").open(limits=TO_CLIENTS)
 
 
 # a slow reader
@@ -304,7 +303,7 @@ def test_towards_a_vehicle_nothing_old_is_delivered_later(
     server: socket.socket, clock: Clock
 ) -> None:
     """Its connection stalls; the newest setpoint comes next after what the system had taken."""
-    link = TcpOutLink(LinkUrl("tcp", HOST, server.getsockname()[1]), limits=TO_VEHICLES)
+    link = TcpOutLink(TcpOutUrl("tcp", HOST, server.getsockname()[1]), limits=TO_VEHICLES)
     server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2_048)
     watched = Watched(link)
     watched.until(lambda: watched.states == [PeerState.UP])
@@ -331,7 +330,7 @@ def test_towards_a_vehicle_nothing_old_is_delivered_later(
 
 def test_a_dialling_link_has_one_peer_that_comes(server: socket.socket) -> None:
     port = server.getsockname()[1]
-    link = TcpOutLink(LinkUrl("tcp", HOST, port), limits=TO_VEHICLES)
+    link = TcpOutLink(TcpOutUrl("tcp", HOST, port), limits=TO_VEHICLES)
     watched = Watched(link)
     watched.until(lambda: watched.changes)
     other, _ = server.accept()
@@ -353,7 +352,7 @@ def test_a_dialling_link_has_one_peer_that_comes(server: socket.socket) -> None:
 def test_it_waits_for_the_other_end_and_dials_again_when_it_is_lost(clock: Clock) -> None:
     with socket.create_server((HOST, 0)) as reserved:
         port = reserved.getsockname()[1]
-    link = TcpOutLink(LinkUrl("tcp", HOST, port), limits=TO_VEHICLES)
+    link = TcpOutLink(TcpOutUrl("tcp", HOST, port), limits=TO_VEHICLES)
     watched = Watched(link)
     for _ in range(3):
         watched.until(lambda: link._dialling is None and watched.changes)
@@ -379,7 +378,7 @@ def test_it_waits_for_the_other_end_and_dials_again_when_it_is_lost(clock: Clock
 
 
 def test_it_dials_no_more_than_once_a_second(server: socket.socket, clock: Clock) -> None:
-    link = TcpOutLink(LinkUrl("tcp", HOST, server.getsockname()[1]), limits=TO_VEHICLES)
+    link = TcpOutLink(TcpOutUrl("tcp", HOST, server.getsockname()[1]), limits=TO_VEHICLES)
     watched = Watched(link)
     watched.until(lambda: watched.changes)
     server.accept()[0].close()
@@ -398,7 +397,7 @@ def test_it_dials_no_more_than_once_a_second(server: socket.socket, clock: Clock
 def test_one_that_never_answers_is_given_up_and_dialled_again(
     clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    link = TcpOutLink(LinkUrl("tcp", HOST, 9), limits=TO_VEHICLES)
+    link = TcpOutLink(TcpOutUrl("tcp", HOST, 9), limits=TO_VEHICLES)
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as full:
         full.bind((HOST, 0))
         full.listen(0)
@@ -424,7 +423,7 @@ def test_one_that_never_answers_is_given_up_and_dialled_again(
 
 def test_what_was_sent_just_before_the_end_arrives(server: socket.socket) -> None:
     """Even with something unread, for which the system would otherwise reset the connection."""
-    link = TcpOutLink(LinkUrl("tcp", HOST, server.getsockname()[1]), limits=TO_VEHICLES)
+    link = TcpOutLink(TcpOutUrl("tcp", HOST, server.getsockname()[1]), limits=TO_VEHICLES)
     watched = Watched(link)
     watched.until(lambda: watched.changes)
     other, _ = server.accept()
@@ -438,6 +437,6 @@ def test_what_was_sent_just_before_the_end_arrives(server: socket.socket) -> Non
 
 @pytest.mark.parametrize(("host", "local"), [(HOST, True), ("localhost", True), ("0.0.0.0", False)])
 def test_a_link_beyond_this_machine_is_not_local(host: str, local: bool) -> None:
-    link = TcpInLink(LinkUrl("tcpin", host, 0), limits=TO_CLIENTS)
+    link = TcpInLink(TcpInUrl("tcpin", host, 0), limits=TO_CLIENTS)
     assert link.is_local is local
     link.close()

@@ -12,9 +12,8 @@ from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.base import Link, Peer
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
 from mav_tasks.links.local_port import COUNT, FIRST, port_for
-from mav_tasks.links.opening import open_link
-from mav_tasks.links.udp import UdpLink
-from mav_tasks.links.url import LinkUrl
+from mav_tasks.links.udp import UdpLink, UdpUrl
+from mav_tasks.links.url import parse_url
 
 HOST = "127.0.0.1"
 
@@ -30,7 +29,7 @@ def other() -> Iterator[socket.socket]:
 
 @pytest.fixture
 def listening() -> Iterator[UdpLink]:
-    link = UdpLink(LinkUrl("udpin", HOST, 0))
+    link = UdpLink(UdpUrl("udpin", HOST, 0))
     yield link
     link.close()
 
@@ -85,7 +84,7 @@ def test_without_datagrams_it_gives_none_at_once(listening: UdpLink) -> None:
 
 
 def test_a_dialling_link_knows_its_peer_beforehand(other: socket.socket) -> None:
-    link = UdpLink(LinkUrl("udpout", HOST, other.getsockname()[1]))
+    link = UdpLink(UdpUrl("udpout", HOST, other.getsockname()[1]))
     assert link.peers == (other.getsockname(),)
     link.send(link.peers[0], b"first word")
     data, sender = other.recvfrom(100)
@@ -97,7 +96,7 @@ def test_a_dialling_link_knows_its_peer_beforehand(other: socket.socket) -> None
 
 def test_peers_that_are_pushed_to_are_known_beforehand(other: socket.socket) -> None:
     port = other.getsockname()[1]
-    link = UdpLink(LinkUrl("udpin", HOST, 0), push=(("localhost", port),))
+    link = UdpLink(UdpUrl("udpin", HOST, 0), push=(("localhost", port),))
     assert link.peers == ((HOST, port),)
     link.close()
 
@@ -108,7 +107,7 @@ def test_peers_that_are_pushed_to_are_known_beforehand(other: socket.socket) -> 
 def test_a_link_is_local_if_all_that_it_speaks_to_are(
     push: tuple[tuple[str, int], ...], local: bool
 ) -> None:
-    link = UdpLink(LinkUrl("udpin", HOST, 0), push=push)
+    link = UdpLink(UdpUrl("udpin", HOST, 0), push=push)
     assert link.is_local is local
     link.close()
 
@@ -116,13 +115,13 @@ def test_a_link_is_local_if_all_that_it_speaks_to_are(
 def test_a_port_in_use_is_one_clear_error(other: socket.socket) -> None:
     port = other.getsockname()[1]
     with pytest.raises(LinkOpenError) as error:
-        UdpLink(LinkUrl("udpin", HOST, port))
+        UdpLink(UdpUrl("udpin", HOST, port))
     assert str(error.value) == f"link udpin:{HOST}:{port} cannot be opened: Address already in use"
 
 
 def test_a_host_that_is_none_is_one_clear_error() -> None:
     with pytest.raises(LinkOpenError, match=r"^link udpin:no host:1 cannot be opened: "):
-        UdpLink(LinkUrl("udpin", "no host", 1))
+        UdpLink(UdpUrl("udpin", "no host", 1))
 
 
 def test_a_peer_that_is_gone_costs_nothing_but_the_datagram(listening: UdpLink) -> None:
@@ -157,20 +156,21 @@ def test_a_link_that_dials_this_machine_hears_no_other(
 
     monkeypatch.setattr(socket, "socket", noted)
     host = HOST if family == socket.AF_INET else "::1"
-    link = UdpLink(LinkUrl("udpout", host, 9))
+    link = UdpLink(UdpUrl("udpout", host, 9))
     link.send(link.peers[0], b"hello")
     assert made[0].getsockname()[0] == host
     link.close()
 
 
 def test_one_that_speaks_to_others_too_hears_them() -> None:
-    link = UdpLink(LinkUrl("udpout", HOST, 9), push=(("192.0.2.1", 9),))
+    link = UdpLink(UdpUrl("udpout", HOST, 9), push=(("192.0.2.1", 9),))
     assert not link.is_local
     link.close()
 
 
 def dialling(port: int, *, local: int | None = None) -> UdpLink:
-    link = open_link(LinkUrl("udpout", HOST, port, local=local), limits=TO_VEHICLES)
+    option = "" if local is None else f"?local={local}"
+    link = parse_url(f"udpout:{HOST}:{port}{option}").open(limits=TO_VEHICLES)
     assert isinstance(link, UdpLink)
     return link
 
@@ -219,8 +219,8 @@ def test_a_port_that_the_url_names_is_the_one_or_none(other: socket.socket) -> N
 
 
 def test_clients_dial_from_any_port(other: socket.socket) -> None:
-    url = LinkUrl("udpout", HOST, other.getsockname()[1])
-    several = [open_link(url, limits=TO_CLIENTS) for _ in range(3)]
+    url = UdpUrl("udpout", HOST, other.getsockname()[1])
+    several = [url.open(limits=TO_CLIENTS) for _ in range(3)]
     assert len({address_of(cast(UdpLink, link)) for link in several}) == 3
     for link in several:
         link.close()
@@ -254,7 +254,7 @@ def test_what_has_no_stamp_counts_as_having_waited_for_the_longest(
     monkeypatch: pytest.MonkeyPatch, other: socket.socket
 ) -> None:
     monkeypatch.setattr("mav_tasks.links.udp.ask_for_stamps", lambda sock: None)
-    link = UdpLink(LinkUrl("udpin", HOST, 0))
+    link = UdpLink(UdpUrl("udpin", HOST, 0))
     other.sendto(b"word", address_of(link))
     wait_for(link)
     assert link.receive_stamped(64, longest=3.0) == ([(other.getsockname(), b"word")], [3.0])

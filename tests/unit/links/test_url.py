@@ -7,13 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.errors import LinkUrlError
-from mav_tasks.links.url import (
-    LinkUrl,
-    SerialUrl,
-    is_loopback,
-    parse_endpoint,
-    parse_url,
-)
+from mav_tasks.links import serial, tcp_in, tcp_out, udp
+from mav_tasks.links.endpoint import HostUrl, is_loopback, parse_endpoint
+from mav_tasks.links.serial import SerialUrl
+from mav_tasks.links.tcp_in import TcpInUrl
+from mav_tasks.links.tcp_out import TcpOutUrl
+from mav_tasks.links.udp import UdpUrl
+from mav_tasks.links.url import KINDS, KindModule, LinkUrl, parse_url
+from tests.kit import third_link
+
+#: mypy checks each module against the interface
+MODULES: list[KindModule] = [serial, tcp_in, tcp_out, udp, third_link]
 
 RATES = "from 1200 to 12000000"
 EXPECTED = (
@@ -25,12 +29,12 @@ EXPECTED = (
 @pytest.mark.parametrize(
     ("text", "url"),
     [
-        ("udpin:127.0.0.1:14560", LinkUrl("udpin", "127.0.0.1", 14560)),
-        ("udpout:localhost:14580", LinkUrl("udpout", "localhost", 14580)),
-        ("udpin://0.0.0.0:14550", LinkUrl("udpin", "0.0.0.0", 14550)),
-        ("udpout:[::1]:65535", LinkUrl("udpout", "::1", 65535)),
-        ("tcpin:0.0.0.0:5760", LinkUrl("tcpin", "0.0.0.0", 5760)),
-        ("tcp:rover.local:5760", LinkUrl("tcp", "rover.local", 5760)),
+        ("udpin:127.0.0.1:14560", UdpUrl("udpin", "127.0.0.1", 14560)),
+        ("udpout:localhost:14580", UdpUrl("udpout", "localhost", 14580)),
+        ("udpin://0.0.0.0:14550", UdpUrl("udpin", "0.0.0.0", 14550)),
+        ("udpout:[::1]:65535", UdpUrl("udpout", "::1", 65535)),
+        ("tcpin:0.0.0.0:5760", TcpInUrl("tcpin", "0.0.0.0", 5760)),
+        ("tcp:rover.local:5760", TcpOutUrl("tcp", "rover.local", 5760)),
         ("serial:/dev/ttyUSB0:57600", SerialUrl("/dev/ttyUSB0", 57_600)),
         (
             "serial:/dev/serial/by-path/pci-0:1.0:9600",
@@ -38,7 +42,7 @@ EXPECTED = (
         ),
     ],
 )
-def test_a_url_names_kind_host_and_port(text: str, url: LinkUrl | SerialUrl) -> None:
+def test_a_url_names_kind_host_and_port(text: str, url: LinkUrl) -> None:
     assert parse_url(text) == url
 
 
@@ -107,7 +111,7 @@ def test_any_text_is_a_url_or_a_clear_error(text: str) -> None:
     problem = ""
     try:
         url = parse_url(text)
-        assert isinstance(url, SerialUrl) or 0 < url.port < 65536
+        assert not isinstance(url, HostUrl) or 0 < url.port < 65536
     except LinkUrlError as error:
         problem = str(error)
     assert not problem or repr(text) in problem
@@ -145,7 +149,7 @@ def test_a_url_says_what_is_asked_of_signatures(
     link: str, options: str, unsigned: bool | None, key: str
 ) -> None:
     url = parse_url(link + options)
-    assert (url.unsigned, url.key) == (unsigned, key)
+    assert (url.options.unsigned, url.options.key) == (unsigned, key)
     assert str(url) == link
     assert url == parse_url(link), "it is the same link, whatever is asked of it"
 
@@ -155,15 +159,17 @@ def test_a_url_says_what_is_asked_of_signatures(
     [
         (
             "?keys=a",
-            "unknown option 'keys': expected unsigned=allow, unsigned=refuse, key=NAME and local",
+            "unknown option 'keys': expected unsigned=allow, unsigned=refuse and key=NAME",
         ),
         ("?unsigned=yes", "unsigned: expected one of "),
         ("?unsigned", "unsigned: expected one of "),
         ("?key=", "key: expected one of "),
         ("?key=a&key=b", "key is given twice"),
         ("?key=a&", "unknown option ''"),
-        ("?local=14590", "local: only udpout has a local port"),
-        ("?local=0", "local: expected a port from 1 to 65535"),
+        (
+            "?local=14590",
+            "unknown option 'local': expected unsigned=allow, unsigned=refuse and key",
+        ),
     ],
 )
 def test_an_unknown_option_is_refused_by_name(options: str, words: str) -> None:
@@ -173,5 +179,17 @@ def test_an_unknown_option_is_refused_by_name(options: str, words: str) -> None:
 
 def test_a_url_says_from_which_port_it_dials() -> None:
     url = parse_url("udpout:127.0.0.1:14580?local=14590")
-    assert isinstance(url, LinkUrl)
-    assert (url.local, str(url)) == (14590, "udpout:127.0.0.1:14580")
+    assert isinstance(url, UdpUrl)
+    assert (url.options.others, str(url)) == ({"local": "14590"}, "udpout:127.0.0.1:14580")
+    with pytest.raises(LinkUrlError, match="local: expected a port from 1 to 65535"):
+        parse_url("udpout:127.0.0.1:14580?local=0")
+    with pytest.raises(LinkUrlError, match=r"unknown option 'x': expected .* and local=PORT"):
+        parse_url("udpout:127.0.0.1:14580?x=0")
+
+
+def test_a_third_kind_takes_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(KINDS, "unix", third_link.KIND)
+    url = parse_url("unix:/tmp/rover?key=anna")
+    assert (str(url), url.options.key, url.is_nearby) == ("unix:/tmp/rover", "anna", True)
+    with pytest.raises(LinkUrlError, match=r"serial:device:baud or unix:path$"):
+        parse_url("other:/tmp/rover")

@@ -14,7 +14,9 @@ REAL32, INT32, INT16 = 9, 6, 4
 
 
 def kind_of(persona: Persona, **values: float) -> TurningKind:
-    made = TurningKind(Address(1, 1), persona)
+    made = TurningKind(
+        Address(1, 1), persona.turning_parameters, is_bytewise=persona.has_bytewise_parameters
+    )
     for name, value in values.items():
         wire, type_ = value, REAL32
         if isinstance(value, int):

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mav_tasks.settings import Retention
-from mav_tasks.store import Kept, NotKept, Outcome
+from mav_tasks.store import Kept, NotKept, Outcome, Store
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import TaskSubmitted
 from mav_tasks.tasks.goal import Move
@@ -55,7 +55,7 @@ def opened(
         store.close()
 
 
-def wait_for(store: SqliteStore, through: int) -> list[Outcome]:
+def wait_for(store: Store, through: int) -> list[Outcome]:
     """Wait until events are kept, woken by the descriptor; gives all outcomes until then."""
     outcomes: list[Outcome] = []
     while Kept(through) not in outcomes:
@@ -71,11 +71,12 @@ def wait_for_failure(store: SqliteStore) -> NotKept:
                 return outcome
 
 
-def next_outcomes(store: SqliteStore) -> list[Outcome]:
+def next_outcomes(store: Store) -> list[Outcome]:
     """Wait for the next outcomes."""
     began = time.monotonic()
     descriptor = store.fileno()
-    assert descriptor is not None
+    if descriptor is None:  # outcomes are there at once
+        return store.take_outcomes()
     ready, _, _ = select.select([descriptor], [], [], PATIENCE)
     assert ready, f"no outcome in {time.monotonic() - began:.0f} s"
     return store.take_outcomes()

@@ -12,7 +12,8 @@ import pytest
 from mav_tasks.errors import StoreError
 from mav_tasks.store import journal as module
 from mav_tasks.store import schema
-from mav_tasks.store.journal import PAGE, Journal, Which
+from mav_tasks.store.base import Which
+from mav_tasks.store.journal import PAGE, Journal
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry

@@ -1,0 +1,41 @@
+"""All commands, in the order of the help: name, function, and the first line of its help."""
+
+from mav_tasks.cli.lazy import LazyCommand as Lazy
+from mav_tasks.cli.program import Program
+
+COMMANDS = (
+    Lazy("serve", "serve:serve", "Run the task server.", kind="serve:ServeCommand"),
+    Program("sim", "rover_sim", "Run simulated rovers on UDP 14580."),
+    Program("demo", "rover_sim.demo", "Run the demonstration: three tasks, driven and measured."),
+    Lazy("submit", "submit:app", "Submit a task."),
+    Lazy("status", "status:status", "Show a task, and what to do if it waits for you."),
+    Lazy("queue", "queue:queue", "Show the running and the waiting tasks, and why they wait."),
+    Lazy("history", "history:history", "List finished tasks, newest first."),
+    Lazy("cancel", "control:cancel", "Cancel a task, by default the running one."),
+    Lazy("clear", "control:clear", "Cancel all waiting tasks of a rover."),
+    Lazy("stop", "halts:stop", "Stop the rovers at once; no task runs until you resume."),
+    Lazy(
+        "pause",
+        "halts:pause",
+        "Stop a rover, and pause its task and queue until you resume.",
+    ),
+    Lazy("resume", "halts:resume", "Resume tasks after a pause, a STOP or a takeover."),
+    Lazy("modify", "control:modify", "Change a task that has not ended."),
+    Lazy("release", "control:release", "Restart, finish or skip a held task."),
+    Lazy("vehicles", "vehicles:vehicles", "Show the rovers of the server."),
+    Lazy("ready", "ready:ready", "Check that the server answers and that it hears its rovers."),
+    Lazy("probe", "probe:probe", "Test what a rover can do, without a server."),
+    Lazy("mission", "plans:mission", "Upload, start and download missions."),
+    Lazy("fence", "plans:fence", "Upload and download the fence."),
+    Lazy("rally", "plans:rally", "Upload rally points."),
+    Lazy("log", "log:log", "Print the journal, one event per line; times are UTC."),
+    Lazy("replay", "replay:replay", "Replay a record and compare the results."),
+    Lazy("config", "config:app", "Show, check and create the configuration of the server."),
+    Lazy("keys", "keys:app", "Add, list and revoke signing keys."),
+    Lazy(
+        "qgc-actions",
+        "qgc_actions:qgc_actions",
+        "Print or install action buttons for QGroundControl.",
+    ),
+    Lazy("dialect", "dialect:dialect", "Print the MAVLink definitions of the task messages."),
+)

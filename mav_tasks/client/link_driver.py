@@ -1,0 +1,145 @@
+"""The I/O of one end of a conversation on one link: reads, sends, keeps one timer. Decides nothing.
+
+The client and the probe are such ends. The server has a driver of its own, ``runner``: it reads
+many links as one batch, and leaves splitting, signatures and peers to the engine.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from mav_tasks.client.signatures import ClientSignatures
+from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
+from mav_tasks.mavlink.packet import Packet, split_datagram
+from mav_tasks.mavlink.stream import StreamSplitter
+
+DRAIN = 64  # datagrams read per callback, so that other tasks get to run
+
+
+class Talk(Protocol):
+    """A conversation, sans-I/O. Times are of the loop."""
+
+    def receive(self, packet: Packet, *, now: float) -> None:
+        """Process one packet."""
+        ...
+
+    def next_deadline(self) -> float:
+        """Return when to call ``handle_deadline``."""
+        ...
+
+    def handle_deadline(self, *, now: float) -> None:
+        """Do what is due."""
+        ...
+
+    def take_packets(self) -> list[bytes]:
+        """Return the packets to send since the last call, in order."""
+        ...
+
+
+class LinkDriver:
+    """Runs a conversation on an open link, which it closes."""
+
+    def __init__(self, link: Link, talk: Talk, *, signatures: ClientSignatures | None) -> None:
+        """``signatures``: for all packets; None: they are not signed. Call ``begin`` next."""
+        self.link = link
+        self._talk = talk
+        self._signatures = signatures
+        self._loop = asyncio.get_running_loop()
+        self._peers: dict[Peer, None] = dict.fromkeys(link.peers)
+        self._splitters: dict[Peer, StreamSplitter] = {}
+        self._timer: asyncio.TimerHandle | None = None
+        self._tending: asyncio.TimerHandle | None = None
+        self._is_closed = False
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.link.name}, {self._talk!r})"
+
+    @property
+    def now(self) -> float:
+        """The loop's time in seconds."""
+        return self._loop.time()
+
+    def begin(self) -> None:
+        """Read from now on, and do what is due."""
+        try:
+            self._loop.add_reader(self.link.fileno(), self._step, self._read)
+        except BaseException:  # the loop cannot watch it: a virtual-time loop, for instance
+            self.link.close()
+            raise
+        if isinstance(self.link, StreamLink):
+            self._tend(self.link)
+        self._on_timer()
+
+    def turn(self) -> None:
+        """Send the packets of the conversation, and set the timer to its next deadline."""
+        if self._is_closed:
+            return
+        for packet in self._talk.take_packets():
+            self.send(packet)
+        due = self._talk.next_deadline()
+        if self._timer is None or self._timer.when() != due:
+            if self._timer is not None:
+                self._timer.cancel()
+            self._timer = self._loop.call_at(due, self._on_timer)
+
+    def close(self) -> None:
+        """Cancel the timers and close the link."""
+        self._is_closed = True
+        for timer in (self._timer, self._tending):
+            if timer is not None:
+                timer.cancel()
+        self._timer = self._tending = None
+        self._loop.remove_reader(self.link.fileno())
+        self.link.close()
+
+    def send(self, data: bytes) -> None:
+        """Send a packet to each peer."""
+        if self._signatures is not None:
+            data = self._signatures.sealed(data, utc=time.time())
+        for peer in self._peers:
+            self.link.send(peer, data)
+
+    def _step(self, step: Callable[[], None]) -> None:
+        """Run one step of the conversation, then ``turn``."""
+        step()
+        self.turn()
+
+    def _on_up(self) -> None:
+        """Note that a peer of a stream link is there."""
+
+    def _on_timer(self) -> None:
+        self._timer = None
+        self._step(lambda: self._talk.handle_deadline(now=self.now))
+
+    def _read(self) -> None:
+        self._take_changes()
+        for peer, data in self.link.receive(DRAIN):
+            for packet in filter(self._believes, self._packets(peer, data)):
+                self._peers.setdefault(peer)
+                self._talk.receive(packet, now=self.now)
+        self._take_changes()
+
+    def _packets(self, peer: Peer, data: bytes) -> list[Packet]:
+        if not self.link.is_stream:
+            return split_datagram(data)
+        return self._splitters.setdefault(peer, StreamSplitter()).feed(data, now=self.now)
+
+    def _believes(self, packet: Packet) -> bool:
+        return self._signatures is None or self._signatures.believes(packet, utc=time.time())
+
+    def _take_changes(self) -> None:
+        if not isinstance(self.link, StreamLink):
+            return
+        for change in self.link.take_changes():
+            if change.state is PeerState.UP:
+                self._peers.setdefault(change.peer)
+                self._on_up()
+            elif change.state is PeerState.DOWN:
+                self._peers.pop(change.peer, None)
+                self._splitters.pop(change.peer, None)
+
+    def _tend(self, link: StreamLink) -> None:
+        self._tending = self._loop.call_later(TEND_PERIOD, self._tend, link)
+        link.poll()
+        self._step(self._take_changes)

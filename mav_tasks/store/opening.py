@@ -1,0 +1,54 @@
+"""The kinds of stores, by the beginning of a store's place: the text of ``--store``."""
+
+import time
+from collections.abc import Callable
+from importlib import import_module
+from typing import Protocol, cast
+
+from mav_tasks.clock import boot_time
+from mav_tasks.errors import StoreError
+from mav_tasks.settings import Retention
+from mav_tasks.store.base import JournalReader, Store, Which
+
+IN_MEMORY = ":memory:"
+
+#: the beginning of a place -> the module of that kind of store, which is imported when it is used
+KINDS = {
+    "": "mav_tasks.store.sqlite",  # a path; "": the file in the user's data folder
+    IN_MEMORY: "mav_tasks.store.memory",
+}
+
+
+class StoreKind(Protocol):
+    """The interface of a module in KINDS. Each function raises StoreError if it cannot do it."""
+
+    def open_store(
+        self, place: str, wall_offset: Callable[[], float], retention: Retention, /
+    ) -> Store:
+        """Open a store for the one server that writes it; create it if it does not exist.
+
+        ``wall_offset`` returns the current UTC minus ``boot_time``.
+        """
+        ...
+
+    def open_journal(self, place: str, which: Which, /) -> JournalReader:
+        """Open the journal of an existing store, which a server may be writing."""
+        ...
+
+    def read_parameters(self, place: str, /) -> dict[str, float]:
+        """Return the parameters that clients have set, by name; {} if there is no store yet."""
+        ...
+
+
+def kind_of(place: str) -> StoreKind:
+    """Return the kind of a store: the one in KINDS with the longest beginning that fits."""
+    beginning = max(filter(place.startswith, KINDS), key=len)
+    if not beginning and "://" in place:
+        raise StoreError(f"store {place}: unknown kind; expected a path, or {IN_MEMORY}")
+    return cast(StoreKind, import_module(KINDS[beginning]))
+
+
+def open_store(place: str, retention: Retention | None = None) -> Store:
+    """Open the store of a server; raise StoreError."""
+    kind = kind_of(place)
+    return kind.open_store(place, lambda: time.time() - boot_time(), retention or Retention())

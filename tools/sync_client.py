@@ -1,0 +1,155 @@
+"""Make mav_tasks/client/sync.py from the asyncio client; `--check` reports whether it is outdated.
+
+Each public call of ``Client`` and ``Task`` becomes one of ``SyncClient`` and ``SyncTask``, with its
+signature and docstring, for editors and mypy. ``mav_tasks/client/blocking.py`` has the rest.
+"""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from textwrap import indent
+
+from generated import ROOT, keep_file_current
+
+SYNC = "mav_tasks/client/sync.py"
+#: (module, class) -> its calls that stay with the asyncio client, or are in blocking.py
+LEFT_OUT: Mapping[tuple[str, str], frozenset[str]] = {
+    ("handle", "Task"): frozenset({"done", "wake", "close"}),
+    ("aio", "Client"): frozenset({"vehicle", "rearm", "streaming"}),
+}
+OPENING = {"open": "_begin", "close": "_end"}
+HEADER = '''"""The blocking client: the calls of the asyncio client, each waiting for its answer.
+
+Made by tools/sync_client.py: change aio.py, handle.py or blocking.py instead.
+"""
+
+'''
+OF_LOOP = "Use a client only on the event loop on which it was opened."
+OF_PORTAL = "It is open within a ``with`` block. ``portal`` runs its asyncio part."
+
+
+def made() -> str:
+    """Return the text of the blocking client."""
+    sources = {name: _parsed(name) for name, _ in LEFT_OUT}
+    classes = "\n\n".join(
+        _class(next(_classes(sources[module], name)), left_out)
+        for (module, name), left_out in LEFT_OUT.items()
+    )
+    return _formatted(f"{HEADER}{_imports(classes, sources)}\n\n{classes}")
+
+
+def _parsed(module: str) -> ast.Module:
+    path = ROOT / "mav_tasks" / "client" / f"{module}.py"
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def _classes(module: ast.Module, name: str) -> Iterator[ast.ClassDef]:
+    return (each for each in module.body if isinstance(each, ast.ClassDef) and each.name == name)
+
+
+def _class(kind: ast.ClassDef, left_out: frozenset[str]) -> str:
+    text = f"class Sync{kind.name}(Blocking{kind.name}):\n{_docstring(kind)}\n"
+    for call in kind.body:
+        if not isinstance(call, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        if call.name == "__init__" and kind.name == "Client":
+            text += _constructor(call)
+        elif not call.name.startswith("_") and call.name not in left_out:
+            text += _call(call, kind.name)
+    return text
+
+
+def _constructor(call: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
+    parameters = f"{_parameters(call, '')}, portal: Portal | None = None"
+    made = f"lambda: Client({_arguments(call)})"
+    return f"\n    def __init__({parameters}) -> None:\n        super().__init__({made}, portal)\n"
+
+
+def _call(call: ast.FunctionDef | ast.AsyncFunctionDef, kind: str) -> str:
+    returns = _annotation(call.returns, kind).replace("AsyncIterator", "Iterator")
+    asked = f"self._aio.{call.name}({_arguments(call)})"
+    decorator = ""
+    if kind == "Client" and call.name in OPENING:
+        body = f"self.{OPENING[call.name]}()"
+    elif call.decorator_list:
+        decorator, body = "    @property\n", f"return self._aio.{call.name}"
+    elif isinstance(call, ast.FunctionDef):
+        body = f"return self._call(called(self._aio.{call.name}))"
+    elif returns.startswith("Iterator"):
+        body = f"return self._each({asked})"
+    elif returns == "SyncTask":
+        body = f"return self._handle(SyncTask, {asked})"
+    else:
+        body = f"{'' if returns == 'None' else 'return '}self._call({asked})"
+    head = f"{decorator}    def {call.name}({_parameters(call, kind)}) -> {returns}:\n"
+    return f"\n{head}{indent(_docstring(call), '    ')}\n        {body}\n"
+
+
+def _docstring(node: ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> str:
+    text = ast.get_docstring(node) or ""
+    text = text.replace(OF_LOOP, OF_PORTAL).replace("``Client", "``SyncClient")
+    end = "\n" if "\n" in text else ""
+    return indent(f'"""{text}{end}"""', "    ")
+
+
+def _parameters(call: ast.FunctionDef | ast.AsyncFunctionDef, kind: str) -> str:
+    for each in (*call.args.args, *call.args.kwonlyargs):
+        if each.annotation is not None:
+            each.annotation = ast.Name(_annotation(each.annotation, kind))
+    return ast.unparse(call.args)
+
+
+def _annotation(annotation: ast.expr | None, kind: str) -> str:
+    """Return an annotation of the blocking client; in SyncTask its own name is quoted."""
+    assert annotation is not None
+    text = ast.unparse(annotation).strip("'")
+    words = [f"Sync{word}" if word == "Task" else word for word in text.split(" ")]
+    is_own = kind == "Task" and words != text.split(" ")
+    return f'"{" ".join(words)}"' if is_own else " ".join(words)
+
+
+def _arguments(call: ast.FunctionDef | ast.AsyncFunctionDef) -> str:
+    arguments = [_argument(each) for each in call.args.args[1:]]
+    arguments += [f"{each.arg}={_argument(each)}" for each in call.args.kwonlyargs]
+    return ", ".join(arguments)
+
+
+def _argument(parameter: ast.arg) -> str:
+    assert parameter.annotation is not None
+    kinds = ast.unparse(parameter.annotation).strip("'").split(" | ")
+    if "Task" not in kinds:
+        return parameter.arg
+    bare = f"id_of({parameter.arg})"
+    return f"None if {parameter.arg} is None else {bare}" if "None" in kinds else bare
+
+
+def _imports(code: str, sources: Mapping[str, ast.Module]) -> str:
+    """Return the imports of the names in the code, from the same modules as in the sources."""
+    homes = dict.fromkeys(("BlockingClient", "BlockingTask", "Portal"), "mav_tasks.client.blocking")
+    homes |= dict.fromkeys(("called", "id_of"), "mav_tasks.client.blocking")
+    homes["Iterator"] = "collections.abc"
+    for module, source in sources.items():
+        for node in source.body:
+            if isinstance(node, ast.ImportFrom) and node.module is not None:
+                homes |= {alias.name: node.module for alias in node.names}
+            elif isinstance(node, ast.Assign):
+                names = [each.id for each in node.targets if isinstance(each, ast.Name)]
+                homes |= dict.fromkeys(names, f"mav_tasks.client.{module}")
+    homes["Client"] = "mav_tasks.client.aio"
+    used = {node.id for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Name)}
+    return "\n".join(f"from {homes[name]} import {name}" for name in sorted(used & homes.keys()))
+
+
+def _formatted(text: str) -> str:
+    for step in (("check", "--select=I", "--fix", "--quiet"), ("format",)):
+        command = [sys.executable, "-m", "ruff", *step, "--stdin-filename", SYNC, "-"]
+        done = subprocess.run(
+            command, input=text, capture_output=True, text=True, check=True, cwd=ROOT
+        )
+        text = done.stdout
+    return text
+
+
+if __name__ == "__main__":
+    sys.exit(keep_file_current(SYNC, "blocking client", "sync_client.py", made()))
