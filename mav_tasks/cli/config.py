@@ -11,8 +11,7 @@ from mav_tasks.config import configuration, report, toml_file
 from mav_tasks.config.configuration import Sources
 from mav_tasks.config.sample import sample
 from mav_tasks.errors import StoreError, UsageError
-from mav_tasks.settings import KEYS
-from mav_tasks.settings import ServerSettings
+from mav_tasks.settings import KEYS, ServerSettings
 from mav_tasks.store.opening import kind_of
 
 app = typer.Typer(

@@ -8,7 +8,7 @@ from mav_tasks.config.reload import Reload
 from mav_tasks.config.words import Flag, flag_of_set
 from mav_tasks.errors import StoreError
 from mav_tasks.serve import serve
-from mav_tasks.store.place import IN_MEMORY
+from mav_tasks.store.opening import IN_MEMORY
 
 
 def serve_with(flags: Sequence[Flag], *, set_: Sequence[str], config: str | None) -> int:

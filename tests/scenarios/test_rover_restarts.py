@@ -334,6 +334,20 @@ def test_a_rover_that_restarts_between_two_tasks_is_driven(
     world.until_state(2, S.COMPLETED, within=40)
 
 
+def test_a_rover_that_is_silent_for_longer_than_it_was_up_before_is_driven(idle: World) -> None:
+    """As after a change of its battery: its new clock is ahead of the old one."""
+    world = idle
+    world.run(30)
+    world.rover.autopilot.reboot(now=world.now)
+    world.fault(Faults(withheld=EVERYTHING))
+    world.run(90)
+    world.fault(Faults())
+    world.run(10)
+    assert "Rover 1 restarted" in world.client.texts()
+    world.client.move(0.5, nonce=2)
+    world.until_state(2, S.COMPLETED, within=40)
+
+
 @pytest.mark.parametrize("restarts", ["before it", "after it", "long after it", "never"])
 def test_a_mode_that_a_person_sets_on_a_disarmed_rover_is_no_restart(
     idle: World, restarts: str
