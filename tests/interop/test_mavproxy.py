@@ -11,7 +11,7 @@ from mav_tasks.services.parameter_table import PARAMETERS
 from tests.kit.mavproxy import Logged, MavProxy, mavproxy
 from tests.kit.processes import Stand, stand, wait_until
 
-pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(240)]
 
 HOME = (-35.363262, 149.165237)
 METRE = 9e-6  # degrees of latitude, about
@@ -189,6 +189,7 @@ def plans(it: MavProxy, folder: Path) -> None:
     load(it, "rally", [(3, RALLY_POINT, 0.0, *HOME)], folder)
 
 
+ARRIVES = 40.0  # s; the rover is as far away as it was driven until MAVProxy asked for STOP
 #: 1 m and 2 m north
 PLACES = [(round(HOME[0] + metres * METRE, 6), HOME[1]) for metres in (1, 2)]
 
@@ -216,8 +217,8 @@ def mission(it: MavProxy, running: Stand) -> None:
     it.ask("mode AUTO", "DO_SET_MODE: ACCEPTED")
     it.wait_for("AUTO> ")
     it.wait_for("AP: Task 2 started")
-    it.wait_for("waypoint 2", within=15)
-    it.wait_for("AP: Task 2 done", within=15)
+    it.wait_for("waypoint 2", within=ARRIVES)
+    it.wait_for("AP: Task 2 done", within=ARRIVES)
     assert place(running) == pytest.approx((2.0, 0.0), abs=0.3)
 
 
@@ -227,7 +228,7 @@ def tasks(it: MavProxy, running: Stand) -> None:
     it.ask("pause", "DO_PAUSE_CONTINUE: ACCEPTED")
     it.wait_for("AP: Task 3 paused by")
     it.ask("long DO_PAUSE_CONTINUE 1", "DO_PAUSE_CONTINUE: ACCEPTED")
-    it.wait_for("AP: Task 3 done", within=15)
+    it.wait_for("AP: Task 3 done", within=ARRIVES)
     assert place(running) == pytest.approx((2.6, 0.0), abs=0.3)
 
 
@@ -235,7 +236,7 @@ def places(it: MavProxy, running: Stand) -> None:
     lat, lon = PLACES[1]
     it.ask(f"guided {lat + METRE} {lon} 0", "DO_REPOSITION: ACCEPTED")
     it.wait_for("AP: Task 4 queued: go to")
-    it.wait_for("AP: Task 4 done", within=15)
+    it.wait_for("AP: Task 4 done", within=ARRIVES)
     assert place(running) == pytest.approx((3.0, 0.0), abs=0.3)
     it.ask(f"guided {NORTH + METRE} {lon} 0", "DO_REPOSITION: DENIED")
     it.wait_for("AP: .* fence")

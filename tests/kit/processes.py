@@ -26,7 +26,7 @@ T = TypeVar("T")
 START_LIMIT = 20.0  # s, for a process to report its start (cold caches, busy machine)
 STOP_LIMIT = 10.0  # s
 PORTS = range(20_000, 32_000)  # below Linux's ephemeral ports, above 14550 and its like
-WORKERS = 8  # of pytest-xdist, each with its own ports
+WORKERS = 8  # of pytest-xdist, in all runs at a time, each with its own ports
 TOLD_OF_A_FAILURE = 8_000  # characters of each process's output
 
 
@@ -274,6 +274,7 @@ def _ports_of_this_process() -> Iterator[int]:
     that, and take another test's rover for its own.
     """
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    worker += int(os.environ.get("PORTS_OF", "0"))  # of a second run beside this one (tools/test)
     own = PORTS[worker % WORKERS :: WORKERS]
     begin = os.getpid() * 97 % len(own)  # concurrent runs start at different ports
     return cycle((*own[begin:], *own[:begin]))

@@ -16,16 +16,19 @@ from tests.kit.processes import STOP_LIMIT, Stand
 FACES = {"sync": "", "asyncio": "asyncio_"}
 LOSS = 0.2  # of the datagrams, each way
 NETS = {0.0: "nothing lost", LOSS: "a fifth lost"}
-#: each make on each net, and each face on each net; the full product would take ten minutes more
+#: each make, each face and each net
 CASES = (
     ("ardupilot", "sync", 0.0),
-    ("ardupilot", "asyncio", 0.0),
     ("ardupilot", "asyncio", LOSS),
     ("px4", "sync", 0.0),
+    ("generic", "asyncio", LOSS),
+)
+#: each make on each net, and each face on each net; the full product would take ten minutes more
+VOLUME = (
+    ("ardupilot", "asyncio", 0.0),
     ("px4", "asyncio", 0.0),
     ("px4", "sync", LOSS),
     ("generic", "sync", 0.0),
-    ("generic", "asyncio", LOSS),
 )
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 150.0  # s for a script
@@ -37,8 +40,9 @@ TRIES = 8
 each_case = pytest.mark.parametrize(
     ("persona", "face", "loss"),
     [
-        pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}")
-        for make, face, loss in CASES
+        pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}", marks=marks)
+        for cases, marks in ((CASES, ()), (VOLUME, (pytest.mark.volume,)))
+        for make, face, loss in cases
     ],
 )
 each_net = pytest.mark.parametrize("loss", list(NETS), ids=list(NETS.values()))

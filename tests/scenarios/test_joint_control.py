@@ -4,19 +4,21 @@ All states are more than a test has time for; ``tools/control_states.py`` tries 
 told to.
 """
 
+import re
+import subprocess
 import sys
-from functools import partial
+from pathlib import Path
 
 import pytest
 
 from mav_tasks.engine.commands import dispatch, mode_requests
-from rover_sim.personas import Persona
 from tests.kit.joint.search import search
-from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and ends with its parent")
 
+TOOL = Path(__file__).resolve().parents[2] / "tools/control_states.py"
+LIMIT = 170  # s for a search that takes ten
 MOST = 12  # states from which everything is tried
 STARTS = (
     (),
@@ -27,20 +29,30 @@ STARTS = (
 )
 
 
-def world_of(persona: Persona) -> World:
-    return World(persona=persona).ready()
-
-
 @pytest.mark.volume
+@pytest.mark.timeout(LIMIT + 10)
 @pytest.mark.parametrize("start", STARTS, ids=" ".join)
-@pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=["ardupilot", "px4"])
+@pytest.mark.parametrize("persona", ["ardupilot", "px4"])
 def test_whatever_happens_in_any_state_what_holds_the_rover_holds(
-    persona: Persona, start: tuple[str, ...]
+    persona: str, start: tuple[str, ...]
 ) -> None:
-    found = search(partial(world_of, persona), most=MOST, start=start)
-    print(found)
-    assert found.wrong == []
-    assert len(found.states) > 3 * MOST, "hardly anything has happened"
+    """In a process of its own: one that holds little is forked sooner."""
+    search_of = ("--persona", persona, "--most", str(MOST), "--start", ", ".join(start))
+    done = subprocess.run(
+        [sys.executable, TOOL, *search_of],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=LIMIT,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = re.search(r"^(\d+) states", done.stdout, flags=re.MULTILINE)
+    assert found is not None, done.stdout
+    assert int(found[1]) > 3 * MOST, "hardly anything has happened"
+
+
+def world() -> World:
+    return World(persona=PROMPT).ready()
 
 
 @pytest.mark.patches_core
@@ -49,6 +61,6 @@ def test_the_search_finds_a_copy_that_arms_again(monkeypatch: pytest.MonkeyPatch
     for module in (dispatch, mode_requests):
         monkeypatch.setattr(module, "require_newer", lambda *_, **__: None)
     start = ("arm", "disarm")
-    found = search(partial(world_of, PROMPT), most=1, start=start, way_out=False)
+    found = search(world, most=1, start=start, way_out=False)
     wrong = {path[-1]: what for path, what in found.wrong}
     assert wrong == {"copy of the last go": "armed though somebody has disarmed it"}

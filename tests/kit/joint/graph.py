@@ -1,13 +1,16 @@
 """The graph of joint control: every state that the table reaches, from the first of each make."""
 
+import gc
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
 from itertools import product
 from typing import Any
 
 from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event
 from mav_tasks.engine.vehicles.joint_state import Grip, Queue, State, Work
-from tests.kit.joint.model import FREE, MAKES, START, happens, others_do, passes
+from tests.kit.joint.model import FREE, MAKES, START, Known, forget, happens, others_do, passes
 
 #: per event, the conditions of its rows that the graph leaves open
 ASKED = {
@@ -19,6 +22,18 @@ ASKED = {
 
 
 TIME, PEOPLE = "time", "people"  # other causes of transitions
+
+
+@contextmanager
+def without_collector() -> Iterator[None]:
+    """Let no garbage be looked for: millions of objects are made, and all of them are kept."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def always(_state: State) -> bool:
@@ -62,23 +77,30 @@ def can_happen(event: Event, state: State) -> bool:
 def variants(event: Event, state: State) -> Iterator[State]:
     """Yield the state with each combination of the conditions that the event's rows have."""
     names = ASKED[event]
+    if not names:
+        yield state
+        return
     for values in product((False, True), repeat=len(names)):
         asked: dict[str, Any] = dict(zip(names, values, strict=True))
         if asked.get("may_be_armed", True) or not state.armed:
             yield state._replace(**asked)
 
 
-def after(event: Event, state: State) -> set[State]:
+def after(event: Event, state: State) -> frozenset[State]:
     """Return the states to which an event can lead."""
-    found: set[State] = set()
-    for each in variants(event, state):
-        for there in happens(event, each):
-            found.update(plain(there))
-    return found
+    found = [all_plain(happens(event, each)) for each in variants(event, state)]
+    return found[0] if len(found) == 1 else frozenset().union(*found)
 
 
-def plain(state: State) -> Iterator[State]:
-    """Yield a state without open conditions, and with one waiting effect at a time.
+@cache
+def all_plain(states: frozenset[State]) -> frozenset[State]:
+    """Return what ``plain`` makes of the states."""
+    return frozenset().union(*map(plain, states))
+
+
+@cache
+def plain(state: State) -> tuple[State, ...]:
+    """Return a state without open conditions, and with one waiting effect at a time.
 
     Each of several waiting effects is removed or takes effect independently of the others.
     """
@@ -86,10 +108,8 @@ def plain(state: State) -> Iterator[State]:
         may_be_armed=False, is_idle=True, is_stopping=False, is_late=False, brakes=False
     )
     if len(state.waits) < 2:
-        yield state
-    else:
-        for each in state.waits:
-            yield state._replace(waits=each)
+        return (state,)
+    return tuple(state._replace(waits=each) for each in state.waits)
 
 
 class Graph:
@@ -97,23 +117,26 @@ class Graph:
 
     def __init__(self, make: str) -> None:
         make_of: dict[str, Any] = {**MAKES[make]}
-        first = START._replace(**make_of)
+        first = Known._make(START._replace(**make_of))
         #: each state, with the path to it from the first
         self.paths: dict[State, tuple[str, ...]] = {first: ()}
         #: each state's events, with the states to which they lead
         self.leads: dict[State, dict[str, frozenset[State]]] = {}
-        # Share equal states and sets: there are hundreds of thousands of sets.
-        one: dict[State, State] = {}
+        with without_collector():
+            self._explore(first)
+        forget()
+        all_plain.cache_clear()
+
+    def _explore(self, first: State) -> None:
+        # Share equal sets: there are hundreds of thousands. An old one leads to no new state.
         once: dict[frozenset[State], frozenset[State]] = {}
         waiting = deque([first])
         while waiting:
             state = waiting.popleft()
             ways = self.leads[state] = {}
             for name, found in _leads(state):
-                same = frozenset(one.setdefault(each, each) for each in found)
-                ways[name] = once.setdefault(same, same)
-            for name, states in ways.items():
-                for there in states:
+                ways[name] = once.setdefault(found, found)
+                for there in found if ways[name] is found else ():
                     if there not in self.paths:
                         self.paths[there] = (*self.paths[state], name)
                         waiting.append(there)
@@ -144,9 +167,9 @@ class Graph:
         return found
 
 
-def _leads(state: State) -> Iterator[tuple[str, set[State]]]:
+def _leads(state: State) -> Iterator[tuple[str, frozenset[State]]]:
     for event in Event:
         if can_happen(event, state):
             yield event.name, after(event, state)
-    yield TIME, {each for there in passes(state) for each in plain(there)}
-    yield PEOPLE, {each for there in others_do(state) for each in plain(there)}
+    yield TIME, all_plain(frozenset(passes(state)))
+    yield PEOPLE, all_plain(frozenset(others_do(state)))

@@ -5,7 +5,8 @@ server, in each scenario.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import NamedTuple
+from functools import cache, partial
+from typing import Any, ClassVar, NamedTuple
 
 from mav_tasks.engine.vehicles.control import Effect, Event, Step, effects_of
 from mav_tasks.engine.vehicles.joint_state import NOTHING, Driver, Grip, Queue, State, Waits, Work
@@ -33,6 +34,27 @@ GOES = (
 )
 
 
+class Known(State):
+    """A state of which there is one object only: sets and dicts find it by its identity.
+
+    What the model makes of one is another.
+    """
+
+    __slots__ = ()
+    __eq__ = object.__eq__
+    __ne__ = object.__ne__
+    __hash__ = object.__hash__
+
+    _all: ClassVar[dict[tuple[Any, ...], "Known"]] = {}
+
+    @classmethod
+    def _make(cls, iterable: Iterable[Any]) -> "Known":  # type: ignore[override]
+        values = tuple(iterable)
+        if (found := cls._all.get(values)) is None:
+            found = cls._all[values] = tuple.__new__(cls, values)
+        return found
+
+
 class Deed(NamedTuple):
     """A transition: its name and the states to which it leads."""
 
@@ -42,7 +64,6 @@ class Deed(NamedTuple):
 
 def happens(event: Event, state: State) -> frozenset[State]:
     """Return the states to which an event leads, by the table and by what the event implies."""
-    states = {state}
     if event in (E.MODE, E.MODE_IN_STOP, E.LATE_MODE):  # HOLD or another mode
         states = {state._replace(is_led=False), state._replace(is_led=True)}
     elif event in (E.LAPSED, E.PARKED):
@@ -51,29 +72,44 @@ def happens(event: Event, state: State) -> frozenset[State]:
         states = {state._replace(armed=True)}
     elif event is E.DISARMED:
         states = {state._replace(armed=False)}
-    found: set[State] = set()
-    for each in states:
-        found |= _follow(event, effects_of(event, each), each)
-    return frozenset(found)
+    else:
+        return _follow(event, state)
+    return frozenset().union(*(_follow(event, each) for each in states))
 
 
-def _follow(event: Event, steps: Iterable[Step], state: State) -> set[State]:
-    states, is_emptied = {state}, False
-    for step in steps:
-        following: set[State] = set()
-        is_emptied |= event is E.CLEAR and step is F.DO
-        for each in states:
-            if isinstance(step, Event):
-                following |= _follow(step, effects_of(step, each), each)
-            elif step is F.DO:
-                following |= set(DO[event](each))
-            else:
-                following |= set(RESULTS.get(step, _same)(each))
-        states = _emptied(following) if is_emptied else following
-    return states
+def _follow(event: Event, state: State) -> frozenset[State]:
+    return _chain(event, effects_of(event, state))(state)
 
 
-def _emptied(states: set[State]) -> set[State]:
+@cache
+def _chain(
+    event: Event, steps: tuple[Step, ...], is_emptied: bool = False
+) -> Callable[[State], frozenset[State]]:
+    """Return the function from a state to those after the steps, which remembers its results."""
+    if not steps:
+        return lambda state: frozenset((state,))
+    step = steps[0]
+    is_emptied |= event is E.CLEAR and step is F.DO
+    after = _chain(event, steps[1:], is_emptied)
+    if isinstance(step, Event):
+        first: Callable[[State], Iterable[State]] = partial(_follow, step)
+    else:
+        first = DO[event] if step is F.DO else RESULTS.get(step, _same)
+
+    @cache
+    def follow(state: State) -> frozenset[State]:
+        following = _emptied(first(state)) if is_emptied else first(state)
+        return frozenset().union(*map(after, following))
+
+    return follow
+
+
+def forget() -> None:
+    """Forget the remembered results, which take hundreds of megabytes."""
+    _chain.cache_clear()
+
+
+def _emptied(states: Iterable[State]) -> set[State]:
     """Return the states after CLEAR: nothing waits, nothing starts."""
     return {
         state._replace(work=Work.NONE) if state.work is Work.WAITS else state

@@ -12,6 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.car import Car
 from tests.kit.client import ACCEPTED, GUIDED, HOLD, MOVE, command_long, setpoint
+from tests.kit.pairs import every_pair
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World
 from tests.scenarios.attacks.test_late_arming import is_arming, mode_of
@@ -24,9 +25,9 @@ from tests.scenarios.test_car import RADIUS, car_profile
 CANCEL, CLEAR, SET_MODE, ARM = 54010, 54011, 176, 400
 COMMAND_ACK = 77
 POSITIONS = (30, 32, 33)  # ATTITUDE, and where it is
-EVERY_MAKE = pytest.mark.parametrize(
-    "persona", [PROMPT, ARDUPILOT, PROMPT_PX4, PX4], ids=["ap", "ap 1 Hz", "px4", "px4 1 Hz"]
-)
+MAKES = {"ap": PROMPT, "ap 1 Hz": ARDUPILOT, "px4": PROMPT_PX4, "px4 1 Hz": PX4}
+EVERY_MAKE = pytest.mark.parametrize("persona", MAKES.values(), ids=MAKES)
+BOTH = [True, False]
 
 
 def driving(world: World, distance: float = 20.0) -> None:
@@ -36,10 +37,7 @@ def driving(world: World, distance: float = 20.0) -> None:
     world.run(2)
 
 
-@EVERY_MAKE
-@pytest.mark.parametrize("both_ways", [False, True])
-@pytest.mark.parametrize("seconds", [1.3, 1.6, 2.2])
-@pytest.mark.parametrize("phase", [0.0, 0.25, 0.5, 0.75])
+@every_pair(persona=MAKES, both_ways=BOTH, seconds=[1.3, 1.6, 2.2], phase=[0.0, 0.25, 0.5, 0.75])
 def test_who_takes_it_during_a_short_gap_keeps_it(
     make_world: MakeWorld, persona: Persona, seconds: float, both_ways: bool, phase: float
 ) -> None:
@@ -242,10 +240,12 @@ def test_a_second_controller_takes_a_streaming_client_the_rover(world: World) ->
     assert abs(world.truth.north) < 0.1
 
 
-@EVERY_MAKE
-@pytest.mark.parametrize("shows_on_request", [True, False])
-@pytest.mark.parametrize("word", ["a task", "a continue", "the next task"])
-@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+@every_pair(
+    persona=MAKES,
+    shows_on_request=BOTH,
+    word=["a task", "a continue", "the next task"],
+    phase=[0.0, 0.2, 0.4, 0.6, 0.8],
+)
 def test_who_takes_it_just_before_we_do_keeps_it(
     make_world: MakeWorld, persona: Persona, shows_on_request: bool, word: str, phase: float
 ) -> None:
@@ -290,10 +290,12 @@ def test_who_takes_it_while_the_server_stands_still_keeps_it(
     assert mode_of(world) is Mode.MANUAL
 
 
-@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["px4 1 Hz", "px4"])
-@pytest.mark.parametrize("word", ["a task", "a continue"])
-@pytest.mark.parametrize("after", [0.25, 0.45, 0.65, 0.85, 1.05])
-@pytest.mark.parametrize("phase", [0.0, 0.35, 0.7])
+@every_pair(
+    persona={"px4 1 Hz": PX4, "px4": PROMPT_PX4},
+    word=["a task", "a continue"],
+    after=[0.25, 0.45, 0.65, 0.85, 1.05],
+    phase=[0.0, 0.35, 0.7],
+)
 def test_who_takes_it_while_zeros_lead_in_keeps_it(
     make_world: MakeWorld, persona: Persona, word: str, after: float, phase: float
 ) -> None:
@@ -313,10 +315,7 @@ def test_who_takes_it_while_zeros_lead_in_keeps_it(
     assert mode_of(world) is Mode.MANUAL
 
 
-@EVERY_MAKE
-@pytest.mark.parametrize("shows_on_request", [True, False])
-@pytest.mark.parametrize("seconds", [4.0, 8.0, 20.0])
-@pytest.mark.parametrize("phase", [0.0, 0.3, 0.6])
+@every_pair(persona=MAKES, shows_on_request=BOTH, seconds=[4.0, 8.0, 20.0], phase=[0.0, 0.3, 0.6])
 def test_who_drives_and_parks_it_unheard_before_we_take_it_keeps_it(
     make_world: MakeWorld, persona: Persona, shows_on_request: bool, seconds: float, phase: float
 ) -> None:
@@ -342,10 +341,12 @@ def test_who_drives_and_parks_it_unheard_before_we_take_it_keeps_it(
     assert not world.rover.autopilot.armed
 
 
-@pytest.mark.parametrize("persona", [PROMPT_PX4, PX4], ids=["px4", "px4 1 Hz"])
-@pytest.mark.parametrize("shows_on_request", [True, False])
-@pytest.mark.parametrize("halt", ["pause", "cancel"])
-@pytest.mark.parametrize("after", [0.02, 0.1, 0.3, 0.6])
+@every_pair(
+    persona={"px4": PROMPT_PX4, "px4 1 Hz": PX4},
+    shows_on_request=BOTH,
+    halt=["pause", "cancel"],
+    after=[0.02, 0.1, 0.3, 0.6],
+)
 def test_a_halt_while_it_is_being_taken_stops_its_way_to_a_place(
     make_world: MakeWorld, persona: Persona, shows_on_request: bool, halt: str, after: float
 ) -> None:
@@ -372,10 +373,12 @@ def test_a_halt_while_it_is_being_taken_stops_its_way_to_a_place(
     assert abs(world.truth.forward_speed) < 0.05
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=["ap", "px4"])
-@pytest.mark.parametrize("answers", [1, 3])
-@pytest.mark.parametrize("after", [0.05, 0.15, 0.3])
-@pytest.mark.parametrize("phase", [0.0, 0.25, 0.5, 0.75])
+@every_pair(
+    persona={"ap": ARDUPILOT, "px4": PX4},
+    answers=[1, 3],
+    after=[0.05, 0.15, 0.3],
+    phase=[0.0, 0.25, 0.5, 0.75],
+)
 def test_who_takes_it_while_the_answer_to_our_mode_is_lost_keeps_it(
     make_world: MakeWorld, persona: Persona, answers: int, after: float, phase: float
 ) -> None:
