@@ -1,4 +1,6 @@
-"""The same measurements of this server and of another revision's, alternating in one run.
+"""The same measurements of this server and of another one's, alternating in one run.
+
+The other is that of another revision, or this one with a compiled core.
 
 Clients, floods and simulated rovers are this revision's for both: only the server differs. Each
 measurement is repeated in alternating order, so that a machine that slows down affects both alike.
@@ -10,7 +12,8 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -34,10 +37,22 @@ class Pair:
     there: tuple[float, ...]
 
 
-def measure(revision: str, names: Sequence[str], *, rounds: int) -> list[Pair]:
-    """Return the figures of each measurement for both servers."""
+@contextmanager
+def compiled() -> Iterator[Path]:
+    """Return a folder with the files of HEAD, and the compiled core of the present ones."""
+    with checked_out("HEAD") as tree:
+        print("compiling the core: minutes", file=sys.stderr, flush=True)
+        command = [sys.executable, "tools/compile_core.py", str(tree)]
+        subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+        yield tree
+
+
+def measure(
+    other: AbstractContextManager[Path], names: Sequence[str], *, rounds: int
+) -> list[Pair]:
+    """Return the figures of each measurement for both servers; ``other``: the other's folder."""
     pairs: list[Pair] = []
-    with checked_out(revision) as tree:
+    with other as tree:
         for name in names:
             figures: dict[Path, list[dict[str, str]]] = {ROOT: [], tree: []}
             for number in range(rounds):

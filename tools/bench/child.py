@@ -16,16 +16,22 @@ READY = "ready"  # a child prints it once its sockets are open
 END_WITHIN = 10.0  # s
 
 
+class Said(list[str]):
+    """The lines that a child printed at its end; ``pid``: its process."""
+
+    pid = 0
+
+
 @contextmanager
 def child(
     module: str, *arguments: str, quiet: bool = False, pass_fds: tuple[int, ...] = ()
-) -> Iterator[list[str]]:
+) -> Iterator[Said]:
     """Run a module of this package as a process for a ``with`` block.
 
     A server runs from the folder in SERVER_FROM, if set. ``quiet`` discards stderr, where the log
     goes. After the block, the list has the lines that the process printed at its end.
     """
-    said: list[str] = []
+    said = Said()
     process = subprocess.Popen(
         [sys.executable, "-m", f"tools.bench.{module}", *arguments],
         cwd=os.environ.get(SERVER_FROM, ROOT) if module == "server" else ROOT,
@@ -38,6 +44,7 @@ def child(
         assert process.stdout is not None
         if process.stdout.readline().strip() != READY:
             raise RuntimeError(f"{module} did not start")
+        said.pid = process.pid
         yield said
     finally:
         process.terminate()
