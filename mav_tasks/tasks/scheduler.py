@@ -19,6 +19,8 @@ def start_blocker(
         return TaskReason.VEHICLE_SILENT
     if view.other_controller:
         return TaskReason.OTHER_CONTROLLER
+    if view.is_booting:
+        return TaskReason.NOT_READY
     if view.mode is ModeKind.OTHER or (view.mode is ModeKind.MANUAL and view.armed):
         return TaskReason.WRONG_MODE
     if view.motion is None or now - view.motion.at > watch.motion_fresh:

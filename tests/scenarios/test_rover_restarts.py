@@ -9,6 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import PX4, Mode, Persona
+from rover_sim.realism import ARDUPILOT_BOOT, EXACT
 from tests.kit import px4
 from tests.kit.client import ACCEPTED, DENIED, Sent
 from tests.kit.world import PROMPT, World, near_pose
@@ -346,6 +347,24 @@ def test_a_rover_that_is_silent_for_longer_than_it_was_up_before_is_driven(idle:
     assert "Rover 1 restarted" in world.client.texts()
     world.client.move(0.5, nonce=2)
     world.until_state(2, S.COMPLETED, within=40)
+
+
+def test_a_task_that_is_submitted_while_the_rover_boots_waits_until_it_is_ready(
+    make_world: MakeWorld,
+) -> None:
+    """It says so: nobody has to set a mode, or to resume."""
+    world = make_world(realism=replace(EXACT, boot=ARDUPILOT_BOOT.scaled(0.5)))
+    world.run(30)
+    world.rover.autopilot.reboot(now=world.now)
+    world.until(lambda: world.rover.autopilot.mode is Mode.INITIALISING, within=3)
+    world.run(1.1)
+    assert world.rover.autopilot.mode is Mode.INITIALISING
+    world.client.move(0.5)
+    world.run(0.1)
+    world.client.request_status(1)
+    world.run(0.1)
+    assert world.client.statuses(1)[-1].why == (S.QUEUED, R.NOT_READY)
+    world.until_state(1, S.COMPLETED, within=60)
 
 
 @pytest.mark.parametrize("restarts", ["before it", "after it", "long after it", "never"])
