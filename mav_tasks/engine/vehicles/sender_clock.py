@@ -6,6 +6,7 @@ nor a restart is dropped, so that it steers nothing.
 """
 
 from enum import Enum, auto
+from math import inf
 
 from mav_tasks.engine.vehicles.clock_offset import ClockOffset
 from mav_tasks.mavlink.messages import Attitude, GlobalPositionInt, LocalPositionNed
@@ -40,6 +41,7 @@ class SenderClock:
         self.offset = ClockOffset()
         self._newest: int | None = None  # ms over all messages, counted on over overflows
         self._newest_at = 0.0  # when that message came
+        self._heard_at = -inf  # when any message came
         self._latest: dict[int, int] = {}  # the newest ms by message id
         self._back_since: float | None = None  # only older messages have come since then
 
@@ -49,9 +51,10 @@ class SenderClock:
     def hear(self, message: Stamped, *, now: float) -> Heard:
         """Classify a message by its time stamp."""
         ms = self._counted_on(message.time_boot_ms, now=now)
+        unheard, self._heard_at = now - self._heard_at, now
         if self._newest is not None and self._newest - ms >= REBOOT:
             return self._went_back(ms, now=now)
-        if self._lost_time(ms, now=now) and self._may_have_booted(ms % OVERFLOW / 1000, now=now):
+        if 1000 * unheard > LATEST and self._lost_time(ms, now=now):
             return Heard.RESTART  # it was silent for longer than it had been up before
         if ms <= self._latest.get(message.id, ms - 1):
             return Heard.OLD
@@ -85,8 +88,10 @@ class SenderClock:
         return self._newest + round(1000 * (now - self._newest_at))
 
     def _lost_time(self, ms: int, *, now: float) -> bool:
-        """Return whether the clock is far behind: it began anew, or stood still."""
-        return self._newest is not None and self._expected(now) - ms > LATEST
+        """Return whether the clock is far behind, and began anew rather than stood still."""
+        if self._newest is None or self._expected(now) - ms <= LATEST:
+            return False
+        return self._may_have_booted(ms % OVERFLOW / 1000, now=now)
 
     def _may_have_booted(self, uptime: float, *, now: float) -> bool:
         """Return whether it can have booted since the newest message was sent."""

@@ -54,6 +54,13 @@ def test_a_vehicle_whose_clock_stood_still_has_not_restarted() -> None:
     assert clock.hear(position(DAY + 60_100), now=60.0 + 600.0) is Heard.NEWS
 
 
+def test_a_vehicle_that_repeats_its_messages_for_long_has_not_restarted() -> None:
+    clock = drives(up=0)
+    for second in range(1, 41):
+        assert clock.hear(position(60_000), now=60.0 + second) is Heard.OLD
+    assert clock.hear(position(60_050), now=101.0) is Heard.NEWS
+
+
 @pytest.mark.parametrize("late", [1.1, 2.0, 5.0, 20.0])
 @pytest.mark.parametrize("days", [0.0, 1, 25, 49.71])
 def test_one_that_comes_again_late_is_old(days: float, late: float) -> None:
