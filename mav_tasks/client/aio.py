@@ -237,7 +237,7 @@ class Client:
         return await self._ask.timing(task_id or 0, self._which(vehicle))
 
     async def cancel(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """Cancel a task, None: the running one. Return its id. Raise Refused if there is none."""
+        """Cancel a task, by default the running one. Return its id. Raise Refused if none runs."""
         return await self._cancel(task_id, 0.0, vehicle)
 
     async def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:

@@ -205,7 +205,7 @@ class SyncClient(BlockingClient):
         return self._call(self._aio.timing(task_id, vehicle=vehicle))
 
     def cancel(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """Cancel a task, None: the running one. Return its id. Raise Refused if there is none."""
+        """Cancel a task, by default the running one. Return its id. Raise Refused if none runs."""
         return self._call(self._aio.cancel(task_id, vehicle=vehicle))
 
     def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:

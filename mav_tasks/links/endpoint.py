@@ -42,7 +42,7 @@ def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
 
 
 def number_in(text: str, numbers: range) -> int | None:
-    """Return the whole number of a text; None if it is none, or not in ``numbers``."""
+    """Return the whole number that a text shows, or None if it is not one of ``numbers``."""
     if not text.isdecimal() or len(text) > 8:  # ``int`` refuses more than 4300 digits
         return None
     return int(text) if int(text) in numbers else None

@@ -88,7 +88,7 @@ class SenderClock:
         return self._newest + round(1000 * (now - self._newest_at))
 
     def _lost_time(self, ms: int, *, now: float) -> bool:
-        """Return whether the clock is far behind, and began anew rather than stood still."""
+        """Return whether the clock is far behind because the vehicle may have booted."""
         if self._newest is None or self._expected(now) - ms <= LATEST:
             return False
         return self._may_have_booted(ms % OVERFLOW / 1000, now=now)
