@@ -6,7 +6,6 @@ sources would not run.
 """
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -31,22 +30,18 @@ class WheelHook(BuildHookInterface[Any]):
         if build_dialect(Path(self.root)):
             self.app.display_info("generated the MAVLink dialect")
         if _is_compiled() and version != "editable":
-            self._compiled = tempfile.mkdtemp()
+            self._folder = tempfile.TemporaryDirectory()  # as long as this hook: until all is built
             compiler = str(Path(self.root) / "tools" / "compile_core.py")
             made = subprocess.run(
-                [sys.executable, compiler, self._compiled],
+                [sys.executable, compiler, self._folder.name],
                 stdout=subprocess.PIPE,
                 text=True,
                 check=True,
             )
             build_data["force_include"] |= {
-                str(Path(self._compiled) / name): name for name in made.stdout.splitlines()
+                str(Path(self._folder.name) / name): name for name in made.stdout.splitlines()
             }
             build_data["pure_python"], build_data["infer_tag"] = False, True
-
-    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:  # noqa: ARG002
-        if _is_compiled() and version != "editable":
-            shutil.rmtree(self._compiled)
 
 
 def _is_compiled() -> bool:
