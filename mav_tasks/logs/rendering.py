@@ -37,6 +37,12 @@ _NAMES = {"task_id": "task", "submitter": "actor"}
 #: a field may hold one of several of these classes: their values tell which
 _CHOICES = frozenset((*Goal.__args__, *Place.__args__))
 
+#: of the events that are not logged as information
+_LEVELS: dict[type, int] = {
+    **dict.fromkeys((SignaturesSeen, TaskProgressed, VehicleHalted), logging.DEBUG),
+    **dict.fromkeys((SubmissionRefused, SignatureRefused, VehicleNoted), logging.WARNING),
+}  # DEBUG: other events tell the operator enough
+
 _PLAIN = frozenset({int, str, bool, NoneType})
 
 
@@ -63,16 +69,12 @@ def event_values(event: Event, *, offset: float) -> dict[str, Any]:
 
 def level_of(event: Event) -> int:
     """Return the log level of an event: a warning if the operator should look at it."""
-    if isinstance(event, SignaturesSeen | TaskProgressed | VehicleHalted):
-        return logging.DEBUG  # other events tell the operator enough
     match event:
         case TaskChanged(new=TaskState.FAILED | TaskState.HELD | TaskState.EXPIRED):
             return logging.WARNING
-        case QueuePaused(reason=TaskReason.OPERATOR):
-            return logging.INFO  # an operator requested it
-        case SubmissionRefused() | SignatureRefused() | VehicleNoted() | QueuePaused():
+        case QueuePaused(reason=reason) if reason is not TaskReason.OPERATOR:
             return logging.WARNING
-    return logging.INFO
+    return _LEVELS.get(type(event), logging.INFO)
 
 
 def utc_text(utc: float) -> str | None:

@@ -74,11 +74,11 @@ class TaskQueue:
         if task_id in self._entries:
             self.discard(task_id)
         self._entries[task_id] = entry
-        insort(self._order, (rank, task_id))
+        _insert(self._order, (rank, task_id))
         by_priority = (-priority, rank, task_id)
-        insort(self._by_priority, by_priority)
+        _insert(self._by_priority, by_priority)
         if is_preemptive:
-            insort(self._preemptive, by_priority)
+            _insert(self._preemptive, by_priority)
 
     def put_all(self, entries: Iterable[Entry]) -> None:
         """Insert many tasks; none of them may be in the queue yet."""
@@ -130,6 +130,14 @@ class TaskQueue:
     def in_order(self) -> list[TaskId]:
         """Return all tasks, next one first."""
         return self.page(0, len(self))
+
+
+def _insert(ordered: list[Any], item: tuple[Any, ...]) -> None:
+    """Insert an item into a sorted list: nearly always at its end, which one comparison shows."""
+    if ordered and item < ordered[-1]:
+        insort(ordered, item)
+    else:
+        ordered.append(item)
 
 
 def _remove(ordered: list[Any], item: tuple[Any, ...]) -> None:
