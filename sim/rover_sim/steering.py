@@ -69,7 +69,7 @@ def turn_then_drive(estimate: Estimate, yaw: float, speed: float) -> Demand:
     error = wrap_angle(yaw - estimate.yaw)
     if speed == 0.0:
         return STOP
-    yaw_rate = max(-MAX_YAW_RATE, min(MAX_YAW_RATE, 2.0 * HEADING_GAIN * error))
+    yaw_rate = _turn(error)
     return Demand(0.0 if abs(error) > PIVOT_ERROR else speed * math.cos(error), yaw_rate)
 
 
@@ -82,11 +82,10 @@ def steer_to_point(
     if distance < radius:
         return None
     error = wrap_angle(math.atan2(de, dn) - estimate.yaw)
-    yaw_rate = max(-MAX_YAW_RATE, min(MAX_YAW_RATE, 2.0 * HEADING_GAIN * error))
+    yaw_rate = _turn(error)
     if abs(error) > PIVOT_ERROR:
         return Demand(0.0, yaw_rate)
-    slowest_stop = min(math.sqrt(2.0 * 0.6 * BRAKING * distance), APPROACH_GAIN * distance)
-    return Demand(min(speed_limit, slowest_stop) * math.cos(error), yaw_rate)
+    return Demand(min(speed_limit, _approach(distance)) * math.cos(error), yaw_rate)
 
 
 def arc_to_point(
@@ -102,7 +101,16 @@ def arc_to_point(
     if distance < radius:
         return None
     error = wrap_angle(math.atan2(de, dn) - estimate.yaw)
-    yaw_rate = max(-MAX_YAW_RATE, min(MAX_YAW_RATE, 2.0 * HEADING_GAIN * error))
-    slowest_stop = min(math.sqrt(2.0 * 0.6 * BRAKING * distance), APPROACH_GAIN * distance)
-    speed = min(speed_limit, max(slowest_stop, LEAST_ARC_SPEED))
+    yaw_rate = _turn(error)
+    speed = min(speed_limit, max(_approach(distance), LEAST_ARC_SPEED))
     return Demand(speed * (1.0 - 0.5 * abs(error) / math.pi), yaw_rate)
+
+
+def _turn(error: float) -> float:
+    """Return the yaw rate, rad/s, that turns by a heading error."""
+    return max(-MAX_YAW_RATE, min(MAX_YAW_RATE, 2.0 * HEADING_GAIN * error))
+
+
+def _approach(distance: float) -> float:
+    """Return the highest speed, m/s, from which the rover stops within a distance."""
+    return min(math.sqrt(2.0 * 0.6 * BRAKING * distance), APPROACH_GAIN * distance)

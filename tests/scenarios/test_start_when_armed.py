@@ -40,8 +40,7 @@ def shown(world: World) -> int:
     return int(beats[-1].custom_mode)
 
 
-@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
-def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
+def mark(world: World, by: str) -> None:
     if by == "SET_MODE":
         world.client.send(set_mode(MISSION))
         world.run(0.05)
@@ -49,6 +48,11 @@ def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
         sent = ask_mode(world.client, MISSION)
         world.run(0.05)
         assert sent.answer == (ACCEPTED, 1)
+
+
+@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
+def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
+    mark(world, by)
     assert shown(world) == MISSION, "at once"
     world.run(3)
     assert shown(world) == MISSION, "and as long as it is marked"
@@ -64,13 +68,7 @@ def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
 def test_armed_before_the_mode_starts(world: World, by: str) -> None:
     world.client.arm()
     world.run(0.3)
-    if by == "SET_MODE":
-        world.client.send(set_mode(MISSION))
-        world.run(0.05)
-    else:
-        sent = ask_mode(world.client, MISSION)
-        world.run(0.05)
-        assert sent.answer == (ACCEPTED, 1)
+    mark(world, by)
     assert world.state(1)[0] is S.STARTING
     world.run(0.1)
     assert shown(world) == MISSION

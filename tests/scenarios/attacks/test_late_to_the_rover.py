@@ -15,7 +15,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
-from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, command_long, setpoint
+from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, FakeClient, command_long, setpoint
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import PROMPT_PX4, ask_mode
@@ -106,10 +106,8 @@ def test_a_place_to_go_to(world: World) -> None:
     assert stays(world, 3)
 
 
-def test_a_px4_that_a_place_moves_in_hold_is_held_before_its_next_heartbeat(
-    make_world: MakeWorld,
-) -> None:
-    """It holds its place by going to it, and shows HOLD all along."""
+def armed_px4(make_world: MakeWorld) -> tuple[World, FakeClient]:
+    """Return an armed rover in HOLD, away from home, and a second client."""
     world = make_world(persona=PROMPT_PX4, settings=Settings(claim=False))
     person = world.add_client("person")
     world.client.move(5)
@@ -117,6 +115,14 @@ def test_a_px4_that_a_place_moves_in_hold_is_held_before_its_next_heartbeat(
     world.run(3)
     world.client.arm()
     world.run(1)
+    return world, person
+
+
+def test_a_px4_that_a_place_moves_in_hold_is_held_before_its_next_heartbeat(
+    make_world: MakeWorld,
+) -> None:
+    """It holds its place by going to it, and shows HOLD all along."""
+    world, person = armed_px4(make_world)
     caught = catch(world, GO_TO)
     world.client.send(go_to(20, 0))
     world.run(0.1)
@@ -163,13 +169,7 @@ def test_a_mode_that_shows_only_with_the_next_heartbeat(
 def test_a_px4_that_a_place_moves_in_hold_only_some_time_later(
     make_world: MakeWorld, late: float
 ) -> None:
-    world = make_world(persona=PROMPT_PX4, settings=Settings(claim=False))
-    person = world.add_client("person")
-    world.client.move(5)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(3)
-    world.client.arm()
-    world.run(1)
+    world, person = armed_px4(make_world)
     caught = catch(world, GO_TO)
     world.client.send(go_to(40, 0))
     world.run(0.05)

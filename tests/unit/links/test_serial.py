@@ -17,20 +17,11 @@ from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
 from mav_tasks.links.memory import MemoryNet
 from mav_tasks.links.serial import LEAD, USED, SerialLink, SerialUrl
 from mav_tasks.runner import link_changed
+from tests.kit.clock import Clock
 from tests.kit.lines import Device, device, read_from
 
 BAUD = 57_600
 LIMIT = 10.0  # s
-
-
-class Clock:
-    """Time as the link sees it."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture

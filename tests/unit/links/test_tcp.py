@@ -17,19 +17,10 @@ from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES, LinkLimits
 from mav_tasks.links.tcp_in import TcpInLink, TcpInUrl
 from mav_tasks.links.tcp_out import TcpOutLink, TcpOutUrl
 from mav_tasks.links.url import parse_url
+from tests.kit.clock import Clock
 
 HOST = "127.0.0.1"
 LIMIT = 10.0  # s
-
-
-class Clock:
-    """Stands in for the clock of a link: time passes when it is told to."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @pytest.fixture
