@@ -71,7 +71,7 @@ class Event(Enum):
 
 
 class Effect(Enum):
-    """What is done; ``hands`` has a function of the same name for each."""
+    """What is done; ``hands`` does it."""
 
     # how it is stopped
     BRAKE = auto()  # the stop ladder: set-points while they brake, then HOLD, then disarming
@@ -80,36 +80,36 @@ class Effect(Enum):
     STEP = auto()  # run the tasks now: a task that stands sends zeros
     WATCH = auto()  # run the stop ladder from here on
     ZERO = auto()  # one zero
-    ZERO_KEPT = auto()  # one zero if it may keep a velocity of ours
+    ZERO_KEPT = auto()  # one zero if it may keep a velocity of ours: armed, it would drive off
     ZERO_AND_HOLD = auto()  # once each, and nothing after them
     STAY = auto()  # ask for HOLD although it shows HOLD
-    LOSE = auto()  # send nothing more of ours
+    LOSE = auto()  # send nothing more of ours, not even to stop it
     # earlier requests must not take effect later
-    FORGET_GO_TO = auto()
-    FORGET_START = auto()
-    FORGET_RELEASE = auto()
-    REVOKE = auto()
-    DROP_WAITING = auto()
+    FORGET_GO_TO = auto()  # that a "go to" may undo a HOLD
+    FORGET_START = auto()  # that a mission starts with the arming
+    FORGET_RELEASE = auto()  # a released task that has not started is held again
+    REVOKE = auto()  # the grants: a client that wants to drive must ask again
+    DROP_WAITING = auto()  # commands of clients behind an unanswered one, if they might move it
     # the tasks
     COUNT = auto()  # count a halt, so that older requests do not count
-    PAUSE = auto()
-    PAUSE_TAKEN = auto()
-    LATCH = auto()
-    HOLD_TASK = auto()
+    PAUSE = auto()  # queue and active task; the result is its id
+    PAUSE_TAKEN = auto()  # the same, because somebody else has the vehicle
+    LATCH = auto()  # kill the active task, and start none before a continue; the result is its id
+    HOLD_TASK = auto()  # until somebody decides
     DO = auto()  # the request itself; if it raises Rejection, nothing follows
     WAKE = auto()  # run the tasks: one may be ready
     # permissions and reports
-    WITHDRAW_ARMING = auto()
+    WITHDRAW_ARMING = auto()  # also across a restart of the server
     RESTORE_ARMING = auto()
-    OUTDATE_ARMING = auto()  # requests sent earlier, ours or a client's
-    OUTDATE_OUR_ARMING = auto()
-    EXPECT_DISARMED = auto()
-    DISARM = auto()
+    OUTDATE_ARMING = auto()  # requests sent earlier, ours or a client's, also copies on their way
+    OUTDATE_OUR_ARMING = auto()  # we need it armed no more
+    EXPECT_DISARMED = auto()  # it counts as disarmed until it has shown that
+    DISARM = auto()  # ask for it until it is answered, whoever armed the vehicle
     LINGER = auto()  # leave its mode alone, a "go to" may follow
-    HAND_OVER = auto()
-    KEEP_ARMED = auto()
-    DISARM_AT_END = auto()
-    NOTE_OTHERS = auto()
+    HAND_OVER = auto()  # a client takes the vehicle while we hand it back
+    KEEP_ARMED = auto()  # when we hand it back
+    DISARM_AT_END = auto()  # when we hand it back, whoever armed it
+    NOTE_OTHERS = auto()  # somebody who is not our client is driving
     LEFT = auto()  # a set-point leaves late
     TELL = auto()
     TELL_TAKEN = auto()
