@@ -14,7 +14,7 @@ from mav_tasks.tasks.events import QueuePaused, VehicleHalted
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import SingleGoal
 from mav_tasks.tasks.halts import Halts
-from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.queue import TaskQueue
 from mav_tasks.tasks.registry import TaskRegistry
@@ -76,7 +76,7 @@ class Lineup:
         self.halts = Halts()
         #: the task that runs although the queue is paused
         self.immediate: TaskId | None = None
-        #: a task was killed: nothing starts before the vehicle stands
+        #: a task was killed: nothing starts before the vehicle stands, or somebody else has it
         self.stopping_after_kill = False
         self.begun_at = 0.0
         #: a held task that waits until the vehicle has rebooted, or the queue resumes
@@ -110,16 +110,6 @@ class Lineup:
     def waiting(self) -> list[TaskId]:
         """Waiting tasks, next one first."""
         return self.room.of(self.vehicle)
-
-    @property
-    def next_waiting(self) -> TaskId | None:
-        """The first task in the queue, or None."""
-        return self.queue.first()
-
-    @property
-    def capacity(self) -> int:
-        """Maximum number of waiting tasks."""
-        return self.settings.queueing.capacity
 
     @property
     def is_idle(self) -> bool:
@@ -173,20 +163,6 @@ class Lineup:
         if active is not None and active.state is S.HELD:
             return True
         return bool(self.suspended_ids) and any(task.state is S.HELD for task in self.suspended)
-
-    @property
-    def resumes_by_itself(self) -> bool:
-        """Whether a task is paused only until the vehicle, or its position, is heard again."""
-        return self.executor.resumes_by_itself
-
-    @property
-    def lost_since(self) -> float | None:
-        """When the task that resumes by itself was paused, in s; None without one."""
-        return self.executor.lost_since
-
-    def waits(self, task: Task) -> bool:
-        """Return whether a task has not started."""
-        return task.state in WAITING
 
     # shared by several parts
 

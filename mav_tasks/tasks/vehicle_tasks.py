@@ -97,10 +97,6 @@ class VehicleTasks(Lineup):
             self.executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
 
-    def withdraw(self, task: Task, *, now: float) -> None:
-        """Withdraw a submission that did not become durable; it cannot have started."""
-        self.room.withdraw(task, now=now)
-
     def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> Task:
         """Add a task that runs at once; all others wait until the queue is resumed.
 
@@ -179,10 +175,6 @@ class VehicleTasks(Lineup):
             return
         for task in [*self.suspended, *([] if self.active is None else [self.active])]:
             self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
-
-    def forget_release(self) -> None:
-        """Drop a release that waits, since something halted it; the task is held as before."""
-        self.released = None
 
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
         """Continue, or start, an unfinished plan at another of its steps."""
@@ -306,15 +298,7 @@ class VehicleTasks(Lineup):
             self.room.ended(killed, now=now)
         return killed
 
-    def end_halting(self) -> None:
-        """Stop waiting for standstill after a kill, since somebody else has the vehicle."""
-        self.stopping_after_kill = False
-
     # time
-
-    def setpoint_left(self, *, now: float) -> None:
-        """Note that a setpoint is sent to the vehicle now."""
-        self.executor.setpoint_left(now=now)
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
         """Start the tasks that can start. Return what the vehicle must be made to do now."""

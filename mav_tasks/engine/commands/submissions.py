@@ -23,7 +23,7 @@ from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.goal import GoTo, describe
-from mav_tasks.tasks.lifecycle import TaskReason, words_of
+from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
 
@@ -197,8 +197,8 @@ class Submissions:
         self._deduplicator.forget(task)
         self._store_is_away = True
         current = self._registry.get(task.id)
-        if current is not None and vehicle.tasks.waits(current):
-            vehicle.tasks.withdraw(current, now=now)
+        if current is not None and current.state in WAITING:
+            vehicle.tasks.room.withdraw(current, now=now)
 
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
         """Note that a client halted a vehicle: a return that it requests next is a new task."""

@@ -68,7 +68,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             control.ask_to_stay(now=now)
             requests.flush(now=now)
         case Effect.LOSE:
-            tasks.end_halting()
+            tasks.stopping_after_kill = False
             control.lose()
             requests.end_performing()
         # earlier requests must not take effect later
@@ -77,7 +77,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.FORGET_START:
             parts.forget_start()
         case Effect.FORGET_RELEASE:
-            tasks.forget_release()
+            tasks.released = None
         case Effect.REVOKE:
             parts.authority.revoke()
         case Effect.DROP_WAITING:
@@ -128,7 +128,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.NOTE_OTHERS:
             parts.authority.note_other(now=now)
         case Effect.LEFT:
-            tasks.setpoint_left(now=now)
+            tasks.executor.setpoint_left(now=now)
         case Effect.TELL:
             parts.note(word.text, now=now)
         case Effect.TELL_TAKEN:
