@@ -7,7 +7,7 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.missions.plans import MISSION, NOTHING, STORED, Plans, Stored
-from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -44,14 +44,12 @@ class MissionClearing:
         submissions: Submissions,
         plans: Plans,
         answers: MissionAnswers,
-        write_through: WriteThrough,
     ) -> None:
         self._vehicles = vehicles
         self._registry = registry
         self._submissions = submissions
         self._plans = plans
         self._answers = answers
-        self._write_through = write_through
         submissions.gate.knows(_Cleared, self._accept, self._undo)
 
     def clear(
@@ -113,7 +111,7 @@ class MissionClearing:
         if first == MISSION:
             go_on(now=now)
         else:
-            self._write_through.write(vehicle, first, (), go_on, refuse, now=now)
+            write_through(vehicle, first, (), go_on, refuse, now=now)
 
     def _accept(self, cleared: _Cleared, *, now: float) -> None:
         vehicle, task, actor = cleared.vehicle, cleared.task, str(cleared.sender.address)

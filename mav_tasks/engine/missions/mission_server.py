@@ -16,7 +16,6 @@ from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.mission_clearing import MissionClearing
 from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadSession
 from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored
-from mav_tasks.engine.missions.write_through import WriteThrough
 from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -98,13 +97,8 @@ class MissionServers:
         self._timers = timers
         self._settings = settings
         self._answers = MissionAnswers(gcs, registry)
-        write_through = WriteThrough(vehicles)
-        self._uploads = MissionUploads(
-            gcs, vehicles, registry, submissions, plans, self._answers, write_through
-        )
-        self._clearing = MissionClearing(
-            vehicles, registry, submissions, plans, self._answers, write_through
-        )
+        self._uploads = MissionUploads(gcs, vehicles, registry, submissions, plans, self._answers)
+        self._clearing = MissionClearing(vehicles, registry, submissions, plans, self._answers)
         self._go_to = GoToItems(submissions, registry)
         self._desks: dict[tuple[int, int, int], _Desk] = {}
 

@@ -19,7 +19,7 @@ from mav_tasks.engine.missions.item_check import ItemCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.missions.plans import MISSION, Plans, Stored
-from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -95,7 +95,6 @@ class MissionUploads:
         submissions: Submissions,
         plans: Plans,
         answers: MissionAnswers,
-        write_through: WriteThrough,
     ) -> None:
         self._gcs = gcs
         self._vehicles = vehicles
@@ -103,7 +102,6 @@ class MissionUploads:
         self._submissions = submissions
         self._plans = plans
         self._answers = answers
-        self._write_through = write_through
         submissions.gate.knows(_Mission, self._accept, self._withdraw)
         submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
 
@@ -226,7 +224,7 @@ class MissionUploads:
             items = fence_for_vehicle(items)
         store = partial(self._store, desk, vehicle, upload)
         refuse = partial(self._refuse, desk, vehicle)
-        self._write_through.write(vehicle, kind, items, store, refuse, now=now)
+        write_through(vehicle, kind, items, store, refuse, now=now)
 
     def _store(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         sender, kind = upload.sender, upload.mission_type
