@@ -107,7 +107,7 @@ class Forwarder:
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """Stop the vehicles that a client was driving, because it is gone."""
         for vehicle in self._vehicles.all:
-            if vehicle.motion_rights.has_granted((link, peer)):
+            if vehicle.parts.authority.has_granted((link, peer)):
                 self._vehicles.mark_dirty(vehicle)
                 vehicle.joint.client_is_gone((link, peer), now=now)
 

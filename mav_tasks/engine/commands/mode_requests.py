@@ -151,7 +151,7 @@ class ModeRequests:
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
-        if vehicle.parts.is_manual and not vehicle.motion_rights.is_armed_by_client(now=now):
+        if vehicle.parts.is_manual and not vehicle.parts.armings.are_by_client(now=now):
             return  # armed by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)

@@ -10,6 +10,7 @@ from typing import Any
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.policy import Kind, Row
+from mav_tasks.engine.vehicles.motion_rights import why_no_motion, why_not_moved
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.services.orders import moves
@@ -27,9 +28,9 @@ def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable, *, takes_over: bo
     ``takes_over``: it also asks for the mode in which clients drive.
     """
     if row.needs_grant:
-        return vehicle.motion_rights.why_not_moved(client, takes_over=takes_over)
+        return why_not_moved(vehicle.parts, client, takes_over=takes_over)
     if not row.passes_beside_task:
-        return vehicle.motion_rights.why_no_motion(takes_over=takes_over)
+        return why_no_motion(vehicle.parts, takes_over=takes_over)
     if not row.passes_under_stop and vehicle.tasks.is_stopped:
         return STOP_IN_FORCE
     return ""
@@ -53,7 +54,7 @@ def may_pass(
 def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> None:
     """Note that a client's packet is not forwarded to the vehicle."""
     if row.needs_grant:
-        vehicle.motion_rights.withheld(client, now=now)
+        vehicle.parts.authority.note_withheld(client, now=now)
 
 
 def passed(
@@ -61,7 +62,7 @@ def passed(
 ) -> None:
     """Note the effect on the tasks of a packet that is forwarded to the vehicle."""
     if row.needs_grant:
-        vehicle.motion_rights.passed(client, now=now)
+        vehicle.parts.authority.note_client(client, now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
         vehicle.joint.sticks_moved(now=now)
 

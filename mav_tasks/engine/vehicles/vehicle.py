@@ -16,7 +16,6 @@ from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.joint_control import JointControl
-from mav_tasks.engine.vehicles.motion_rights import MotionRights
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
@@ -90,7 +89,6 @@ class Vehicle:
         self._registry, self._monitor = registry, monitor
         self.pilot = Pilot(parts, self._view)
         self.joint = JointControl(parts, self.pilot, self._view)
-        self.motion_rights = MotionRights(parts)
         self._takeovers = Takeovers(parts, self.joint)
         self._clock = self.pilot.clock
         self.last_heartbeat: Packet | None = None
