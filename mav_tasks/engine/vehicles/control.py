@@ -157,26 +157,17 @@ TAKE_BACK = (
     _F.REVOKE,
     _F.DROP_WAITING,
 )
-BUT_GO_TO = TAKE_BACK[1:]
+LINGERS = (_F.COUNT, *TAKE_BACK[1:], _F.LINGER)  # a "go to" may still follow
+#: somebody has taken it from a task
+TAKES = (_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN)
 UNARMS = (_F.OUTDATE_ARMING, _F.EXPECT_DISARMED, _F.WITHDRAW_ARMING)
 
 TABLE = (
     # requests that halt it
     _row(_E.STOP, *TAKE_BACK, _F.OUTDATE_ARMING, _F.LATCH, _F.BRAKE),
     _row(_E.HOLD, _F.COUNT, _F.BRAKE, queue=Queue.STOPPED),
-    _row(
-        _E.HOLD,
-        *(_F.COUNT, *BUT_GO_TO, _F.LINGER, _F.STEP),
-        grip=Grip.DRIVING,
-        lingers=True,
-        work=Work.NONE,
-    ),
-    _row(
-        _E.HOLD,
-        *(_F.COUNT, *BUT_GO_TO, _F.LINGER, _F.PAUSE, _F.STEP),
-        grip=Grip.DRIVING,
-        lingers=True,
-    ),
+    _row(_E.HOLD, *LINGERS, _F.STEP, grip=Grip.DRIVING, lingers=True, work=Work.NONE),
+    _row(_E.HOLD, *LINGERS, _F.PAUSE, _F.STEP, grip=Grip.DRIVING, lingers=True),
     _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.LET_GO, work=Work.NONE),
     _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.PAUSE, _F.LET_GO),
     # a vehicle that moves without a task is stopped as by HOLD; so is one that was taken over
@@ -233,25 +224,10 @@ TABLE = (
     _row(_E.CLOSE, _F.BRAKE),
     # observations that halt it
     _row(_E.TAKEN, _F.COUNT, queue=Queue.STOPPED),
-    _row(
-        _E.TAKEN,
-        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
-        work=GOES_ON,  # also a task that runs although the queue is paused
-    ),
+    _row(_E.TAKEN, *TAKES, work=GOES_ON),  # also a task that runs although the queue is paused
     # it was being stopped: no waiting task may drive it off from where somebody takes it
-    _row(
-        _E.TAKEN,
-        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
-        work=Work.WAITS,
-        queue=IS_LET_RUN,
-        grip=Grip.STOPPING,
-    ),
-    _row(
-        _E.TAKEN,
-        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
-        work=HAS_IT,
-        queue=IS_LET_RUN,
-    ),
+    _row(_E.TAKEN, *TAKES, work=Work.WAITS, queue=IS_LET_RUN, grip=Grip.STOPPING),
+    _row(_E.TAKEN, *TAKES, work=HAS_IT, queue=IS_LET_RUN),
     _row(_E.TAKEN, _F.COUNT, *TAKE_BACK, _F.LOSE),
     _row(_E.MODE, _F.WITHDRAW_ARMING, _E.TAKEN),
     # the next set-point under way would end a failsafe's HOLD
