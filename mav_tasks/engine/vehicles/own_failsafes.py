@@ -1,17 +1,19 @@
 """What a vehicle reports about its own failsafes: which one, if any, changed its mode.
 
 The text may come before or after the heartbeat that shows the mode. Its fence is reported by no
-text, but by SYS_STATUS, at 1 Hz.
+text, but by SYS_STATUS, at 1 Hz: ArduPilot (4.6.3) reports its fence as healthy unless it is
+breached, and it stays breached until the rover is back inside or the fence is switched off. PX4
+1.17 has no such bit: only its mode shows a breach.
 """
 
 from math import inf
 from typing import NamedTuple
 
-from mav_tasks.engine.vehicles.own_fence import is_breached
 from mav_tasks.engine.vehicles.vehicle_texts import VehicleTexts
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.messages import Statustext, SysStatus
 
+GEOFENCE = 0x100000  # MAV_SYS_STATUS_GEOFENCE
 FENCE = "its own fence"
 TOLD_WITHIN = 1.5  # s after a mode change in which the cause may be reported
 
@@ -63,3 +65,9 @@ class OwnFailsafes:
     def _explained(self, cause: str, *, now: float) -> str:
         is_just_now, self._changed_at = now - self._changed_at <= TOLD_WITHIN, -inf
         return cause if is_just_now else ""
+
+
+def is_breached(status: SysStatus) -> bool:
+    """Return whether a fence that is switched on is reported as unhealthy."""
+    is_on = status.onboard_control_sensors_enabled & GEOFENCE
+    return bool(is_on) and not status.onboard_control_sensors_health & GEOFENCE
