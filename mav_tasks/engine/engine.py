@@ -126,7 +126,7 @@ class Engine:
             kept=kept,
         )
         stored = {} if restored is None else restored.plans
-        self._plans = Plans(self._registry, self._fleet, settings, restored=stored)
+        self._plans = Plans(self._registry, self._fleet, restored=stored)
         self._desks = MissionServers(
             self._gcs,
             self._vehicles,
@@ -134,7 +134,6 @@ class Engine:
             self._submissions,
             self._plans,
             timers,
-            settings,
         )
         self._reports = MissionReports(
             self._gcs, self._vehicles, self._registry, self._plans, timers, settings, now=now
@@ -142,18 +141,16 @@ class Engine:
         self._displays = MessageRequests(self._gcs, self._vehicles, self._registry)
         refusals = Refusals(self._registry)
         self._modes = ModeRequests(
-            self._gcs, self._registry, self._submissions, self._plans, refusals, settings
+            self._gcs, self._registry, self._submissions, self._plans, refusals
         )
         self._commands = Commands(
-            self._gcs,
             self._vehicles,
             self._registry,
             self._submissions,
             self._plans,
             self._modes,
-            TaskControl(self._registry, settings),
+            TaskControl(self._registry),
             self._displays,
-            settings,
         )
         self._publisher = Publisher(
             self._gcs,
@@ -168,7 +165,7 @@ class Engine:
         self._passing = Forwarder(self._vehicles, refusals)
         self._door = Door(self._vehicles, refusals)
         self._operator = OperatorWatch(timers, self._note_unheard, settings)
-        self._setup = SetupSigning(self.signatures, self._vehicles, settings)
+        self._setup = SetupSigning(self.signatures, self._vehicles)
         self._reception = Reception(
             gcs=self._gcs,
             vehicles=self._vehicles,
@@ -357,14 +354,11 @@ class Engine:
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
         self.signatures.apply(settings.signing.window)
-        self._setup.apply(settings)
         self._gates.apply(settings.clients)
         self._fleet.apply(settings)
         self._gcs.apply(settings)
         self._vehicles.apply(settings)
-        self._commands.apply(settings)
-        self._plans.apply(settings)
-        self._desks.apply(settings)
+        self._submissions.apply(settings)
         self._reports.apply(settings)
         self._operator.apply(settings)
 

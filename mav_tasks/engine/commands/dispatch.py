@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.gcs_client import GcsClient
-from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.command_request import CommandRequest
@@ -36,7 +35,6 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
@@ -59,7 +57,6 @@ class Commands:
 
     def __init__(
         self,
-        gcs: GcsSide,
         vehicles: VehicleSide,
         registry: TaskRegistry,
         submissions: Submissions,
@@ -67,10 +64,7 @@ class Commands:
         modes: ModeRequests,
         control: TaskControl,
         displays: MessageRequests,
-        settings: Settings,
     ) -> None:
-        self._settings = settings
-        self._gcs = gcs
         self._vehicles = vehicles
         self._registry = registry
         self._submissions = submissions
@@ -79,13 +73,6 @@ class Commands:
         self._control = control
         self._displays = displays
         submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
-        self._submissions.apply(settings)
-        self._modes.apply(settings)
-        self._control.apply(settings)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """Execute or refuse a client's command, and answer it."""
@@ -176,12 +163,14 @@ class Commands:
         command, row = asked.command, asked.row
         component = command.target.component_id
         at_server = component == asked.vehicle.server_address.component_id
+        # otherwise the server does not handle standard commands that are sent to the autopilot
+        claims = at_server or asked.vehicle.parts.settings.claim
         if row.is_claimed and (
             at_server or component in (0, AUTOPILOT) or _is_of_what_nobody_sends(asked)
         ):
             asked.rights.require(row.role, f"send {row.name}")
             match command.command:
-                case number if number in GOALS and (at_server or self._claims(number)):
+                case number if number in GOALS and (claims or is_task_command(number)):
                     if number == MavCmd.DO_REPOSITION:
                         self._reposition(asked, now=now)
                     else:
@@ -196,21 +185,19 @@ class Commands:
                 ):
                     asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
                     return
-                case MavCmd.NAV_TAKEOFF as number if at_server or self._claims(
-                    number
-                ):  # examples for every kind of vehicle send it: nothing to do
+                case MavCmd.NAV_TAKEOFF if claims:  # examples for all vehicles send it: no effect
                     asked.answer(MavResult.ACCEPTED)
                     return
-                case MavCmd.NAV_LAND as number if at_server or self._claims(number):
+                case MavCmd.NAV_LAND if claims:
                     asked.vehicle.joint.stand_down(asked.client.key, now=now)
                     asked.answer(MavResult.ACCEPTED)
                     return
-                case MavCmd.MISSION_START as number if at_server or self._claims(number):
+                case MavCmd.MISSION_START if claims:
                     first = whole(asked.command, 1, "first item", high=0xFFFF)
                     _check_last_item(asked)
                     self._modes.start_plan(asked, first=first, now=now)
                     return
-                case MavCmd.DO_SET_MISSION_CURRENT as number if at_server or self._claims(number):
+                case MavCmd.DO_SET_MISSION_CURRENT if claims:
                     self._plans.check_start(asked.rights, asked.vehicle, asked.submitter)
                     seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
                     task = self._plans.go_on_with(asked.vehicle, seq, now=now)
@@ -264,10 +251,6 @@ class Commands:
         words = f"command {asked.command.command}: not supported in this version"
         unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
         self._registry.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
-
-    def _claims(self, command: int) -> bool:
-        """Whether the server handles this command when it is sent to the autopilot."""
-        return is_task_command(command) or self._settings.claim
 
     def _reposition(self, asked: CommandRequest, *, now: float) -> None:
         """DO_REPOSITION: submit a "go to"; without a place, pause."""

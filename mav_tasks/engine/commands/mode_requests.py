@@ -19,7 +19,6 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -49,19 +48,13 @@ class ModeRequests:
         submissions: Submissions,
         plans: Plans,
         refusals: Refusals,
-        settings: Settings,
     ) -> None:
         self._refusals = refusals
         self._gcs = gcs
         self._registry = registry
         self._submissions = submissions
         self._plans = plans
-        self._claims = settings.claim
         submissions.gate.knows(_Started, self._accept, self._give_up)
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._claims = settings.claim
 
     def asked(self, asked: CommandRequest, *, now: float) -> bool:
         """Handle DO_SET_MODE. Return False if the vehicle itself is to answer it."""
@@ -192,16 +185,16 @@ class ModeRequests:
 
     def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether the server drives this mode itself, as a return to a known home."""
-        return (
-            self._claims and mode == vehicle.persona.return_mode and vehicle.where.home is not None
-        )
+        is_return = mode == vehicle.persona.return_mode and vehicle.where.home is not None
+        return is_return and vehicle.parts.settings.claim
 
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether the server drives this mode itself, as the mission uploaded to it."""
         active = vehicle.tasks.active
         has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).items)
         has_plan = has_plan or (active is not None and isinstance(active.goal, Plan))
-        return self._claims and mode == vehicle.persona.mission_mode and has_plan
+        is_mission = mode == vehicle.persona.mission_mode and has_plan
+        return is_mission and vehicle.parts.settings.claim
 
 
 def _return_home(asked: CommandRequest) -> Draft:

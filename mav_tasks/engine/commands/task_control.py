@@ -15,7 +15,6 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import MAX_PRIORITY, Submitter, Task, Terms
@@ -30,13 +29,8 @@ GROUND_OR_AIR = 1  # DO_CHANGE_SPEED, highest param1: airspeed counts as ground 
 class TaskControl:
     """The commands of clients on existing tasks."""
 
-    def __init__(self, registry: TaskRegistry, settings: Settings) -> None:
+    def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
-        self._settings = settings
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
 
     def act(self, asked: CommandRequest, *, now: float) -> int:
         """Execute one of these commands; return the task's id, or 0."""
@@ -140,7 +134,8 @@ class TaskControl:
         wish = asked.command.params[1]
         if wish == NO_CHANGE:
             return 0
-        top = min(self._settings.driving.max_speed, asked.rights.limits.max_speed)
+        driving = asked.vehicle.parts.settings.driving
+        top = min(driving.max_speed, asked.rights.limits.max_speed)
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
         return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
 

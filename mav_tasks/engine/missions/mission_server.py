@@ -28,7 +28,6 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.mission_item import unpacked
 from mav_tasks.services.mission_receiver import RequestForm, Sender
 from mav_tasks.services.mission_sender import MissionSender
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -90,23 +89,15 @@ class MissionServers:
         submissions: Submissions,
         plans: Plans,
         timers: Timers,
-        settings: Settings,
     ) -> None:
         self._vehicles = vehicles
         self._plans = plans
         self._timers = timers
-        self._settings = settings
         self._answers = MissionAnswers(gcs, registry)
         self._uploads = MissionUploads(gcs, vehicles, registry, submissions, plans, self._answers)
         self._clearing = MissionClearing(vehicles, registry, submissions, plans, self._answers)
         self._go_to = GoToItems(submissions, registry)
         self._desks: dict[tuple[int, int, int], _Desk] = {}
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
-        for desk in self._desks.values():
-            desk.uploads.check.apply(settings)
 
     def receive(
         self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
@@ -118,7 +109,7 @@ class MissionServers:
             return False
         component = message.target_component or AUTOPILOT
         at_server = component == vehicle.server_component
-        if not at_server and (component != AUTOPILOT or not self._settings.claim):
+        if not at_server and (component != AUTOPILOT or not vehicle.parts.settings.claim):
             return False
         desk = self._desk(vehicle, component, getattr(message, "mission_type", MISSION))
         who = (client.key, client.signed_by.name)  # an endpoint may have several keys
@@ -209,7 +200,7 @@ class MissionServers:
         if desk is None:
             is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests
             form = m.MissionRequest if is_plain else m.MissionRequestInt
-            check = ItemCheck(vehicle, component, self._settings)
+            check = ItemCheck(vehicle, component)
             ask_again = partial(self._ask_again, vehicle)
             desk = self._desks[key] = _Desk(check, form, self._timers, ask_again)
         return desk

@@ -16,7 +16,6 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
 from mav_tasks.services.mission_item import Item, item_at, packed, unpacked
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of
@@ -65,13 +64,11 @@ class Plans:
         self,
         registry: TaskRegistry,
         fleet: Fleet,
-        settings: Settings,
         *,
         restored: Mapping[tuple[int, int], tuple[int, str]],
     ) -> None:
         self._registry = registry
         self._fleet = fleet
-        self._settings = settings
         self._stored = {
             key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
         }
@@ -79,10 +76,6 @@ class Plans:
         self._started: dict[int, _Started] = {}  # the last start of each vehicle
         for (system_id, kind), stored in self._stored.items():
             self._apply_bounds(system_id, kind, stored.items)
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
 
     def stored(self, vehicle: int, kind: int) -> Stored:
         """Return a vehicle's mission, fence or rally points."""
@@ -251,7 +244,7 @@ class Plans:
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
     ) -> Draft:
         manner = MissionParseOptions.of(
-            vehicle.persona, is_staged=True, driving=self._settings.driving
+            vehicle.persona, is_staged=True, driving=vehicle.parts.settings.driving
         )
         steps = steps_of(stored.items, manner=manner)
         wanted = plan_of(stored.items, steps, has_home=manner.has_home, now=now)
