@@ -26,7 +26,6 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Submitter
 
-MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
 LIST_EACH = 0.2  # s between lists: one packet asks for many, no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
 

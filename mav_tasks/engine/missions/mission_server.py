@@ -33,19 +33,6 @@ from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 
 #: messages of the mission protocol from clients
-MESSAGES = (
-    m.MissionCount,
-    m.MissionItem,
-    m.MissionItemInt,
-    m.MissionRequestList,
-    m.MissionRequest,
-    m.MissionRequestInt,
-    m.MissionAck,
-    m.MissionClearAll,
-    m.MissionSetCurrent,
-    m.MissionRequestPartialList,
-    m.MissionWritePartialList,
-)
 MissionMessage = (
     m.MissionCount
     | m.MissionItem
