@@ -20,7 +20,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer
+from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import gcs_heartbeat
@@ -90,8 +90,12 @@ class VehicleSide:
         #: the address under which the server speaks to vehicles
         self.our_address = _own_address(settings)
         self._decoder = Decoder()
+        #: packet counts of the vehicle links
+        self.counts = self._decoder.counts
         #: the deadlines of all vehicles
         self.deadline_heap = DeadlineHeap(timers)
+        #: note that a vehicle that was only looked at is about to be changed
+        self.mark_dirty = self.deadline_heap.mark_dirty
         self._old_until = -inf
         self._stood_for = 0.0  # s, how long this process stalled before that
         self._noted: set[str] = set()
@@ -127,10 +131,6 @@ class VehicleSide:
         if vehicle is not None:
             self.deadline_heap.mark_dirty(vehicle)
         return vehicle
-
-    def mark_dirty(self, vehicle: Vehicle) -> None:
-        """Note that a vehicle that was only looked at is about to be changed."""
-        self.deadline_heap.mark_dirty(vehicle)
 
     def addressed_by(self, system_id: int) -> list[Vehicle]:
         """Return the vehicles that a target_system addresses; 0 addresses all of them."""
@@ -194,11 +194,6 @@ class VehicleSide:
         for vehicle in waiting:
             self.deadline_heap.mark_dirty(vehicle)
             vehicle.joint.step(now)
-
-    @property
-    def counts(self) -> DecodeCounts:
-        """Packet counts of the vehicle links."""
-        return self._decoder.counts
 
     def apply(self, settings: Settings) -> None:
         """Apply new settings."""
