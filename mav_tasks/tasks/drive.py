@@ -73,7 +73,6 @@ class Drive:
         return f"Drive({self._course!r}, {self._last_velocity})"
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
 
     def forget(self) -> None:

@@ -61,7 +61,6 @@ class Executor:
 
     @property
     def task(self) -> Task | None:
-        """The active task."""
         return None if self.task_id is None else self._registry[self.task_id]
 
     @property
@@ -76,7 +75,6 @@ class Executor:
             self._meter.note(now=now)
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
         self.drive.apply(settings)
 

@@ -52,7 +52,6 @@ class VehicleTasks(Lineup):
     # requests
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self.settings = settings
         self.terms.apply(settings)
 

@@ -103,7 +103,6 @@ class GcsClient:
         return f"GcsClient({names} at {self.endpoint})"
 
     def apply(self, settings: Clients) -> None:
-        """Take new settings."""
         self.thinner.default_interval = settings.stream_interval
         self.statuses.apply(rate=settings.status_rate)
         self._texts.apply(rate=settings.text_rate)
@@ -162,7 +161,6 @@ class GcsClient:
         return sender
 
     def heard(self, packet: Packet, *, now: float) -> None:
-        """Note a packet from this client."""
         source = packet.source
         sender = self._senders.get(source) or self.sender(source)
         sender.line.place(packet.seq, now=now)

@@ -108,7 +108,6 @@ class GcsSide:
             client.thinner.backoff.note(change.is_congested, now=now)
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
         self._settings = settings
         self._rights = RightsBook(settings.roles)
         self._newcomers = None

@@ -75,7 +75,6 @@ class Submissions:
         self._is_closing = True
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
         self.gate.within = settings.watch.commit
 
     def committed(self, through: int, *, now: float) -> None:

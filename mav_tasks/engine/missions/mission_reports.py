@@ -81,7 +81,6 @@ class MissionReports:
         self.apply(settings)
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
         self._claims = settings.claim
         self._timer.set(self._next_at if self._claims else inf)
 

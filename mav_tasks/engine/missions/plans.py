@@ -313,7 +313,6 @@ class Plans:
 
 
 def plan_of_task(task: Task) -> Plan:
-    """Return the plan of a mission task."""
     assert isinstance(task.goal, Plan), "the task of a mission is a plan"
     return task.goal
 
@@ -324,7 +323,6 @@ def waits_for_start(task: Task) -> bool:
 
 
 def _mission_state(task: Task | None, *, has_plan: bool) -> int:
-    """Return the MISSION_STATE."""
     if not has_plan:
         return 1  # NO_MISSION
     match None if task is None else task.state:

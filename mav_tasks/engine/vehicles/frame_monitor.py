@@ -41,7 +41,6 @@ class FrameMonitor:
         return f"FrameMonitor({self.origin}, home {self.home})"
 
     def boot(self, booted_at: float, *, now: float) -> None:
-        """Note when the vehicle booted."""
         self._booted_at, self._heard_at = booted_at, now
 
     def receive(self, message: Seen) -> None:

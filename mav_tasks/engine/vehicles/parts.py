@@ -58,7 +58,6 @@ class Parts:
 
     @property
     def control(self) -> OffboardControl:
-        """Our offboard control of the vehicle."""
         return self.requests.control
 
     @property
@@ -68,7 +67,6 @@ class Parts:
 
     @property
     def is_manual(self) -> bool:
-        """Whether it is in a manual mode."""
         return self.monitor.custom_mode in self.persona.manual_modes
 
     def is_driven_by_others(self, *, now: float) -> bool:

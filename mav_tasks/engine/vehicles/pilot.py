@@ -52,7 +52,6 @@ class Pilot:
         return f"Pilot({self.clock!r}, {self.guard.ladder!r})"
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self.guard.apply(settings.watch)
 
     def close(self) -> None:

@@ -196,7 +196,6 @@ class VehicleSide:
             vehicle.joint.step(now)
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
         self.our_address = _own_address(settings)
         self.links.apply(settings)
