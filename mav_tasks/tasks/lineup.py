@@ -193,9 +193,13 @@ class Lineup:
         self.executor.give_up()
         self.suspended_ids[task_id] = None
 
+    def blocker(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> TaskReason:
+        """Return why no task with this goal can take control of the vehicle now, or NONE."""
+        return start_blocker(seen, watch=self.settings.watch, now=now, goal=goal)
+
     def check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         """Raise Rejection, with a remedy, if a task with this goal could not start now."""
-        blocker = start_blocker(seen, watch=self.settings.watch, now=now, goal=goal)
+        blocker = self.blocker(seen, goal, now=now)
         if blocker:
             raise Rejection(blocker, f"cannot start: {WAYS_OUT.get(blocker, words_of(blocker))}")
 

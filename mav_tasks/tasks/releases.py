@@ -10,7 +10,6 @@ from mav_tasks.tasks.events import TaskWaits, VehicleNoted
 from mav_tasks.tasks.goal import MoveTurned, Rotate
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason, TaskState, words_of
 from mav_tasks.tasks.lineup import Lineup, Released
-from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Task, same_frame
 from mav_tasks.tasks.view import VehicleView
 
@@ -111,8 +110,7 @@ class Releases:
             return R.NONE
         if seen.heard and seen.is_booting:  # it shows another mode for a moment
             return R.NO_POSITION
-        goal = goal_of(task)
-        blocker = start_blocker(seen, watch=self._lineup.settings.watch, now=now, goal=goal)
+        blocker = self._lineup.blocker(seen, goal_of(task), now=now)
         return blocker if blocker in OF_RESTART else R.NONE
 
     def _note_held(self, task: Task, why: str, *, now: float) -> None:
