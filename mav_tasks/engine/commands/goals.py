@@ -248,13 +248,6 @@ def _yaw(command: Command, index: int, *, turn: float) -> float | None:
     return value or None
 
 
-def _speed(command: Command, index: int, driving: Driving) -> float | None:
-    """Return a speed in m/s, None for the default: 0, -1 or NaN."""
-    if command.params[index - 1] == -1.0:
-        return None
-    return _speed_or_default(command, index, driving)
-
-
 def _speed_or_default(command: Command, index: int, driving: Driving) -> float | None:
     """Return a speed in m/s, None for the default: 0 or NaN."""
     if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
@@ -331,7 +324,7 @@ def reposition_flags(command: Command) -> int:
 
 
 def _reposition(command: Command, driving: Driving) -> SingleGoal:
-    speed = _speed(command, 1, driving)
+    speed = None if command.params[0] == -1.0 else _speed_or_default(command, 1, driving)
     radius = number(command, 3, "radius", low=-inf, high=1000.0, default=0.0)
     yaw = _yaw(command, 4, turn=tau)
     if yaw is not None and reposition_flags(command) & RELATIVE_YAW:

@@ -51,12 +51,6 @@ def may_pass(
     return not why_not_sent(row, vehicle, client.key)
 
 
-def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> None:
-    """Note that a client's packet is not forwarded to the vehicle."""
-    if row.needs_grant:
-        vehicle.parts.authority.note_withheld(client, now=now)
-
-
 def passed(
     vehicle: Vehicle, client: Hashable, row: Row, message: m.Message | None, *, now: float
 ) -> None:
