@@ -14,14 +14,13 @@ from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
-from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.takeovers import Takeovers
-from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
+from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition, home_meant
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
