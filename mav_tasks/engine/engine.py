@@ -70,8 +70,8 @@ class Engine:
     """The task server without sockets, clock or disk."""
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
-        kept = {} if restored is None else restored.parameters
-        configured, (settings, why_not) = settings, with_all(settings, kept)
+        earlier = restored or Restored()
+        configured, (settings, why_not) = settings, with_all(settings, earlier.parameters)
         #: why the latest settings override parameters that clients set
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
@@ -89,12 +89,11 @@ class Engine:
         self._starting = timers.timer(Turn.TASKS, self._fleet.room.handle_deadline)
         self._starting.set(self._fleet.room.times.next_at)
         self._telling = timers.timer(Turn.STATUSES, self._tell_statuses)
-        seen = Restored() if restored is None else restored
         #: verifies the signatures of incoming packets and signs outgoing ones
         self.signatures = Signatures(
             window=settings.signing.window,
-            times=seen.signatures,
-            signed_until=seen.signed_until,
+            times=earlier.signatures,
+            signed_until=earlier.signed_until,
         )
         self._gcs = GcsSide(
             queue=self._packets,
@@ -114,8 +113,7 @@ class Engine:
             settings=settings,
         )
         deduplicator = SubmissionDeduplicator(self._registry)
-        if restored is not None:
-            deduplicator.restore(restored.tasks, now=now)
+        deduplicator.restore(earlier.tasks, now=now)
         self._submissions = Submissions(self._gcs, self._registry, deduplicator, timers, settings)
         self._parameters = ParameterServer(
             self._gcs,
@@ -123,10 +121,9 @@ class Engine:
             self._registry,
             self._submissions,
             settings=configured,
-            kept=kept,
+            kept=earlier.parameters,
         )
-        stored = {} if restored is None else restored.plans
-        self._plans = Plans(self._registry, self._fleet, restored=stored)
+        self._plans = Plans(self._registry, self._fleet, restored=earlier.plans)
         self._desks = MissionServers(
             self._gcs,
             self._vehicles,
@@ -143,13 +140,14 @@ class Engine:
         self._modes = ModeRequests(
             self._gcs, self._registry, self._submissions, self._plans, refusals
         )
+        control = TaskControl(self._registry)
         self._commands = Commands(
             self._vehicles,
             self._registry,
             self._submissions,
             self._plans,
             self._modes,
-            TaskControl(self._registry),
+            control,
             self._displays,
         )
         self._publisher = Publisher(
@@ -174,6 +172,7 @@ class Engine:
             door=self._door,
             broadcasts=Broadcasts(self._vehicles, packer),
             commands=self._commands,
+            control=control,
             modes=self._modes,
             displays=self._displays,
             setup=self._setup,

@@ -18,6 +18,7 @@ from mav_tasks.engine.commands.command_request import MessageRequest
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
 from mav_tasks.engine.commands.mode_requests import ModeRequests
+from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.words import kind_of_message
 from mav_tasks.engine.inputs import Packets
 from mav_tasks.engine.missions.mission_reports import MissionReports
@@ -40,6 +41,7 @@ class Reception:
     door: Door
     broadcasts: Broadcasts
     commands: Commands
+    control: TaskControl
     modes: ModeRequests
     displays: MessageRequests
     setup: SetupSigning
@@ -133,11 +135,14 @@ class Reception:
         client, packet, message = received.client, received.packet, received.message
         if isinstance(message, m.CommandLong | m.CommandInt):
             self.commands.receive(client, packet, command_of(message), now=now)
-        elif isinstance(message, m.CommandCancel):
-            self.commands.cancel_latest(client, packet, message, now=now)
-        elif isinstance(message, m.SetMode):
+        elif isinstance(message, m.CommandCancel | m.SetMode):
             vehicle = self.vehicles.get(message.target_system)
-            if vehicle is not None:
+            if vehicle is None:
+                return
+            if isinstance(message, m.CommandCancel):
+                number = message.command
+                self.control.cancel_latest(client, vehicle, packet.source, number, now=now)
+            else:
                 asked = MessageRequest.of(client, vehicle, packet, int(message.custom_mode))
                 self.modes.heard(asked, now=now)
         elif isinstance(message, m.RequestDataStream):

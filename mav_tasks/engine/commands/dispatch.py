@@ -271,21 +271,6 @@ class Commands:
             undoes = _UndoesHold(asked.vehicle, number, asked.actor)
             self._submissions.gate.hold(undoes, now=now)
 
-    def cancel_latest(
-        self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
-    ) -> None:
-        """COMMAND_CANCEL: it has no acknowledgement; the task's status shows the effect."""
-        vehicle = self._vehicles.get(message.target_system)
-        if vehicle is not None:
-            self._control.cancel_latest(
-                client.rights,
-                vehicle,
-                client.submitter(packet.source),
-                message.command,
-                is_late=client.is_late,
-                now=now,
-            )
-
     # STOP, pause, modes
 
     def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:

@@ -5,19 +5,21 @@ Each returns the id of the task that it acted on, 0 for none or many, or raises 
 
 from dataclasses import replace
 
-from mav_tasks.engine.clients.rights import OPERATOR, Rights
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import MAX_DELAY, flag, identifier, number, whole
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import MAX_PRIORITY, Submitter, Task, Terms
+from mav_tasks.tasks.task import MAX_PRIORITY, Task, Terms
 
 R, P = TaskReason, TaskProperty
 
@@ -47,23 +49,18 @@ class TaskControl:
                 return self._change_speed(asked, now=now)
 
     def cancel_latest(
-        self,
-        rights: Rights,
-        vehicle: Vehicle,
-        submitter: Submitter,
-        command: int,
-        *,
-        is_late: bool,
-        now: float,
+        self, client: GcsClient, vehicle: Vehicle, source: Address, command: int, *, now: float
     ) -> None:
         """COMMAND_CANCEL: cancel a client's latest task of a command, if it is not over.
 
-        ``is_late``: the message waited while the server was stalled. A held task then stays held.
+        A message that waited while the server was stalled leaves a held task as it is. There is no
+        acknowledgement; the task's status shows the effect.
         """
+        submitter = client.submitter(source)
         task = self._registry.latest(submitter, command, vehicle=vehicle.system_id)
-        if task is None or (is_late and task.state is TaskState.HELD):
+        if task is None or (client.is_late and task.state is TaskState.HELD):
             return
-        if rights.reach(row_of_message(CommandCancel.id).role):
+        if client.rights.reach(row_of_message(CommandCancel.id).role):
             vehicle.joint.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: CommandRequest, *, now: float) -> int:
