@@ -120,12 +120,11 @@ class Reception:
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
-        client, packet, message = received.client, received.packet, received.message
-        if not self.door.may_pass(client, packet, message, now=now):
+        if not self.door.may_pass(received, now=now):
             return
-        if len(client.introduced) < len(self.vehicles.by_id):
-            self.publisher.welcome(client, now=now)
-        if getattr(message, "target_system", None) == EVERYBODY:
+        if len(received.client.introduced) < len(self.vehicles.by_id):
+            self.publisher.welcome(received.client, now=now)
+        if getattr(received.message, "target_system", None) == EVERYBODY:
             for each in self.broadcasts.addressed(received):
                 self._see_to(each, now=now)
         else:
