@@ -15,6 +15,7 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plans import MISSION, Plans
 from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
+from mav_tasks.engine.vehicles.start_mark import Marker
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -83,7 +84,7 @@ class ModeRequests:
             vehicle.joint.client_asks_mode(mode, client.key, now=now)
             return False
         self._plans.check_start(asked.rights, vehicle, asked.submitter)
-        if self._is_to_be_armed_first(vehicle):
+        if vehicle.persona.starts_when_armed and not vehicle.armed:
             self._mark(asked, now=now)
             shown = self._plans.shown(vehicle)
             asked.answer(MavResult.ACCEPTED, 0 if shown is None else shown.id)
@@ -164,9 +165,7 @@ class ModeRequests:
     def _mark(self, asked: CommandRequest, *, now: float) -> None:
         vehicle = asked.vehicle
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
-        vehicle.start_mark.put(
-            asked.client.key, asked.submitter, asked.rights, plan_id=plan_id, now=now
-        )
+        vehicle.start_mark.put(Marker(asked.submitter, asked.rights, plan_id), now=now)
         asked.tell("The mission starts when the rover is armed", MavSeverity.INFO, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
@@ -179,9 +178,6 @@ class ModeRequests:
         for client in self._gcs.clients:
             if vehicle.system_id in client.introduced:
                 client.outlet.send(heartbeat, source)
-
-    def _is_to_be_armed_first(self, vehicle: Vehicle) -> bool:
-        return vehicle.persona.starts_when_armed and not vehicle.armed
 
     def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether the server drives this mode itself, as a return to a known home."""
@@ -199,12 +195,5 @@ class ModeRequests:
 
 def _return_home(asked: CommandRequest) -> Draft:
     """Return the draft for the mode RTL."""
-    command = MavCmd.NAV_RETURN_TO_LAUNCH
-    return Draft(
-        asked.vehicle.system_id,
-        command,
-        GoTo(None),
-        asked.submitter,
-        CRUISING,
-        marks=asked.marks,
-    )
+    number, command = asked.vehicle.system_id, MavCmd.NAV_RETURN_TO_LAUNCH
+    return Draft(number, command, GoTo(None), asked.submitter, CRUISING, asked.marks)
