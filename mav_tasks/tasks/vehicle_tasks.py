@@ -178,11 +178,11 @@ class VehicleTasks(Lineup):
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
         """Continue, or start, an unfinished plan at another of its steps."""
         assert isinstance(task.goal, Plan), "only plans have steps"
-        if self.active is not None and self.active.id == task.id:
-            self.executor.drive.skip_to(self.active, step, now=now)
-        else:
-            progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
-            self.registry.advance(task.id, progress, now=now)
+        present = self.registry[task.id].progress
+        progress = skipped_to(task.goal, replace(present, pending=()), step)
+        if self.executor.task_id == task.id:
+            self.executor.drive.forget()
+        self.registry.advance(task.id, progress, now=now)
 
     def rest(self, seen: VehicleView, *, now: float) -> None:
         """Record how far the vehicle rolled after it was stopped for the end of the server."""
