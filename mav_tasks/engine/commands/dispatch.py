@@ -158,8 +158,7 @@ class Commands:
     def _dispatch(self, asked: CommandRequest, *, now: float) -> None:
         if asked.command.target.system_id == EVERYBODY:  # others: see ``Broadcasts``
             number = asked.command.command
-            words = f"command {number} must name one rover, not system 0"
-            raise Rejection(R.BAD_PARAMETER, words)
+            raise Rejection(R.BAD_PARAMETER, f"command {number} must name one rover, not system 0")
         command, row = asked.command, asked.row
         component = command.target.component_id
         at_server = component == asked.vehicle.server_address.component_id
@@ -325,8 +324,7 @@ class Commands:
         self._submissions.held(vehicle, asked.submitter)
         paused = vehicle.joint.pause(actor=asked.actor, now=now)
         if not vehicle.is_heard(now=now):  # it is paused nevertheless
-            words = f"paused, but rover {vehicle.system_id} is silent"
-            raise Rejection(R.VEHICLE_SILENT, words)
+            raise Rejection(R.VEHICLE_SILENT, f"paused, but rover {vehicle.system_id} is silent")
         return paused
 
 

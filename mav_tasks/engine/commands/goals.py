@@ -150,8 +150,7 @@ def number(
         return value
     label = f"param{index} {name}"
     if not isnan(value):
-        words = f"{label} {value:.8g} not in {low:.8g}..{high:.8g}"
-        raise bad(words, param=index)
+        raise bad(f"{label} {value:.8g} not in {low:.8g}..{high:.8g}", param=index)
     if default is None:
         raise bad(f"{label} is not given", param=index)
     return default
@@ -170,8 +169,7 @@ def whole(
     fallback = None if default is None else float(default)
     value = number(command, index, name, low=low, high=high, default=fallback)
     if value != int(value):
-        words = f"param{index} {name} {value:.8g} is not a whole number"
-        raise bad(words, param=index)
+        raise bad(f"param{index} {name} {value:.8g} is not a whole number", param=index)
     return int(value)
 
 
@@ -344,8 +342,7 @@ def _return(_command: Command, _driving: Driving) -> SingleGoal:
 
 def _delay(command: Command, _driving: Driving) -> SingleGoal:
     if command.params[0] == -1.0:
-        words = "param1 -1: a time of day is not supported, see START_UTC"
-        raise bad(words, param=1)
+        raise bad("param1 -1: a time of day is not supported, see START_UTC", param=1)
     return Wait(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
 
 

@@ -90,8 +90,7 @@ class Submissions:
         """Submit the task of a command. Raise Rejection if it is refused."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         if client.waited > GIVEN_UP:
-            words = "delayed by the server: send it again"
-            raise Rejection(R.STALE, words)
+            raise Rejection(R.STALE, "delayed by the server: send it again")
         is_ours, settings = command.command in TASK_COMMANDS, vehicle.parts.settings
         wish = parse_command(
             command,

@@ -69,8 +69,7 @@ class TaskControl:
         if first is not None and first.result == MavResult.ACCEPTED:
             return first.result_param2
         if first is not None:
-            words = "just refused; send it again if you mean it"
-            raise Rejection(R(first.result_param2), words)
+            raise Rejection(R(first.result_param2), "just refused; send it again if you mean it")
         task_id = identifier(asked.command, 1, "task", default=None)
         kill = flag(asked.command, 2, "kill")
         active = asked.vehicle.tasks.active
@@ -94,8 +93,7 @@ class TaskControl:
         copy = asked.receiver.answer_to_copy(asked.command, now=now)
         if copy is not None:
             done = "skipped" if asked.command.params[1] == SKIP else "released"
-            words = f"task {copy.result_param2}: already {done}"
-            asked.tell(words, MavSeverity.INFO, now=now)
+            asked.tell(f"task {copy.result_param2}: already {done}", MavSeverity.INFO, now=now)
             return copy.result_param2
         task_id = identifier(asked.command, 1, "task", default=None)
         how = whole(asked.command, 2, "how", high=SKIP, default=None)
@@ -191,8 +189,7 @@ _OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
 def _label(label: str, command: Command) -> str:
     """Return the label with the piece in a command put in."""
     if command.frame is None:
-        words = "LABEL must be sent as COMMAND_INT"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise Rejection(R.BAD_PARAMETER, "LABEL must be sent as COMMAND_INT")
     offset = whole(command, 3, "byte", high=MAX_LABEL, default=None)
     x, y = int(command.params[4]), int(command.params[5])
     try:
@@ -203,6 +200,5 @@ def _label(label: str, command: Command) -> str:
 
 def _utc(command: Command) -> int:
     if command.frame is None:
-        words = "START_UTC must be sent as COMMAND_INT"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise Rejection(R.BAD_PARAMETER, "START_UTC must be sent as COMMAND_INT")
     return whole(command, 5, "UTC", low=1, high=0x7FFFFFFF, default=None)

@@ -175,8 +175,7 @@ class MissionUploads:
             return
         halts = vehicle.tasks.halts
         if not is_staged and upload.begun_at < halts.at:
-            words = f"{halts.words} came during the upload: upload it again"
-            raise Rejection(R.STALE, words)
+            raise Rejection(R.STALE, f"{halts.words} came during the upload: upload it again")
         before = self._plans.stored(vehicle.system_id, MISSION)
         client = self._client(sender)
         if is_staged:

@@ -154,8 +154,7 @@ def plan_of(
     plan = Plan(steps, packed(items), has_home=has_home, has_options=has_options)
     loop = loops_in_vain(plan)
     if loop is not None:
-        words = f"item {plan.item_number(loop)}: a loop without motion"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise Rejection(R.BAD_PARAMETER, f"item {plan.item_number(loop)}: a loop without motion")
     return ParsedMission(plan, _terms_of(items, now=now), _nonce_of(items))
 
 
