@@ -159,69 +159,14 @@ class Commands:
         if asked.command.target.system_id == EVERYBODY:  # others: see ``Broadcasts``
             number = asked.command.command
             raise Rejection(R.BAD_PARAMETER, f"command {number} must name one rover, not system 0")
-        command, row = asked.command, asked.row
-        component = command.target.component_id
+        row, component = asked.row, asked.command.target.component_id
         at_server = component == asked.vehicle.server_address.component_id
-        # otherwise the server does not handle standard commands that are sent to the autopilot
-        claims = at_server or asked.vehicle.parts.settings.claim
         if row.is_claimed and (
             at_server or component in (0, AUTOPILOT) or _is_of_what_nobody_sends(asked)
         ):
             asked.rights.require(row.role, f"send {row.name}")
-            match command.command:
-                case number if number in GOALS and (claims or is_task_command(number)):
-                    if number == MavCmd.DO_REPOSITION:
-                        self._reposition(asked, now=now)
-                    else:
-                        self._submissions.submit(asked, now=now)
-                    return
-                case (
-                    MavCmd.TASK_CANCEL
-                    | MavCmd.TASK_CLEAR
-                    | MavCmd.TASK_MODIFY
-                    | MavCmd.TASK_RELEASE
-                    | MavCmd.DO_CHANGE_SPEED
-                ):
-                    asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
-                    return
-                case MavCmd.NAV_TAKEOFF if claims:  # examples for all vehicles send it: no effect
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.NAV_LAND if claims:
-                    asked.vehicle.joint.stand_down(asked.client.key, now=now)
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.MISSION_START if claims:
-                    first = whole(asked.command, 1, "first item", high=0xFFFF)
-                    _check_last_item(asked)
-                    self._modes.start_plan(asked, first=first, now=now)
-                    return
-                case MavCmd.DO_SET_MISSION_CURRENT if claims:
-                    self._plans.check_start(asked.rights, asked.vehicle, asked.submitter)
-                    seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
-                    task = self._plans.go_on_with(asked.vehicle, seq, now=now)
-                    asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
-                    if task is None and seq is not None:
-                        words = self._plans.begins_with(asked.vehicle, seq)
-                        asked.tell(words, MavSeverity.INFO, now=now)
-                    return
-                case MavCmd.DO_PAUSE_CONTINUE:
-                    asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
-                    return
-                case MavCmd.SET_MESSAGE_INTERVAL:
-                    self._displays.set_interval(asked, now=now)
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.GET_MESSAGE_INTERVAL:
-                    self._displays.show_interval(asked)
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.REQUEST_MESSAGE if self._displays.show(asked, now=now):
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case number if is_task_command(number):
-                    self._refuse_unknown(asked, now=now)
-                    return
+            if self._handle(asked, at_server=at_server, now=now):
+                return
         if at_server and row.kind is Kind.QUESTION:  # ground stations ask all components
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif at_server:
@@ -235,6 +180,58 @@ class Commands:
             check_relay(asked, row.passed_on, now=now)
             self._check_question(asked, now=now)
             relay(asked, now=now)
+
+    def _handle(self, asked: CommandRequest, *, at_server: bool, now: float) -> bool:
+        """Execute a command that the server claims. Return False if the rover is to answer it."""
+        vehicle = asked.vehicle
+        # the settings may leave standard commands that are sent to the autopilot to it
+        claims = at_server or vehicle.parts.settings.claim
+        match asked.command.command:
+            case MavCmd.DO_REPOSITION if claims:
+                self._reposition(asked, now=now)
+            case number if number in GOALS and (claims or is_task_command(number)):
+                self._submissions.submit(asked, now=now)
+            case (
+                MavCmd.TASK_CANCEL
+                | MavCmd.TASK_CLEAR
+                | MavCmd.TASK_MODIFY
+                | MavCmd.TASK_RELEASE
+                | MavCmd.DO_CHANGE_SPEED
+            ):
+                asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
+            case MavCmd.NAV_TAKEOFF if claims:  # examples for every kind of vehicle send it
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.NAV_LAND if claims:
+                vehicle.joint.stand_down(asked.client.key, now=now)
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.MISSION_START if claims:
+                first = whole(asked.command, 1, "first item", high=0xFFFF)
+                last = whole(asked.command, 2, "last item", high=0xFFFF)
+                if last:
+                    raise bad(f"param2 last item {last}: only the whole plan can run", param=2)
+                self._modes.start_plan(asked, first=first, now=now)
+            case MavCmd.DO_SET_MISSION_CURRENT if claims:
+                self._plans.check_start(asked.rights, vehicle, asked.submitter)
+                seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
+                task = self._plans.go_on_with(vehicle, seq, now=now)
+                asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
+                if task is None:
+                    asked.tell(self._plans.begins_with(vehicle, seq), MavSeverity.INFO, now=now)
+            case MavCmd.DO_PAUSE_CONTINUE:
+                asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
+            case MavCmd.SET_MESSAGE_INTERVAL:
+                self._displays.set_interval(asked, now=now)
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.GET_MESSAGE_INTERVAL:
+                self._displays.show_interval(asked)
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.REQUEST_MESSAGE if self._displays.show(asked, now=now):
+                asked.answer(MavResult.ACCEPTED)
+            case number if is_task_command(number):
+                self._refuse_unknown(asked, now=now)
+            case _:
+                return False
+        return True
 
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
         """Raise Rejection if an observer's question is too much for the rover's link."""
@@ -349,9 +346,3 @@ def _is_of_what_nobody_sends(asked: CommandRequest) -> bool:
     intervals = MavCmd.SET_MESSAGE_INTERVAL, MavCmd.GET_MESSAGE_INTERVAL
     component = asked.command.target.component_id
     return asked.command.command in intervals and component not in asked.vehicle.components
-
-
-def _check_last_item(asked: CommandRequest) -> None:
-    last = whole(asked.command, 2, "last item", high=0xFFFF)
-    if last:
-        raise bad(f"param2 last item {last}: only the whole plan can run", param=2)
