@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.commands.motion_gate import why_no_motion
 from mav_tasks.engine.policy import DISARM, PAUSE, PAUSE_HERE, Kind, Row, row_of, row_of_command
 from mav_tasks.engine.policy.commands import COMMANDS, HOLD, START
 from mav_tasks.engine.policy.messages import MESSAGES
-from mav_tasks.engine.vehicles.motion_rights import why_no_motion
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Decoder

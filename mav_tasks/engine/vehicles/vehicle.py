@@ -1,7 +1,7 @@
 """One vehicle: dispatches its messages and requests to the parts that decide about it.
 
-``joint`` decides who may move it, ``pilot`` what drives it, ``motion_rights`` whether a client's
-set-points pass. ``takeovers`` detects what others have done to it.
+``joint`` decides who may move it, ``pilot`` what drives it. ``takeovers`` detects what others have
+done to it. ``commands.motion_gate`` decides whether a client's set-points pass.
 """
 
 from collections.abc import Hashable
