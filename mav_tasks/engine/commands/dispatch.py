@@ -5,6 +5,7 @@ sent it. A command that the server does not claim is forwarded to the vehicle; i
 through ``deliver``.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
@@ -52,27 +53,20 @@ class _UndoesHold(NamedTuple):
     actor: str
 
 
+@dataclass(repr=False, eq=False)
 class Commands:
     """The dispatcher of client commands."""
 
-    def __init__(
-        self,
-        vehicles: VehicleSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        modes: ModeRequests,
-        control: TaskControl,
-        displays: MessageRequests,
-    ) -> None:
-        self._vehicles = vehicles
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        self._modes = modes
-        self._control = control
-        self._displays = displays
-        submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
+    _vehicles: VehicleSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _modes: ModeRequests
+    _control: TaskControl
+    _displays: MessageRequests
+
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """Execute or refuse a client's command, and answer it."""

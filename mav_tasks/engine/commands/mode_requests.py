@@ -4,6 +4,7 @@ A request comes as DO_SET_MODE, which is answered, or as the older message SET_M
 acknowledgement: its sender waits until a heartbeat shows the mode.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -39,23 +40,18 @@ class _Started(NamedTuple):
     task: Task
 
 
+@dataclass(repr=False, eq=False)
 class ModeRequests:
     """The handler of mode requests and mission starts of all clients."""
 
-    def __init__(
-        self,
-        gcs: GcsSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        refusals: Refusals,
-    ) -> None:
-        self._refusals = refusals
-        self._gcs = gcs
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        submissions.gate.knows(_Started, self._accept, self._give_up)
+    _gcs: GcsSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _refusals: Refusals
+
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_Started, self._accept, self._give_up)
 
     def asked(self, asked: CommandRequest, *, now: float) -> bool:
         """Handle DO_SET_MODE. Return False if the vehicle itself is to answer it."""

@@ -1,6 +1,7 @@
 """Clears plans: a mission that is not being driven, fence and rally points."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from mav_tasks.engine.commands.submissions import Submissions
@@ -34,23 +35,18 @@ class _Cleared(NamedTuple):
     task: Task | None
 
 
+@dataclass(repr=False, eq=False)
 class MissionClearing:
     """The handler of MISSION_CLEAR_ALL."""
 
-    def __init__(
-        self,
-        vehicles: VehicleSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        answers: MissionAnswers,
-    ) -> None:
-        self._vehicles = vehicles
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        self._answers = answers
-        submissions.gate.knows(_Cleared, self._accept, self._undo)
+    _vehicles: VehicleSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _answers: MissionAnswers
+
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_Cleared, self._accept, self._undo)
 
     def clear(
         self, vehicle: Vehicle, sender: Sender, kind: int, *, is_late: bool, now: float

@@ -5,7 +5,7 @@ The task server's address takes any number; each is queued at once. Fence and ra
 the vehicle, at either address.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import blake2b
 from typing import NamedTuple
@@ -84,26 +84,20 @@ class _Kept(NamedTuple):
     actor: str
 
 
+@dataclass(repr=False, eq=False)
 class MissionUploads:
     """The decision about whole uploads, and the answers to their clients."""
 
-    def __init__(
-        self,
-        gcs: GcsSide,
-        vehicles: VehicleSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        answers: MissionAnswers,
-    ) -> None:
-        self._gcs = gcs
-        self._vehicles = vehicles
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        self._answers = answers
-        submissions.gate.knows(_Mission, self._accept, self._withdraw)
-        submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
+    _gcs: GcsSide
+    _vehicles: VehicleSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _answers: MissionAnswers
+
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_Mission, self._accept, self._withdraw)
+        self._submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
 
     def flush(
         self,
