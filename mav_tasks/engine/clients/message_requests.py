@@ -221,7 +221,7 @@ class MessageRequests:
         message = translate.task_timing(
             task,
             vehicle.tasks.timing_of(task),
-            period=vehicle.setpoint_period,
+            period=vehicle.parts.settings.watch.setpoint_period,
             reader=asked.packet.source,
             now=now,
         )

@@ -37,16 +37,7 @@ R = TaskReason
 
 #: a COMMAND_INT without coordinates may name any existing frame
 KNOWN_FRAMES = frozenset(MavFrame)
-GLOBAL_FRAMES = frozenset(
-    {
-        MavFrame.GLOBAL,
-        MavFrame.GLOBAL_RELATIVE_ALT,
-        MavFrame.GLOBAL_INT,
-        MavFrame.GLOBAL_RELATIVE_ALT_INT,
-        MavFrame.GLOBAL_TERRAIN_ALT,
-        MavFrame.GLOBAL_TERRAIN_ALT_INT,
-    }
-)
+GLOBAL_FRAMES = frozenset(frame for frame in MavFrame if frame.name.startswith("GLOBAL"))
 NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT, whose integers have no NaN
 LOCAL_SCALE = 1e4  # COMMAND_INT's x and y in a local frame are metres times this
 MAX_WAIT = 86_400.0  # s

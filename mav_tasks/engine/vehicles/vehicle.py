@@ -114,11 +114,6 @@ class Vehicle:
         return self.parts.persona
 
     @property
-    def setpoint_period(self) -> float:
-        """The nominal seconds from one setpoint to the next."""
-        return self.parts.settings.watch.setpoint_period
-
-    @property
     def server_component(self) -> int:
         """The component id under which the task server appears inside this vehicle's system."""
         return self.server_address.component_id
@@ -127,11 +122,6 @@ class Vehicle:
     def armed(self) -> bool:
         """Whether the vehicle was last seen armed."""
         return self._monitor.armed
-
-    @property
-    def heartbeat(self) -> m.Heartbeat:
-        """Its last heartbeat."""
-        return self._monitor.latest
 
     @property
     def heard_at(self) -> float:
