@@ -8,6 +8,7 @@ never goes back.
 from math import inf
 from typing import assert_never
 
+from mav_tasks.engine import inputs
 from mav_tasks.engine.clients.broadcasts import Broadcasts
 from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.flood_gate import FloodGates
@@ -26,24 +27,7 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
-from mav_tasks.engine.inputs import (
-    AtOnce,
-    Backlog,
-    Committed,
-    Congestion,
-    HaltNotStored,
-    Input,
-    KeysChanged,
-    LinkChanged,
-    LinkSide,
-    Outgoing,
-    Packets,
-    PeerChanged,
-    SettingsChanged,
-    Shutdown,
-    StoreFailed,
-    WallClock,
-)
+from mav_tasks.engine.inputs import Input, LinkSide, Outgoing
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionServers
 from mav_tasks.engine.missions.plans import Plans
@@ -203,43 +187,43 @@ class Engine:
         if self._timers.not_before + self._settings.watch.late_tick < now:
             self._vehicles.check_late(now=now)
         match item:
-            case Packets():
+            case inputs.Packets():
                 self._reception.receive((item,), now=now)
-            case Committed(through=through):
+            case inputs.Committed(through=through):
                 self._submissions.committed(through, now=now)
                 self._vehicles.commit(through, now=now)
-            case AtOnce(packets=several) | Backlog(packets=several):
+            case inputs.AtOnce(packets=several) | inputs.Backlog(packets=several):
                 self._reception.receive(several, now=now)
-            case LinkChanged(side=side):
+            case inputs.LinkChanged(side=side):
                 self._intake.change_link(item)
                 self._gates.change_link(item)
                 self.signatures.change_link(item)
                 clients = side is LinkSide.CLIENTS
                 (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
-            case KeysChanged():
+            case inputs.KeysChanged():
                 gone = self.signatures.change_keys(item)
                 self._vehicles.pause_tasks_of(gone, now=now)
                 for link, peer in self._gcs.forget_unknown():
                     self._passing.end(link, peer, now=now)
-            case PeerChanged():
+            case inputs.PeerChanged():
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
                 self._vehicles.links.change_peer(item)
                 if item.link in self._gcs.links:
                     self._passing.end(item.link, item.peer, now=now)
-            case Congestion():
+            case inputs.Congestion():
                 self._gcs.note_congestion(item, now=now)
-            case StoreFailed():
+            case inputs.StoreFailed():
                 self._submissions.store_failed()
-            case HaltNotStored(vehicle=vehicle):
+            case inputs.HaltNotStored(vehicle=vehicle):
                 self._publisher.warn_of_loss(vehicle, now=now)
-            case SettingsChanged(settings=settings):
+            case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
                 self.not_in_force = self._parameters.not_in_force
-            case WallClock(offset=offset):
+            case inputs.WallClock(offset=offset):
                 self.signatures.set_wall(offset)
                 self._fleet.room.set_wall_offset(offset, now=now)
-            case Shutdown():
+            case inputs.Shutdown():
                 self._shut_down(now=now)
             case _:
                 assert_never(item)
