@@ -31,28 +31,24 @@ class OwnFailsafes:
     """The failsafes of one vehicle, as far as it has reported them."""
 
     def __init__(self) -> None:
-        self._texts = VehicleTexts()
+        self.texts = VehicleTexts()
         self.is_outside_fence = False
         self._changed_at = -inf  # when the mode changed without a known cause
 
     def __repr__(self) -> str:
-        return f"OwnFailsafes({self._texts!r}, outside={self.is_outside_fence})"
-
-    def why_not_ready(self, *, now: float) -> str:
-        """Return the vehicle's recent text on why it does not arm, or ""."""
-        return self._texts.why_not_ready(now=now)
+        return f"OwnFailsafes({self.texts!r}, outside={self.is_outside_fence})"
 
     def mode_changed(self, *, now: float) -> str:
         """Note a mode change. Return the failsafe that caused it, or "" if none is known yet."""
-        cause = self._texts.failsafe(now=now) or (FENCE if self.is_outside_fence else "")
+        cause = self.texts.failsafe(now=now) or (FENCE if self.is_outside_fence else "")
         self._changed_at = -inf if cause else now
         return cause
 
     def receive_text(self, sender: Address, message: Statustext, *, now: float) -> News:
         """Process a text of the vehicle, or a chunk of one."""
-        if not self._texts.receive(sender, message, now=now):
+        if not self.texts.receive(sender, message, now=now):
             return News()
-        return News(self._explained(self._texts.failsafe(now=now), now=now))
+        return News(self._explained(self.texts.failsafe(now=now), now=now))
 
     def receive_status(self, message: SysStatus, *, now: float) -> News:
         """Process what the vehicle reports about its fence."""

@@ -206,7 +206,7 @@ class Vehicle:
             self._says.receive_parameter(message, now=now)
             self.joint.wake(now=now)
         elif isinstance(message, m.RcChannels):
-            sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
+            sent_at = self.where.motion.clock.sent_at(message.time_boot_ms, now=now)
             if self.parts.sticks.look(message, armed=self.armed, sent_at=sent_at):
                 self.joint.on(Event.STICK, Word(TaskReason.TAKEOVER, self.parts.actor), now=now)
         elif isinstance(message, m.AutopilotVersion):
@@ -258,7 +258,7 @@ class Vehicle:
         self._was_heard = True
         self.requests.ask_which_again()
         self._registry.record(VehicleSeen(self.system_id, "heard again", now))
-        self._takeovers.heard_again(now=now)
+        self.joint.on(Event.HEARD_AGAIN, Word(), now=now)
 
     def _note_component(self, component_id: int, *, now: float) -> None:
         before = self.server_component

@@ -217,7 +217,7 @@ class VehicleSide:
             self.counts.unknown += 1
         if self._signatures.admit(link, peer, packet) is None:
             return None
-        if self._is_intruder(packet):
+        if packet.source == self.our_address or packet.message_id in SETPOINTS:
             self._note_intruder(link, packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
@@ -236,7 +236,7 @@ class VehicleSide:
         if isinstance(message, m.Timesync) and message.ts1 in self._asked:
             self._answer = packet
             if message.tc1 and packet.component_id == AUTOPILOT:
-                offset = vehicle.where.clock.offset
+                offset = vehicle.where.motion.clock.offset
                 offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
         if packet.component_id == AUTOPILOT:
             vehicle.count(packet.seq, now=now)
@@ -328,9 +328,6 @@ class VehicleSide:
         vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
         vehicle.joint.step(now)
         return vehicle
-
-    def _is_intruder(self, packet: Packet) -> bool:
-        return packet.source == self.our_address or packet.message_id in SETPOINTS
 
     def _note_intruder(
         self, link: str, packet: Packet, message: m.Message | None, *, now: float
