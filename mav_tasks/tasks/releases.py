@@ -99,13 +99,9 @@ class Releases:
     def _waits_for(
         self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
     ) -> TaskReason:
-        """Return what a released task waits for, NONE if it can start."""
+        """Return what a released task waits for: the queue, or a reboot; NONE if it can start."""
         if self._lineup.paused and not (self._lineup.paused is R.RESTARTED and may_continue):
             return R.QUEUE_PAUSED
-        return self._waits_for_restart(task, seen, now=now)
-
-    def _waits_for_restart(self, task: Task, seen: VehicleView, *, now: float) -> TaskReason:
-        """Return what a held task waits for while its vehicle reboots, NONE otherwise."""
         if task.reason is not R.FRAME_RESET:
             return R.NONE
         if seen.heard and seen.is_booting:  # it shows another mode for a moment

@@ -119,16 +119,11 @@ class VehicleTasks(Lineup):
         elif active is not None and active.state in (S.STARTING, S.EXECUTING, S.PAUSED):
             self.executor.pause(R.OPERATOR, actor=actor, now=now)
             self.set_aside(active.id)
-        if self.immediate is not None:
-            self._replace_immediate(actor=actor, now=now)
-        self.immediate = task.id
-        self.pause_queue(R.OPERATOR, actor=actor, now=now)
-
-    def _replace_immediate(self, *, actor: str, now: float) -> None:
-        assert self.immediate is not None
-        before = self.registry.get(self.immediate)
+        before = None if self.immediate is None else self.registry.get(self.immediate)
         if before is not None and before.state in WAITING:
             self.room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
+        self.immediate = task.id
+        self.pause_queue(R.OPERATOR, actor=actor, now=now)
 
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
         """Cancel a task, or end it at once (``kill``); the vehicle stands before anything starts.

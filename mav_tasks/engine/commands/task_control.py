@@ -114,7 +114,7 @@ class TaskControl:
         return task.id
 
     def _modify(self, asked: CommandRequest, *, now: float) -> int:
-        task = self._find(asked, _task_id(asked.command))
+        task = self._find(asked, identifier(asked.command, 1, "task", low=1, default=None))
         asked.rights.require_own(task, asked.submitter, "modify")
         terms = _modified(task, asked.command, now=now)
         if terms.priority > task.terms.priority:
@@ -143,10 +143,6 @@ class TaskControl:
         if task.state in TERMINAL:
             raise Rejection(R.WRONG_STATE, f"task {task_id} has ended ({_words(task)})")
         return task
-
-
-def _task_id(command: Command) -> int:
-    return identifier(command, 1, "task", low=1, default=None)
 
 
 def _words(task: Task) -> str:
