@@ -62,8 +62,8 @@ class Engine:
         self._packets: list[Outgoing] = []
         self._intake = PacketReader()
         self._journal: list[Event] = []
-        self._registry = TaskRegistry()
-        self._fleet = Fleet(self._registry, settings)
+        registry = self._registry = TaskRegistry()
+        self._fleet = Fleet(registry, settings)
         if restored is not None:
             self._fleet.restore(restored, now=now)
         packer, timers = Packer(), Timers()
@@ -79,88 +79,54 @@ class Engine:
             times=earlier.signatures,
             signed_until=earlier.signed_until,
         )
-        self._gcs = GcsSide(
+        gcs = self._gcs = GcsSide(
             queue=self._packets,
             packer=packer,
             signatures=self.signatures,
             statuses=self._telling,
             settings=settings,
         )
-        self._gates = FloodGates(is_client=self._gcs.has, settings=settings.clients)
-        self._vehicles = VehicleSide(
+        self._gates = FloodGates(is_client=gcs.has, settings=settings.clients)
+        vehicles = self._vehicles = VehicleSide(
             queue=self._packets,
             packer=packer,
             signatures=self.signatures,
-            registry=self._registry,
+            registry=registry,
             fleet=self._fleet,
             timers=timers,
             settings=settings,
         )
-        deduplicator = SubmissionDeduplicator(self._registry)
+        deduplicator = SubmissionDeduplicator(registry)
         deduplicator.restore(earlier.tasks, now=now)
-        self._submissions = Submissions(self._gcs, self._registry, deduplicator, timers, settings)
+        submissions = Submissions(gcs, registry, deduplicator, timers, settings)
+        self._submissions = submissions
         self._parameters = ParameterServer(
-            self._gcs,
-            self._vehicles,
-            self._registry,
-            self._submissions,
-            settings=configured,
-            kept=earlier.parameters,
+            gcs, vehicles, registry, submissions, settings=configured, kept=earlier.parameters
         )
-        self._plans = Plans(self._registry, self._fleet, restored=earlier.plans)
-        self._desks = MissionServers(
-            self._gcs,
-            self._vehicles,
-            self._registry,
-            self._submissions,
-            self._plans,
-            timers,
-        )
-        self._reports = MissionReports(
-            self._gcs, self._vehicles, self._registry, self._plans, timers, settings, now=now
-        )
-        self._displays = MessageRequests(self._gcs, self._vehicles, self._registry)
-        refusals = Refusals(self._registry)
-        self._modes = ModeRequests(
-            self._gcs, self._registry, self._submissions, self._plans, refusals
-        )
-        control = TaskControl(self._registry)
-        self._commands = Commands(
-            self._vehicles,
-            self._registry,
-            self._submissions,
-            self._plans,
-            self._modes,
-            control,
-            self._displays,
-        )
+        plans = Plans(registry, self._fleet, restored=earlier.plans)
+        self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
+        displays, refusals = MessageRequests(gcs, vehicles, registry), Refusals(registry)
+        modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
+        control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
         self._publisher = Publisher(
-            self._gcs,
-            self._vehicles,
-            self._registry,
-            self._displays,
-            self._submissions,
-            TelemetryRates(self._gcs, self._vehicles),
-            timers,
-            now=now,
+            gcs, vehicles, registry, displays, submissions, rates, timers, now=now
         )
-        self._passing = Forwarder(self._vehicles, refusals)
-        self._door = Door(self._vehicles, refusals)
+        self._passing = Forwarder(vehicles, refusals)
+        self._door = Door(vehicles, refusals)
         self._operator = OperatorWatch(timers, self._note_unheard, settings)
-        self._setup = SetupSigning(self.signatures, self._vehicles)
         self._reception = Reception(
-            gcs=self._gcs,
-            vehicles=self._vehicles,
+            gcs=gcs,
+            vehicles=vehicles,
             gates=self._gates,
             intake=self._intake,
             door=self._door,
-            broadcasts=Broadcasts(self._vehicles, packer),
-            commands=self._commands,
+            broadcasts=Broadcasts(vehicles, packer),
+            commands=Commands(vehicles, registry, submissions, plans, modes, control, displays),
             control=control,
-            modes=self._modes,
-            displays=self._displays,
-            setup=self._setup,
-            desks=self._desks,
+            modes=modes,
+            displays=displays,
+            setup=SetupSigning(self.signatures, vehicles),
+            desks=MissionServers(gcs, vehicles, registry, submissions, plans, timers),
             operator=self._operator,
             parameters=self._parameters,
             passing=self._passing,
