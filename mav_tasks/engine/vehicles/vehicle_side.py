@@ -122,9 +122,6 @@ class VehicleSide:
             note_once=self._note_once,
         )
 
-    def __len__(self) -> int:
-        return len(self._vehicles)
-
     def get(self, system_id: int) -> Vehicle | None:
         """Return a vehicle in order to change it."""
         vehicle = self._vehicles.get(system_id)
