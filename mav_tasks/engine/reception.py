@@ -134,7 +134,7 @@ class Reception:
         client, packet, message = received.client, received.packet, received.message
         if isinstance(message, m.CommandLong | m.CommandInt):
             self.commands.receive(client, packet, command_of(message), now=now)
-        elif isinstance(message, m.CommandCancel | m.SetMode):
+        elif isinstance(message, (m.CommandCancel, m.SetMode)):
             vehicle = self.vehicles.get(message.target_system)
             if vehicle is None:
                 return
