@@ -112,7 +112,9 @@ class MissionClearing:
     def _accept(self, cleared: _Cleared, *, now: float) -> None:
         vehicle, task, actor = cleared.vehicle, cleared.task, str(cleared.sender.address)
         self._vehicles.mark_dirty(vehicle)
-        self._call_off(vehicle, task, actor=actor, now=now)
+        current = None if task is None else self._registry.get(task.id)
+        if current is not None and current.state in AT_REST:  # nobody could resume it
+            vehicle.joint.cancel(current, kill=False, actor=actor, now=now)
         self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ACCEPTED)
 
@@ -121,12 +123,6 @@ class MissionClearing:
         for kind, stored in cleared.before:
             self._plans.keep(cleared.vehicle, kind, stored, actor=actor, now=now)
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ERROR)
-
-    def _call_off(self, vehicle: Vehicle, task: Task | None, *, actor: str, now: float) -> None:
-        """Cancel an interrupted mission: without its plan nobody could resume it."""
-        current = None if task is None else self._registry.get(task.id)
-        if current is not None and current.state in AT_REST:
-            vehicle.joint.cancel(current, kill=False, actor=actor, now=now)
 
     def _refused(self, sender: Sender, vehicle: Vehicle, why: Rejection, *, now: float) -> None:
         message_id = m.MissionClearAll.id
