@@ -8,6 +8,7 @@ never goes back.
 from math import inf
 from typing import assert_never
 
+from mav_tasks.engine import inputs
 from mav_tasks.engine.clients.broadcasts import Broadcasts
 from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.flood_gate import FloodGates
@@ -26,24 +27,7 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
-from mav_tasks.engine.inputs import (
-    AtOnce,
-    Backlog,
-    Committed,
-    Congestion,
-    HaltNotStored,
-    Input,
-    KeysChanged,
-    LinkChanged,
-    LinkSide,
-    Outgoing,
-    Packets,
-    PeerChanged,
-    SettingsChanged,
-    Shutdown,
-    StoreFailed,
-    WallClock,
-)
+from mav_tasks.engine.inputs import Input, LinkSide, Outgoing
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionServers
 from mav_tasks.engine.missions.plans import Plans
@@ -70,16 +54,16 @@ class Engine:
     """The task server without sockets, clock or disk."""
 
     def __init__(self, settings: Settings, *, now: float, restored: Restored | None = None) -> None:
-        kept = {} if restored is None else restored.parameters
-        configured, (settings, why_not) = settings, with_all(settings, kept)
+        earlier = restored or Restored()
+        configured, (settings, why_not) = settings, with_all(settings, earlier.parameters)
         #: why the latest settings override parameters that clients set
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
         self._settings = settings
         self._packets: list[Outgoing] = []
         self._intake = PacketReader()
         self._journal: list[Event] = []
-        self._registry = TaskRegistry()
-        self._fleet = Fleet(self._registry, settings)
+        registry = self._registry = TaskRegistry()
+        self._fleet = Fleet(registry, settings)
         if restored is not None:
             self._fleet.restore(restored, now=now)
         packer, timers = Packer(), Timers()
@@ -89,98 +73,60 @@ class Engine:
         self._starting = timers.timer(Turn.TASKS, self._fleet.room.handle_deadline)
         self._starting.set(self._fleet.room.times.next_at)
         self._telling = timers.timer(Turn.STATUSES, self._tell_statuses)
-        seen = Restored() if restored is None else restored
         #: verifies the signatures of incoming packets and signs outgoing ones
         self.signatures = Signatures(
             window=settings.signing.window,
-            times=seen.signatures,
-            signed_until=seen.signed_until,
+            times=earlier.signatures,
+            signed_until=earlier.signed_until,
         )
-        self._gcs = GcsSide(
+        gcs = self._gcs = GcsSide(
             queue=self._packets,
             packer=packer,
             signatures=self.signatures,
             statuses=self._telling,
             settings=settings,
         )
-        self._gates = FloodGates(is_client=self._gcs.has, settings=settings.clients)
-        self._vehicles = VehicleSide(
+        self._gates = FloodGates(is_client=gcs.has, settings=settings.clients)
+        vehicles = self._vehicles = VehicleSide(
             queue=self._packets,
             packer=packer,
             signatures=self.signatures,
-            registry=self._registry,
+            registry=registry,
             fleet=self._fleet,
             timers=timers,
             settings=settings,
         )
-        deduplicator = SubmissionDeduplicator(self._registry)
-        if restored is not None:
-            deduplicator.restore(restored.tasks, now=now)
-        self._submissions = Submissions(self._gcs, self._registry, deduplicator, timers, settings)
+        deduplicator = SubmissionDeduplicator(registry)
+        deduplicator.restore(earlier.tasks, now=now)
+        submissions = Submissions(gcs, registry, deduplicator, timers, settings)
+        self._submissions = submissions
         self._parameters = ParameterServer(
-            self._gcs,
-            self._vehicles,
-            self._registry,
-            self._submissions,
-            settings=configured,
-            kept=kept,
+            gcs, vehicles, registry, submissions, settings=configured, kept=earlier.parameters
         )
-        stored = {} if restored is None else restored.plans
-        self._plans = Plans(self._registry, self._fleet, settings, restored=stored)
-        self._desks = MissionServers(
-            self._gcs,
-            self._vehicles,
-            self._registry,
-            self._submissions,
-            self._plans,
-            timers,
-            settings,
-        )
-        self._reports = MissionReports(
-            self._gcs, self._vehicles, self._registry, self._plans, timers, settings, now=now
-        )
-        self._displays = MessageRequests(self._gcs, self._vehicles, self._registry)
-        refusals = Refusals(self._registry)
-        self._modes = ModeRequests(
-            self._gcs, self._registry, self._submissions, self._plans, refusals, settings
-        )
-        self._commands = Commands(
-            self._gcs,
-            self._vehicles,
-            self._registry,
-            self._submissions,
-            self._plans,
-            self._modes,
-            TaskControl(self._registry, settings),
-            self._displays,
-            settings,
-        )
+        plans = Plans(registry, self._fleet, restored=earlier.plans)
+        self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
+        displays, refusals = MessageRequests(gcs, vehicles, registry), Refusals(registry)
+        modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
+        control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
         self._publisher = Publisher(
-            self._gcs,
-            self._vehicles,
-            self._registry,
-            self._displays,
-            self._submissions,
-            TelemetryRates(self._gcs, self._vehicles),
-            timers,
-            now=now,
+            gcs, vehicles, registry, displays, submissions, rates, timers, now=now
         )
-        self._passing = Forwarder(self._vehicles, refusals)
-        self._door = Door(self._vehicles, refusals)
+        self._passing = Forwarder(vehicles, refusals)
+        self._door = Door(vehicles, refusals)
         self._operator = OperatorWatch(timers, self._note_unheard, settings)
-        self._setup = SetupSigning(self.signatures, self._vehicles, settings)
         self._reception = Reception(
-            gcs=self._gcs,
-            vehicles=self._vehicles,
+            gcs=gcs,
+            vehicles=vehicles,
             gates=self._gates,
             intake=self._intake,
             door=self._door,
-            broadcasts=Broadcasts(self._vehicles, packer),
-            commands=self._commands,
-            modes=self._modes,
-            displays=self._displays,
-            setup=self._setup,
-            desks=self._desks,
+            broadcasts=Broadcasts(vehicles, packer),
+            commands=Commands(vehicles, registry, submissions, plans, modes, control, displays),
+            control=control,
+            modes=modes,
+            displays=displays,
+            setup=SetupSigning(self.signatures, vehicles),
+            desks=MissionServers(gcs, vehicles, registry, submissions, plans, timers),
             operator=self._operator,
             parameters=self._parameters,
             passing=self._passing,
@@ -207,43 +153,43 @@ class Engine:
         if self._timers.not_before + self._settings.watch.late_tick < now:
             self._vehicles.check_late(now=now)
         match item:
-            case Packets():
+            case inputs.Packets():
                 self._reception.receive((item,), now=now)
-            case Committed(through=through):
+            case inputs.Committed(through=through):
                 self._submissions.committed(through, now=now)
                 self._vehicles.commit(through, now=now)
-            case AtOnce(packets=several) | Backlog(packets=several):
+            case inputs.AtOnce(packets=several) | inputs.Backlog(packets=several):
                 self._reception.receive(several, now=now)
-            case LinkChanged(side=side):
+            case inputs.LinkChanged(side=side):
                 self._intake.change_link(item)
                 self._gates.change_link(item)
                 self.signatures.change_link(item)
                 clients = side is LinkSide.CLIENTS
                 (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
-            case KeysChanged():
+            case inputs.KeysChanged():
                 gone = self.signatures.change_keys(item)
                 self._vehicles.pause_tasks_of(gone, now=now)
                 for link, peer in self._gcs.forget_unknown():
                     self._passing.end(link, peer, now=now)
-            case PeerChanged():
+            case inputs.PeerChanged():
                 self._intake.change_peer(item)
                 self._gcs.change_peer(item, now=now)
                 self._vehicles.links.change_peer(item)
                 if item.link in self._gcs.links:
                     self._passing.end(item.link, item.peer, now=now)
-            case Congestion():
+            case inputs.Congestion():
                 self._gcs.note_congestion(item, now=now)
-            case StoreFailed():
+            case inputs.StoreFailed():
                 self._submissions.store_failed()
-            case HaltNotStored(vehicle=vehicle):
+            case inputs.HaltNotStored(vehicle=vehicle):
                 self._publisher.warn_of_loss(vehicle, now=now)
-            case SettingsChanged(settings=settings):
+            case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
                 self.not_in_force = self._parameters.not_in_force
-            case WallClock(offset=offset):
+            case inputs.WallClock(offset=offset):
                 self.signatures.set_wall(offset)
                 self._fleet.room.set_wall_offset(offset, now=now)
-            case Shutdown():
+            case inputs.Shutdown():
                 self._shut_down(now=now)
             case _:
                 assert_never(item)
@@ -357,14 +303,11 @@ class Engine:
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
         self.signatures.apply(settings.signing.window)
-        self._setup.apply(settings)
         self._gates.apply(settings.clients)
         self._fleet.apply(settings)
         self._gcs.apply(settings)
         self._vehicles.apply(settings)
-        self._commands.apply(settings)
-        self._plans.apply(settings)
-        self._desks.apply(settings)
+        self._submissions.apply(settings)
         self._reports.apply(settings)
         self._operator.apply(settings)
 

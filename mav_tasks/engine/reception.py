@@ -1,6 +1,7 @@
 """Routes incoming packets to the parts that handle them; halts come first."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.door import Door
@@ -8,8 +9,7 @@ from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.operator_watch import OperatorWatch
-from mav_tasks.engine.clients.parameters import MESSAGES as PARAMETER_MESSAGES
-from mav_tasks.engine.clients.parameters import ParameterServer
+from mav_tasks.engine.clients.parameters import ParameterServer, ParamMessage
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
@@ -18,10 +18,11 @@ from mav_tasks.engine.commands.command_request import MessageRequest
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
 from mav_tasks.engine.commands.mode_requests import ModeRequests
+from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.words import kind_of_message
 from mav_tasks.engine.inputs import Packets
 from mav_tasks.engine.missions.mission_reports import MissionReports
-from mav_tasks.engine.missions.mission_server import MESSAGES, MissionServers
+from mav_tasks.engine.missions.mission_server import MissionMessage, MissionServers
 from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -29,93 +30,75 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.services.command_receiver import command_of
 
 
+@dataclass(repr=False, eq=False)
 class Reception:
     """Handles what all links deliver."""
 
-    def __init__(
-        self,
-        *,
-        gcs: GcsSide,
-        vehicles: VehicleSide,
-        gates: FloodGates,
-        intake: PacketReader,
-        door: Door,
-        broadcasts: Broadcasts,
-        commands: Commands,
-        modes: ModeRequests,
-        displays: MessageRequests,
-        setup: SetupSigning,
-        desks: MissionServers,
-        operator: OperatorWatch,
-        parameters: ParameterServer,
-        passing: Forwarder,
-        publisher: Publisher,
-        reports: MissionReports,
-    ) -> None:
-        self._gcs = gcs
-        self._vehicles = vehicles
-        self._gates = gates
-        self._intake = intake
-        self._door = door
-        self._broadcasts = broadcasts
-        self._commands = commands
-        self._modes = modes
-        self._displays = displays
-        self._setup = setup
-        self._desks = desks
-        self._operator = operator
-        self._parameters = parameters
-        self._passing = passing
-        self._publisher = publisher
-        self._reports = reports
-        self._restarts = RestartWatch()
+    gcs: GcsSide
+    vehicles: VehicleSide
+    gates: FloodGates
+    intake: PacketReader
+    door: Door
+    broadcasts: Broadcasts
+    commands: Commands
+    control: TaskControl
+    modes: ModeRequests
+    displays: MessageRequests
+    setup: SetupSigning
+    desks: MissionServers
+    operator: OperatorWatch
+    parameters: ParameterServer
+    passing: Forwarder
+    publisher: Publisher
+    reports: MissionReports
+    restarts: RestartWatch = field(default_factory=RestartWatch)
 
     def __repr__(self) -> str:
-        return f"Reception({self._intake!r})"
+        return f"Reception({self.intake!r})"
 
     def receive(self, items: Sequence[Packets], *, now: float) -> None:
         """Handle packets that arrived at one moment; those that halt a rover come first."""
         received: list[Received] = []
         others: list[Packets] = []
         for item in items:
-            if item.link in self._gcs.links:
+            if item.link in self.gcs.links:
                 received += self._received(item, now=now)
             else:
                 others.append(item)
         if len(received) > 1:
             for each in self._halts_first(received):
-                self._gcs.hear_out(each, now=now)
+                self.gcs.hear_out(each, now=now)
                 self._receive_from_client(each, now=now)
         elif received:
             self._receive_from_client(received[0], now=now)
         for item in others:
-            if self._vehicles.links.owns(item.link):
+            if self.vehicles.links.owns(item.link):
                 self._receive_from_vehicles(item, now=now)
 
     def _received(self, item: Packets, *, now: float) -> list[Received]:
-        let_in = self._gates.let_in(item, now=now)
-        taken = self._intake.packets(let_in, self._gcs.counts, now=now)
-        may_have_waited = self._vehicles.may_have_waited(now=now)
+        let_in = self.gates.let_in(item, now=now)
+        taken = self.intake.packets(let_in, self.gcs.counts, now=now)
+        may_have_waited = self.vehicles.may_have_waited(now=now)
         received: list[Received] = []
         for peer, packet, measured in taken:
             waited = may_have_waited if measured is None else measured
-            each = self._gcs.receive(item.link, peer, packet, waited=waited, now=now)
+            each = self.gcs.receive(item.link, peer, packet, waited=waited, now=now)
             if each is not None:
                 received.append(each)
         return received
 
     def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
-        for peer, packet, _ in self._intake.packets(item, self._vehicles.counts, now=now):
-            vehicle = self._vehicles.receive(item.link, peer, packet, now=now)
+        for peer, packet, _ in self.intake.packets(item, self.vehicles.counts, now=now):
+            vehicle = self.vehicles.receive(item.link, peer, packet, now=now)
             if vehicle is not None:
-                if self._restarts.begins_anew(packet, now=now):
-                    self._gcs.continue_numbers(packet)
-                is_ours = self._vehicles.is_answer_to_us(packet)
+                if self.restarts.begins_anew(packet, now=now):
+                    self.gcs.continue_numbers(packet)
+                is_ours = self.vehicles.is_answer_to_us(packet)
                 is_withheld = is_ours or packet.message_id == m.CommandAck.id
-                if is_withheld or self._reports.replaces(packet):
-                    self._publisher.withhold(packet)
+                if is_withheld or self.reports.replaces(packet):
+                    self.publisher.withhold(packet)
                 else:
-                    self._gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
+                    self.gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
 
     def _halts_first(self, received: list[Received]) -> list[Received]:
         """Move packets that start or drive a rover behind those that halt one.
@@ -133,17 +116,16 @@ class Reception:
 
     def _kind_of(self, message: m.Message | None) -> Kind:
         target = getattr(message, "target_system", 0)
-        vehicle = self._vehicles.look_at(target) if target else next(iter(self._vehicles.all), None)
+        vehicle = self.vehicles.look_at(target) if target else next(iter(self.vehicles.all), None)
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
-        client, packet, message = received.client, received.packet, received.message
-        if not self._door.may_pass(client, packet, message, now=now):
+        if not self.door.may_pass(received, now=now):
             return
-        if len(client.introduced) < len(self._vehicles.by_id):
-            self._publisher.welcome(client, now=now)
-        if getattr(message, "target_system", None) == EVERYBODY:
-            for each in self._broadcasts.addressed(received):
+        if len(received.client.introduced) < len(self.vehicles.by_id):
+            self.publisher.welcome(received.client, now=now)
+        if getattr(received.message, "target_system", None) == EVERYBODY:
+            for each in self.broadcasts.addressed(received):
                 self._see_to(each, now=now)
         else:
             self._see_to(received, now=now)
@@ -151,25 +133,28 @@ class Reception:
     def _see_to(self, received: Received, *, now: float) -> None:
         client, packet, message = received.client, received.packet, received.message
         if isinstance(message, m.CommandLong | m.CommandInt):
-            self._commands.receive(client, packet, command_of(message), now=now)
-        elif isinstance(message, m.CommandCancel):
-            self._commands.cancel_latest(client, packet, message, now=now)
-        elif isinstance(message, m.SetMode):
-            vehicle = self._vehicles.get(message.target_system)
-            if vehicle is not None:
+            self.commands.receive(client, packet, command_of(message), now=now)
+        elif isinstance(message, (m.CommandCancel, m.SetMode)):
+            vehicle = self.vehicles.get(message.target_system)
+            if vehicle is None:
+                return
+            if isinstance(message, m.CommandCancel):
+                number = message.command
+                self.control.cancel_latest(client, vehicle, packet.source, number, now=now)
+            else:
                 asked = MessageRequest.of(client, vehicle, packet, int(message.custom_mode))
-                self._modes.heard(asked, now=now)
+                self.modes.heard(asked, now=now)
         elif isinstance(message, m.RequestDataStream):
-            self._displays.set_streams(client, message)
+            self.displays.set_streams(client, message)
         elif isinstance(message, m.SetupSigning):
-            self._setup.receive(client, message, now=now)
-        elif isinstance(message, MESSAGES) and self._desks.receive(
+            self.setup.receive(client, message, now=now)
+        elif isinstance(message, MissionMessage) and self.desks.receive(
             client, packet, message, now=now
         ):
             return
         else:
             if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
-                self._operator.receive(message, now=now)
-            elif isinstance(message, PARAMETER_MESSAGES):
-                self._parameters.receive(client, packet, message, now=now)
-            self._passing.forward(client, packet, message, now=now)
+                self.operator.receive(message, now=now)
+            elif isinstance(message, ParamMessage):
+                self.parameters.receive(client, packet, message, now=now)
+            self.passing.forward(client, packet, message, now=now)

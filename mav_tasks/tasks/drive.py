@@ -14,7 +14,7 @@ from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.limits import limited, within_fence
-from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal, skipped_to
+from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal
 from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_divergence import AstrayWatch
 from mav_tasks.tasks.driving.path_follower import PathFollower
@@ -73,11 +73,10 @@ class Drive:
         return f"Drive({self._course!r}, {self._last_velocity})"
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
 
     def forget(self) -> None:
-        """Drop the path of the active task, since another task takes its place."""
+        """Drop the path of the active task: another task, or step, takes its place."""
         self._course = self._way_back = None
 
     def entered(self, *, now: float) -> None:
@@ -261,13 +260,6 @@ class Drive:
                 return after
             return self._go_on(task, after, seen, motion, now=now)
         return None
-
-    def skip_to(self, task: Task, step: int, *, now: float) -> None:
-        """Continue at another step of a plan; at once, if it is being driven."""
-        assert isinstance(task.goal, Plan), "only plans have steps"
-        progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
-        self._course = self._way_back = None
-        self._registry.advance(task.id, progress, now=now)
 
     def _look_on_the_way(
         self,

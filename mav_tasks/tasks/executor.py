@@ -61,7 +61,6 @@ class Executor:
 
     @property
     def task(self) -> Task | None:
-        """The active task."""
         return None if self.task_id is None else self._registry[self.task_id]
 
     @property
@@ -76,7 +75,6 @@ class Executor:
             self._meter.note(now=now)
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
         self.drive.apply(settings)
 
@@ -250,24 +248,18 @@ class Executor:
         if seen.refusal and seen.is_not_ready and is_waited_for:
             return self._wait_until_ready(task, seen, now)
         if seen.refusal:
-            self._finish(S.FAILED, seen.refusal, actor=SERVER, now=now)
-            return view.HOLD
+            return self._becomes(Becomes(S.FAILED, seen.refusal), now=now)
         if seen.drives_on:
-            self._finish(S.FAILED, R.LOSS_FAILSAFE, actor=SERVER, now=now)
-            return view.HOLD
+            return self._becomes(Becomes(S.FAILED, R.LOSS_FAILSAFE), now=now)
         if not seen.in_control:
-            if now - self._taking_since > self._settings.watch.start_timeout:
-                self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
-                return view.HOLD
-            return view.TAKE
+            return self._take(now)
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
             return view.STAND
         creeps = now - self._taking_since > CREEPS_FOR and motion.speed < CREEPS
         if not seen.still and not creeps:  # the start heading must be measured at rest
             if now - self._since > 2 * self._settings.watch.start_timeout:
-                self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
-                return view.HOLD
+                return self._becomes(Becomes(S.FAILED, R.START_TIMEOUT), now=now)
             return view.STAND
         progress = self.drive.begin(task, seen, motion, now=now)
         if isinstance(progress, Becomes):
@@ -279,10 +271,7 @@ class Executor:
         if self._pause_if_lost(seen, now):
             return view.HOLD
         if not seen.in_control:
-            if now - self._taking_since > self._settings.watch.start_timeout:
-                self._finish(S.FAILED, R.START_TIMEOUT, actor=SERVER, now=now)
-                return view.HOLD
-            return view.TAKE
+            return self._take(now)
         self._taking_since = now
         motion = seen.motion
         if motion is None or now - motion.at > self._settings.watch.motion_fresh:
@@ -290,6 +279,12 @@ class Executor:
         executed = self._executed_before + now - self._since
         outcome = self.drive.go_on(task, seen, motion, executed=executed, elapsed=elapsed, now=now)
         return self._becomes(outcome, now=now) if isinstance(outcome, Becomes) else outcome
+
+    def _take(self, now: float) -> Demand:
+        """Demand control of the vehicle, for a limited time."""
+        if now - self._taking_since > self._settings.watch.start_timeout:
+            return self._becomes(Becomes(S.FAILED, R.START_TIMEOUT), now=now)
+        return view.TAKE
 
     def _becomes(self, outcome: Becomes, *, now: float) -> Demand:
         """Apply an outcome to the task. Return HOLD."""

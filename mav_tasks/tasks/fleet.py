@@ -59,7 +59,6 @@ class Fleet:
         return halt if halt is not None and now - halt.at <= UNSEEN else None
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
         self.room.apply(settings)
         for tasks in self:

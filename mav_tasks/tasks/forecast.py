@@ -12,7 +12,7 @@ from mav_tasks.tasks.driving.estimate import SETTLING, UNKNOWN, Estimate, Known,
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Pose, Task, TaskId
+from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 S = TaskState
@@ -122,12 +122,8 @@ class Forecast:
 
 def known_of(tasks: VehicleTasks) -> Known:
     """Return the inputs for an estimate of a vehicle's tasks."""
-    seen, pose = tasks.seen, _pose_of(tasks)
+    seen = tasks.seen
     if seen is None:
         return Known(tasks.terms.driving)
+    pose = None if seen.motion is None else seen.motion.pose
     return Known(tasks.terms.driving, pose, seen.home, seen.origin)
-
-
-def _pose_of(tasks: VehicleTasks) -> Pose | None:
-    seen = tasks.seen
-    return None if seen is None or seen.motion is None else seen.motion.pose

@@ -159,22 +159,7 @@ class Near:
     distance: float
 
 
-Step = (
-    Move
-    | MoveTurned
-    | Rotate
-    | Drive
-    | GoTo
-    | Face
-    | Head
-    | Wait
-    | Nothing
-    | SetSpeed
-    | Jump
-    | Perform
-    | Delay
-    | Near
-)
+Step = SingleGoal | Nothing | SetSpeed | Jump | Perform | Delay | Near
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from mav_tasks.tasks.events import QueuePaused, VehicleHalted
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import SingleGoal
 from mav_tasks.tasks.halts import Halts
-from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, TaskState, words_of
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.queue import TaskQueue
 from mav_tasks.tasks.registry import TaskRegistry
@@ -76,7 +76,7 @@ class Lineup:
         self.halts = Halts()
         #: the task that runs although the queue is paused
         self.immediate: TaskId | None = None
-        #: a task was killed: nothing starts before the vehicle stands
+        #: a task was killed: nothing starts before the vehicle stands, or somebody else has it
         self.stopping_after_kill = False
         self.begun_at = 0.0
         #: a held task that waits until the vehicle has rebooted, or the queue resumes
@@ -110,16 +110,6 @@ class Lineup:
     def waiting(self) -> list[TaskId]:
         """Waiting tasks, next one first."""
         return self.room.of(self.vehicle)
-
-    @property
-    def next_waiting(self) -> TaskId | None:
-        """The first task in the queue, or None."""
-        return self.queue.first()
-
-    @property
-    def capacity(self) -> int:
-        """Maximum number of waiting tasks."""
-        return self.settings.queueing.capacity
 
     @property
     def is_idle(self) -> bool:
@@ -174,20 +164,6 @@ class Lineup:
             return True
         return bool(self.suspended_ids) and any(task.state is S.HELD for task in self.suspended)
 
-    @property
-    def resumes_by_itself(self) -> bool:
-        """Whether a task is paused only until the vehicle, or its position, is heard again."""
-        return self.executor.resumes_by_itself
-
-    @property
-    def lost_since(self) -> float | None:
-        """When the task that resumes by itself was paused, in s; None without one."""
-        return self.executor.lost_since
-
-    def waits(self, task: Task) -> bool:
-        """Return whether a task has not started."""
-        return task.state in WAITING
-
     # shared by several parts
 
     def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
@@ -217,9 +193,13 @@ class Lineup:
         self.executor.give_up()
         self.suspended_ids[task_id] = None
 
+    def blocker(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> TaskReason:
+        """Return why no task with this goal can take control of the vehicle now, or NONE."""
+        return start_blocker(seen, watch=self.settings.watch, now=now, goal=goal)
+
     def check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         """Raise Rejection, with a remedy, if a task with this goal could not start now."""
-        blocker = start_blocker(seen, watch=self.settings.watch, now=now, goal=goal)
+        blocker = self.blocker(seen, goal, now=now)
         if blocker:
             raise Rejection(blocker, f"cannot start: {WAYS_OUT.get(blocker, words_of(blocker))}")
 

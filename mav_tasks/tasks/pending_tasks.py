@@ -14,7 +14,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.dependencies import Dependencies
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState
-from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, full, rank_of
+from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.times import Times
@@ -100,7 +100,7 @@ class PendingTasks:
         """Add a new task. Raise Rejection at a limit, or if its dependency cannot complete."""
         queueing = self._settings.queueing
         if self._of_vehicle.get(draft.vehicle, 0) >= queueing.capacity:
-            raise full(queueing.capacity)
+            raise Rejection(R.QUEUE_FULL, f"queue full: {queueing.capacity} tasks wait")
         owner = draft.submitter.owner
         if self._of_owner.get(owner, 0) >= queueing.quota:
             raise Rejection(R.QUOTA, f"quota: this client has {queueing.quota} waiting tasks")

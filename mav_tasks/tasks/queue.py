@@ -10,8 +10,6 @@ from bisect import bisect_left, insort
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from mav_tasks.errors import Rejection
-from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, TaskId
 
 
@@ -143,8 +141,3 @@ def _insert(ordered: list[Any], item: tuple[Any, ...]) -> None:
 def _remove(ordered: list[Any], item: tuple[Any, ...]) -> None:
     """Remove an item that a sorted list contains."""
     del ordered[bisect_left(ordered, item)]
-
-
-def full(capacity: int) -> Rejection:
-    """Return the refusal of a task for a full queue."""
-    return Rejection(TaskReason.QUEUE_FULL, f"queue full: {capacity} tasks wait")

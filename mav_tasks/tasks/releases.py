@@ -10,7 +10,6 @@ from mav_tasks.tasks.events import TaskWaits, VehicleNoted
 from mav_tasks.tasks.goal import MoveTurned, Rotate
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason, TaskState, words_of
 from mav_tasks.tasks.lineup import Lineup, Released
-from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Task, same_frame
 from mav_tasks.tasks.view import VehicleView
 
@@ -100,19 +99,14 @@ class Releases:
     def _waits_for(
         self, task: Task, seen: VehicleView, *, may_continue: bool, now: float
     ) -> TaskReason:
-        """Return what a released task waits for, NONE if it can start."""
+        """Return what a released task waits for: the queue, or a reboot; NONE if it can start."""
         if self._lineup.paused and not (self._lineup.paused is R.RESTARTED and may_continue):
             return R.QUEUE_PAUSED
-        return self._waits_for_restart(task, seen, now=now)
-
-    def _waits_for_restart(self, task: Task, seen: VehicleView, *, now: float) -> TaskReason:
-        """Return what a held task waits for while its vehicle reboots, NONE otherwise."""
         if task.reason is not R.FRAME_RESET:
             return R.NONE
         if seen.heard and seen.is_booting:  # it shows another mode for a moment
             return R.NO_POSITION
-        goal = goal_of(task)
-        blocker = start_blocker(seen, watch=self._lineup.settings.watch, now=now, goal=goal)
+        blocker = self._lineup.blocker(seen, goal_of(task), now=now)
         return blocker if blocker in OF_RESTART else R.NONE
 
     def _note_held(self, task: Task, why: str, *, now: float) -> None:

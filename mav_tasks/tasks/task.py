@@ -227,8 +227,3 @@ class Task:
     def priority(self) -> int:
         """Priority as submitted or modified, 0–10; 10 runs first."""
         return self.terms.priority
-
-    @property
-    def nonce(self) -> int:
-        """Nonce chosen by the client, 0 for none."""
-        return self.marks.nonce

@@ -4,8 +4,7 @@ from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.lineup import Lineup
-from mav_tasks.tasks.queue import Rank
-from mav_tasks.tasks.scheduler import outranks, start_blocker
+from mav_tasks.tasks.scheduler import outranks
 from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.times import is_too_late
 from mav_tasks.tasks.view import VehicleView
@@ -46,32 +45,20 @@ class Turns:
 
     def is_interrupted(self, seen: VehicleView, *, now: float) -> bool:
         """Let a waiting task pre-empt the running one, if it may and can start. Return whether."""
-        running = self._lineup.active
-        if (
-            running is None
-            or self._lineup.paused
-            or not self._lineup.queue
-            or self._lineup.is_held_ahead
-        ):
+        lineup = self._lineup
+        running, queueing = lineup.active, lineup.settings.queueing
+        if running is None or lineup.paused or not lineup.queue or lineup.is_held_ahead:
             return False
-        if now - self._lineup.begun_at < self._lineup.settings.queueing.preemption_rest:
+        if now - lineup.begun_at < queueing.preemption_rest:
             return False
-        for task_id in self._lineup.queue.interrupters():
-            if not self._lineup.registry.is_durable(task_id):
+        for task_id in lineup.queue.interrupters():
+            waiting = lineup.registry[task_id]
+            if not lineup.registry.is_durable(task_id) or is_too_late(waiting, now=now):
                 continue
-            waiting = self._lineup.registry[task_id]
-            if is_too_late(waiting, now=now):
-                continue
-            if outranks(
-                waiting, running, queueing=self._lineup.settings.queueing
-            ) and not start_blocker(
-                seen,
-                watch=self._lineup.settings.watch,
-                now=now,
-                goal=goal_of(waiting),
-            ):
-                self._lineup.executor.pause(R.PREEMPTED, actor=SERVER, now=now)
-                self._lineup.set_aside(running.id)
+            outranked = outranks(waiting, running, queueing=queueing)
+            if outranked and not lineup.blocker(seen, goal_of(waiting), now=now):
+                lineup.executor.pause(R.PREEMPTED, actor=SERVER, now=now)
+                lineup.set_aside(running.id)
                 self._begin(waiting, seen, now=now)
                 return True
         return False
@@ -86,9 +73,7 @@ class Turns:
             self._lineup.room.handle_deadline(now=now)  # after a delay this may precede its timer
             self.begin_next(seen, now=now)
             return
-        blocker = start_blocker(
-            seen, watch=self._lineup.settings.watch, now=now, goal=goal_of(task)
-        )
+        blocker = self._lineup.blocker(seen, goal_of(task), now=now)
         self._note_blocker(first, blocker, now=now)
         if not blocker and self._lineup.registry.is_durable(first):
             self._begin(task, seen, now=now)
@@ -107,13 +92,11 @@ class Turns:
         resumable = [task for task in self._lineup.suspended if task.state is S.PAUSED]
         if not resumable:
             return first
-        best = min(resumable, key=self._rank)
-        if first is not None and self._lineup.queue.rank(first) < self._rank(best):
+        rank = self._lineup.room.rank
+        best = min(resumable, key=rank)
+        if first is not None and self._lineup.queue.rank(first) < rank(best):
             return first
         return best.id
-
-    def _rank(self, task: Task) -> Rank:
-        return self._lineup.room.rank(task)
 
     def _begin(self, task: Task, seen: VehicleView, *, now: float) -> None:
         if task.state is S.QUEUED:

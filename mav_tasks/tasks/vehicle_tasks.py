@@ -52,7 +52,6 @@ class VehicleTasks(Lineup):
     # requests
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self.settings = settings
         self.terms.apply(settings)
 
@@ -97,10 +96,6 @@ class VehicleTasks(Lineup):
             self.executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
 
-    def withdraw(self, task: Task, *, now: float) -> None:
-        """Withdraw a submission that did not become durable; it cannot have started."""
-        self.room.withdraw(task, now=now)
-
     def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> Task:
         """Add a task that runs at once; all others wait until the queue is resumed.
 
@@ -124,16 +119,11 @@ class VehicleTasks(Lineup):
         elif active is not None and active.state in (S.STARTING, S.EXECUTING, S.PAUSED):
             self.executor.pause(R.OPERATOR, actor=actor, now=now)
             self.set_aside(active.id)
-        if self.immediate is not None:
-            self._replace_immediate(actor=actor, now=now)
-        self.immediate = task.id
-        self.pause_queue(R.OPERATOR, actor=actor, now=now)
-
-    def _replace_immediate(self, *, actor: str, now: float) -> None:
-        assert self.immediate is not None
-        before = self.registry.get(self.immediate)
+        before = None if self.immediate is None else self.registry.get(self.immediate)
         if before is not None and before.state in WAITING:
             self.room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
+        self.immediate = task.id
+        self.pause_queue(R.OPERATOR, actor=actor, now=now)
 
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
         """Cancel a task, or end it at once (``kill``); the vehicle stands before anything starts.
@@ -180,18 +170,14 @@ class VehicleTasks(Lineup):
         for task in [*self.suspended, *([] if self.active is None else [self.active])]:
             self.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
 
-    def forget_release(self) -> None:
-        """Drop a release that waits, since something halted it; the task is held as before."""
-        self.released = None
-
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
         """Continue, or start, an unfinished plan at another of its steps."""
         assert isinstance(task.goal, Plan), "only plans have steps"
-        if self.active is not None and self.active.id == task.id:
-            self.executor.drive.skip_to(self.active, step, now=now)
-        else:
-            progress = skipped_to(task.goal, replace(task.progress, pending=()), step)
-            self.registry.advance(task.id, progress, now=now)
+        present = self.registry[task.id].progress
+        progress = skipped_to(task.goal, replace(present, pending=()), step)
+        if self.executor.task_id == task.id:
+            self.executor.drive.forget()
+        self.registry.advance(task.id, progress, now=now)
 
     def rest(self, seen: VehicleView, *, now: float) -> None:
         """Record how far the vehicle rolled after it was stopped for the end of the server."""
@@ -306,15 +292,7 @@ class VehicleTasks(Lineup):
             self.room.ended(killed, now=now)
         return killed
 
-    def end_halting(self) -> None:
-        """Stop waiting for standstill after a kill, since somebody else has the vehicle."""
-        self.stopping_after_kill = False
-
     # time
-
-    def setpoint_left(self, *, now: float) -> None:
-        """Note that a setpoint is sent to the vehicle now."""
-        self.executor.setpoint_left(now=now)
 
     def step(self, seen: VehicleView, *, now: float) -> Demand:
         """Start the tasks that can start. Return what the vehicle must be made to do now."""

@@ -54,7 +54,6 @@ class VehicleTerms:
         self._apply_driving()
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
         self._apply_driving()
 

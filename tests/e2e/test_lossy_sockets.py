@@ -272,7 +272,7 @@ def test_500_submissions_with_nonces_are_500_tasks(running: Stand, path: Path) -
     assert len({task.submitter.endpoint for task in tasks}) == CLIENTS
     for submitter in submitters:
         system_id = submitter.endpoint.system_id
-        own = {t.nonce: t.id for t in tasks if t.submitter.system_id == system_id}
+        own = {t.marks.nonce: t.id for t in tasks if t.submitter.system_id == system_id}
         assert set(own) == set(nonces)
         assert submitter.told == own
         assert submitter.acked == set(own.values())

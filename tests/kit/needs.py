@@ -56,7 +56,7 @@ def needs_of(engine: Engine) -> Iterator[tuple[Timer, float, object]]:
         yield e._vehicles.deadline_heap._due[vehicle.system_id], vehicle.next_deadline(), vehicle
     gate = e._submissions.gate
     yield gate._timer, gate._held[0][1] if gate._held else inf, gate
-    for desk in e._desks._desks.values():
+    for desk in e._reception.desks._desks.values():
         due = desk.uploads.receiver.next_deadline()
         yield desk._timer, inf if due is None else due, desk.uploads.receiver
     times = e._fleet.room.times

@@ -160,7 +160,7 @@ class Lives(RuleBasedStateMachine):
             case "modify":
                 self.modify(task, data.draw(changes), after=data.draw(st.integers(0, task.id - 1)))
             case "withdraw":
-                self.fleet.of(task.vehicle).withdraw(task, now=self.now)
+                self.fleet.of(task.vehicle).room.withdraw(task, now=self.now)
             case action:
                 tasks, kill = self.fleet.of(task.vehicle), action == "kill"
                 tasks.cancel(task, kill=kill, reason=R.CANCELLED, actor="client", now=self.now)

@@ -65,7 +65,7 @@ class TasksOfAVehicle(RuleBasedStateMachine):
     def withdraw(self, data: st.DataObject) -> None:
         _, task_id = data.draw(st.sampled_from(self.waiting))
         if not self.registry.is_durable(TaskId(task_id)):
-            self.tasks.withdraw(self.registry[TaskId(task_id)], now=self.now)
+            self.tasks.room.withdraw(self.registry[TaskId(task_id)], now=self.now)
         self.note()
 
     @rule()

@@ -70,11 +70,11 @@ def test_10000_submissions_with_nonces_are_10000_tasks(make_world: MakeWorld) ->
         world.run(0.05)
     tasks = world.tasks()
     assert len(tasks) == CLIENTS * EACH == len(world.events(TaskSubmitted))
-    assert {(t.submitter.system_id, t.nonce) for t in tasks} == sent
+    assert {(t.submitter.system_id, t.marks.nonce) for t in tasks} == sent
     for submitter in submitters:
         for nonce, task_id in submitter.known.items():
             task = world.task(task_id) if task_id % 97 == 0 else None
-            assert task is None or task.nonce == nonce
+            assert task is None or task.marks.nonce == nonce
         assert len(set(submitter.known.values())) == EACH
 
 

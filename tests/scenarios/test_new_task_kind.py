@@ -19,7 +19,7 @@ ADDED = {
         "    TASK_STOP = 54003\n": "    TASK_DOCK = 54004\n",
     },
     "engine/policy/commands.py": {
-        "    54003: Row(": '    54004: replace(SUBMITS, name="TASK_DOCK"),\n',
+        "    54003: handled(": '    54004: replace(SUBMITS, name="TASK_DOCK"),\n',
     },
     "engine/commands/goals.py": {
         "    Drive,\n": "    Dock,\n",

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.commands.motion_gate import why_no_motion
 from mav_tasks.engine.policy import DISARM, PAUSE, PAUSE_HERE, Kind, Row, row_of, row_of_command
 from mav_tasks.engine.policy.commands import COMMANDS, HOLD, START
 from mav_tasks.engine.policy.messages import MESSAGES
@@ -156,7 +157,7 @@ def granted(walk: "Walk") -> None:
     driver = walk.client if walk.role in ("operator", "safety") else walk.world.client
     driver.mode(GUIDED)
     walk.world.run(1.0)
-    assert walk.vehicle.motion_rights.has_granted((driver.server, driver.name)), "it was granted"
+    assert walk.vehicle.parts.authority.has_granted((driver.server, driver.name)), "it was granted"
 
 
 STATES = (idle, armed_in_hold, task_drives, paused, stopped, granted)
@@ -221,9 +222,9 @@ class Walk:
             self.world.control(),
             None if active is None else (active.id, active.state),
             len(tuple(tasks.waiting)),
-            self.vehicle.motion_rights.has_granted((self.client.server, self.client.name)),
-            self.vehicle.motion_rights.has_granted((self.client.server, self.world.client.name)),
-            self.vehicle.motion_rights.why_no_motion(),
+            self.vehicle.parts.authority.has_granted((self.client.server, self.client.name)),
+            self.vehicle.parts.authority.has_granted((self.client.server, self.world.client.name)),
+            why_no_motion(self.vehicle.parts),
         )
 
     def say(self, word: Word) -> None:

@@ -10,7 +10,7 @@ from copy import copy
 from typing import Any
 
 from mav_tasks.engine.clients.gcs_side import Received
-from mav_tasks.engine.missions.mission_server import MESSAGES as MISSION_MESSAGES
+from mav_tasks.engine.missions.mission_server import MissionMessage
 from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
@@ -50,4 +50,4 @@ def _is_to_be_answered(message: m.Message | None) -> bool:
     """Whether each rover is to answer a message of this kind."""
     if isinstance(message, m.CommandLong | m.CommandInt):
         return not is_task_command(message.command)
-    return isinstance(message, (m.SetMode, *MISSION_MESSAGES))
+    return isinstance(message, m.SetMode | MissionMessage)

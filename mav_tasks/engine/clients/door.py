@@ -9,17 +9,17 @@ limited before parsing. From a client below operator, every message that an obse
 counted, because the link to the rover may be slow.
 """
 
-from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR
+from mav_tasks.engine.commands.translate import result_of
 from mav_tasks.engine.policy import Kind, row_of
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import target_of
-from mav_tasks.mavlink.enums import MavResult, MavSeverity
-from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.services.command_receiver import Answer, is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -33,22 +33,28 @@ class Door:
         #: requests dropped because they were too many
         self.left_out = 0
 
-    def may_pass(
-        self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
-    ) -> bool:
+    def may_pass(self, received: Received, *, now: float) -> bool:
         """Whether a client's packet is processed; the sender of a refused command is told."""
+        client, packet, message = received.client, received.packet, received.message
         if is_stop(message):
             return True
-        if self._is_ours(packet.source):
-            self._turn_away(client, packet, message, now=now)
-            return False
         row = row_of(packet.message_id, message)
+        if self._is_ours(packet.source):
+            if message is not None and row.kind is not Kind.TELL:
+                words = f"address {packet.source} belongs to the server or a rover: use another"
+                self._refuse(received, message, Rejection(TaskReason.NOT_ALLOWED, words), now=now)
+            # noise may look so, and nobody waits for an answer to a heartbeat
+            return False
         is_counted = row.is_counted or (row.role == OBSERVER and not client.rights.reach(OPERATOR))
         if not is_counted or client.requests.take(now=now):
             return True
         self.left_out += 1
-        if isinstance(message, m.CommandLong | m.CommandInt) and client.may_be_refused(now=now):
-            self._tell_rate(client, packet, message, now=now)
+        if isinstance(message, m.CommandLong | m.CommandInt):
+            rights = client.rights
+            words = (
+                f"too many requests: role {rights.role} may send {rights.limits.rate:g} per second"
+            )
+            self._refuse(received, message, Rejection(TaskReason.RATE_LIMITED, words), now=now)
         return False
 
     def _is_ours(self, source: Address) -> bool:
@@ -59,48 +65,20 @@ class Door:
             and (source == vehicle.server_address or source.component_id == AUTOPILOT)
         )
 
-    def _turn_away(
-        self, client: GcsClient, packet: Packet, message: m.Message | None, *, now: float
-    ) -> None:
-        if message is None or row_of(packet.message_id, message).kind is Kind.TELL:
-            return  # noise may look so, and nobody waits for an answer to a heartbeat
-        words = f"address {packet.source} belongs to the server or a rover: use another"
-        refusal = Rejection(TaskReason.NOT_ALLOWED, words)
-        if isinstance(message, m.CommandLong | m.CommandInt):
-            if client.may_be_refused(now=now):
-                self._refuse(client, packet, message, MavResult.DENIED, refusal, now=now)
-        else:
-            self._refusals.stream(client, target_of(message).system_id, packet, refusal, now=now)
-
-    def _tell_rate(
-        self,
-        client: GcsClient,
-        packet: Packet,
-        message: m.CommandLong | m.CommandInt,
-        *,
-        now: float,
-    ) -> None:
-        rights = client.rights
-        words = f"too many requests: role {rights.role} may send {rights.limits.rate:g} per second"
-        refusal = Rejection(TaskReason.RATE_LIMITED, words)
-        result = MavResult.TEMPORARILY_REJECTED
-        self._refuse(client, packet, message, result, refusal, now=now)
-
     def _refuse(
-        self,
-        client: GcsClient,
-        packet: Packet,
-        message: m.CommandLong | m.CommandInt,
-        result: MavResult,
-        refusal: Rejection,
-        *,
-        now: float,
+        self, received: Received, message: m.Message, refusal: Rejection, *, now: float
     ) -> None:
-        self._refusals.stream(client, message.target_system, packet, refusal, now=now)
-        vehicle = self._vehicles.look_at(message.target_system)
-        if vehicle is None:
+        """Record a refusal; answer a command, unless the client's commands are a flood."""
+        client, packet = received.client, received.packet
+        is_command = isinstance(message, m.CommandLong | m.CommandInt)
+        if is_command and not client.may_be_refused(now=now):
+            return
+        self._refusals.stream(client, target_of(message).system_id, packet, refusal, now=now)
+        vehicle = self._vehicles.look_at(target_of(message).system_id)
+        if vehicle is None or not isinstance(message, m.CommandLong | m.CommandInt):
             return
         component = message.target_component or vehicle.server_component
         source = Address(vehicle.system_id, component)
+        result = result_of(refusal.reason)
         client.answer(Answer(message.command, result, refusal.reason, source), packet.source)
         client.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)

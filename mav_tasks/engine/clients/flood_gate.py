@@ -45,7 +45,6 @@ class FloodGates:
         return sum(gate.left_out for gate in self._gates.values())
 
     def apply(self, settings: Clients) -> None:
-        """Take new settings."""
         self._rate = settings.packet_rate
         for gate in self._gates.values():
             gate.apply(rate=self._rate)

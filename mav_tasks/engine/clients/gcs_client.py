@@ -1,6 +1,5 @@
 """One client: an endpoint on a client link, what it was sent and what it requested."""
 
-from collections import OrderedDict
 from collections.abc import Callable
 from math import inf
 
@@ -13,7 +12,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import statustext
-from mav_tasks.services.command_receiver import Answer, Pending
+from mav_tasks.services.command_receiver import Answer
 from mav_tasks.services.message_interval import StreamRateLimiter
 from mav_tasks.services.task_status import TaskStatusSender
 from mav_tasks.services.token_bucket import TokenBucket
@@ -31,8 +30,6 @@ OLD = 0.5  # s; a packet that lay here longer may be older than packets that cam
 MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 MAX_SENDERS = 32  # addresses at one endpoint whose commands are remembered: there may be a router
-
-Nonces = dict[Address, OrderedDict[int, Pending]]
 
 
 class GcsClient:
@@ -103,7 +100,6 @@ class GcsClient:
         return f"GcsClient({names} at {self.endpoint})"
 
     def apply(self, settings: Clients) -> None:
-        """Take new settings."""
         self.thinner.default_interval = settings.stream_interval
         self.statuses.apply(rate=settings.status_rate)
         self._texts.apply(rate=settings.text_rate)
@@ -162,7 +158,6 @@ class GcsClient:
         return sender
 
     def heard(self, packet: Packet, *, now: float) -> None:
-        """Note a packet from this client."""
         source = packet.source
         sender = self._senders.get(source) or self.sender(source)
         sender.line.place(packet.seq, now=now)

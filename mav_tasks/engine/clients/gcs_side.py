@@ -65,8 +65,6 @@ class GcsSide:
         #: the client links, by name
         self.links: set[str] = set()
         self._newcomers: TokenBucket | None = None
-        #: packets of unknown senders for which there was no room
-        self.turned_away = 0
         #: number of each client link of this run, from 1
         self.link_numbers: dict[str, int] = {}
         self._clients: dict[tuple[str, Peer], GcsClient] = {}
@@ -110,7 +108,6 @@ class GcsSide:
             client.thinner.backoff.note(change.is_congested, now=now)
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
         self._settings = settings
         self._rights = RightsBook(settings.roles)
         self._newcomers = None
@@ -279,7 +276,6 @@ class GcsSide:
             return client
         if is_stop(message):
             return self._new(link, peer, is_configured=False, is_connected=False, now=now)
-        self.turned_away += 1
         return None
 
     def _is_crowd(self, clients: int) -> bool:

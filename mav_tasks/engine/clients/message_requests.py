@@ -1,5 +1,6 @@
 """Serves REQUEST_MESSAGE and the requests about message intervals."""
 
+from collections.abc import Iterable
 from math import isfinite
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -113,20 +114,10 @@ class MessageRequests:
                 self._show_queue(client, tasks, address, heard_at=None, now=now)
             case m.TaskStatus.id:
                 task_id = translate.task_id_of(command)
-                forecast = Forecast(tasks, self._registry, now=now)
-                for each in (task_id,) if task_id else self._page(tasks, command):
-                    task = self._registry.get(each)
-                    if task is None:
-                        raise Rejection(R.NOT_FOUND, f"no task {each}")
-                    self._send(
-                        client,
-                        task,
-                        tasks,
-                        address,
-                        reader=packet.source,
-                        forecast=forecast,
-                        now=now,
-                    )
+                if task_id and self._registry.get(task_id) is None:
+                    raise Rejection(R.NOT_FOUND, f"no task {task_id}")
+                ids = [TaskId(task_id)] if task_id else self._page(tasks, command)
+                self._show_statuses(client, ids, tasks, address, reader=packet.source, now=now)
             case m.TaskTiming.id:  # needs the rover's setpoint rate
                 raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
             case _:
@@ -136,31 +127,28 @@ class MessageRequests:
     def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
         """Send a task's TASK_STATUS without its queue position, which takes time to compute."""
         task = self._registry.get(task_id)
-        if task is not None:
+        vehicle = None if task is None else self._vehicles.look_at(task.vehicle)
+        if task is not None and vehicle is not None:
             to = task.submitter.system_id, task.submitter.component_id
             reader = address_of(*to) if client.submitted(task) else EVERYBODY
-            self._send_status(client, task, reader=reader, is_full=False, now=now)
+            tasks, address = vehicle.tasks, vehicle.server_address
+            self._send(client, task, tasks, address, reader=reader, forecast=None, now=now)
 
-    def _send_status(
+    def _show_statuses(
         self,
         client: GcsClient,
-        task: Task,
+        ids: Iterable[TaskId],
+        tasks: VehicleTasks,
+        address: Address,
         *,
         reader: Address,
         now: float,
-        is_full: bool = True,
     ) -> None:
-        """Send a task's TASK_STATUS, from the task server of its vehicle.
-
-        ``is_full``: with its queue position and estimated times.
-        """
-        vehicle = self._vehicles.look_at(task.vehicle)
-        if vehicle is not None:
-            forecast = Forecast(vehicle.tasks, self._registry, now=now) if is_full else None
-            address = vehicle.server_address
-            self._send(
-                client, task, vehicle.tasks, address, reader=reader, forecast=forecast, now=now
-            )
+        """Send the TASK_STATUS of tasks, with their queue positions and estimated times."""
+        forecast = Forecast(tasks, self._registry, now=now)
+        for each in ids:
+            task = self._registry[each]
+            self._send(client, task, tasks, address, reader=reader, forecast=forecast, now=now)
 
     def _send(
         self,
@@ -202,24 +190,17 @@ class MessageRequests:
         client, vehicle, reader = asked.client, asked.vehicle, asked.packet.source
         task_id = translate.task_id_of(asked.command)
         if task_id == 0:
-            forecast = Forecast(vehicle.tasks, self._registry, now=now)
-            address = vehicle.server_address
-            for each in self._page(vehicle.tasks, asked.command):
-                self._send(
-                    client,
-                    self._registry[each],
-                    vehicle.tasks,
-                    address,
-                    reader=reader,
-                    forecast=forecast,
-                    now=now,
-                )
-            return
-        task = self._registry.get(task_id)
-        if task is None:
-            raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
-        client.follow(task_id)
-        self._send_status(client, task, reader=reader, now=now)
+            ids, of = self._page(vehicle.tasks, asked.command), vehicle.system_id
+        else:
+            task = self._registry.get(task_id)
+            if task is None:
+                raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
+            client.follow(task_id)
+            ids, of = [task.id], task.vehicle
+        owner = self._vehicles.look_at(of)
+        if owner is not None:
+            address = owner.server_address
+            self._show_statuses(client, ids, owner.tasks, address, reader=reader, now=now)
 
     def _page(self, tasks: VehicleTasks, command: Command) -> list[TaskId]:
         """Return the waiting or finished tasks for a request without a task id."""
@@ -240,7 +221,7 @@ class MessageRequests:
         message = translate.task_timing(
             task,
             vehicle.tasks.timing_of(task),
-            period=vehicle.setpoint_period,
+            period=vehicle.parts.settings.watch.setpoint_period,
             reader=asked.packet.source,
             now=now,
         )

@@ -22,12 +22,10 @@ class OperatorWatch:
         return f"OperatorWatch(heard at {self._heard_at})"
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
         self._limit = settings.watch.operator_lost
         self._timer.set(self._heard_at + self._limit)
 
     def receive(self, heartbeat: m.Heartbeat, *, now: float) -> None:
-        """Take a client's heartbeat in."""
         if heartbeat.type == MavType.GCS:
             self._heard_at = now
             self._timer.set(now + self._limit)

@@ -26,7 +26,6 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Submitter
 
-MESSAGES = (m.ParamRequestList, m.ParamRequestRead, m.ParamSet)
 LIST_EACH = 0.2  # s between lists: one packet asks for many, no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
 
@@ -153,8 +152,7 @@ class ParameterServer:
         name, value = name_in(message), as_sent(message.param_value)
         wish = _Wish(client, vehicle, packet.source, message, client.who, name, value)
         if name not in PARAMETERS:
-            words = f"{name}: no such parameter"
-            self._refuse(wish, words, MavParamError.DOES_NOT_EXIST, now=now)
+            self._refuse(wish, f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
             return
         try:
             if message.param_type != MavParamType.REAL32:

@@ -54,8 +54,7 @@ class Rights(NamedTuple):
         """Raise Rejection unless the task is the submitter's own, or the role reaches operator."""
         self.require(SUBMITTER, what)
         if not self.reach(OPERATOR) and task.submitter.owner != submitter.owner:
-            words = f"may not {what}: task {task.id} belongs to {task.submitter}"
-            raise self.refusal(words)
+            raise self.refusal(f"may not {what}: task {task.id} belongs to {task.submitter}")
 
     def refusal(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
         """Return a Rejection that names the role."""

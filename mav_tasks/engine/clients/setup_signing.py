@@ -9,35 +9,29 @@ from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavSeverity
-from mav_tasks.settings import Settings
 
 
 class SetupSigning:
     """The handler of SETUP_SIGNING. QGroundControl looks for signed packets or a text."""
 
-    def __init__(self, signatures: Signatures, vehicles: VehicleSide, settings: Settings) -> None:
+    def __init__(self, signatures: Signatures, vehicles: VehicleSide) -> None:
         self._signatures = signatures
         self._vehicles = vehicles
-        self._policy = settings.signing.setup
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._policy = settings.signing.setup
 
     def receive(self, client: GcsClient, message: m.SetupSigning, *, now: float) -> None:
         """Start or end signing to this client; a text says why not."""
         targets = self._vehicles.addressed_by(message.target_system)
         if not targets:
             return
-        why_not = self._set_up(client, bytes(message.secret_key))
+        why_not = "disabled by signing.setup"
+        if targets[0].parts.settings.signing.setup == "known":
+            why_not = self._set_up(client, bytes(message.secret_key))
         if why_not:
             words = f"signing refused: {why_not}"
             client.tell(words, MavSeverity.ERROR, targets[0].server_address, now=now)
 
     def _set_up(self, client: GcsClient, secret: bytes) -> str:
         link, peer = client.key
-        if self._policy != "known":
-            return "disabled by signing.setup"
         if not any(secret):
             if not self._signatures.takes_unsigned(link):
                 return "this link requires signed packets"

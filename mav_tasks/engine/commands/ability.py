@@ -20,7 +20,6 @@ class Ability(NamedTuple):
 
     @classmethod
     def of(cls, persona: Persona, *, rover: str = "this rover") -> "Ability":
-        """Return the ability of a vehicle."""
         return cls(persona.honours_yaw_rate, persona.turning, rover, persona.turns_by_course)
 
     @property

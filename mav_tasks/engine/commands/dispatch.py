@@ -5,11 +5,11 @@ sent it. A command that the server does not claim is forwarded to the vehicle; i
 through ``deliver``.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.gcs_client import GcsClient
-from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
 from mav_tasks.engine.commands.command_request import CommandRequest
@@ -36,7 +36,6 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
@@ -54,38 +53,20 @@ class _UndoesHold(NamedTuple):
     actor: str
 
 
+@dataclass(repr=False, eq=False)
 class Commands:
     """The dispatcher of client commands."""
 
-    def __init__(
-        self,
-        gcs: GcsSide,
-        vehicles: VehicleSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        modes: ModeRequests,
-        control: TaskControl,
-        displays: MessageRequests,
-        settings: Settings,
-    ) -> None:
-        self._settings = settings
-        self._gcs = gcs
-        self._vehicles = vehicles
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        self._modes = modes
-        self._control = control
-        self._displays = displays
-        submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
+    _vehicles: VehicleSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _modes: ModeRequests
+    _control: TaskControl
+    _displays: MessageRequests
 
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
-        self._submissions.apply(settings)
-        self._modes.apply(settings)
-        self._control.apply(settings)
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """Execute or refuse a client's command, and answer it."""
@@ -171,71 +152,15 @@ class Commands:
     def _dispatch(self, asked: CommandRequest, *, now: float) -> None:
         if asked.command.target.system_id == EVERYBODY:  # others: see ``Broadcasts``
             number = asked.command.command
-            words = f"command {number} must name one rover, not system 0"
-            raise Rejection(R.BAD_PARAMETER, words)
-        command, row = asked.command, asked.row
-        component = command.target.component_id
+            raise Rejection(R.BAD_PARAMETER, f"command {number} must name one rover, not system 0")
+        row, component = asked.row, asked.command.target.component_id
         at_server = component == asked.vehicle.server_address.component_id
         if row.is_claimed and (
             at_server or component in (0, AUTOPILOT) or _is_of_what_nobody_sends(asked)
         ):
             asked.rights.require(row.role, f"send {row.name}")
-            match command.command:
-                case number if number in GOALS and (at_server or self._claims(number)):
-                    if number == MavCmd.DO_REPOSITION:
-                        self._reposition(asked, now=now)
-                    else:
-                        self._submissions.submit(asked, now=now)
-                    return
-                case (
-                    MavCmd.TASK_CANCEL
-                    | MavCmd.TASK_CLEAR
-                    | MavCmd.TASK_MODIFY
-                    | MavCmd.TASK_RELEASE
-                    | MavCmd.DO_CHANGE_SPEED
-                ):
-                    asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
-                    return
-                case MavCmd.NAV_TAKEOFF as number if at_server or self._claims(
-                    number
-                ):  # examples for every kind of vehicle send it: nothing to do
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.NAV_LAND as number if at_server or self._claims(number):
-                    asked.vehicle.joint.stand_down(asked.client.key, now=now)
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.MISSION_START as number if at_server or self._claims(number):
-                    first = whole(asked.command, 1, "first item", high=0xFFFF)
-                    _check_last_item(asked)
-                    self._modes.start_plan(asked, first=first, now=now)
-                    return
-                case MavCmd.DO_SET_MISSION_CURRENT as number if at_server or self._claims(number):
-                    self._plans.check_start(asked.rights, asked.vehicle, asked.submitter)
-                    seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
-                    task = self._plans.go_on_with(asked.vehicle, seq, now=now)
-                    asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
-                    if task is None and seq is not None:
-                        words = self._plans.begins_with(asked.vehicle, seq)
-                        asked.tell(words, MavSeverity.INFO, now=now)
-                    return
-                case MavCmd.DO_PAUSE_CONTINUE:
-                    asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
-                    return
-                case MavCmd.SET_MESSAGE_INTERVAL:
-                    self._displays.set_interval(asked, now=now)
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.GET_MESSAGE_INTERVAL:
-                    self._displays.show_interval(asked)
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case MavCmd.REQUEST_MESSAGE if self._displays.show(asked, now=now):
-                    asked.answer(MavResult.ACCEPTED)
-                    return
-                case number if is_task_command(number):
-                    self._refuse_unknown(asked, now=now)
-                    return
+            if self._handle(asked, at_server=at_server, now=now):
+                return
         if at_server and row.kind is Kind.QUESTION:  # ground stations ask all components
             asked.answer(MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
         elif at_server:
@@ -249,6 +174,58 @@ class Commands:
             check_relay(asked, row.passed_on, now=now)
             self._check_question(asked, now=now)
             relay(asked, now=now)
+
+    def _handle(self, asked: CommandRequest, *, at_server: bool, now: float) -> bool:
+        """Execute a command that the server claims. Return False if the rover is to answer it."""
+        vehicle = asked.vehicle
+        # the settings may leave standard commands that are sent to the autopilot to it
+        claims = at_server or vehicle.parts.settings.claim
+        match asked.command.command:
+            case MavCmd.DO_REPOSITION if claims:
+                self._reposition(asked, now=now)
+            case number if number in GOALS and (claims or is_task_command(number)):
+                self._submissions.submit(asked, now=now)
+            case (
+                MavCmd.TASK_CANCEL
+                | MavCmd.TASK_CLEAR
+                | MavCmd.TASK_MODIFY
+                | MavCmd.TASK_RELEASE
+                | MavCmd.DO_CHANGE_SPEED
+            ):
+                asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
+            case MavCmd.NAV_TAKEOFF if claims:  # examples for every kind of vehicle send it
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.NAV_LAND if claims:
+                vehicle.joint.stand_down(asked.client.key, now=now)
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.MISSION_START if claims:
+                first = whole(asked.command, 1, "first item", high=0xFFFF)
+                last = whole(asked.command, 2, "last item", high=0xFFFF)
+                if last:
+                    raise bad(f"param2 last item {last}: only the whole plan can run", param=2)
+                self._modes.start_plan(asked, first=first, now=now)
+            case MavCmd.DO_SET_MISSION_CURRENT if claims:
+                self._plans.check_start(asked.rights, vehicle, asked.submitter)
+                seq = whole(asked.command, 1, "item", high=0xFFFF, default=None)
+                task = self._plans.go_on_with(vehicle, seq, now=now)
+                asked.answer(MavResult.ACCEPTED, 0 if task is None else task.id)
+                if task is None:
+                    asked.tell(self._plans.begins_with(vehicle, seq), MavSeverity.INFO, now=now)
+            case MavCmd.DO_PAUSE_CONTINUE:
+                asked.answer(MavResult.ACCEPTED, self._pause_continue(asked, now=now) or 0)
+            case MavCmd.SET_MESSAGE_INTERVAL:
+                self._displays.set_interval(asked, now=now)
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.GET_MESSAGE_INTERVAL:
+                self._displays.show_interval(asked)
+                asked.answer(MavResult.ACCEPTED)
+            case MavCmd.REQUEST_MESSAGE if self._displays.show(asked, now=now):
+                asked.answer(MavResult.ACCEPTED)
+            case number if is_task_command(number):
+                self._refuse_unknown(asked, now=now)
+            case _:
+                return False
+        return True
 
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
         """Raise Rejection if an observer's question is too much for the rover's link."""
@@ -264,10 +241,6 @@ class Commands:
         words = f"command {asked.command.command}: not supported in this version"
         unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
         self._registry.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
-
-    def _claims(self, command: int) -> bool:
-        """Whether the server handles this command when it is sent to the autopilot."""
-        return is_task_command(command) or self._settings.claim
 
     def _reposition(self, asked: CommandRequest, *, now: float) -> None:
         """DO_REPOSITION: submit a "go to"; without a place, pause."""
@@ -287,21 +260,6 @@ class Commands:
         if number is not None and asked.rights.reach(OPERATOR):
             undoes = _UndoesHold(asked.vehicle, number, asked.actor)
             self._submissions.gate.hold(undoes, now=now)
-
-    def cancel_latest(
-        self, client: GcsClient, packet: Packet, message: m.CommandCancel, *, now: float
-    ) -> None:
-        """COMMAND_CANCEL: it has no acknowledgement; the task's status shows the effect."""
-        vehicle = self._vehicles.get(message.target_system)
-        if vehicle is not None:
-            self._control.cancel_latest(
-                client.rights,
-                vehicle,
-                client.submitter(packet.source),
-                message.command,
-                is_late=client.is_late,
-                now=now,
-            )
 
     # STOP, pause, modes
 
@@ -357,8 +315,7 @@ class Commands:
         self._submissions.held(vehicle, asked.submitter)
         paused = vehicle.joint.pause(actor=asked.actor, now=now)
         if not vehicle.is_heard(now=now):  # it is paused nevertheless
-            words = f"paused, but rover {vehicle.system_id} is silent"
-            raise Rejection(R.VEHICLE_SILENT, words)
+            raise Rejection(R.VEHICLE_SILENT, f"paused, but rover {vehicle.system_id} is silent")
         return paused
 
 
@@ -383,9 +340,3 @@ def _is_of_what_nobody_sends(asked: CommandRequest) -> bool:
     intervals = MavCmd.SET_MESSAGE_INTERVAL, MavCmd.GET_MESSAGE_INTERVAL
     component = asked.command.target.component_id
     return asked.command.command in intervals and component not in asked.vehicle.components
-
-
-def _check_last_item(asked: CommandRequest) -> None:
-    last = whole(asked.command, 2, "last item", high=0xFFFF)
-    if last:
-        raise bad(f"param2 last item {last}: only the whole plan can run", param=2)

@@ -6,7 +6,7 @@ A packet goes to the link on which its target was seen.
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import SAFETY, SUBMITTER
-from mav_tasks.engine.commands.motion_gate import may_pass, passed, why_not_sent, withheld
+from mav_tasks.engine.commands.motion_gate import may_pass, passed, why_not_sent
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.policy import Kind, Row, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -73,12 +73,12 @@ class Forwarder:
                     passed(vehicle, client.key, row, message, now=now)
                 vehicles[0].requests.forward(packet)
                 continue
-            for vehicle in vehicles:
-                withheld(vehicle, client.key, row, now=now)
-            if message is None:
-                continue
-            for vehicle in refusing:
-                why_not = Rejection(R.NOT_ALLOWED, _why_withheld(vehicle, client, row))
+            for vehicle in vehicles if row.needs_grant else ():
+                vehicle.parts.authority.note_withheld(client.key, now=now)
+            for vehicle in refusing if message is not None else ():
+                words = why_not_sent(row, vehicle, client.key)
+                words = words or "a number is not finite, or the server delayed it"
+                why_not = Rejection(R.NOT_ALLOWED, words)
                 self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
 
     def _refuse_question(
@@ -107,16 +107,9 @@ class Forwarder:
     def end(self, link: str, peer: Peer, *, now: float) -> None:
         """Stop the vehicles that a client was driving, because it is gone."""
         for vehicle in self._vehicles.all:
-            if vehicle.motion_rights.has_granted((link, peer)):
+            if vehicle.parts.authority.has_granted((link, peer)):
                 self._vehicles.mark_dirty(vehicle)
                 vehicle.joint.client_is_gone((link, peer), now=now)
-
-
-def _why_withheld(vehicle: Vehicle, client: GcsClient, row: Row) -> str:
-    """Return why a packet that the client's role may send does not go to a rover now."""
-    return (
-        why_not_sent(row, vehicle, client.key) or "a number is not finite, or the server delayed it"
-    )
 
 
 def _target(message: m.Message) -> Address:

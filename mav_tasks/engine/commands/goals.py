@@ -37,16 +37,7 @@ R = TaskReason
 
 #: a COMMAND_INT without coordinates may name any existing frame
 KNOWN_FRAMES = frozenset(MavFrame)
-GLOBAL_FRAMES = frozenset(
-    {
-        MavFrame.GLOBAL,
-        MavFrame.GLOBAL_RELATIVE_ALT,
-        MavFrame.GLOBAL_INT,
-        MavFrame.GLOBAL_RELATIVE_ALT_INT,
-        MavFrame.GLOBAL_TERRAIN_ALT,
-        MavFrame.GLOBAL_TERRAIN_ALT_INT,
-    }
-)
+GLOBAL_FRAMES = frozenset(frame for frame in MavFrame if frame.name.startswith("GLOBAL"))
 NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT, whose integers have no NaN
 LOCAL_SCALE = 1e4  # COMMAND_INT's x and y in a local frame are metres times this
 MAX_WAIT = 86_400.0  # s
@@ -150,8 +141,7 @@ def number(
         return value
     label = f"param{index} {name}"
     if not isnan(value):
-        words = f"{label} {value:.8g} not in {low:.8g}..{high:.8g}"
-        raise bad(words, param=index)
+        raise bad(f"{label} {value:.8g} not in {low:.8g}..{high:.8g}", param=index)
     if default is None:
         raise bad(f"{label} is not given", param=index)
     return default
@@ -170,8 +160,7 @@ def whole(
     fallback = None if default is None else float(default)
     value = number(command, index, name, low=low, high=high, default=fallback)
     if value != int(value):
-        words = f"param{index} {name} {value:.8g} is not a whole number"
-        raise bad(words, param=index)
+        raise bad(f"param{index} {name} {value:.8g} is not a whole number", param=index)
     return int(value)
 
 
@@ -246,13 +235,6 @@ def _yaw(command: Command, index: int, *, turn: float) -> float | None:
     """
     value = number(command, index, "yaw", low=-turn, high=turn, default=0.0)
     return value or None
-
-
-def _speed(command: Command, index: int, driving: Driving) -> float | None:
-    """Return a speed in m/s, None for the default: 0, -1 or NaN."""
-    if command.params[index - 1] == -1.0:
-        return None
-    return _speed_or_default(command, index, driving)
 
 
 def _speed_or_default(command: Command, index: int, driving: Driving) -> float | None:
@@ -331,7 +313,7 @@ def reposition_flags(command: Command) -> int:
 
 
 def _reposition(command: Command, driving: Driving) -> SingleGoal:
-    speed = _speed(command, 1, driving)
+    speed = None if command.params[0] == -1.0 else _speed_or_default(command, 1, driving)
     radius = number(command, 3, "radius", low=-inf, high=1000.0, default=0.0)
     yaw = _yaw(command, 4, turn=tau)
     if yaw is not None and reposition_flags(command) & RELATIVE_YAW:
@@ -351,8 +333,7 @@ def _return(_command: Command, _driving: Driving) -> SingleGoal:
 
 def _delay(command: Command, _driving: Driving) -> SingleGoal:
     if command.params[0] == -1.0:
-        words = "param1 -1: a time of day is not supported, see START_UTC"
-        raise bad(words, param=1)
+        raise bad("param1 -1: a time of day is not supported, see START_UTC", param=1)
     return Wait(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
 
 

@@ -4,6 +4,7 @@ A request comes as DO_SET_MODE, which is answered, or as the older message SET_M
 acknowledgement: its sender waits until a heartbeat shows the mode.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -15,11 +16,11 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.plans import MISSION, Plans
 from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
+from mav_tasks.engine.vehicles.start_mark import Marker
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -39,29 +40,18 @@ class _Started(NamedTuple):
     task: Task
 
 
+@dataclass(repr=False, eq=False)
 class ModeRequests:
     """The handler of mode requests and mission starts of all clients."""
 
-    def __init__(
-        self,
-        gcs: GcsSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        refusals: Refusals,
-        settings: Settings,
-    ) -> None:
-        self._refusals = refusals
-        self._gcs = gcs
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        self._claims = settings.claim
-        submissions.gate.knows(_Started, self._accept, self._give_up)
+    _gcs: GcsSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _refusals: Refusals
 
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._claims = settings.claim
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_Started, self._accept, self._give_up)
 
     def asked(self, asked: CommandRequest, *, now: float) -> bool:
         """Handle DO_SET_MODE. Return False if the vehicle itself is to answer it."""
@@ -90,7 +80,7 @@ class ModeRequests:
             vehicle.joint.client_asks_mode(mode, client.key, now=now)
             return False
         self._plans.check_start(asked.rights, vehicle, asked.submitter)
-        if self._is_to_be_armed_first(vehicle):
+        if vehicle.persona.starts_when_armed and not vehicle.armed:
             self._mark(asked, now=now)
             shown = self._plans.shown(vehicle)
             asked.answer(MavResult.ACCEPTED, 0 if shown is None else shown.id)
@@ -151,7 +141,7 @@ class ModeRequests:
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
-        if vehicle.parts.is_manual and not vehicle.motion_rights.is_armed_by_client(now=now):
+        if vehicle.parts.is_manual and not vehicle.parts.armings.are_by_client(now=now):
             return  # armed by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)
@@ -171,9 +161,7 @@ class ModeRequests:
     def _mark(self, asked: CommandRequest, *, now: float) -> None:
         vehicle = asked.vehicle
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
-        vehicle.start_mark.put(
-            asked.client.key, asked.submitter, asked.rights, plan_id=plan_id, now=now
-        )
+        vehicle.start_mark.put(Marker(asked.submitter, asked.rights, plan_id), now=now)
         asked.tell("The mission starts when the rover is armed", MavSeverity.INFO, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
@@ -181,37 +169,27 @@ class ModeRequests:
         """Show clients a mode at once: SET_MODE has no other answer."""
         lasts = START_WAITS if vehicle.start_mark.is_put(now=now) else SHOWN_FOR
         vehicle.shown.show(mode, until=now + lasts)
-        heartbeat = vehicle.shown.in_message(vehicle.heartbeat, now=now)
+        heartbeat = vehicle.shown.in_message(vehicle.parts.monitor.latest, now=now)
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs.clients:
             if vehicle.system_id in client.introduced:
                 client.outlet.send(heartbeat, source)
 
-    def _is_to_be_armed_first(self, vehicle: Vehicle) -> bool:
-        return vehicle.persona.starts_when_armed and not vehicle.armed
-
     def _is_return(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether the server drives this mode itself, as a return to a known home."""
-        return (
-            self._claims and mode == vehicle.persona.return_mode and vehicle.where.home is not None
-        )
+        is_return = mode == vehicle.persona.return_mode and vehicle.where.home is not None
+        return is_return and vehicle.parts.settings.claim
 
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether the server drives this mode itself, as the mission uploaded to it."""
         active = vehicle.tasks.active
         has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).items)
         has_plan = has_plan or (active is not None and isinstance(active.goal, Plan))
-        return self._claims and mode == vehicle.persona.mission_mode and has_plan
+        is_mission = mode == vehicle.persona.mission_mode and has_plan
+        return is_mission and vehicle.parts.settings.claim
 
 
 def _return_home(asked: CommandRequest) -> Draft:
     """Return the draft for the mode RTL."""
-    command = MavCmd.NAV_RETURN_TO_LAUNCH
-    return Draft(
-        asked.vehicle.system_id,
-        command,
-        GoTo(None),
-        asked.submitter,
-        CRUISING,
-        marks=asked.marks,
-    )
+    number, command = asked.vehicle.system_id, MavCmd.NAV_RETURN_TO_LAUNCH
+    return Draft(number, command, GoTo(None), asked.submitter, CRUISING, asked.marks)

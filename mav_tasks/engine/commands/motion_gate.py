@@ -10,9 +10,11 @@ from typing import Any
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.policy import Kind, Row
+from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.services.orders import moves
+from mav_tasks.services.phase import Phase
 from mav_tasks.tasks.lifecycle import STOP_IN_FORCE
 
 NO_PLACE = 7  # type_mask that ignores x, y and z
@@ -21,15 +23,47 @@ RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
 
 
+def why_not_moved(parts: Parts, client: Hashable, *, takes_over: bool = False) -> str:
+    """Return why a client's motion message may not pass, in words, or "" if it may.
+
+    ``takes_over``: the client also asks for the mode in which clients drive.
+    """
+    why_not = why_no_motion(parts, takes_over=takes_over)
+    if why_not:
+        return why_not
+    if parts.tasks.is_driving:  # also one that is paused
+        return "not during a task"
+    if not parts.monitor.armed:
+        return "the rover is not armed"
+    if not takes_over and not parts.authority.has_granted(client):
+        return f"set {parts.persona.mode_name(parts.persona.control_mode)} first"
+    return ""
+
+
+def why_no_motion(parts: Parts, *, takes_over: bool = False) -> str:
+    """Return why no client may move it now, in words, or "" if one may.
+
+    With ``takes_over``, the client may continue from where we hand the vehicle back.
+    """
+    if parts.tasks.is_stopped:
+        return STOP_IN_FORCE
+    is_handed_over = takes_over and parts.control.phase is Phase.RELEASING
+    if parts.control.is_engaged and not is_handed_over:
+        return "not during a task"
+    if parts.control.awaits_mode:
+        return "the server is setting HOLD"
+    return ""
+
+
 def why_not_sent(row: Row, vehicle: Vehicle, client: Hashable, *, takes_over: bool = False) -> str:
     """Return why a client's message may not go to a rover now, "" if it may.
 
     ``takes_over``: it also asks for the mode in which clients drive.
     """
     if row.needs_grant:
-        return vehicle.motion_rights.why_not_moved(client, takes_over=takes_over)
+        return why_not_moved(vehicle.parts, client, takes_over=takes_over)
     if not row.passes_beside_task:
-        return vehicle.motion_rights.why_no_motion(takes_over=takes_over)
+        return why_no_motion(vehicle.parts, takes_over=takes_over)
     if not row.passes_under_stop and vehicle.tasks.is_stopped:
         return STOP_IN_FORCE
     return ""
@@ -50,18 +84,12 @@ def may_pass(
     return not why_not_sent(row, vehicle, client.key)
 
 
-def withheld(vehicle: Vehicle, client: Hashable, row: Row, *, now: float) -> None:
-    """Note that a client's packet is not forwarded to the vehicle."""
-    if row.needs_grant:
-        vehicle.motion_rights.withheld(client, now=now)
-
-
 def passed(
     vehicle: Vehicle, client: Hashable, row: Row, message: m.Message | None, *, now: float
 ) -> None:
     """Note the effect on the tasks of a packet that is forwarded to the vehicle."""
     if row.needs_grant:
-        vehicle.motion_rights.passed(client, now=now)
+        vehicle.parts.authority.note_client(client, now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
         vehicle.joint.sticks_moved(now=now)
 

@@ -47,7 +47,7 @@ def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
     if takes_over:
         vehicle.joint.client_asks_mode(vehicle.persona.control_mode, asked.client.key, now=now)
     if row.needs_grant:
-        vehicle.motion_rights.passed(asked.client.key, now=now)
+        vehicle.parts.authority.note_client(asked.client.key, now=now)
 
 
 def relay(asked: CommandRequest, *, now: float) -> None:

@@ -23,7 +23,7 @@ from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.goal import GoTo, describe
-from mav_tasks.tasks.lifecycle import TaskReason, words_of
+from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
 
@@ -62,7 +62,6 @@ class Submissions:
         self._gcs = gcs
         self._registry = registry
         self._deduplicator = deduplicator
-        self._settings = settings
         #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         self.gate.knows(Submitted, self._accept, self._withdraw)
@@ -76,8 +75,6 @@ class Submissions:
         self._is_closing = True
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
         self.gate.within = settings.watch.commit
 
     def committed(self, through: int, *, now: float) -> None:
@@ -93,15 +90,14 @@ class Submissions:
         """Submit the task of a command. Raise Rejection if it is refused."""
         client, vehicle, command = asked.client, asked.vehicle, asked.command
         if client.waited > GIVEN_UP:
-            words = "delayed by the server: send it again"
-            raise Rejection(R.STALE, words)
-        is_ours = command.command in TASK_COMMANDS
+            raise Rejection(R.STALE, "delayed by the server: send it again")
+        is_ours, settings = command.command in TASK_COMMANDS, vehicle.parts.settings
         wish = parse_command(
             command,
             asked.packet.raw,
-            self._settings.driving,
+            settings.driving,
             now=now,
-            priority=DEFAULT_PRIORITY if is_ours else self._priority_of(asked.submitter),
+            priority=DEFAULT_PRIORITY if is_ours else _priority_of(asked.submitter, settings),
             is_cruising=command.target.component_id in (0, AUTOPILOT),
         )
         # A stock client counts TASK_STATUS, which it cannot read, as a lost packet; it fills unused
@@ -109,11 +105,11 @@ class Submissions:
         client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
         goal, words = driven(wish.goal, vehicle.parts.persona, system_id=vehicle.system_id)
         if isinstance(goal, GoTo):
-            self._check_reach(vehicle, goal)
+            _check_reach(vehicle, goal)
         draft = Draft(
             vehicle.system_id, command.command, goal, asked.submitter, wish.terms, wish.marks
         )
-        runs_now = self._settings.guided == "now" and asked.is_go_to
+        runs_now = settings.guided == "now" and asked.is_go_to
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
@@ -197,29 +193,12 @@ class Submissions:
         self._deduplicator.forget(task)
         self._store_is_away = True
         current = self._registry.get(task.id)
-        if current is not None and vehicle.tasks.waits(current):
-            vehicle.tasks.withdraw(current, now=now)
+        if current is not None and current.state in WAITING:
+            vehicle.tasks.room.withdraw(current, now=now)
 
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
         """Note that a client halted a vehicle: a return that it requests next is a new task."""
         self._deduplicator.held(submitter, vehicle.system_id)
-
-    def _priority_of(self, submitter: Submitter) -> int:
-        priorities = self._settings.clients.priorities
-        if not priorities:
-            return DEFAULT_PRIORITY
-        by_address = priorities.get(submitter.address, DEFAULT_PRIORITY)
-        return priorities.get(submitter.place, by_address)
-
-    def _check_reach(self, vehicle: Vehicle, goal: GoTo) -> None:
-        """Raise Rejection for a place too far away, by a typing error, or outside the fence."""
-        far = vehicle.where.distance_to(goal)
-        longest = self._settings.driving.max_distance
-        if far is not None and far > longest:
-            words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
-            raise Rejection(R.BAD_PARAMETER, words)
-        if not vehicle.where.is_within_fence(goal):
-            raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
 
     def check_open(self) -> None:
         """Raise Rejection while new submissions are refused."""
@@ -277,7 +256,7 @@ class Submissions:
     ) -> bool:
         """Whether a submission came before; if so, answer it."""
         # only to compare places
-        origin = asked.vehicle.where.origin if isinstance(draft.goal, GoTo) else None
+        origin = asked.vehicle.where.frame.origin if isinstance(draft.goal, GoTo) else None
         known = self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
         if known is not None:
             self._answer_repeat(asked, known, now=now)
@@ -299,6 +278,25 @@ class Submissions:
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"repeated {what}, no new task: see task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
+
+
+def _priority_of(submitter: Submitter, settings: Settings) -> int:
+    priorities = settings.clients.priorities
+    if not priorities:
+        return DEFAULT_PRIORITY
+    by_address = priorities.get(submitter.address, DEFAULT_PRIORITY)
+    return priorities.get(submitter.place, by_address)
+
+
+def _check_reach(vehicle: Vehicle, goal: GoTo) -> None:
+    """Raise Rejection for a place too far away, by a typing error, or outside the fence."""
+    far = vehicle.where.distance_to(goal)
+    longest = vehicle.parts.settings.driving.max_distance
+    if far is not None and far > longest:
+        words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
+        raise Rejection(R.BAD_PARAMETER, words)
+    if not vehicle.where.is_within_fence(goal):
+        raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
 
 
 def _acknowledge(asked: CommandRequest, task_id: TaskId) -> None:

@@ -5,20 +5,21 @@ Each returns the id of the task that it acted on, 0 for none or many, or raises 
 
 from dataclasses import replace
 
-from mav_tasks.engine.clients.rights import OPERATOR, Rights
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.rights import OPERATOR
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import MAX_DELAY, flag, identifier, number, whole
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import MAX_PRIORITY, Submitter, Task, Terms
+from mav_tasks.tasks.task import MAX_PRIORITY, Task, Terms
 
 R, P = TaskReason, TaskProperty
 
@@ -30,13 +31,8 @@ GROUND_OR_AIR = 1  # DO_CHANGE_SPEED, highest param1: airspeed counts as ground 
 class TaskControl:
     """The commands of clients on existing tasks."""
 
-    def __init__(self, registry: TaskRegistry, settings: Settings) -> None:
+    def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
-        self._settings = settings
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
 
     def act(self, asked: CommandRequest, *, now: float) -> int:
         """Execute one of these commands; return the task's id, or 0."""
@@ -53,23 +49,18 @@ class TaskControl:
                 return self._change_speed(asked, now=now)
 
     def cancel_latest(
-        self,
-        rights: Rights,
-        vehicle: Vehicle,
-        submitter: Submitter,
-        command: int,
-        *,
-        is_late: bool,
-        now: float,
+        self, client: GcsClient, vehicle: Vehicle, source: Address, command: int, *, now: float
     ) -> None:
         """COMMAND_CANCEL: cancel a client's latest task of a command, if it is not over.
 
-        ``is_late``: the message waited while the server was stalled. A held task then stays held.
+        A message that waited while the server was stalled leaves a held task as it is. There is no
+        acknowledgement; the task's status shows the effect.
         """
+        submitter = client.submitter(source)
         task = self._registry.latest(submitter, command, vehicle=vehicle.system_id)
-        if task is None or (is_late and task.state is TaskState.HELD):
+        if task is None or (client.is_late and task.state is TaskState.HELD):
             return
-        if rights.reach(row_of_message(CommandCancel.id).role):
+        if client.rights.reach(row_of_message(CommandCancel.id).role):
             vehicle.joint.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: CommandRequest, *, now: float) -> int:
@@ -78,8 +69,7 @@ class TaskControl:
         if first is not None and first.result == MavResult.ACCEPTED:
             return first.result_param2
         if first is not None:
-            words = "just refused; send it again if you mean it"
-            raise Rejection(R(first.result_param2), words)
+            raise Rejection(R(first.result_param2), "just refused; send it again if you mean it")
         task_id = identifier(asked.command, 1, "task", default=None)
         kill = flag(asked.command, 2, "kill")
         active = asked.vehicle.tasks.active
@@ -103,8 +93,7 @@ class TaskControl:
         copy = asked.receiver.answer_to_copy(asked.command, now=now)
         if copy is not None:
             done = "skipped" if asked.command.params[1] == SKIP else "released"
-            words = f"task {copy.result_param2}: already {done}"
-            asked.tell(words, MavSeverity.INFO, now=now)
+            asked.tell(f"task {copy.result_param2}: already {done}", MavSeverity.INFO, now=now)
             return copy.result_param2
         task_id = identifier(asked.command, 1, "task", default=None)
         how = whole(asked.command, 2, "how", high=SKIP, default=None)
@@ -125,7 +114,7 @@ class TaskControl:
         return task.id
 
     def _modify(self, asked: CommandRequest, *, now: float) -> int:
-        task = self._find(asked, _task_id(asked.command))
+        task = self._find(asked, identifier(asked.command, 1, "task", low=1, default=None))
         asked.rights.require_own(task, asked.submitter, "modify")
         terms = _modified(task, asked.command, now=now)
         if terms.priority > task.terms.priority:
@@ -140,7 +129,8 @@ class TaskControl:
         wish = asked.command.params[1]
         if wish == NO_CHANGE:
             return 0
-        top = min(self._settings.driving.max_speed, asked.rights.limits.max_speed)
+        driving = asked.vehicle.parts.settings.driving
+        top = min(driving.max_speed, asked.rights.limits.max_speed)
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
         return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
 
@@ -153,10 +143,6 @@ class TaskControl:
         if task.state in TERMINAL:
             raise Rejection(R.WRONG_STATE, f"task {task_id} has ended ({_words(task)})")
         return task
-
-
-def _task_id(command: Command) -> int:
-    return identifier(command, 1, "task", low=1, default=None)
 
 
 def _words(task: Task) -> str:
@@ -199,8 +185,7 @@ _OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
 def _label(label: str, command: Command) -> str:
     """Return the label with the piece in a command put in."""
     if command.frame is None:
-        words = "LABEL must be sent as COMMAND_INT"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise Rejection(R.BAD_PARAMETER, "LABEL must be sent as COMMAND_INT")
     offset = whole(command, 3, "byte", high=MAX_LABEL, default=None)
     x, y = int(command.params[4]), int(command.params[5])
     try:
@@ -211,6 +196,5 @@ def _label(label: str, command: Command) -> str:
 
 def _utc(command: Command) -> int:
     if command.frame is None:
-        words = "START_UTC must be sent as COMMAND_INT"
-        raise Rejection(R.BAD_PARAMETER, words)
+        raise Rejection(R.BAD_PARAMETER, "START_UTC must be sent as COMMAND_INT")
     return whole(command, 5, "UTC", low=1, high=0x7FFFFFFF, default=None)

@@ -93,7 +93,6 @@ def fence_for_vehicle(items: Sequence[Item]) -> tuple[Item, ...]:
 
 
 def rally_of(items: Sequence[Item]) -> tuple[GlobalPlace, ...]:
-    """Return the places of rally points."""
     return tuple(_place(item) for item in items)
 
 

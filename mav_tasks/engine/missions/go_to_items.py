@@ -22,7 +22,7 @@ from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 
-GO_THERE, ONLY_HIGHER = 2, 3  # MISSION_ITEM.current
+ONLY_HIGHER = 3  # MISSION_ITEM.current; 2 is a place to go to
 
 
 class GuidedItemRequest(CommandRequest):

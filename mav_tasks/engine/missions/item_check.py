@@ -18,7 +18,6 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.services.mission_item import Item
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.goal import GoTo, Step, number_of
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -28,10 +27,9 @@ R = TaskReason
 class ItemCheck:
     """The item check of uploads to one address, one upload after the other."""
 
-    def __init__(self, vehicle: Vehicle, component: int, settings: Settings) -> None:
+    def __init__(self, vehicle: Vehicle, component: int) -> None:
         self._vehicle = vehicle
         self._is_at_autopilot = component == AUTOPILOT
-        self._settings = settings
         self._read_by: tuple[int, MissionParseOptions] | None = (
             None  # item count and options of ``_read``
         )
@@ -40,10 +38,6 @@ class ItemCheck:
 
     def __repr__(self) -> str:
         return f"ItemCheck({len(self._read)} items read)"
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
 
     def take_refusal(self) -> Rejection | None:
         """Return why an item was refused since the last call, or None."""
@@ -81,7 +75,7 @@ class ItemCheck:
 
     @property
     def _manner(self) -> MissionParseOptions:
-        persona, driving = self._vehicle.persona, self._settings.driving
+        persona, driving = self._vehicle.persona, self._vehicle.parts.settings.driving
         return MissionParseOptions.of(persona, is_staged=self._is_at_autopilot, driving=driving)
 
     def _step(self, item: Item, seq: int, *, count: int) -> Step:
@@ -100,7 +94,8 @@ class ItemCheck:
     def _check_place(self, step: GoTo, seq: int) -> None:
         """Raise Rejection for a place too far away, outside the fence, or reached across it."""
         name = f"item {number_of(seq, has_home=self._manner.has_home)}"
-        far, longest = self._vehicle.where.distance_to(step), self._settings.driving.max_distance
+        longest = self._vehicle.parts.settings.driving.max_distance
+        far = self._vehicle.where.distance_to(step)
         if far is not None and far > longest:
             words = f"{name} is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
             raise bad(words, param=5)

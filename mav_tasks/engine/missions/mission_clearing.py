@@ -1,13 +1,14 @@
 """Clears plans: a mission that is not being driven, fence and rally points."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.missions.plans import MISSION, NOTHING, STORED, Plans, Stored
-from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -34,25 +35,18 @@ class _Cleared(NamedTuple):
     task: Task | None
 
 
+@dataclass(repr=False, eq=False)
 class MissionClearing:
     """The handler of MISSION_CLEAR_ALL."""
 
-    def __init__(
-        self,
-        vehicles: VehicleSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        answers: MissionAnswers,
-        write_through: WriteThrough,
-    ) -> None:
-        self._vehicles = vehicles
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        self._answers = answers
-        self._write_through = write_through
-        submissions.gate.knows(_Cleared, self._accept, self._undo)
+    _vehicles: VehicleSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _answers: MissionAnswers
+
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_Cleared, self._accept, self._undo)
 
     def clear(
         self, vehicle: Vehicle, sender: Sender, kind: int, *, is_late: bool, now: float
@@ -113,12 +107,14 @@ class MissionClearing:
         if first == MISSION:
             go_on(now=now)
         else:
-            self._write_through.write(vehicle, first, (), go_on, refuse, now=now)
+            write_through(vehicle, first, (), go_on, refuse, now=now)
 
     def _accept(self, cleared: _Cleared, *, now: float) -> None:
         vehicle, task, actor = cleared.vehicle, cleared.task, str(cleared.sender.address)
         self._vehicles.mark_dirty(vehicle)
-        self._call_off(vehicle, task, actor=actor, now=now)
+        current = None if task is None else self._registry.get(task.id)
+        if current is not None and current.state in AT_REST:  # nobody could resume it
+            vehicle.joint.cancel(current, kill=False, actor=actor, now=now)
         self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ACCEPTED)
 
@@ -127,12 +123,6 @@ class MissionClearing:
         for kind, stored in cleared.before:
             self._plans.keep(cleared.vehicle, kind, stored, actor=actor, now=now)
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ERROR)
-
-    def _call_off(self, vehicle: Vehicle, task: Task | None, *, actor: str, now: float) -> None:
-        """Cancel an interrupted mission: without its plan nobody could resume it."""
-        current = None if task is None else self._registry.get(task.id)
-        if current is not None and current.state in AT_REST:
-            vehicle.joint.cancel(current, kill=False, actor=actor, now=now)
 
     def _refused(self, sender: Sender, vehicle: Vehicle, why: Rejection, *, now: float) -> None:
         message_id = m.MissionClearAll.id

@@ -17,6 +17,7 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.mission_item import item_at
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import (
     Event,
@@ -81,7 +82,6 @@ class MissionReports:
         self.apply(settings)
 
     def apply(self, settings: Settings) -> None:
-        """Take new settings."""
         self._claims = settings.claim
         self._timer.set(self._next_at if self._claims else inf)
 
@@ -134,7 +134,8 @@ class MissionReports:
         self._last[event.vehicle] = _Last(event.task_id, event.step)
         task = self._registry.get(event.task_id) if event.performs else None
         if task is not None:
-            item = self._plans.item_of(task, event.step)
+            assert isinstance(task.goal, Plan), "only plans have steps"
+            item = item_at(task.goal.source, event.step)
             vehicle.perform(performed(item, Address(vehicle.system_id, AUTOPILOT)), now=now)
 
     def tell_unperformed(self, vehicle: Vehicle, *, now: float) -> None:

@@ -16,7 +16,6 @@ from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.mission_clearing import MissionClearing
 from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadSession
 from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored
-from mav_tasks.engine.missions.write_through import WriteThrough
 from mav_tasks.engine.policy import GO_TO, row_of
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -29,25 +28,11 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.mission_item import unpacked
 from mav_tasks.services.mission_receiver import RequestForm, Sender
 from mav_tasks.services.mission_sender import MissionSender
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 
 #: messages of the mission protocol from clients
-MESSAGES = (
-    m.MissionCount,
-    m.MissionItem,
-    m.MissionItemInt,
-    m.MissionRequestList,
-    m.MissionRequest,
-    m.MissionRequestInt,
-    m.MissionAck,
-    m.MissionClearAll,
-    m.MissionSetCurrent,
-    m.MissionRequestPartialList,
-    m.MissionWritePartialList,
-)
 MissionMessage = (
     m.MissionCount
     | m.MissionItem
@@ -91,28 +76,15 @@ class MissionServers:
         submissions: Submissions,
         plans: Plans,
         timers: Timers,
-        settings: Settings,
     ) -> None:
         self._vehicles = vehicles
         self._plans = plans
         self._timers = timers
-        self._settings = settings
         self._answers = MissionAnswers(gcs, registry)
-        write_through = WriteThrough(vehicles)
-        self._uploads = MissionUploads(
-            gcs, vehicles, registry, submissions, plans, self._answers, write_through
-        )
-        self._clearing = MissionClearing(
-            vehicles, registry, submissions, plans, self._answers, write_through
-        )
+        self._uploads = MissionUploads(gcs, vehicles, registry, submissions, plans, self._answers)
+        self._clearing = MissionClearing(vehicles, registry, submissions, plans, self._answers)
         self._go_to = GoToItems(submissions, registry)
         self._desks: dict[tuple[int, int, int], _Desk] = {}
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
-        for desk in self._desks.values():
-            desk.uploads.check.apply(settings)
 
     def receive(
         self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
@@ -124,7 +96,7 @@ class MissionServers:
             return False
         component = message.target_component or AUTOPILOT
         at_server = component == vehicle.server_component
-        if not at_server and (component != AUTOPILOT or not self._settings.claim):
+        if not at_server and (component != AUTOPILOT or not vehicle.parts.settings.claim):
             return False
         desk = self._desk(vehicle, component, getattr(message, "mission_type", MISSION))
         who = (client.key, client.signed_by.name)  # an endpoint may have several keys
@@ -215,7 +187,7 @@ class MissionServers:
         if desk is None:
             is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests
             form = m.MissionRequest if is_plain else m.MissionRequestInt
-            check = ItemCheck(vehicle, component, self._settings)
+            check = ItemCheck(vehicle, component)
             ask_again = partial(self._ask_again, vehicle)
             desk = self._desks[key] = _Desk(check, form, self._timers, ask_again)
         return desk

@@ -5,7 +5,7 @@ The task server's address takes any number; each is queued at once. Fence and ra
 the vehicle, at either address.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import blake2b
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from mav_tasks.engine.missions.item_check import ItemCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.missions.plans import MISSION, Plans, Stored
-from mav_tasks.engine.missions.write_through import WriteThrough
+from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -84,28 +84,20 @@ class _Kept(NamedTuple):
     actor: str
 
 
+@dataclass(repr=False, eq=False)
 class MissionUploads:
     """The decision about whole uploads, and the answers to their clients."""
 
-    def __init__(
-        self,
-        gcs: GcsSide,
-        vehicles: VehicleSide,
-        registry: TaskRegistry,
-        submissions: Submissions,
-        plans: Plans,
-        answers: MissionAnswers,
-        write_through: WriteThrough,
-    ) -> None:
-        self._gcs = gcs
-        self._vehicles = vehicles
-        self._registry = registry
-        self._submissions = submissions
-        self._plans = plans
-        self._answers = answers
-        self._write_through = write_through
-        submissions.gate.knows(_Mission, self._accept, self._withdraw)
-        submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
+    _gcs: GcsSide
+    _vehicles: VehicleSide
+    _registry: TaskRegistry
+    _submissions: Submissions
+    _plans: Plans
+    _answers: MissionAnswers
+
+    def __post_init__(self) -> None:
+        self._submissions.gate.knows(_Mission, self._accept, self._withdraw)
+        self._submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
 
     def flush(
         self,
@@ -177,8 +169,7 @@ class MissionUploads:
             return
         halts = vehicle.tasks.halts
         if not is_staged and upload.begun_at < halts.at:
-            words = f"{halts.words} came during the upload: upload it again"
-            raise Rejection(R.STALE, words)
+            raise Rejection(R.STALE, f"{halts.words} came during the upload: upload it again")
         before = self._plans.stored(vehicle.system_id, MISSION)
         client = self._client(sender)
         if is_staged:
@@ -226,7 +217,7 @@ class MissionUploads:
             items = fence_for_vehicle(items)
         store = partial(self._store, desk, vehicle, upload)
         refuse = partial(self._refuse, desk, vehicle)
-        self._write_through.write(vehicle, kind, items, store, refuse, now=now)
+        write_through(vehicle, kind, items, store, refuse, now=now)
 
     def _store(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         sender, kind = upload.sender, upload.mission_type

@@ -154,19 +154,21 @@ def plan_of(
     plan = Plan(steps, packed(items), has_home=has_home, has_options=has_options)
     loop = loops_in_vain(plan)
     if loop is not None:
-        words = f"item {plan.item_number(loop)}: a loop without motion"
-        raise Rejection(R.BAD_PARAMETER, words)
-    return ParsedMission(plan, _terms_of(items, now=now), _nonce_of(items))
+        raise Rejection(R.BAD_PARAMETER, f"item {plan.item_number(loop)}: a loop without motion")
+    options = next((item for item in reversed(items) if item.command == MavCmd.TASK_OPTIONS), None)
+    if options is None:
+        return ParsedMission(plan, Terms())
+    nonce = options.x if 0 < options.x <= MAX_NONCE else 0  # 0: it has no valid one
+    return ParsedMission(plan, _options(_command_of(options), now=now), nonce)
 
 
 def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
     """Return the command of an item that the vehicle executes."""
-    p1, p2, p3, p4 = map(_given, (item.param1, item.param2, item.param3, item.param4))
-    p7 = _given(item.z)
-    if item.frame == MavFrame.MISSION:
-        p5, p6 = float(item.x), float(item.y)
-        return m.CommandLong(*target, item.command, 0, p1, p2, p3, p4, p5, p6, p7)
+    first = (item.param1, item.param2, item.param3, item.param4)
+    p1, p2, p3, p4, p7 = map(_given, (*first, item.z))
     x, y = item.x, item.y
+    if item.frame == MavFrame.MISSION:
+        return m.CommandLong(*target, item.command, 0, p1, p2, p3, p4, float(x), float(y), p7)
     return m.CommandInt(*target, item.frame, item.command, 0, 0, p1, p2, p3, p4, x, y, p7)
 
 
@@ -179,20 +181,6 @@ def _command_of(item: Item) -> Command:
     first = (item.param1, item.param2, item.param3, item.param4)
     params = (*first, float(item.x), float(item.y), item.z)
     return Command(NOBODY, item.command, params, 0, item.frame, NO_MESSAGE)
-
-
-def _terms_of(items: Sequence[Item], *, now: float) -> Terms:
-    terms = Terms()
-    for item in items:
-        if item.command == MavCmd.TASK_OPTIONS:
-            terms = _options(_command_of(item), now=now)
-    return terms
-
-
-def _nonce_of(items: Sequence[Item]) -> int:
-    """Return the nonce of the options item, 0 if it has no valid one."""
-    marks = [item.x for item in items if item.command == MavCmd.TASK_OPTIONS]
-    return marks[-1] if marks and 0 < marks[-1] <= MAX_NONCE else 0
 
 
 def _options(command: Command, *, now: float) -> Terms:

@@ -15,8 +15,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
-from mav_tasks.services.mission_item import Item, item_at, packed, unpacked
-from mav_tasks.settings import Settings
+from mav_tasks.services.mission_item import Item, packed, unpacked
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of
@@ -65,13 +64,11 @@ class Plans:
         self,
         registry: TaskRegistry,
         fleet: Fleet,
-        settings: Settings,
         *,
         restored: Mapping[tuple[int, int], tuple[int, str]],
     ) -> None:
         self._registry = registry
         self._fleet = fleet
-        self._settings = settings
         self._stored = {
             key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
         }
@@ -79,10 +76,6 @@ class Plans:
         self._started: dict[int, _Started] = {}  # the last start of each vehicle
         for (system_id, kind), stored in self._stored.items():
             self._apply_bounds(system_id, kind, stored.items)
-
-    def apply(self, settings: Settings) -> None:
-        """Take new settings."""
-        self._settings = settings
 
     def stored(self, vehicle: int, kind: int) -> Stored:
         """Return a vehicle's mission, fence or rally points."""
@@ -165,13 +158,9 @@ class Plans:
         vehicle.parts.check_not_manual(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
         active, task = vehicle.tasks.active, self.task(vehicle)
-        is_fresh = task is not None and waits_for_start(task)
-        if (
-            active
-            and active.id != stored.plan_id
-            and isinstance(active.goal, Plan)
-            and not is_fresh
-        ):
+        is_fresh = task is not None and task.state in WAITING and task.terms.is_staged
+        is_other = active and active.id != stored.plan_id and isinstance(active.goal, Plan)
+        if active and is_other and not is_fresh:
             self._set_going(vehicle, active, actor=str(submitter), now=now)
             return active
         if not stored.items:
@@ -188,7 +177,7 @@ class Plans:
         if first:
             vehicle.tasks.skip_to(task, first, now=now)
         self._set_going(vehicle, self._registry[task.id], actor=str(submitter), now=now)
-        self._note_start(vehicle, submitter, task, now=now)
+        self._started[vehicle.system_id] = _Started(submitter, task.id, now)
         return task
 
     def _check_queue(self, vehicle: Vehicle) -> None:
@@ -230,12 +219,7 @@ class Plans:
         stored = replace(self.stored(vehicle.system_id, MISSION), plan_id=task.id)
         self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
         self._set_going(vehicle, task, actor=str(task.submitter), now=now)
-        self._note_start(vehicle, task.submitter, task, now=now)
-
-    def _note_start(
-        self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
-    ) -> None:
-        self._started[vehicle.system_id] = _Started(submitter, task.id, now)
+        self._started[vehicle.system_id] = _Started(task.submitter, task.id, now)
 
     def _is_started_again(
         self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
@@ -251,7 +235,7 @@ class Plans:
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
     ) -> Draft:
         manner = MissionParseOptions.of(
-            vehicle.persona, is_staged=True, driving=self._settings.driving
+            vehicle.persona, is_staged=True, driving=vehicle.parts.settings.driving
         )
         steps = steps_of(stored.items, manner=manner)
         wanted = plan_of(stored.items, steps, has_home=manner.has_home, now=now)
@@ -314,24 +298,8 @@ class Plans:
             self.stored(system_id, MavMissionType.RALLY).plan_id,
         )
 
-    def item_of(self, task: Task, step: int) -> Item:
-        """Return an item of a task's plan as uploaded."""
-        return item_at(plan_of_task(task).source, step)
-
-
-def plan_of_task(task: Task) -> Plan:
-    """Return the plan of a mission task."""
-    assert isinstance(task.goal, Plan), "the task of a mission is a plan"
-    return task.goal
-
-
-def waits_for_start(task: Task) -> bool:
-    """Whether a task is a staged mission that was not started."""
-    return task.state in WAITING and task.terms.is_staged
-
 
 def _mission_state(task: Task | None, *, has_plan: bool) -> int:
-    """Return the MISSION_STATE."""
     if not has_plan:
         return 1  # NO_MISSION
     match None if task is None else task.state:

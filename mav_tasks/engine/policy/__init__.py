@@ -49,7 +49,6 @@ def row_of_command(number: int) -> Row:
 
 
 def row_of_message(message_id: int) -> Row:
-    """Return the row of a message by its number."""
     return MESSAGES.get(message_id, UNKNOWN)
 
 

@@ -32,6 +32,11 @@ BOUNDS = Row(
 SUBMITS = Row("", Kind.WISH, SUBMITTER, "creates a task", is_claimed=True)
 
 
+def handled(name: str, kind: Kind, role: str, about: str, elsewhere: Row | None = None) -> Row:
+    """Return the row of what the server handles; ``elsewhere`` applies where it does not."""
+    return Row(name, kind, role, about, is_claimed=True, elsewhere=elsewhere)
+
+
 def named(row: Row, names: str) -> dict[int, Row]:
     """Return equal rows for several names, by number; ``names`` is like "1 THIS, 2 THAT"."""
     pairs = (each.split() for each in names.split(","))
@@ -42,22 +47,14 @@ def named(row: Row, names: str) -> dict[int, Row]:
 DISARM = Row(
     "COMPONENT_ARM_DISARM with param1 = 0", Kind.HALT, OBSERVER, "disarms; forwarded at once"
 )
-PAUSE = Row(
-    "DO_PAUSE_CONTINUE with param1 = 0",
-    Kind.HALT,
-    OBSERVER,
-    "pauses",
-    is_claimed=True,
-    elsewhere=GOES,
-)
+PAUSE = handled("DO_PAUSE_CONTINUE with param1 = 0", Kind.HALT, OBSERVER, "pauses", GOES)
 PAUSE_HERE = replace(PAUSE, name="DO_REPOSITION without a place", elsewhere=MOVES)
-HOLD = Row("DO_SET_MODE, SET_MODE: HOLD", Kind.HALT, OBSERVER, "sets HOLD", is_claimed=True)
-START = Row(
+HOLD = handled("DO_SET_MODE, SET_MODE: HOLD", Kind.HALT, OBSERVER, "sets HOLD")
+START = handled(
     "DO_SET_MODE, SET_MODE: return, or the mission",
     Kind.GO,
     SUBMITTER,
     "starts a return or the mission, which the server drives",
-    is_claimed=True,
 )
 #: rows that have no number of their own
 BY_WORDS = (DISARM, PAUSE, PAUSE_HERE, HOLD, START)
@@ -66,10 +63,10 @@ OURS = {
     **named(SUBMITS, "54000 TASK_MOVE, 54001 TASK_ROTATE, 54002 TASK_DRIVE"),
     **named(replace(SUBMITS, about="options of a plan, only as its item"), "54014 TASK_OPTIONS"),
     **named(replace(SUBMITS, about="changes one's own task"), "54012 TASK_MODIFY"),
-    54003: Row("TASK_STOP", Kind.HALT, OBSERVER, "STOP, at any component", is_claimed=True),
-    54010: Row("TASK_CANCEL", Kind.HALT, SUBMITTER, "cancels one's own task", is_claimed=True),
-    54011: Row("TASK_CLEAR", Kind.HALT, OPERATOR, "cancels everybody's tasks", is_claimed=True),
-    54013: Row("TASK_RELEASE", Kind.GO, SUBMITTER, "releases one's own task", is_claimed=True),
+    54003: handled("TASK_STOP", Kind.HALT, OBSERVER, "STOP, at any component"),
+    54010: handled("TASK_CANCEL", Kind.HALT, SUBMITTER, "cancels one's own task"),
+    54011: handled("TASK_CLEAR", Kind.HALT, OPERATOR, "cancels everybody's tasks"),
+    54013: handled("TASK_RELEASE", Kind.GO, SUBMITTER, "releases one's own task"),
 }
 
 #: standard commands that the server handles
@@ -81,49 +78,15 @@ CLAIMED = {
     ),
     **named(replace(SUBMITS, elsewhere=GOES), "20 NAV_RETURN_TO_LAUNCH"),
     **named(replace(SUBMITS, elsewhere=ACTS), "93 NAV_DELAY"),
-    21: Row(
-        "NAV_LAND",
-        Kind.WISH,
-        OBSERVER,
-        "disarms once no task is left",
-        is_claimed=True,
-        elsewhere=GOES,
-    ),
-    22: Row(
-        "NAV_TAKEOFF",
-        Kind.WISH,
-        OBSERVER,
-        "accepted without effect",
-        is_claimed=True,
-        elsewhere=MOVES,
-    ),
-    178: Row(
-        "DO_CHANGE_SPEED",
-        Kind.WISH,
-        OPERATOR,
-        "sets the speed of tasks",
-        is_claimed=True,
-        elsewhere=MOVES,
-    ),
-    **named(
-        replace(GOES, about="resumes", is_claimed=True, elsewhere=GOES),
-        "193 DO_PAUSE_CONTINUE",
-    ),
-    **named(
-        replace(GOES, about="any other mode"),
-        "176 DO_SET_MODE",
-    ),
-    **named(
-        Row("", Kind.GO, SUBMITTER, "starts one's own plan", is_claimed=True, elsewhere=GOES),
-        "224 DO_SET_MISSION_CURRENT, 300 MISSION_START",
-    ),
-    511: Row(
-        "SET_MESSAGE_INTERVAL",
-        Kind.QUESTION,
-        OBSERVER,
-        "message rates of one client",
-        is_claimed=True,
-        elsewhere=ACTS,
+    21: handled("NAV_LAND", Kind.WISH, OBSERVER, "disarms once no task is left", GOES),
+    22: handled("NAV_TAKEOFF", Kind.WISH, OBSERVER, "accepted without effect", MOVES),
+    178: handled("DO_CHANGE_SPEED", Kind.WISH, OPERATOR, "sets the speed of tasks", MOVES),
+    193: handled("DO_PAUSE_CONTINUE", Kind.GO, OPERATOR, "resumes", GOES),
+    176: replace(GOES, name="DO_SET_MODE", about="any other mode"),
+    224: handled("DO_SET_MISSION_CURRENT", Kind.GO, SUBMITTER, "starts one's own plan", GOES),
+    300: handled("MISSION_START", Kind.GO, SUBMITTER, "starts one's own plan", GOES),
+    511: handled(
+        "SET_MESSAGE_INTERVAL", Kind.QUESTION, OBSERVER, "message rates of one client", ACTS
     ),
     **named(
         replace(ASKS, is_claimed=True, elsewhere=ASKS),

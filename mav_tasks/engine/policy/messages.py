@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR, SAFETY, SUBMITTER
-from mav_tasks.engine.policy.commands import ACTS, ASKS, BOUNDS, GOES, MOVES, named
+from mav_tasks.engine.policy.commands import ACTS, ASKS, BOUNDS, GOES, MOVES, handled, named
 from mav_tasks.engine.policy.row import Kind, Row
 
 SETS = Row("", Kind.WISH, SAFETY, "sets parameters, writes files, erases logs", is_bound=True)
 TELLS = Row("", Kind.TELL, OPERATOR, "corrections, acknowledgements, identification")
-UPLOADS = Row("", Kind.WISH, SUBMITTER, "uploads a mission", is_claimed=True, elsewhere=ACTS)
+UPLOADS = handled("", Kind.WISH, SUBMITTER, "uploads a mission", ACTS)
+ITEMS_ASKED = handled("", Kind.QUESTION, OBSERVER, "requests an item of a plan", ASKS)
+PLAN_ACK = handled("", Kind.TELL, OBSERVER, "end of a plan transfer", Row("", Kind.TELL, OBSERVER))
 #: a packet in a packet, whose content is not checked
 CARRIES = Row("", Kind.MOTION, SAFETY, "carries arbitrary data, also firmware", is_bound=True)
 
@@ -22,14 +24,8 @@ READ_FILE = replace(
     name="FILE_TRANSFER_PROTOCOL with an opcode that changes no file",
     about="lists and reads files",
 )
-GO_TO_ITEM = Row(
-    "MISSION_ITEM, MISSION_ITEM_INT with current = 2 or 3",
-    Kind.WISH,
-    SUBMITTER,
-    "creates a task",
-    is_claimed=True,
-    elsewhere=MOVES,
-)
+_GO_TO = "MISSION_ITEM, MISSION_ITEM_INT with current = 2 or 3"
+GO_TO_ITEM = handled(_GO_TO, Kind.WISH, SUBMITTER, "creates a task", MOVES)
 BOUNDING_PLAN = Row(
     "uploads and MISSION_CLEAR_ALL with a mission_type other than 0",
     Kind.WISH,
@@ -57,33 +53,15 @@ MESSAGES: Mapping[int, Row] = {
     ),
     **named(replace(ASKS, is_counted=False), "4 PING, 111 TIMESYNC"),
     **named(ASKS, "20 PARAM_REQUEST_READ, 21 PARAM_REQUEST_LIST"),
-    **named(
-        replace(ASKS, about="message rates of one client", is_claimed=True, elsewhere=ACTS),
-        "66 REQUEST_DATA_STREAM",
+    66: handled(
+        "REQUEST_DATA_STREAM", Kind.QUESTION, OBSERVER, "message rates of one client", ACTS
     ),
     **named(
-        replace(ASKS, about="requests a plan", is_claimed=True, elsewhere=ASKS),
+        handled("", Kind.QUESTION, OBSERVER, "requests a plan", ASKS),
         "37 MISSION_REQUEST_PARTIAL_LIST, 43 MISSION_REQUEST_LIST",
     ),
-    **named(
-        replace(
-            ASKS,
-            about="requests an item of a plan",
-            is_claimed=True,
-            is_counted=False,
-            elsewhere=ASKS,
-        ),
-        "40 MISSION_REQUEST, 51 MISSION_REQUEST_INT",
-    ),
-    47: Row(
-        "MISSION_ACK",
-        Kind.TELL,
-        OBSERVER,
-        "end of a plan transfer",
-        is_claimed=True,
-        is_counted=False,
-        elsewhere=Row("", Kind.TELL, OBSERVER),
-    ),
+    **named(replace(ITEMS_ASKED, is_counted=False), "40 MISSION_REQUEST, 51 MISSION_REQUEST_INT"),
+    47: replace(PLAN_ACK, name="MISSION_ACK", is_counted=False),
     **named(
         replace(ASKS, role=OPERATOR, about="requests that are expensive to answer"),
         """117 LOG_REQUEST_LIST, 119 LOG_REQUEST_DATA, 122 LOG_REQUEST_END, 135 TERRAIN_CHECK,
@@ -96,26 +74,12 @@ MESSAGES: Mapping[int, Row] = {
     **named(
         replace(UPLOADS, role=OPERATOR, about="clears anybody's mission"), "45 MISSION_CLEAR_ALL"
     ),
-    **named(
-        Row(
-            "",
-            Kind.GO,
-            SUBMITTER,
-            "chooses an item of one's own plan",
-            is_claimed=True,
-            elsewhere=GOES,
-        ),
-        "41 MISSION_SET_CURRENT",
+    41: handled(
+        "MISSION_SET_CURRENT", Kind.GO, SUBMITTER, "chooses an item of one's own plan", GOES
     ),
-    **named(replace(GOES, about="any other mode"), "11 SET_MODE"),
-    **named(
-        Row("", Kind.HALT, SUBMITTER, "cancels one's own task", is_claimed=True),
-        "80 COMMAND_CANCEL",
-    ),
-    **named(
-        Row("", Kind.WISH, OBSERVER, "asks the server to sign to this client", is_claimed=True),
-        "256 SETUP_SIGNING",
-    ),
+    11: replace(GOES, name="SET_MODE", about="any other mode"),
+    80: handled("COMMAND_CANCEL", Kind.HALT, SUBMITTER, "cancels one's own task"),
+    256: handled("SETUP_SIGNING", Kind.WISH, OBSERVER, "asks the server to sign to this client"),
     **named(SETS, "23 PARAM_SET, 110 FILE_TRANSFER_PROTOCOL, 121 LOG_ERASE, 323 PARAM_EXT_SET"),
     **named(
         Row("", Kind.STICKS, OPERATOR, "manual control", is_counted=False),

@@ -35,7 +35,7 @@ class Row:
     role: str
     #: what it is about, for the printed table
     about: str = ""
-    #: only from a client granted control since the last halt (``MotionRights.why_not_moved``)
+    #: only from a client granted control since the last halt (``motion_gate.why_not_moved``)
     needs_grant: bool = False
     #: the server handles it, at its own address and, as far as it claims that, at the rover's
     is_claimed: bool = False

@@ -30,7 +30,8 @@ class Authority:
 
     def __init__(self, persona: Persona, *, may_arm: bool) -> None:
         self._persona = persona
-        self._arming_allowed = may_arm  # by the settings
+        #: by the settings: whether we may arm it once a person allows that again
+        self.may_arm_again = may_arm
         self._asked_mode = -1  # the mode that a client last asked for through us
         self._asked_at = -inf
         self._passed_on: dict[int, float] = {}  # when a client last asked for each mode
@@ -47,11 +48,6 @@ class Authority:
 
     def __repr__(self) -> str:
         return f"Authority(may_arm={self.may_arm}, mode_is_ours={self._mode_is_ours})"
-
-    @property
-    def may_arm_again(self) -> bool:
-        """Whether we may arm it once a person allows that again."""
-        return self._arming_allowed
 
     def withdraw_arming(self) -> None:
         """Stop arming the vehicle, because somebody else controls it."""
@@ -77,12 +73,12 @@ class Authority:
 
     def moved(self, *, may_arm: bool) -> None:
         """Apply the permission to arm of the link on which the vehicle is now."""
-        self._arming_allowed = may_arm
+        self.may_arm_again = may_arm
         self.may_arm = self.may_arm and may_arm
 
     def restore_arming(self) -> None:
         """Allow arming again, as a person asked."""
-        self.may_arm = self._arming_allowed
+        self.may_arm = self.may_arm_again
         self.is_withdrawn_by_restart = False
         self._before = None
 

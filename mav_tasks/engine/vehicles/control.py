@@ -71,7 +71,7 @@ class Event(Enum):
 
 
 class Effect(Enum):
-    """What is done; ``hands`` has a function of the same name for each."""
+    """What is done; ``hands`` does it."""
 
     # how it is stopped
     BRAKE = auto()  # the stop ladder: set-points while they brake, then HOLD, then disarming
@@ -80,36 +80,36 @@ class Effect(Enum):
     STEP = auto()  # run the tasks now: a task that stands sends zeros
     WATCH = auto()  # run the stop ladder from here on
     ZERO = auto()  # one zero
-    ZERO_KEPT = auto()  # one zero if it may keep a velocity of ours
+    ZERO_KEPT = auto()  # one zero if it may keep a velocity of ours: armed, it would drive off
     ZERO_AND_HOLD = auto()  # once each, and nothing after them
     STAY = auto()  # ask for HOLD although it shows HOLD
-    LOSE = auto()  # send nothing more of ours
+    LOSE = auto()  # send nothing more of ours, not even to stop it
     # earlier requests must not take effect later
-    FORGET_GO_TO = auto()
-    FORGET_START = auto()
-    FORGET_RELEASE = auto()
-    REVOKE = auto()
-    DROP_WAITING = auto()
+    FORGET_GO_TO = auto()  # that a "go to" may undo a HOLD
+    FORGET_START = auto()  # that a mission starts with the arming
+    FORGET_RELEASE = auto()  # a released task that has not started is held again
+    REVOKE = auto()  # the grants: a client that wants to drive must ask again
+    DROP_WAITING = auto()  # commands of clients behind an unanswered one, if they might move it
     # the tasks
     COUNT = auto()  # count a halt, so that older requests do not count
-    PAUSE = auto()
-    PAUSE_TAKEN = auto()
-    LATCH = auto()
-    HOLD_TASK = auto()
+    PAUSE = auto()  # queue and active task; the result is its id
+    PAUSE_TAKEN = auto()  # the same, because somebody else has the vehicle
+    LATCH = auto()  # kill the active task, and start none before a continue; the result is its id
+    HOLD_TASK = auto()  # until somebody decides
     DO = auto()  # the request itself; if it raises Rejection, nothing follows
     WAKE = auto()  # run the tasks: one may be ready
     # permissions and reports
-    WITHDRAW_ARMING = auto()
+    WITHDRAW_ARMING = auto()  # also across a restart of the server
     RESTORE_ARMING = auto()
-    OUTDATE_ARMING = auto()  # requests sent earlier, ours or a client's
-    OUTDATE_OUR_ARMING = auto()
-    EXPECT_DISARMED = auto()
-    DISARM = auto()
+    OUTDATE_ARMING = auto()  # requests sent earlier, ours or a client's, also copies on their way
+    OUTDATE_OUR_ARMING = auto()  # we need it armed no more
+    EXPECT_DISARMED = auto()  # it counts as disarmed until it has shown that
+    DISARM = auto()  # ask for it until it is answered, whoever armed the vehicle
     LINGER = auto()  # leave its mode alone, a "go to" may follow
-    HAND_OVER = auto()
-    KEEP_ARMED = auto()
-    DISARM_AT_END = auto()
-    NOTE_OTHERS = auto()
+    HAND_OVER = auto()  # a client takes the vehicle while we hand it back
+    KEEP_ARMED = auto()  # when we hand it back
+    DISARM_AT_END = auto()  # when we hand it back, whoever armed it
+    NOTE_OTHERS = auto()  # somebody who is not our client is driving
     LEFT = auto()  # a set-point leaves late
     TELL = auto()
     TELL_TAKEN = auto()
@@ -149,73 +149,45 @@ STANDS = (Work.NONE, Work.WAITS, Work.STANDS, Work.TAKEN)  # it stands, and stay
 NO_TASK_HAS_IT = (Work.NONE, Work.WAITS)
 IS_LET_RUN = (Queue.RUNS, Queue.PAUSED)
 
+NOT_FREE = (*ENGAGED, Grip.STOPPING)
+GOES_INTO_HOLD = (Grip.RELEASING, Grip.STOPPING)
+
+FORGETS = (_F.FORGET_GO_TO, _F.FORGET_START)
 #: no earlier request moves the vehicle later
-TAKE_BACK = (
-    _F.FORGET_GO_TO,
-    _F.FORGET_START,
-    _F.FORGET_RELEASE,
-    _F.REVOKE,
-    _F.DROP_WAITING,
-)
-BUT_GO_TO = TAKE_BACK[1:]
-UNARMS = (_F.OUTDATE_ARMING, _F.EXPECT_DISARMED, _F.WITHDRAW_ARMING)
+TAKE_BACK = (*FORGETS, _F.FORGET_RELEASE, _F.REVOKE, _F.DROP_WAITING)
+LINGERS = (_F.COUNT, *TAKE_BACK[1:], _F.LINGER)  # a "go to" may still follow
+#: somebody has taken it from a task
+TAKES = (_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN)
+UNARMS = (_F.COUNT, _F.OUTDATE_ARMING, _F.EXPECT_DISARMED, _F.WITHDRAW_ARMING)
+HANDS_OVER = (_F.FORGET_START, _F.DO, _F.HAND_OVER)
 
 TABLE = (
     # requests that halt it
     _row(_E.STOP, *TAKE_BACK, _F.OUTDATE_ARMING, _F.LATCH, _F.BRAKE),
     _row(_E.HOLD, _F.COUNT, _F.BRAKE, queue=Queue.STOPPED),
-    _row(
-        _E.HOLD,
-        *(_F.COUNT, *BUT_GO_TO, _F.LINGER, _F.STEP),
-        grip=Grip.DRIVING,
-        lingers=True,
-        work=Work.NONE,
-    ),
-    _row(
-        _E.HOLD,
-        *(_F.COUNT, *BUT_GO_TO, _F.LINGER, _F.PAUSE, _F.STEP),
-        grip=Grip.DRIVING,
-        lingers=True,
-    ),
+    _row(_E.HOLD, *LINGERS, _F.STEP, grip=Grip.DRIVING, lingers=True, work=Work.NONE),
+    _row(_E.HOLD, *LINGERS, _F.PAUSE, _F.STEP, grip=Grip.DRIVING, lingers=True),
     _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.LET_GO, work=Work.NONE),
     _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.PAUSE, _F.LET_GO),
     # a vehicle that moves without a task is stopped as by HOLD; so is one that was taken over
-    _row(
-        _E.PAUSE,
-        *(*TAKE_BACK, _F.PAUSE, _E.HOLD),
-        work=(Work.NONE, Work.WAITS, Work.STANDS, Work.TAKEN),
-        grip=Grip.FREE,
-        may_be_armed=True,
-    ),
+    _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _E.HOLD, work=STANDS, grip=Grip.FREE, may_be_armed=True),
     _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _F.STEP),
-    _row(_E.PAUSE_TASKS, _F.FORGET_GO_TO, _F.FORGET_START, _F.PAUSE, _F.STEP),
-    _row(
-        _E.DISARM,
-        *(_F.COUNT, *UNARMS, _F.ZERO_KEPT, _E.TAKEN),
-        grip=ENGAGED,
-    ),
+    _row(_E.PAUSE_TASKS, *FORGETS, _F.PAUSE, _F.STEP),
+    _row(_E.DISARM, *UNARMS, _F.ZERO_KEPT, _E.TAKEN, grip=ENGAGED),
     # a stream that ends here would leave a velocity behind
-    _row(
-        _E.DISARM,
-        *(_F.COUNT, *UNARMS, *TAKE_BACK, _F.ZERO),
-        driver=Driver.CLIENT,
-        has_failsafe=False,
-    ),
-    _row(_E.DISARM, _F.COUNT, *UNARMS, *TAKE_BACK),
-    _row(
-        _E.CANCEL,
-        *(_F.FORGET_GO_TO, _F.FORGET_START, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
-    ),
+    _row(_E.DISARM, *UNARMS, *TAKE_BACK, _F.ZERO, driver=Driver.CLIENT, has_failsafe=False),
+    _row(_E.DISARM, *UNARMS, *TAKE_BACK),
+    _row(_E.CANCEL, *FORGETS, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
     # its late set-point would drive it on
     _row(
         _E.CLEAR,
-        *(_F.FORGET_GO_TO, _F.FORGET_START, _F.DO, _F.COUNT, *TAKE_BACK, _F.LET_GO),
+        *(*FORGETS, _F.DO, _F.COUNT, *TAKE_BACK, _F.LET_GO),
         driver=Driver.CLIENT,
         grip=Grip.FREE,
     ),
     _row(
         _E.CLEAR,
-        *(_F.FORGET_GO_TO, _F.FORGET_START, _F.OUTDATE_OUR_ARMING, _F.DO, _F.COUNT),
+        *(*FORGETS, _F.OUTDATE_OUR_ARMING, _F.DO, _F.COUNT),
         *(_E.DRIVING_ENDS, *TAKE_BACK, _F.STEP),
     ),
     _row(_E.OPERATOR_LOST, _F.FORGET_RELEASE, _F.FORGET_START, work=Work.NONE),
@@ -233,25 +205,10 @@ TABLE = (
     _row(_E.CLOSE, _F.BRAKE),
     # observations that halt it
     _row(_E.TAKEN, _F.COUNT, queue=Queue.STOPPED),
-    _row(
-        _E.TAKEN,
-        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
-        work=GOES_ON,  # also a task that runs although the queue is paused
-    ),
+    _row(_E.TAKEN, *TAKES, work=GOES_ON),  # also a task that runs although the queue is paused
     # it was being stopped: no waiting task may drive it off from where somebody takes it
-    _row(
-        _E.TAKEN,
-        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
-        work=Work.WAITS,
-        queue=IS_LET_RUN,
-        grip=Grip.STOPPING,
-    ),
-    _row(
-        _E.TAKEN,
-        *(_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN),
-        work=HAS_IT,
-        queue=IS_LET_RUN,
-    ),
+    _row(_E.TAKEN, *TAKES, work=Work.WAITS, queue=IS_LET_RUN, grip=Grip.STOPPING),
+    _row(_E.TAKEN, *TAKES, work=HAS_IT, queue=IS_LET_RUN),
     _row(_E.TAKEN, _F.COUNT, *TAKE_BACK, _F.LOSE),
     _row(_E.MODE, _F.WITHDRAW_ARMING, _E.TAKEN),
     # the next set-point under way would end a failsafe's HOLD
@@ -259,7 +216,7 @@ TABLE = (
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
     # something was let go since: it is a person at the vehicle, or as good as one
     _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.LOST)),
-    _row(_E.LATE_MODE, grip=(Grip.RELEASING, Grip.STOPPING)),  # we are asking for HOLD
+    _row(_E.LATE_MODE, grip=GOES_INTO_HOLD),  # we are asking for HOLD
     _row(_E.LATE_MODE, _F.TELL, _F.LET_GO),
     _row(_E.LATE_ARMING, grip=Grip.RELEASING),  # the release disarms it, if it was armed for us
     _row(_E.LATE_ARMING, _F.TELL, _F.DISARM, queue=Queue.STOPPED),
@@ -274,19 +231,13 @@ TABLE = (
     _row(_E.PARKED),
     # zeros do not stop it, and nobody can steer it by the stick
     _row(_E.STICK, grip=Grip.FREE),
-    _row(_E.STICK, _F.FORGET_RELEASE, grip=(Grip.RELEASING, Grip.STOPPING), work=STANDS),
+    _row(_E.STICK, _F.FORGET_RELEASE, grip=GOES_INTO_HOLD, work=STANDS),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, grip=Grip.STOPPING),
     # it is already being stopped because of the stick
     _row(_E.STICK, _F.FORGET_RELEASE, queue=Queue.TAKEN, is_stopping=True, work=STANDS),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, _F.STEP, _F.WATCH, brakes=True),
     _row(_E.STICK, _F.TELL_STICK, _F.NOTE_OTHERS, _F.PAUSE_TAKEN, _F.LET_GO, _F.WATCH),
-    _row(
-        _E.DRIVEN_BY_HAND,
-        _F.NOTE_OTHERS,
-        _E.STICK,
-        heeds_stick=True,
-        grip=(*ENGAGED, Grip.STOPPING),
-    ),
+    _row(_E.DRIVEN_BY_HAND, _F.NOTE_OTHERS, _E.STICK, heeds_stick=True, grip=NOT_FREE),
     _row(_E.DRIVEN_BY_HAND, _F.NOTE_OTHERS, _F.ZERO_KEPT, _E.TAKEN),
     _row(_E.SECOND, _F.TELL, _F.COUNT, _F.NOTE_OTHERS, _E.SECOND, driver=Driver.NOBODY),
     _row(_E.SECOND, _F.NOTE_OTHERS, grip=Grip.STOPPING),
@@ -305,7 +256,7 @@ TABLE = (
     _row(
         _E.REBOOTED,
         *(*TAKE_BACK, _F.DO),
-        grip=(Grip.RELEASING, Grip.STOPPING),
+        grip=GOES_INTO_HOLD,
         work=(Work.NONE, Work.WAITS, Work.STANDS),
     ),
     _row(_E.REBOOTED, *TAKE_BACK, _F.LOSE, _F.DO),
@@ -323,23 +274,23 @@ TABLE = (
     _row(_E.RELEASE, _F.DO, _F.WAKE),
     _row(_E.RESTORE, _F.DO, _F.RESTORE_ARMING, _F.WAKE),
     _row(_E.RUN_NOW, _F.FORGET_GO_TO, _F.DO, _F.STEP),
-    _row(_E.ASK_OUR_MODE, _F.FORGET_START, _F.DO, _F.HAND_OVER),
+    _row(_E.ASK_OUR_MODE, *HANDS_OVER),
     _row(
         _E.ASK_OUR_MODE_STREAMING,
-        *(_F.FORGET_START, _F.DO, _F.HAND_OVER, _F.ZERO, _F.ZERO),
+        *(*HANDS_OVER, _F.ZERO, _F.ZERO),
         grip=Grip.FREE,
         work=NO_TASK_HAS_IT,
     ),
-    _row(_E.ASK_OUR_MODE_STREAMING, _F.FORGET_START, _F.DO, _F.HAND_OVER),
-    _row(_E.ASK_OTHER_MODE, _F.FORGET_START, _F.DO, _F.HAND_OVER, _E.TAKEN, grip=Grip.TAKING),
-    _row(_E.ASK_OTHER_MODE, _F.FORGET_START, _F.DO, _F.HAND_OVER),
+    _row(_E.ASK_OUR_MODE_STREAMING, *HANDS_OVER),
+    _row(_E.ASK_OTHER_MODE, *HANDS_OVER, _E.TAKEN, grip=Grip.TAKING),
+    _row(_E.ASK_OTHER_MODE, *HANDS_OVER),
     _row(_E.ARM, _F.DO, _F.KEEP_ARMED),
     # events that move nothing by themselves
-    _row(_E.UNQUEUE, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO),
-    _row(_E.CLEAR_WAITING, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO),
+    _row(_E.UNQUEUE, *FORGETS, _F.DO),
+    _row(_E.CLEAR_WAITING, *FORGETS, _F.DO),
     _row(_E.SKIP, _F.DO, _F.REVOKE, _F.WAKE),
     _row(_E.DRIVING_ENDS, driver=(Driver.NOBODY, Driver.OTHERS)),
-    _row(_E.DRIVING_ENDS, _F.REVOKE, grip=(*ENGAGED, Grip.STOPPING)),
+    _row(_E.DRIVING_ENDS, _F.REVOKE, grip=NOT_FREE),
     _row(_E.DRIVING_ENDS, _F.REVOKE, _F.LET_GO, has_failsafe=True),
     _row(_E.DRIVING_ENDS, _F.REVOKE, _F.ZERO, _F.ZERO),  # one may be lost
     # stop it without waiting for its own timeout

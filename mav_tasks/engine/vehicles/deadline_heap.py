@@ -37,7 +37,9 @@ class DeadlineHeap:
         for system_id, vehicle in self.touched.items():
             timer = self._due.get(system_id)
             if timer is None:
-                timer = self._due[system_id] = self._timer_of(vehicle)
+                do = partial(self._handle_deadline, vehicle)
+                timer = self._timers.timer(Turn.VEHICLES, do, number=system_id)
+                self._due[system_id] = timer
             timer.set(vehicle.next_deadline())
 
     def settle(self) -> list[Vehicle]:
@@ -61,10 +63,6 @@ class DeadlineHeap:
     def next_deadline(self) -> float:
         """Return when the first vehicle has something to do, or inf."""
         return min((timer.at for timer in self._due.values()), default=inf)
-
-    def _timer_of(self, vehicle: Vehicle) -> Timer:
-        do = partial(self._handle_deadline, vehicle)
-        return self._timers.timer(Turn.VEHICLES, do, number=vehicle.system_id)
 
     def _handle_deadline(self, vehicle: Vehicle, *, now: float) -> None:
         self.touched[vehicle.system_id] = vehicle

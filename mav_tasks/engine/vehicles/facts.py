@@ -70,7 +70,7 @@ def _work(tasks: VehicleTasks) -> Work:
         return Work.ENDS if active.state is TaskState.CANCELLING else Work.RUNS
     if active.reason in TAKEN:
         return Work.TAKEN
-    return Work.LOST if tasks.resumes_by_itself else Work.STANDS
+    return Work.LOST if tasks.executor.resumes_by_itself else Work.STANDS
 
 
 def _driver(parts: Parts, *, now: float) -> Driver:

@@ -26,7 +26,8 @@ class FrameMonitor:
     """What one vehicle reports about its local frame."""
 
     def __init__(self) -> None:
-        self._origin: GlobalPlace | None = None
+        #: the global position of the frame's origin, or None if it is unknown
+        self.origin: GlobalPlace | None = None
         self._is_said = False
         self._booted_at: float | None = None
         self._heard_at = 0.0  # when the boot time was determined
@@ -37,15 +38,9 @@ class FrameMonitor:
         self.changed = False
 
     def __repr__(self) -> str:
-        return f"FrameMonitor({self._origin}, home {self.home})"
-
-    @property
-    def origin(self) -> GlobalPlace | None:
-        """The global position of the frame's origin, or None if it is unknown."""
-        return self._origin
+        return f"FrameMonitor({self.origin}, home {self.home})"
 
     def boot(self, booted_at: float, *, now: float) -> None:
-        """Note when the vehicle booted."""
         self._booted_at, self._heard_at = booted_at, now
 
     def receive(self, message: Seen) -> None:
@@ -66,14 +61,14 @@ class FrameMonitor:
         """Return the frame, or None before the boot time is known."""
         if self._booted_at is None:
             return None
-        if self._origin is None:
+        if self.origin is None:
             return Frame(None, None, self._booted_at, self._heard_at)
-        latitude, longitude = self._origin.latitude_degE7, self._origin.longitude_degE7
+        latitude, longitude = self.origin.latitude_degE7, self.origin.longitude_degE7
         return Frame(latitude, longitude, self._booted_at, self._heard_at)
 
     def forget(self) -> None:
         """Forget the frame, as after a restart of the vehicle."""
-        self._origin = self._global = self._local = None
+        self.origin = self._global = self._local = None
         self._is_said = False
         self._booted_at = None
         self.changed = False
@@ -84,7 +79,7 @@ class FrameMonitor:
             return
         later = (where.time_boot_ms - local.time_boot_ms) / 1000
         # between two instants a position may have been corrected, which does not change the origin
-        if abs(later) > (APART if self._origin is None else 0.0):
+        if abs(later) > (APART if self.origin is None else 0.0):
             return
         place = _place(where)
         if place is not None:
@@ -94,15 +89,15 @@ class FrameMonitor:
     def _set_origin(self, origin: GlobalPlace | None, *, is_said: bool) -> None:
         if origin is None:
             return
-        if self._origin is not None:
-            apart = to_local(origin, self._origin)
+        if self.origin is not None:
+            apart = to_local(origin, self.origin)
             exact = is_said and self._is_said
             if hypot(apart.north, apart.east) <= (MOVED_SAID if exact else MOVED_WORKED_OUT):
                 if is_said and not self._is_said:
-                    self._origin, self._is_said = origin, True
+                    self.origin, self._is_said = origin, True
                 return
             self.changed = True
-        self._origin, self._is_said = origin, is_said
+        self.origin, self._is_said = origin, is_said
 
 
 def _place(message: m.GpsGlobalOrigin | m.HomePosition | m.GlobalPositionInt) -> GlobalPlace | None:

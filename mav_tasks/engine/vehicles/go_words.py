@@ -5,19 +5,13 @@ new port, is several endpoints; a copy has the same bytes.
 """
 
 from collections import OrderedDict
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-from mav_tasks.mavlink.number_line import NumberLine
+from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.services.command_receiver import COPIED, DOUBLED
 
 REMEMBERED = 1024  # packets
 PRESENT = 3.0  # s since its last packet, in which a sender counts as present
-
-
-class Sender(Protocol):
-    """The sender of a packet, at one endpoint."""
-
-    line: NumberLine
 
 
 class _Said(NamedTuple):

@@ -6,6 +6,7 @@ not ours gets no set-point at all.
 
 from collections.abc import Callable, Hashable
 from dataclasses import replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -137,28 +138,20 @@ class JointControl:
         tasks = self._parts.tasks
         active = tasks.active
         event = Event.CANCEL if active is not None and active.id == task.id else Event.UNQUEUE
-
-        def call_off() -> None:
-            tasks.cancel(task, kill=kill, reason=R.CANCELLED, actor=actor, now=now)
-
-        self.on(event, Word(R.CANCELLED, actor, do=call_off), now=now)
+        do = partial(tasks.cancel, task, kill=kill, reason=R.CANCELLED, actor=actor, now=now)
+        self.on(event, Word(R.CANCELLED, actor, do=do), now=now)
 
     def skip(self, task: Task, *, actor: str, now: float) -> None:
         """End a held task."""
-
-        def call_off() -> None:
-            self._parts.tasks.cancel(task, kill=False, reason=R.SKIPPED, actor=actor, now=now)
-
-        self.on(Event.SKIP, Word(R.SKIPPED, actor, do=call_off), now=now)
+        cancel = self._parts.tasks.cancel
+        do = partial(cancel, task, kill=False, reason=R.SKIPPED, actor=actor, now=now)
+        self.on(Event.SKIP, Word(R.SKIPPED, actor, do=do), now=now)
 
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
         """Cancel the waiting tasks; with ``begun_too`` also suspended and active ones."""
-
-        def call_off() -> None:
-            self._parts.tasks.clear(begun_too=begun_too, actor=actor, now=now)
-
+        do = partial(self._parts.tasks.clear, begun_too=begun_too, actor=actor, now=now)
         event = Event.CLEAR if begun_too else Event.CLEAR_WAITING
-        self.on(event, Word(R.CLEARED, actor, do=call_off), now=now)
+        self.on(event, Word(R.CLEARED, actor, do=do), now=now)
 
     # requests that let the vehicle go
 
@@ -210,14 +203,11 @@ class JointControl:
         seen = self._view(now)
         if restores:
             seen = replace(seen, may_arm=authority.may_arm_again)
-
-        def let_go_on() -> None:
-            self._parts.tasks.releases.release(
-                task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
-            )
-
-        event = Event.RESTORE if restores else Event.RELEASE
-        self.on(event, Word(R.NONE, actor, do=let_go_on), now=now)
+        release = self._parts.tasks.releases.release
+        do = partial(
+            release, task, again=again, may_continue=may_continue, seen=seen, actor=actor, now=now
+        )
+        self.on(Event.RESTORE if restores else Event.RELEASE, Word(R.NONE, actor, do=do), now=now)
 
     def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
         """Submit a task that runs before all others, at once. Raise Rejection if refused."""
@@ -244,20 +234,13 @@ class JointControl:
             event = Event.ASK_OTHER_MODE
         else:
             event = Event.ASK_OUR_MODE_STREAMING if streams else Event.ASK_OUR_MODE
-
-        def ask() -> None:
-            authority.client_asks(mode, client, present_mode=present_mode, now=now)
-
+        do = partial(authority.client_asks, mode, client, present_mode=present_mode, now=now)
         text = f"a client asked for {persona.mode_name(mode)}"
-        self.on(event, Word(R.TAKEOVER, parts.actor, text, do=ask), now=now)
+        self.on(event, Word(R.TAKEOVER, parts.actor, text, do=do), now=now)
 
     def arm(self, *, now: float) -> None:
         """Handle a client's request to arm, which goes to the vehicle through us."""
-
-        def ask() -> None:
-            self._parts.armings.client_arms(now=now)
-
-        self.on(Event.ARM, Word(do=ask), now=now)
+        self.on(Event.ARM, Word(do=partial(self._parts.armings.client_arms, now=now)), now=now)
 
     # the end of a client's own driving
 

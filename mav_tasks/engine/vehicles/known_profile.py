@@ -45,12 +45,10 @@ class KnownProfile:
         return "its profile says that it does not stop without setpoints" if is_off else ""
 
     def identify(self, identity: VehicleIdentity) -> None:
-        """Note the identity of the vehicle."""
         self._identity = identity
         self._choose()
 
     def apply(self, profiles: tuple[VehicleProfile, ...], system_id: int) -> None:
-        """Apply the present list of profiles."""
         self._profiles = tuple(each for each in profiles if each.system_id == system_id)
         self._choose()
 

@@ -72,7 +72,6 @@ class MotionGuard:
         return f"MotionGuard({self.ladder!r}, {self._overspeed!r})"
 
     def apply(self, watch: Watch) -> None:
-        """Apply new settings."""
         self._watch = watch
 
     def is_fresh(self, *, now: float) -> bool:

@@ -31,7 +31,6 @@ class MotionMonitor:
         self._doubted_until = -inf
 
     def apply(self, watch: Watch) -> None:
-        """Apply new settings."""
         self._watch = watch
 
     def receive(
@@ -134,7 +133,6 @@ class MotionMonitor:
 
 
 def is_finite(message: Attitude | LocalPositionNed) -> bool:
-    """Return whether all fields that are used are finite."""
     if isinstance(message, LocalPositionNed):
         return all(map(isfinite, (message.x, message.y, message.vx, message.vy)))
     return isfinite(message.yaw) and isfinite(message.yawspeed)

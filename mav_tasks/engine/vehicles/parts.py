@@ -58,7 +58,6 @@ class Parts:
 
     @property
     def control(self) -> OffboardControl:
-        """Our offboard control of the vehicle."""
         return self.requests.control
 
     @property
@@ -68,7 +67,6 @@ class Parts:
 
     @property
     def is_manual(self) -> bool:
-        """Whether it is in a manual mode."""
         return self.monitor.custom_mode in self.persona.manual_modes
 
     def is_driven_by_others(self, *, now: float) -> bool:
@@ -144,7 +142,7 @@ class Parts:
             in_control=control.in_control,
             refusal=REFUSALS[control.refused],
             is_not_ready=control.is_not_ready,
-            why_not_ready=self.failsafes.why_not_ready(now=now),
+            why_not_ready=self.failsafes.texts.why_not_ready(now=now),
             motion=where.motion.latest(),
             still=where.motion.is_still(now=now),
             other_controller=self.authority.since_other(now=now) < watch.other_controller,

@@ -52,7 +52,6 @@ class Pilot:
         return f"Pilot({self.clock!r}, {self.guard.ladder!r})"
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self.guard.apply(settings.watch)
 
     def close(self) -> None:
@@ -86,7 +85,7 @@ class Pilot:
     def send(self, *, now: float) -> None:
         """Send what is queued in this tick, and plan the next tick."""
         if self._parts.requests.flush(now=now):
-            self._parts.tasks.setpoint_left(now=now)
+            self._parts.tasks.executor.setpoint_left(now=now)
         self.plan_tick(now=now)
 
     def plan_tick(self, *, now: float) -> None:
@@ -229,7 +228,7 @@ class Pilot:
         A person may have taken the vehicle over meanwhile: HOLD would undo that, zeros would not.
         """
         parts = self._parts
-        heard_at, lost_at = parts.monitor.heard_at, parts.tasks.lost_since
+        heard_at, lost_at = parts.monitor.heard_at, parts.tasks.executor.lost_since
         is_soon = now - heard_at <= parts.settings.watch.heartbeat_lost + SHOWS_AGAIN
         return lost_at is not None and heard_at < lost_at and is_soon
 

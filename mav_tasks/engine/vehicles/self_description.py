@@ -38,7 +38,6 @@ class SelfDescription:
         return bool(failsafe.awaits_answer or failsafe.why_off or self._known.why_drives_on)
 
     def receive_identity(self, identity: VehicleIdentity, *, now: float) -> None:
-        """Process the identity of the vehicle."""
         self._parts.tasks.identified(identity.uid, now=now)
         self._parts.requests.is_identified = True
         self._known.identify(identity)

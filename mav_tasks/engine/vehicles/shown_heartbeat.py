@@ -7,6 +7,7 @@ Armed is shown as active. An ArduPilot that stands armed in HOLD reports standby
 stations then hide what an operator may have it do next.
 """
 
+from copy import copy
 from math import inf
 
 from mav_tasks.mavlink.address import AUTOPILOT
@@ -39,15 +40,10 @@ class ShownHeartbeat:
 
     def in_message(self, heartbeat: Heartbeat, *, now: float) -> Heartbeat:
         """Return a copy of a heartbeat message as clients see it."""
-        mode = self._mode if now < self._until else heartbeat.custom_mode
-        return Heartbeat(
-            type=heartbeat.type,
-            autopilot=heartbeat.autopilot,
-            base_mode=heartbeat.base_mode,
-            custom_mode=mode,
-            system_status=_status(heartbeat.base_mode, heartbeat.system_status),
-            mavlink_version=heartbeat.mavlink_version,
-        )
+        shown = copy(heartbeat)
+        shown.custom_mode = self._mode if now < self._until else heartbeat.custom_mode
+        shown.system_status = _status(heartbeat.base_mode, heartbeat.system_status)
+        return shown
 
     def applied(self, packet: Packet, *, now: float) -> Packet:
         """Return a packet of the vehicle as clients see it."""

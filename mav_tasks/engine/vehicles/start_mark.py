@@ -4,7 +4,6 @@ A ground station asks for the mission mode, waits until a heartbeat shows it, an
 first, the mode alone starts the mission, and there is nothing to remember.
 """
 
-from collections.abc import Hashable
 from math import inf
 from typing import NamedTuple
 
@@ -17,7 +16,6 @@ WAITS = 10.0  # s in which the arming must come
 class Marker(NamedTuple):
     """The client that asked for it."""
 
-    client: Hashable
     submitter: Submitter
     rights: Rights
     plan_id: int  # as clients knew it at that time
@@ -33,17 +31,9 @@ class StartMark:
     def __repr__(self) -> str:
         return f"StartMark({self.marker}, until={self._until:.2f})"
 
-    def put(
-        self,
-        client: Hashable,
-        submitter: Submitter,
-        rights: Rights,
-        *,
-        plan_id: int,
-        now: float,
-    ) -> None:
+    def put(self, marker: Marker, *, now: float) -> None:
         """Remember that a client wants it, and has not armed yet."""
-        self.marker = Marker(client, submitter, rights, plan_id)
+        self.marker = marker
         self._until = now + WAITS
 
     def is_put(self, *, now: float) -> bool:

@@ -110,10 +110,6 @@ class Takeovers:
             words = "moves in HOLD because of a delayed command: HOLD sent again"
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
 
-    def heard_again(self, *, now: float) -> None:
-        """Handle the first heartbeat after a silence."""
-        self._joint.on(Event.HEARD_AGAIN, Word(), now=now)
-
     def rebooted(self, *, booted_at: float, now: float) -> None:
         """Handle a restart: its frame may have changed, and our requests are no longer in force.
 

@@ -1,7 +1,7 @@
 """One vehicle: dispatches its messages and requests to the parts that decide about it.
 
-``joint`` decides who may move it, ``pilot`` what drives it, ``motion_rights`` whether a client's
-set-points pass. ``takeovers`` detects what others have done to it.
+``joint`` decides who may move it, ``pilot`` what drives it. ``takeovers`` detects what others have
+done to it. ``commands.motion_gate`` decides whether a client's set-points pass.
 """
 
 from collections.abc import Hashable
@@ -14,15 +14,13 @@ from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
-from mav_tasks.engine.vehicles.home_command import home_meant
 from mav_tasks.engine.vehicles.joint_control import JointControl
-from mav_tasks.engine.vehicles.motion_rights import MotionRights
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.takeovers import Takeovers
-from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
+from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition, home_meant
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -90,7 +88,6 @@ class Vehicle:
         self._registry, self._monitor = registry, monitor
         self.pilot = Pilot(parts, self._view)
         self.joint = JointControl(parts, self.pilot, self._view)
-        self.motion_rights = MotionRights(parts)
         self._takeovers = Takeovers(parts, self.joint)
         self._clock = self.pilot.clock
         self.last_heartbeat: Packet | None = None
@@ -117,11 +114,6 @@ class Vehicle:
         return self.parts.persona
 
     @property
-    def setpoint_period(self) -> float:
-        """The nominal seconds from one setpoint to the next."""
-        return self.parts.settings.watch.setpoint_period
-
-    @property
     def server_component(self) -> int:
         """The component id under which the task server appears inside this vehicle's system."""
         return self.server_address.component_id
@@ -130,11 +122,6 @@ class Vehicle:
     def armed(self) -> bool:
         """Whether the vehicle was last seen armed."""
         return self._monitor.armed
-
-    @property
-    def heartbeat(self) -> m.Heartbeat:
-        """Its last heartbeat."""
-        return self._monitor.latest
 
     @property
     def heard_at(self) -> float:
@@ -219,7 +206,7 @@ class Vehicle:
             self._says.receive_parameter(message, now=now)
             self.joint.wake(now=now)
         elif isinstance(message, m.RcChannels):
-            sent_at = self.where.clock.sent_at(message.time_boot_ms, now=now)
+            sent_at = self.where.motion.clock.sent_at(message.time_boot_ms, now=now)
             if self.parts.sticks.look(message, armed=self.armed, sent_at=sent_at):
                 self.joint.on(Event.STICK, Word(TaskReason.TAKEOVER, self.parts.actor), now=now)
         elif isinstance(message, m.AutopilotVersion):
@@ -271,7 +258,7 @@ class Vehicle:
         self._was_heard = True
         self.requests.ask_which_again()
         self._registry.record(VehicleSeen(self.system_id, "heard again", now))
-        self._takeovers.heard_again(now=now)
+        self.joint.on(Event.HEARD_AGAIN, Word(), now=now)
 
     def _note_component(self, component_id: int, *, now: float) -> None:
         before = self.server_component

@@ -82,7 +82,6 @@ class VehicleLinks:
         return iter(self._links.values())
 
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
         self._budgets.clear()
 

@@ -1,16 +1,19 @@
 """Where a vehicle is, how it moves, where its local frame begins, and where home and fence are."""
 
 from collections.abc import Sequence
+from math import isfinite
 
 from mav_tasks.engine.vehicles.frame_monitor import FrameMonitor
 from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
-from mav_tasks.engine.vehicles.sender_clock import Heard, SenderClock, Stamped
-from mav_tasks.mavlink.messages import GlobalPositionInt
+from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
+from mav_tasks.mavlink.messages import CommandInt, CommandLong, GlobalPositionInt, Message
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.frames import local_place, to_global
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Step
+
+PRESENT = 1.0  # param1 of DO_SET_HOME: use the vehicle's position
 
 
 class VehiclePosition:
@@ -22,12 +25,7 @@ class VehiclePosition:
         self._bounds = bounds
 
     def __repr__(self) -> str:
-        return f"VehiclePosition({self.motion.latest()}, origin={self.origin})"
-
-    @property
-    def clock(self) -> SenderClock:
-        """The vehicle's own clock."""
-        return self.motion.clock
+        return f"VehiclePosition({self.motion.latest()}, origin={self.frame.origin})"
 
     def receive(self, message: Stamped, *, now: float, not_after: float) -> Heard:
         """Process a message and return its classification; an old message is dropped.
@@ -35,11 +33,11 @@ class VehiclePosition:
         A message that is read late counts as sent at ``not_after`` at the latest.
         """
         if isinstance(message, GlobalPositionInt):
-            heard = self.clock.hear(message, now=now)
+            heard = self.motion.clock.hear(message, now=now)
         else:
             heard = self.motion.receive(message, now=now, not_after=not_after)
         if heard is Heard.NEWS:
-            self.frame.boot(self.clock.booted_at(now=now), now=now)
+            self.frame.boot(self.motion.clock.booted_at(now=now), now=now)
             self.frame.receive(message)
         return heard
 
@@ -47,11 +45,6 @@ class VehiclePosition:
         """Forget all position data after a restart of the vehicle."""
         self.motion.forget()
         self.frame.forget()
-
-    @property
-    def origin(self) -> GlobalPlace | None:
-        """The global position of the local frame's origin, or None if it is unknown."""
-        return self.frame.origin
 
     @property
     def home(self) -> GlobalPlace | None:
@@ -96,3 +89,14 @@ class VehiclePosition:
 
     def _place_of(self, goal: GoTo) -> LocalPlace | None:
         return local_place(self.home if goal.place is None else goal.place, self.frame.origin)
+
+
+def home_meant(command: Message) -> GlobalPlace | None:
+    """Return the place that a DO_SET_HOME names; None: it means the vehicle's position."""
+    if isinstance(command, CommandInt) and command.param1 != PRESENT:
+        return GlobalPlace(command.x, command.y)
+    if isinstance(command, CommandLong) and command.param1 != PRESENT:
+        latitude, longitude = command.param5, command.param6
+        if isfinite(latitude) and isfinite(longitude):
+            return GlobalPlace(round(latitude * 1e7), round(longitude * 1e7))
+    return None

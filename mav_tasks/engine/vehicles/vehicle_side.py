@@ -20,7 +20,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Packer
+from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import gcs_heartbeat
@@ -90,8 +90,12 @@ class VehicleSide:
         #: the address under which the server speaks to vehicles
         self.our_address = _own_address(settings)
         self._decoder = Decoder()
+        #: packet counts of the vehicle links
+        self.counts = self._decoder.counts
         #: the deadlines of all vehicles
         self.deadline_heap = DeadlineHeap(timers)
+        #: note that a vehicle that was only looked at is about to be changed
+        self.mark_dirty = self.deadline_heap.mark_dirty
         self._old_until = -inf
         self._stood_for = 0.0  # s, how long this process stalled before that
         self._noted: set[str] = set()
@@ -118,19 +122,12 @@ class VehicleSide:
             note_once=self._note_once,
         )
 
-    def __len__(self) -> int:
-        return len(self._vehicles)
-
     def get(self, system_id: int) -> Vehicle | None:
         """Return a vehicle in order to change it."""
         vehicle = self._vehicles.get(system_id)
         if vehicle is not None:
             self.deadline_heap.mark_dirty(vehicle)
         return vehicle
-
-    def mark_dirty(self, vehicle: Vehicle) -> None:
-        """Note that a vehicle that was only looked at is about to be changed."""
-        self.deadline_heap.mark_dirty(vehicle)
 
     def addressed_by(self, system_id: int) -> list[Vehicle]:
         """Return the vehicles that a target_system addresses; 0 addresses all of them."""
@@ -195,13 +192,7 @@ class VehicleSide:
             self.deadline_heap.mark_dirty(vehicle)
             vehicle.joint.step(now)
 
-    @property
-    def counts(self) -> DecodeCounts:
-        """Packet counts of the vehicle links."""
-        return self._decoder.counts
-
     def apply(self, settings: Settings) -> None:
-        """Apply new settings."""
         self._settings = settings
         self.our_address = _own_address(settings)
         self.links.apply(settings)
@@ -223,7 +214,7 @@ class VehicleSide:
             self.counts.unknown += 1
         if self._signatures.admit(link, peer, packet) is None:
             return None
-        if self._is_intruder(packet):
+        if packet.source == self.our_address or packet.message_id in SETPOINTS:
             self._note_intruder(link, packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
@@ -242,7 +233,7 @@ class VehicleSide:
         if isinstance(message, m.Timesync) and message.ts1 in self._asked:
             self._answer = packet
             if message.tc1 and packet.component_id == AUTOPILOT:
-                offset = vehicle.where.clock.offset
+                offset = vehicle.where.motion.clock.offset
                 offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
         if packet.component_id == AUTOPILOT:
             vehicle.count(packet.seq, now=now)
@@ -334,9 +325,6 @@ class VehicleSide:
         vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
         vehicle.joint.step(now)
         return vehicle
-
-    def _is_intruder(self, packet: Packet) -> bool:
-        return packet.source == self.our_address or packet.message_id in SETPOINTS
 
     def _note_intruder(
         self, link: str, packet: Packet, message: m.Message | None, *, now: float

@@ -169,7 +169,8 @@ class Arrival:
             self._corrections += 1
             if course.remaining < 0.0:
                 self._creeping(course).overshot()
-        tried = self._gives_up or self._corrections > _corrections(course)
+        most = 0 if course.has_one_try else CORRECTIONS
+        tried = self._gives_up or self._corrections > most
         return tried and course.is_settled(driving=driving)
 
     def _watch(self, course: PathFollower, *, driving: Driving, now: float) -> None:
@@ -213,10 +214,3 @@ class Arrival:
 
     def _asked(self, course: PathFollower, last: Velocity) -> float:
         return abs(last.yaw_rate if isinstance(course.leg, Rotate) else last.forward)
-
-
-def _corrections(course: PathFollower) -> int:
-    """Return how often the end of a leg may be corrected from a standstill."""
-    if course.has_one_try:
-        return 0
-    return CORRECTIONS

@@ -5,8 +5,8 @@ Nobody knows what lies between a task's line and a place reached under manual co
 """
 
 from collections.abc import Iterable
-from math import hypot
 
+from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.recovery_path import is_off_line
 from mav_tasks.tasks.task import Pose, Task, TaskId
 from mav_tasks.tasks.view import VehicleView
@@ -31,8 +31,7 @@ class LedAway:
         at, self._taken_over_at = self._taken_over_at, None
         if at is None or seen.motion is None:
             return
-        here = seen.motion.pose
-        if hypot(here.north - at.north, here.east - at.east) > LED_AWAY:
+        if distance(seen.motion.pose, at) > LED_AWAY:
             self._tasks.update(aside)
 
     def from_line_of(self, task: Task, seen: VehicleView) -> bool:

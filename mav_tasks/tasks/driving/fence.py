@@ -94,11 +94,6 @@ class LocalFence:
         self._groups = list(groups.values())
         self._zones = [zone for kin in (self._exclusions, *self._groups) for zone in kin]
 
-    @property
-    def is_empty(self) -> bool:
-        """Whether the fence has no zones."""
-        return not self._zones
-
     def allows(self, place: LocalPlace) -> bool:
         """Return whether the vehicle may be at a place."""
         north, east = place.north, place.east

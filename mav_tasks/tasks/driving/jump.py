@@ -13,19 +13,15 @@ class JumpWatch:
     """Detector of jumps of one vehicle's pose."""
 
     def __init__(self) -> None:
-        self._last: Motion | None = None
-
-    @property
-    def last(self) -> Motion | None:
-        """The motion at the last look."""
-        return self._last
+        #: the motion at the last look
+        self.last: Motion | None = None
 
     def has_jumped(self, motion: Motion | None, *, driving: Driving) -> bool:
         """Return whether the vehicle cannot have got to this pose from the last; remember it."""
-        last = self._last
+        last = self.last
         if motion is None or motion is last:
             return False
-        self._last = motion
+        self.last = motion
         if last is None:
             return False
         elapsed = max(0.0, motion.at - last.at)

@@ -109,8 +109,8 @@ def bearing(pose: Pose, place: LocalPlace) -> float:
     return atan2(place.east - pose.east, place.north - pose.north)
 
 
-def distance(pose: Pose, place: LocalPlace) -> float:
-    """Return the metres from a pose to a place."""
+def distance(pose: Pose, place: LocalPlace | Pose) -> float:
+    """Return the metres from a pose to a place, or to another pose."""
     return hypot(place.north - pose.north, place.east - pose.east)
 
 

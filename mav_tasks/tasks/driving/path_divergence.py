@@ -8,6 +8,7 @@ drives off its line.
 from math import copysign, cos, hypot, radians, sin
 
 from mav_tasks.tasks.driving.guidance import Motion, Velocity, cross_track, wrap
+from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.path import Follow, beside
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.recovery_path import OFF_TRACK
@@ -108,15 +109,10 @@ class AstrayWatch:
             self._beside = abs(cross_track(anchor, motion.pose))
         if self._least is None or last is None or self._is_turning(motion):
             self._least = self._beside
-        elif _hop(last, motion) > CORRECTED + 2 * motion.speed * elapsed:
+        elif distance(last.pose, motion.pose) > CORRECTED + 2 * motion.speed * elapsed:
             self._least += self._beside - before
         self._least = min(self._least, self._beside)
         return self._beside - self._least > OFF_TRACK
 
     def _is_turning(self, motion: Motion) -> bool:
         return self._course is not None and abs(wrap(self._course - motion.pose.yaw)) > TURNS
-
-
-def _hop(last: Motion, motion: Motion) -> float:
-    here, there = last.pose, motion.pose
-    return hypot(there.north - here.north, there.east - here.east)

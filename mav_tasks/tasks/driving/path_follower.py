@@ -1,6 +1,6 @@
 """Follows one goal, leg after leg: where the vehicle is → the velocity to command, or the end."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import copysign
 
 from mav_tasks.settings import Driving
@@ -29,31 +29,22 @@ ONE_TRY = 3.0  # factor on the settling distance of a car that is steered by cou
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is commanded nearer to the end than required
 
 
+@dataclass(slots=True, repr=False, eq=False)
 class PathFollower:
     """Follower of one goal; ``progress`` is enough to resume it."""
 
-    def __init__(
-        self,
-        goal: SingleGoal,
-        progress: Progress,
-        *,
-        passing: float = 0.0,
-        within: float = 0.0,
-        by_course: bool = False,
-        steering: Steering | None = None,
-    ) -> None:
-        self.goal = goal
-        #: how a car steers; None: the vehicle turns on the spot
-        self.steering = steering
-        self.progress = progress
-        #: whether the vehicle is steered by course, and does not reverse
-        self.by_course = by_course
-        #: m/s at the end of a way that goes on to another place; 0: it stops
-        self.passing = passing
-        #: m from that end at which it goes on
-        self.within = within
-        #: how often a place was missed and driven to again
-        self.misses = 0
+    goal: SingleGoal
+    progress: Progress
+    #: m/s at the end of a way that goes on to another place; 0: it stops
+    passing: float = 0.0
+    #: m from that end at which it goes on
+    within: float = 0.0
+    #: whether the vehicle is steered by course, and does not reverse
+    by_course: bool = False
+    #: how a car steers; None: the vehicle turns on the spot
+    steering: Steering | None = None
+    #: how often a place was missed and driven to again
+    misses: int = 0
 
     def __repr__(self) -> str:
         return f"PathFollower({self.goal}, {self.progress})"

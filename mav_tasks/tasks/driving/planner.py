@@ -10,10 +10,10 @@ from cmath import phase, rect
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
-from math import atan2, hypot, pi, remainder, sqrt, tau
+from math import atan2, pi, remainder, sqrt, tau
 
 from mav_tasks.tasks.driving.fence import LocalFence
-from mav_tasks.tasks.driving.legs import FACE, WAY
+from mav_tasks.tasks.driving.legs import FACE, WAY, distance
 from mav_tasks.tasks.driving.path import (
     STRAIGHT,
     Path,
@@ -62,7 +62,7 @@ class Steering:
 
 def way_to(pose: Pose, place: LocalPlace, steering: Steering) -> Path | None:
     """Return the whole way to a place, which may reverse; None if none stays within the fence."""
-    if hypot(place.north - pose.north, place.east - pose.east) < HERE:
+    if distance(pose, place) < HERE:
         return (Bend(0.0, HERE),)
     return _best(pose, _ways_to(pose, place, steering), steering.fence)
 
@@ -91,7 +91,7 @@ def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Stee
     If no way stays within the fence, it ignores the fence. A car that is as near to the
     place as it can get stays there.
     """
-    if hypot(place.north - pose.north, place.east - pose.east) <= THERE:
+    if distance(pose, place) <= THERE:
         return replace(progress, leg=WAY, anchor=pose, path=(Bend(0.0, HERE),), done=0.0)
     way = way_to(pose, place, steering) or boldest_way_to(pose, place, steering)
     first, *others = runs_of(way)
@@ -183,8 +183,7 @@ def _dubins(pose: Pose, goal: Pose, radius: float) -> Iterator[Path]:
 
 
 def _is_at(pose: Pose, goal: Pose) -> bool:
-    away = hypot(goal.north - pose.north, goal.east - pose.east)
-    return away < HERE and abs(remainder(goal.yaw - pose.yaw, tau)) < HERE
+    return distance(pose, goal) < HERE and abs(remainder(goal.yaw - pose.yaw, tau)) < HERE
 
 
 def _turned(pose: Pose) -> Pose:

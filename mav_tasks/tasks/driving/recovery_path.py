@@ -5,7 +5,7 @@ Errors that are cheap to correct on the way are left to steering.
 """
 
 from dataclasses import replace
-from math import copysign, cos, hypot, inf, radians, sin
+from math import copysign, cos, inf, radians, sin
 
 from mav_tasks.tasks.driving.guidance import Motion, cross_track, done_so_far, wrap
 from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, distance, leg_of, length_of
@@ -36,13 +36,13 @@ def is_off_line(task: Task, pose: Pose) -> bool:
     match leg:
         case Follow():
             along = nearest(anchor, leg.path, pose, around=progress.done, window=inf)
-            return _away(pose, pose_on(anchor, leg.path, along)) > OFF_TRACK
+            return distance(pose, pose_on(anchor, leg.path, along)) > OFF_TRACK
         case Move():
             along = done_so_far(leg, anchor, pose, before=progress.done)
             beside = abs(cross_track(anchor, pose))
             return beside > OFF_TRACK or not -OFF_TRACK <= along <= length_of(leg) + PAST_END
         case Rotate():
-            return hypot(pose.north - anchor.north, pose.east - anchor.east) > OFF_TRACK
+            return distance(pose, anchor) > OFF_TRACK
         case _:
             return False
 
@@ -54,8 +54,7 @@ def was_handled(task: Task, before: Pose, after: Pose) -> bool:
     drove it, it stays where it is.
     """
     if task.progress.anchor is None:
-        away = hypot(after.north - before.north, after.east - before.east)
-        return away > PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
+        return distance(before, after) > PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
     leg = leg_of(goal_of(task), task.progress)
     if not isinstance(leg, Move):
         return False
@@ -103,11 +102,7 @@ def _is_on_path(leg: Follow, anchor: Pose, pose: Pose, *, done: float) -> bool:
     along = nearest(anchor, leg.path, pose, around=done)
     there = pose_on(anchor, leg.path, along)
     is_aligned = abs(wrap(there.yaw - pose.yaw)) <= TURNED
-    return _away(pose, there) <= BESIDE_PATH and is_aligned
-
-
-def _away(pose: Pose, there: Pose) -> float:
-    return hypot(there.north - pose.north, there.east - pose.east)
+    return distance(pose, there) <= BESIDE_PATH and is_aligned
 
 
 def recovery_path(

@@ -120,8 +120,9 @@ def course_of(
     within = min(single.radius or driving.acceptance_radius, distance(here, after) / 2)
     turn = _off(here, bearing(here, after))
     speed = corner_speed(turn, lead=within)
-    if steering is not None:
-        speed = _speed_of_bend(turn, steering, driving)
+    if steering is not None:  # where a car begins its turn; 0: it stops
+        bend = bend_speed(1 / steering.planned_radius, driving)
+        speed = bend if abs(turn) <= ROLLING_TURN else 0.0
     return PathFollower(
         single,
         progress,
@@ -130,11 +131,6 @@ def course_of(
         by_course=by_course,
         steering=steering,
     )
-
-
-def _speed_of_bend(turn: float, steering: Steering, driving: Driving) -> float:
-    """Return the speed in m/s at which a car begins its turn to the next place; 0: it stops."""
-    return bend_speed(1 / steering.planned_radius, driving) if abs(turn) <= ROLLING_TURN else 0.0
 
 
 def _off(pose: Pose, yaw: float) -> float:

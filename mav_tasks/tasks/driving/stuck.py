@@ -4,9 +4,10 @@ There are two signs: no progress towards the end of the leg or, if the leg has n
 nearer to, standstill while a velocity is commanded.
 """
 
-from math import hypot, inf, pi, radians
+from math import inf, pi, radians
 
 from mav_tasks.tasks.driving.guidance import Motion, Velocity, is_far_off, wrap
+from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.goal import Move, Rotate
@@ -49,9 +50,8 @@ class Follows:
             self._since, self._from, self._way = now, motion.pose, 0.0
         self._way += speed * seconds
         here, there = motion.pose, self._from
-        went = hypot(here.north - there.north, here.east - there.east)
         has_turned = abs(wrap(here.yaw - there.yaw)) > TURNED
-        if went > LEAST_PART * self._way or has_turned:
+        if distance(here, there) > LEAST_PART * self._way or has_turned:
             self._since = now if now - self._since > SAID_AFTER else self._since
             return ""
         if self._is_said or now - self._since < SAID_AFTER:
@@ -119,7 +119,7 @@ class StuckWatch:
         before, self._pose = self._pose, None if seen.motion is None else seen.motion.pose
         if before is None or self._pose is None:
             return False
-        moved = hypot(self._pose.north - before.north, self._pose.east - before.east)
+        moved = distance(self._pose, before)
         return moved > LIVES and (has_one_try or moved < SLOW * self._last[0])
 
     def _turns_by_itself(self, seen: VehicleView) -> bool:

@@ -106,9 +106,9 @@ class Ledger:
         if task.id in self.given and task.id not in self.withdrawn and task.id in self.states:
             yield f"id {task.id} was given twice"
         mark = _mark_of(task)
-        if task.nonce and mark in self._of_mark:
+        if task.marks.nonce and mark in self._of_mark:
             twin = self._of_mark[mark]
-            yield f"one submission of nonce {task.nonce} is task {twin} and {task.id}"
+            yield f"one submission of nonce {task.marks.nonce} is task {twin} and {task.id}"
         self._of_mark[mark] = task.id
         self.withdrawn.discard(task.id)  # by an earlier server, and the disk had nothing of it
         self.given[task.id] = mark
@@ -161,4 +161,4 @@ class Ledger:
 def _mark_of(task: Task) -> Mark:
     submitter: Submitter = task.submitter
     endpoint = f"{submitter.link} {submitter.endpoint}"
-    return endpoint, submitter.address, task.vehicle, task.command, task.nonce
+    return endpoint, submitter.address, task.vehicle, task.command, task.marks.nonce

@@ -79,7 +79,7 @@ def test_it_reads_as_a_line() -> None:
 def drive(rig: Rig, ticks: int, *, length: float = 0.5) -> None:
     for _ in range(ticks):
         rig.step(at(length))
-        rig.tasks.setpoint_left(now=rig.now)
+        rig.tasks.executor.setpoint_left(now=rig.now)
 
 
 def test_a_pause_is_no_interval_and_what_was_before_it_counts() -> None:
@@ -92,7 +92,7 @@ def test_a_pause_is_no_interval_and_what_was_before_it_counts() -> None:
     assert paused.longest == pytest.approx(TICK)
     for _ in range(40):  # zeros go on while it is paused
         rig.step(at(0.5, still=True))
-        rig.tasks.setpoint_left(now=rig.now)
+        rig.tasks.executor.setpoint_left(now=rig.now)
     assert rig.task(1).timing == paused
     rig.tasks.proceed(at(0.5, still=True)(rig.now), actor=BY, now=rig.now)
     rig.step(at(0.5, still=True))
@@ -126,7 +126,7 @@ def test_a_task_that_was_never_driven_has_none() -> None:
     rig = Rig()
     rig.submit()
     rig.step(in_control)
-    rig.tasks.setpoint_left(now=rig.now)
+    rig.tasks.executor.setpoint_left(now=rig.now)
     rig.tasks.stop(clear=True, actor=BY, now=rig.now)
     assert rig.task(1).timing is None
     assert rig.tasks.timing_of(rig.task(1)) is None

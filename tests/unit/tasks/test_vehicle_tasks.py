@@ -133,7 +133,7 @@ class TestWaiting:
     def test_a_withdrawn_submission_leaves_nothing(self) -> None:
         rig = Rig()
         task = rig.submit()
-        rig.tasks.withdraw(task, now=rig.now)
+        rig.tasks.room.withdraw(task, now=rig.now)
         assert (rig.tasks.is_idle, rig.registry.all()) == (True, ())
 
 

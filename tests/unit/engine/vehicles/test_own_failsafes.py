@@ -1,7 +1,15 @@
 """Which failsafe has changed a vehicle's mode, told before the mode is shown or after."""
 
-from mav_tasks.engine.vehicles.own_failsafes import FENCE, TOLD_WITHIN, News, OwnFailsafes
-from mav_tasks.engine.vehicles.own_fence import GEOFENCE
+import pytest
+
+from mav_tasks.engine.vehicles.own_failsafes import (
+    FENCE,
+    GEOFENCE,
+    TOLD_WITHIN,
+    News,
+    OwnFailsafes,
+    is_breached,
+)
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import SysStatus
@@ -49,3 +57,14 @@ def test_its_fence_explains_a_mode_as_long_as_it_is_outside() -> None:
     assert failsafes.mode_changed(now=9.0) == FENCE
     assert fence(failsafes, outside=False, now=9.5) == News(is_outside=False)
     assert failsafes.mode_changed(now=20.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("enabled", "healthy", "breached"),
+    [(GEOFENCE, 0, True), (GEOFENCE, GEOFENCE, False), (0, 0, False), (0, GEOFENCE, False)],
+)
+def test_a_fence_that_is_on_and_not_healthy_is_breached(
+    enabled: int, healthy: int, *, breached: bool
+) -> None:
+    status = SysStatus(enabled, enabled, healthy, 0, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
+    assert is_breached(status) is breached
