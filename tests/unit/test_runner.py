@@ -53,6 +53,7 @@ def send(outgoing: Outgoing) -> None:
     """Nobody is there."""
 
 
+@pytest.mark.patches_core
 def test_a_failing_store_is_told_to_the_engine_and_ends_nothing(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -112,6 +113,7 @@ def test_an_observer_that_fails_is_let_go_and_ends_nothing(
     assert [record.levelname for record in caplog.records] == ["ERROR"]
 
 
+@pytest.mark.patches_core
 def test_what_the_store_says_comes_in_at_once(tmp_path: Path) -> None:
     async def run() -> int:
         loop = asyncio.get_running_loop()
@@ -176,6 +178,7 @@ class Flood:
         os.close(self._write)
 
 
+@pytest.mark.patches_core
 @pytest.mark.parametrize("is_due", [True, False])
 def test_what_is_due_does_not_wait_for_all_that_came(is_due: bool) -> None:
     async def run() -> list[str]:
@@ -258,6 +261,7 @@ class FakeStream:
         os.close(self._write)
 
 
+@pytest.mark.patches_core
 def test_the_engine_is_told_who_comes_before_its_words_and_who_goes_after_them(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -304,6 +308,7 @@ def test_the_engine_is_told_who_comes_before_its_words_and_who_goes_after_them(
     assert [record.getMessage() for record in caplog.records] == words
 
 
+@pytest.mark.patches_core
 def test_a_step_of_the_wall_clock_is_told_with_the_next_input_and_nothing_less_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -333,6 +338,7 @@ def test_a_step_of_the_wall_clock_is_told_with_the_next_input_and_nothing_less_i
     assert offsets == pytest.approx([0.0, 3600.0, -86_400.0], abs=0.1)
 
 
+@pytest.mark.patches_core
 def test_who_goes_while_the_engine_is_told_of_others_is_gone_before_anybody_comes() -> None:
     """A packet that it sends then finds nobody there; the next one comes from the same place."""
     link = FakeStream()
@@ -386,6 +392,7 @@ class Slow(Recorder):
         return [*packets, Outgoing("stream", "peer", b"faster", until=now)]
 
 
+@pytest.mark.patches_core
 def test_what_was_made_before_the_process_stood_still_does_not_leave() -> None:
     link = FakeStream()
 
@@ -438,6 +445,7 @@ def run_broken(link: FakeStream) -> int:
     return asyncio.run(run())
 
 
+@pytest.mark.patches_core
 def test_after_the_last_words_of_a_failed_engine_nothing_of_it_is_sent() -> None:
     link = FakeStream()
     assert run_broken(link) == EXIT_FAILED
@@ -446,6 +454,7 @@ def test_after_the_last_words_of_a_failed_engine_nothing_of_it_is_sent() -> None
     assert link.firsts == [b"hold"]
 
 
+@pytest.mark.patches_core
 def test_the_last_words_of_a_failed_engine_do_not_wait_for_its_traceback(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -458,6 +467,7 @@ def test_the_last_words_of_a_failed_engine_do_not_wait_for_its_traceback(
     assert sent_before[-2:] == [b"zero", b"hold"]
 
 
+@pytest.mark.patches_core
 def test_a_failed_engine_ends_the_server_even_if_its_last_words_fail_too() -> None:
     class Mute(FakeStream):
         def send(self, peer: object, data: bytes, *, first: bool = False) -> None:
@@ -513,6 +523,7 @@ def test_sighup_brings_new_settings_also_if_it_came_before(
     assert words in [record.getMessage() for record in caplog.records]
 
 
+@pytest.mark.patches_core
 def test_a_terminal_that_is_gone_is_told_of_twice_and_ends_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

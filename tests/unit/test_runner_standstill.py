@@ -25,6 +25,8 @@ from mav_tasks.settings import Settings
 from mav_tasks.store import MemoryStore
 from tests.unit.test_runner import FakeStream
 
+pytestmark = pytest.mark.patches_core
+
 ASLEEP = 20.0  # s
 STOOD = 0.4  # s, in which the loop does not run
 HOST = "127.0.0.1"
