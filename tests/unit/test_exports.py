@@ -24,11 +24,13 @@ def public(thing: object) -> list[str]:
     return sorted(name for name in vars(thing) if not name.startswith("_"))
 
 
+@pytest.mark.patches_core
 def test_the_engine_has_five_methods_and_two_views() -> None:
     methods = ["handle", "handle_deadline", "next_deadline", "take_events", "take_packets"]
     assert public(Engine) == sorted([*methods, "snapshot", "parameters"])
 
 
+@pytest.mark.patches_core
 def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
     engine = Engine(settings.Settings(), now=0.0)
     assert public(engine) == ["emergency_stop_packets", "not_in_force", "signatures"]

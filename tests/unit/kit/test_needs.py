@@ -17,6 +17,7 @@ def test_nothing_is_found_in_a_server_that_idles(monkeypatch: pytest.MonkeyPatch
     assert needs.surprises == []
 
 
+@pytest.mark.patches_core
 def test_a_timer_that_is_not_set_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     world, needs = World().ready(), Needs()
     needs.look_on(monkeypatch)

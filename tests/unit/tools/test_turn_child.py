@@ -27,6 +27,7 @@ def answers() -> list[Any]:
     return [json.loads(line) for line in ended.stdout.splitlines()]
 
 
+@pytest.mark.patches_core
 def test_a_turn_is_a_submission_that_is_queued_and_answered(answers: list[Any]) -> None:
     turn = answers[1]["turn"]
     assert turn["packets"] == ["COMMAND_ACK", "STATUSTEXT", "TASK_STATUS"]
