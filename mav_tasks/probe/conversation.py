@@ -14,7 +14,6 @@ from mav_tasks.services.command_sender import Answered, CommandSender
 from mav_tasks.services.heartbeat import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
 from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.persona import Persona
-from mav_tasks.services.phase import Phase
 from mav_tasks.services.text_receiver import TextReceiver
 from mav_tasks.settings import Watch
 
@@ -131,8 +130,8 @@ class Conversation:
         self._take_answers()
         requests, self._requests = self._requests, []
         setpoints = [] if self.control is None else self.control.take_messages()
-        # in the control mode a zero comes before arming
-        in_order = (requests, setpoints) if self._holds_first() else (setpoints, requests)
+        holds_first = self.control is not None and self.control.holds_first
+        in_order = (requests, setpoints) if holds_first else (setpoints, requests)
         messages = [*self._outgoing, *in_order[0], *in_order[1]]
         self._outgoing = []
         return [self._encoder.encode(message) for message in messages]
@@ -145,9 +144,7 @@ class Conversation:
         control = self.control
         if control is None or not (control.is_engaged or control.we_armed):
             return []
-        words: list[m.Message] = [control.hold_request(), control.zero_setpoint()]
-        if self._zero_first():
-            words.reverse()
+        words: list[m.Message] = [*control.zero_and_hold()]
         if control.we_armed:
             words.append(_arm_request(self.target, arm=False))
         return [self._encoder.encode(message) for message in words]
@@ -178,17 +175,6 @@ class Conversation:
         self.control = OffboardControl(self.target, persona, self.sender, self.watch)
         self.control.heard(armed=self.armed, mode=self.mode, now=self.now)
         return self.control
-
-    def _holds_first(self) -> bool:
-        control, persona = self.control, self.persona
-        if control is None or persona is None:
-            return False
-        is_handed_back = control.phase is Phase.RELEASING and persona.has_loss_failsafe
-        return is_handed_back or control.phase is Phase.STOPPING
-
-    def _zero_first(self) -> bool:
-        """A zero would end a failsafe of one that holds because setpoints were lost."""
-        return self.persona is not None and not self.persona.has_loss_failsafe
 
     def _meet(self, packet: Packet, heartbeat: m.Heartbeat) -> None:
         if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:

@@ -514,6 +514,21 @@ class OffboardControl:
         """Return the command that asks for HOLD."""
         return self._orders.hold()
 
+    @property
+    def holds_first(self) -> bool:
+        """Whether commands leave before setpoints.
+
+        HOLD also stops a vehicle that ignores setpoints, and a zero before it would end the HOLD of
+        a loss failsafe. Otherwise, in our mode, a zero must come before arming.
+        """
+        is_handed_back = self.phase is Phase.RELEASING and self._persona.has_loss_failsafe
+        return is_handed_back or self.phase is Phase.STOPPING
+
+    def zero_and_hold(self) -> tuple[Message, Message]:
+        """Return both, to be sent once each; HOLD first if a zero would end a failsafe's HOLD."""
+        zero, hold = self.zero_setpoint(), self.hold_request()
+        return (hold, zero) if self._persona.has_loss_failsafe else (zero, hold)
+
     def _note_requests(self, now: float) -> None:
         """Remember until when what we ask for was still being asked for."""
         match self.phase:

@@ -8,7 +8,7 @@ from mav_tasks.tasks.events import ServerStopped
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from rover_sim.personas import Mode
+from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.client import TEMPORARILY_REJECTED
 from tests.kit.observer import Observer
 from tests.kit.world import World, near_pose
@@ -122,25 +122,33 @@ def test_waiting_tasks_do_not_begin_on_the_way_out(make_world: MakeWorld) -> Non
     assert world.state(1)[0] is S.QUEUED
 
 
-def test_last_words_are_there_exactly_while_a_rover_is_engaged(world: World) -> None:
+@pytest.mark.parametrize(
+    ("persona", "words"), [(ARDUPILOT, ("zero", "HOLD")), (PX4, ("HOLD", "zero"))]
+)
+def test_last_words_are_there_exactly_while_a_rover_is_engaged(
+    make_world: MakeWorld, persona: Persona, words: tuple[str, ...]
+) -> None:
+    """A zero before HOLD would end the HOLD of a PX4's failsafe."""
+    world = make_world(persona=persona)
     engine = world.server.engine
     seen: list[tuple[bool, list[str]]] = []
 
     def note(now: float) -> None:
         listener = Observer()
-        for words in engine.emergency_stop_packets:
-            listener.sent(now, words.data)
+        for each in engine.emergency_stop_packets:
+            listener.sent(now, each.data)
         seen.append((world.control() != "IDLE", listener.sent_since(0)))
 
     world.watch(note)
     world.client.move(0.5)
     world.until_idle(tasks=1)
     world.run(1)
-    expected = {(True, ("zero", "HOLD")), (False, ())}
-    assert {(engaged, tuple(words)) for engaged, words in seen} == expected
+    assert {(engaged, tuple(sent)) for engaged, sent in seen} == {(True, words), (False, ())}
 
 
-def test_last_words_stop_a_driving_rover(world: World) -> None:
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4])
+def test_last_words_stop_a_driving_rover(make_world: MakeWorld, persona: Persona) -> None:
+    world = make_world(persona=persona)
     world.client.move(20, speed=1.0)
     world.run(4)
     world.leave(world.server)

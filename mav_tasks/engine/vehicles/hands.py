@@ -58,12 +58,8 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.ZERO_KEPT:
             if control.is_streaming:
                 requests.send_zero()
-        case Effect.ZERO_AND_HOLD if parts.persona.has_loss_failsafe:
-            requests.send_hold()  # a zero before it would end the HOLD of a failsafe
-            requests.send_zero()
         case Effect.ZERO_AND_HOLD:
-            requests.send_zero()
-            requests.send_hold()
+            requests.send_zero_and_hold()
         case Effect.STAY:
             control.ask_to_stay(now=now)
             requests.flush(now=now)

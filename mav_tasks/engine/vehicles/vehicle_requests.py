@@ -172,9 +172,10 @@ class VehicleRequests:
         """Send one zero setpoint, whoever drives the vehicle."""
         self._outlet.send(self.control.zero_setpoint(), self._source)
 
-    def send_hold(self) -> None:
-        """Ask for HOLD once, without waiting for an answer."""
-        self._outlet.send(self.control.hold_request(), self._source)
+    def send_zero_and_hold(self) -> None:
+        """Send a zero and ask for HOLD, once each, without waiting for an answer."""
+        for message in self.control.zero_and_hold():
+            self._outlet.send(message, self._source)
 
     def ask_for_rates(self, *, now: float) -> None:
         """Ask for the next message interval that is due, if any."""
@@ -230,11 +231,9 @@ class VehicleRequests:
         """
         setpoints = self.control.take_messages()
         outgoing, answers = self._sender.take()
-        is_handed_back = self.control.phase is Phase.RELEASING and self._persona.has_loss_failsafe
-        # HOLD also stops one that ignores setpoints, and a zero before it would end a failsafe
-        if is_handed_back or self.control.phase is Phase.STOPPING:
+        if self.control.holds_first:
             outgoing += setpoints
-        else:  # in our mode, a zero must come before arming
+        else:
             outgoing = [*setpoints, *outgoing]
         outgoing += self._uploader.take()
         for item in outgoing:
@@ -296,6 +295,7 @@ class VehicleRequests:
     def _prepare_last_words(self) -> tuple[Outgoing, ...]:
         queue: list[Outgoing] = []
         spare = self._outlet.sibling(queue)
-        spare.send(self.control.zero_setpoint(), self._source)  # stays behind queued setpoints
-        spare.send(self.control.hold_request(), self._source, first=True)
+        for message in self.control.zero_and_hold():
+            # a zero stays behind queued setpoints; HOLD stops the vehicle whatever those say
+            spare.send(message, self._source, first=isinstance(message, m.CommandLong))
         return tuple(queue)
