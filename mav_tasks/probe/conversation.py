@@ -201,7 +201,7 @@ class Conversation:
             case m.Attitude() | m.LocalPositionNed():
                 self.motion.receive(message, now=self.now)
             case m.ParamValue():
-                self.parameters[name_of(message)] = message
+                self.parameters[message.param_id] = message
             case m.MessageInterval():
                 self.intervals[message.message_id] = message.interval_us
             case m.Statustext():
@@ -222,13 +222,6 @@ class Conversation:
         if is_request_of(answer) and self.control is not None:
             self.control.answered(answer, now=self.now)
         self._answers[answer.command] = answer.ack
-
-
-def name_of(message: m.ParamValue) -> str:
-    """Return a parameter's name."""
-    name = message.param_id
-    text = name.decode("ascii", "replace") if isinstance(name, bytes) else name
-    return str(text).rstrip("\0")
 
 
 def result_name(result: int) -> str:

@@ -42,12 +42,10 @@ class CruiseSpeed:
     def receive(self, message: ParamValue) -> None:
         """Take in a parameter of the vehicle, whoever has asked for it, or changed it."""
         name = message.param_id
-        text = name.decode("ascii", "replace") if isinstance(name, bytes) else name
-        text = text.rstrip("\0")
-        is_speed = text in self._names and message.param_type == REAL32
+        is_speed = name in self._names and message.param_type == REAL32
         if is_speed and isfinite(message.param_value):
-            self._values[text] = message.param_value
-            self._unheard.discard(text)
+            self._values[name] = message.param_value
+            self._unheard.discard(name)
 
     def forget(self) -> None:
         """The vehicle has restarted: it may have other parameters."""

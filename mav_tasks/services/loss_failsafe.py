@@ -148,7 +148,7 @@ class LossFailsafe:
         """Take in a parameter of the vehicle; whoever asked for it, or changed it."""
         if self._asked == NEVER:
             return
-        name = _text(message.param_id)
+        name = message.param_id
         if name not in (AFTER, ACTION, NO_STICKS, NO_STATION, EXCEPT):
             return
         value = message.param_value
@@ -194,8 +194,3 @@ class LossFailsafe:
         if without is None:
             return words, None
         return f"{words}, {NO_STICKS} {without:g}", OF_ABSENCE.get(int(without), Deed.NOTHING)
-
-
-def _text(param_id: str | bytes) -> str:
-    text = param_id.decode("ascii", "replace") if isinstance(param_id, bytes) else param_id
-    return text.rstrip("\0")

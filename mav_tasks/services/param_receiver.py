@@ -14,13 +14,6 @@ BY_NAME = -1  # param_index of a request
 HASH_CHECK = "_HASH_CHECK"  # by which a client with a cache begins: whatever it asks, it wants all
 
 
-def name_in(message: m.ParamRequestRead | m.ParamSet) -> str:
-    """Return the name that a message carries, without the zeros behind it."""
-    param_id = message.param_id
-    text = param_id.decode("ascii", "replace") if isinstance(param_id, bytes) else param_id
-    return str(text).split("\0", 1)[0]
-
-
 def value_of(values: Mapping[str, float], name: str) -> m.ParamValue:
     """Return the message that tells one of the values, in the order of the mapping."""
     names = list(values)
@@ -38,7 +31,7 @@ def read(
     values: Mapping[str, float], message: m.ParamRequestRead, *, to: Address
 ) -> m.ParamValue | m.ParamError:
     """Return the answer to a question for one of them."""
-    index, name = message.param_index, name_in(message)
+    index, name = message.param_index, message.param_id
     if index != BY_NAME:
         name = list(values)[index] if 0 <= index < len(values) else ""
     if name in values:
@@ -49,4 +42,4 @@ def read(
 def error(message: m.ParamRequestRead | m.ParamSet, why: int, *, to: Address) -> m.ParamError:
     """Return the PARAM_ERROR that answers a message; ``why`` is a MAV_PARAM_ERROR."""
     index = message.param_index if isinstance(message, m.ParamRequestRead) else BY_NAME
-    return m.ParamError(*to, name_in(message).encode()[:16], index, why)
+    return m.ParamError(*to, message.param_id.encode()[:16], index, why)

@@ -69,9 +69,7 @@ class TurningKind:
 
     def receive(self, message: ParamValue) -> None:
         """Take in a parameter of the vehicle; whoever asked for it, or changed it."""
-        param_id = message.param_id
-        name = param_id.decode("ascii", "replace") if isinstance(param_id, bytes) else param_id
-        name = name.rstrip("\0")
+        name = message.param_id
         if name not in self._names:
             return
         value = float(message.param_value)

@@ -19,7 +19,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import param_receiver
-from mav_tasks.services.param_receiver import HASH_CHECK, name_in
+from mav_tasks.services.param_receiver import HASH_CHECK
 from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.registry import TaskRegistry
@@ -122,10 +122,10 @@ class ParameterServer:
                 self._list(client, vehicle, now=now)
             case m.ParamRequestRead() if _begins(message):
                 self._list(client, vehicle, now=now)
-            case m.ParamRequestRead() if is_meant or name_in(message) in PARAMETERS:
+            case m.ParamRequestRead() if is_meant or message.param_id in PARAMETERS:
                 answer = param_receiver.read(self._values(), message, to=packet.source)
                 client.outlet.send(answer, vehicle.server_address)
-            case m.ParamSet() if is_meant or name_in(message) in PARAMETERS:
+            case m.ParamSet() if is_meant or message.param_id in PARAMETERS:
                 self._set(client, vehicle, packet, message, now=now)
 
     def _values(self) -> dict[str, float]:
@@ -149,7 +149,7 @@ class ParameterServer:
         now: float,
     ) -> None:
         """Check a PARAM_SET and record it; the commit gate makes it take effect."""
-        name, value = name_in(message), as_sent(message.param_value)
+        name, value = message.param_id, as_sent(message.param_value)
         wish = _Wish(client, vehicle, packet.source, message, client.who, name, value)
         if name not in PARAMETERS:
             self._refuse(wish, f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
@@ -224,4 +224,4 @@ class ParameterServer:
 
 def _begins(message: ParamMessage) -> bool:
     """Whether a client with cached parameters asks for their hash; it may then skip the list."""
-    return isinstance(message, m.ParamRequestRead) and name_in(message) == HASH_CHECK
+    return isinstance(message, m.ParamRequestRead) and message.param_id == HASH_CHECK
