@@ -23,7 +23,7 @@ _WIRE = Struct("<BHBB4fiif")
 
 
 class Item(NamedTuple):
-    """The fields of MISSION_ITEM_INT, but for addresses and numbers."""
+    """The fields of MISSION_ITEM_INT, in their order, but for addresses and numbers."""
 
     frame: int
     command: int
@@ -66,45 +66,15 @@ def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
 
 def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItemInt:
     """Return the message that carries an item."""
-    return m.MissionItemInt(
-        to.system_id,
-        to.component_id,
-        seq,
-        item.frame,
-        item.command,
-        item.current,
-        item.autocontinue,
-        item.param1,
-        item.param2,
-        item.param3,
-        item.param4,
-        item.x,
-        item.y,
-        item.z,
-        mission_type,
-    )
+    return m.MissionItemInt(to.system_id, to.component_id, seq, *item, mission_type)
 
 
 def float_message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItem:
     """Return the message that carries an item to a client that asks with MISSION_REQUEST."""
     scale = _scale(item.frame)
-    return m.MissionItem(
-        to.system_id,
-        to.component_id,
-        seq,
-        item.frame,
-        item.command,
-        item.current,
-        item.autocontinue,
-        item.param1,
-        item.param2,
-        item.param3,
-        item.param4,
-        nan if item.x == NOT_GIVEN else item.x / scale,
-        nan if item.y == NOT_GIVEN else item.y / scale,
-        item.z,
-        mission_type,
-    )
+    x = nan if item.x == NOT_GIVEN else item.x / scale
+    y = nan if item.y == NOT_GIVEN else item.y / scale
+    return m.MissionItem(to.system_id, to.component_id, seq, *item[:-3], x, y, item.z, mission_type)
 
 
 def packed(items: Iterable[Item]) -> str:
