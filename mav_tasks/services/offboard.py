@@ -26,7 +26,7 @@ from mav_tasks.services.insistence import Insistence
 from mav_tasks.services.news import AWAITED, News
 from mav_tasks.services.orders import STANDING, Orders, Posture, Speeds, to_stand
 from mav_tasks.services.persona import Persona
-from mav_tasks.services.phase import ENDED, STREAMING, TAKING, Phase
+from mav_tasks.services.phase import ENDED, STREAMING, Phase
 from mav_tasks.settings import Watch
 
 STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirmed yet
@@ -77,7 +77,7 @@ class OffboardControl:
         #: what decides which set-point asks it to stand
         self.posture = Posture()
         self._outgoing: list[Message] = []
-        self._insistence = Insistence()  # while TAKING
+        self._insistence = Insistence()  # while being taken
         self._hold_until = -inf  # while RELEASING: HOLD is asked for until then
         self._next_hold_at = 0.0
         self._asks_left = 0  # times
@@ -119,11 +119,6 @@ class OffboardControl:
     def awaits_mode(self) -> bool:
         """Whether a mode that we have asked for is not answered yet."""
         return self._sender.is_pending(self._target.component_id, MavCmd.DO_SET_MODE)
-
-    @property
-    def is_taking(self) -> bool:
-        """Whether modes or arming are asked for, so as to get into control."""
-        return self.phase in TAKING
 
     @property
     def is_asking_mode(self) -> bool:

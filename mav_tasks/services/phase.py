@@ -28,10 +28,6 @@ class Phase(Enum):
     STOPPING = auto()
 
 
-#: control is being taken
-TAKING = frozenset(
-    {Phase.LOOKING, Phase.ASKING_HOLD, Phase.ASKING_ARM, Phase.LEADING_IN, Phase.ASKING_MODE}
-)
 #: nothing of ours is under way that still has to come true
 ENDED = frozenset({Phase.IDLE, Phase.RELEASING, Phase.STOPPING})
 STREAMING = frozenset({Phase.ASKING_ARM, Phase.LEADING_IN, Phase.CONTROL})
