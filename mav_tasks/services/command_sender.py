@@ -130,11 +130,9 @@ class CommandSender:
         """
         interval = REPEAT if repeats else give_up_after
         retry = Retry.starting(now=now, interval=interval, give_up_after=give_up_after)
-        self._enqueue(
-            _Request(None, (message.target_component, message.command), message, None, retry),
-            now=now,
-            immediate=immediate,
-        )
+        lane = (message.target_component, message.command)
+        request = _Request(None, lane, message, None, retry, is_urgent=immediate)
+        self._enqueue(request, now=now)
 
     def repeat(self, message: CommandLong | CommandInt, *, now: float) -> bool:
         """Send one copy more of a command of our own, which is given up as much later.
@@ -166,7 +164,7 @@ class CommandSender:
         retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
         lane = (component, command)
         request = _Request(origin, lane, message, packet, retry, standing, immediate)
-        self._enqueue(request, now=now, immediate=immediate)
+        self._enqueue(request, now=now)
 
     def withdraw(self, component: int, command: int) -> None:
         """Send no further copy of our own commands of this id, and none that wait."""
@@ -274,11 +272,11 @@ class CommandSender:
         asker = self._source if request.packet is None else request.packet.source
         return Address(ack.target_system, ack.target_component).reaches(asker)
 
-    def _enqueue(self, request: _Request, *, now: float, immediate: bool) -> None:
+    def _enqueue(self, request: _Request, *, now: float) -> None:
         if len(self._lanes) > KEPT_LANES:
             self._forget_idle_lanes(now)
         lane = self._lanes.setdefault(request.lane, _Lane())
-        if immediate:
+        if request.is_urgent:
             for waiting in lane.waiting:  # after it they would undo what was urgent
                 self._answer(waiting, None)
             lane.waiting.clear()
