@@ -7,7 +7,6 @@ come and go.
 import os
 import selectors
 import socket
-from collections.abc import Callable
 
 from mav_tasks.clock import boot_time
 from mav_tasks.links.base import Peer, PeerChange, PeerState
@@ -37,59 +36,35 @@ class Connection:
         return ":".join(map(str, self.peer)) if isinstance(self.peer, tuple) else str(self.peer)
 
 
-class Connections:
-    """The connections of one link, with the selector for them."""
+class TcpLink:
+    """The base class of TCP links: their connections, with the selector for them."""
 
-    def __init__(
-        self,
-        limits: LinkLimits,
-        *,
-        other: Callable[[], None],
-        ended: Callable[[Connection, str], None],
-    ) -> None:
-        """``other`` handles other registered sockets; ``ended`` gets a connection and a reason."""
-        self.selector = selectors.DefaultSelector()
+    peers: tuple[Peer, ...] = ()
+    is_stream = True
+    note = ""
+
+    def __init__(self, url: HostUrl, limits: LinkLimits) -> None:
+        self.name = str(url)
+        self.is_local = url.is_nearby
+        self._selector = selectors.DefaultSelector()
         self._lost = 0  # packets without a peer, or dropped by connections that have ended
-        self._other = other
-        self._ended = ended
         self._limits = limits
         self._by_peer: dict[Peer, Connection] = {}
         self._changes: list[PeerChange] = []
-
-    def __repr__(self) -> str:
-        return f"Connections({list(self._by_peer.values())}, {self.lost} packets lost)"
 
     @property
     def lost(self) -> int:
         """Number of packets that were dropped, or had no peer."""
         return self._lost + sum(each.queue.dropped for each in self._by_peer.values())
 
-    def __len__(self) -> int:
-        return len(self._by_peer)
-
-    def __contains__(self, peer: Peer) -> bool:
-        return peer in self._by_peer
-
     def fileno(self) -> int:
         """Return the selector's descriptor, readable when any socket is ready."""
-        return self.selector.fileno()
-
-    def add(self, sock: socket.socket, peer: Peer, words: str) -> None:
-        """Start to use an established connection; raise OSError if it has failed meanwhile."""
-        prepare(sock, self._limits)
-        connection = Connection(sock, peer, self._limits)
-        self.selector.register(sock, selectors.EVENT_READ, connection)
-        self._by_peer[peer] = connection
-        self._changes.append(PeerChange(peer, PeerState.UP, words))
+        return self._selector.fileno()
 
     def take_changes(self) -> list[PeerChange]:
         """Return the changes of peers since the last call."""
         changes, self._changes = self._changes, []
         return changes
-
-    def note(self, change: PeerChange) -> None:
-        """Add a change to those that ``take_changes`` returns next."""
-        self._changes.append(change)
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
         """Return up to ``limit`` pieces, the connections in turn; send waiting packets.
@@ -98,18 +73,45 @@ class Connections:
         """
         received: list[tuple[Peer, bytes]] = []
         for _ in range(limit):
-            ready = self.selector.select(0) if len(received) < limit else ()
-            before = len(self)
+            ready = self._selector.select(0) if len(received) < limit else ()
+            before = len(self._by_peer)
             for key, events in ready:
                 if isinstance(key.data, Connection) and (
                     reason := self._serve(key.data, events, received)
                 ):
-                    self._ended(key.data, reason)
-            if not ready or len(self) < before:
+                    self._on_ended(key.data, reason)
+            if not ready or len(self._by_peer) < before:
                 break
             if not all(isinstance(key.data, Connection) for key, _ in ready):
-                self._other()
+                self._on_ready()
         return received
+
+    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
+        """Send or queue a packet; drop it if the peer has no connection."""
+        connection = self._by_peer.get(peer)
+        if connection is None:
+            self._lost += 1
+            return
+        connection.queue.put(data, now=boot_time(), first=first)
+        reason = None if connection.is_blocked else self._flush(connection)
+        if reason is not None:
+            self._on_ended(connection, reason)
+
+    def close(self) -> None:
+        """Send waiting packets without blocking, and close everything."""
+        for connection in list(self._by_peer.values()):
+            self._flush(connection)
+            _say_farewell(connection.socket)
+            self._end(connection, None)
+        self._selector.close()
+
+    def _on_ready(self) -> None:
+        """Handle the link's own socket, which is ready."""
+        raise NotImplementedError
+
+    def _on_ended(self, connection: Connection, reason: str) -> None:
+        """Call ``_end`` for a connection that has ended."""
+        raise NotImplementedError
 
     def _serve(
         self, connection: Connection, events: int, received: list[tuple[Peer, bytes]]
@@ -117,7 +119,7 @@ class Connections:
         """Read and write without blocking; return the reason if the connection has ended."""
         if events & selectors.EVENT_WRITE:
             connection.is_blocked = False
-            self.selector.modify(connection.socket, selectors.EVENT_READ, connection)
+            self._selector.modify(connection.socket, selectors.EVENT_READ, connection)
             reason = self._flush(connection)
             if reason is not None:
                 return reason
@@ -134,18 +136,15 @@ class Connections:
         received.append((connection.peer, data))
         return None
 
-    def send(self, peer: Peer, data: bytes, *, first: bool) -> None:
-        """Send or queue a packet; drop it if the peer has no connection."""
-        connection = self._by_peer.get(peer)
-        if connection is None:
-            self._lost += 1
-            return
-        connection.queue.put(data, now=boot_time(), first=first)
-        reason = None if connection.is_blocked else self._flush(connection)
-        if reason is not None:
-            self._ended(connection, reason)
+    def _add(self, sock: socket.socket, peer: Peer, words: str) -> None:
+        """Start to use an established connection; raise OSError if it has failed meanwhile."""
+        _prepare(sock, self._limits)
+        connection = Connection(sock, peer, self._limits)
+        self._selector.register(sock, selectors.EVENT_READ, connection)
+        self._by_peer[peer] = connection
+        self._changes.append(PeerChange(peer, PeerState.UP, words))
 
-    def look(self) -> None:
+    def _look(self) -> None:
         """Note each congestion that has begun or ended."""
         now = boot_time()
         for connection in self._by_peer.values():
@@ -154,22 +153,14 @@ class Connections:
                 state = PeerState.CONGESTED if is_congested else PeerState.CLEAR
                 self._changes.append(PeerChange(connection.peer, state))
 
-    def end(self, connection: Connection, words: str | None) -> None:
+    def _end(self, connection: Connection, words: str | None) -> None:
         """Close a connection; with ``words``, note the change to DOWN."""
         del self._by_peer[connection.peer]
         self._lost += connection.queue.dropped
-        self.selector.unregister(connection.socket)
+        self._selector.unregister(connection.socket)
         connection.socket.close()
         if words is not None:
             self._changes.append(PeerChange(connection.peer, PeerState.DOWN, words))
-
-    def close(self) -> None:
-        """Send waiting packets without blocking, and close everything."""
-        for connection in list(self._by_peer.values()):
-            self._flush(connection)
-            _say_farewell(connection.socket)
-            self.end(connection, None)
-        self.selector.close()
 
     def _flush(self, connection: Connection) -> str | None:
         queue = connection.queue
@@ -178,7 +169,7 @@ class Connections:
                 queue.wrote(connection.socket.send(packet))
             except (BlockingIOError, InterruptedError):
                 both = selectors.EVENT_READ | selectors.EVENT_WRITE
-                self.selector.modify(connection.socket, both, connection)
+                self._selector.modify(connection.socket, both, connection)
                 connection.is_blocked = True
                 break
             except OSError as error:
@@ -186,41 +177,7 @@ class Connections:
         return None
 
 
-class TcpLink:
-    """The base class of TCP links."""
-
-    peers: tuple[Peer, ...] = ()
-    is_stream = True
-    note = ""
-
-    def __init__(self, url: HostUrl, connections: Connections) -> None:
-        self.name = str(url)
-        self.is_local = url.is_nearby
-        self._connections = connections
-
-    @property
-    def lost(self) -> int:
-        """Number of packets that were dropped, or had no peer."""
-        return self._connections.lost
-
-    def fileno(self) -> int:
-        """Return the selector's descriptor."""
-        return self._connections.fileno()
-
-    def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` pieces, the connections in turn; send waiting packets."""
-        return self._connections.receive(limit)
-
-    def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
-        """Send or queue a packet; drop it if the peer has no connection."""
-        self._connections.send(peer, data, first=first)
-
-    def take_changes(self) -> list[PeerChange]:
-        """Return the changes of peers since the last call."""
-        return self._connections.take_changes()
-
-
-def prepare(sock: socket.socket, limits: LinkLimits) -> None:
+def _prepare(sock: socket.socket, limits: LinkLimits) -> None:
     """Set a socket's options: no delay, little buffering, keep-alive and a user time-out."""
     sock.setblocking(False)
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

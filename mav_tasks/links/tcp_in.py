@@ -7,7 +7,7 @@ from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.base import Link
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
-from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
+from mav_tasks.links.tcp import Connection, TcpLink, reason_of, resolve
 from mav_tasks.links.url import UrlOptions
 
 BACKLOG = 64  # connections that the system queues until they are accepted
@@ -39,13 +39,12 @@ class TcpInLink(TcpLink):
             self._socket = _listen(family, address)
         except OSError as error:
             raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
-        self._most = limits.connections
-        super().__init__(url, Connections(limits, other=self._accept, ended=self._end))
+        super().__init__(url, limits)
         self._is_accepting = False
         self._accept_again()
 
     def __repr__(self) -> str:
-        return f"TcpInLink({self.name}, {len(self._connections)} connections)"
+        return f"TcpInLink({self.name}, {len(self._by_peer)} connections)"
 
     @property
     def port(self) -> int:
@@ -54,40 +53,41 @@ class TcpInLink(TcpLink):
 
     def poll(self) -> None:
         """Check for congestion; accept again after a lack of descriptors."""
-        self._connections.look()
+        self._look()
         self._accept_again()
 
     def close(self) -> None:
         """Close everything."""
-        self._connections.close()
+        super().close()
         self._socket.close()
 
-    def _accept(self) -> None:
+    def _on_ready(self) -> None:
+        """Accept a connection."""
         try:
             sock, address = self._socket.accept()
         except (BlockingIOError, InterruptedError, ConnectionError):
             return
         except OSError:  # no descriptors left: the selector would report it again and again
-            self._connections.selector.unregister(self._socket)
+            self._selector.unregister(self._socket)
             self._is_accepting = False
             return
         peer = (str(address[0]), int(address[1]))
         try:
             # A peer whose old connection from the same address has not ended yet will retry.
-            if len(self._connections) >= self._most or peer in self._connections:
+            if len(self._by_peer) >= self._limits.connections or peer in self._by_peer:
                 raise ConnectionRefusedError
-            self._connections.add(sock, peer, f"{peer[0]}:{peer[1]} connected")
+            self._add(sock, peer, f"{peer[0]}:{peer[1]} connected")
         except OSError:
             self.refused += 1
             sock.close()
 
     def _accept_again(self) -> None:
         if not self._is_accepting:
-            self._connections.selector.register(self._socket, selectors.EVENT_READ)
+            self._selector.register(self._socket, selectors.EVENT_READ)
             self._is_accepting = True
 
-    def _end(self, connection: Connection, reason: str) -> None:
-        self._connections.end(connection, f"{connection.name} disconnected: {reason}")
+    def _on_ended(self, connection: Connection, reason: str) -> None:
+        self._end(connection, f"{connection.name} disconnected: {reason}")
 
 
 def _listen(family: socket.AddressFamily, address: tuple[str, int]) -> socket.socket:

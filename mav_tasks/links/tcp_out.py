@@ -9,7 +9,7 @@ from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
-from mav_tasks.links.tcp import Connection, Connections, TcpLink, reason_of, resolve
+from mav_tasks.links.tcp import Connection, TcpLink, reason_of, resolve
 from mav_tasks.links.url import UrlOptions
 
 CONNECT_LIMIT = 3.0  # s for the other end to answer
@@ -43,22 +43,22 @@ class TcpOutLink(TcpLink):
             self._addresses = resolve(url.host, url.port)
         except OSError as error:
             raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
-        super().__init__(url, Connections(limits, other=self._answered, ended=self._end))
+        super().__init__(url, limits)
         self._attempts = Attempts()
         self._dialling: socket.socket | None = None
         self._give_up_at = 0.0
 
     def __repr__(self) -> str:
-        return f"TcpOutLink({self.name}, {'up' if len(self._connections) else 'down'})"
+        return f"TcpOutLink({self.name}, {'up' if self._by_peer else 'down'})"
 
     def poll(self) -> None:
         """Dial, or give up an attempt, if that is due; check for congestion."""
-        self._connections.look()
+        self._look()
         now = monotonic()
         if self._dialling is not None:
             if now >= self._give_up_at:
                 self._hang_up("no answer")
-        elif not len(self._connections) and self._attempts.is_due(now=now):
+        elif not self._by_peer and self._attempts.is_due(now=now):
             self._dial(now)
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ class TcpOutLink(TcpLink):
         if self._dialling is not None:
             self._dialling.close()
             self._dialling = None
-        self._connections.close()
+        super().close()
 
     def _dial(self, now: float) -> None:
         family, address = self._addresses[0]
@@ -75,16 +75,17 @@ class TcpOutLink(TcpLink):
         try:
             self._dialling = socket.socket(family, socket.SOCK_STREAM)
             self._dialling.setblocking(False)
-            self._connections.selector.register(self._dialling, selectors.EVENT_WRITE)
+            self._selector.register(self._dialling, selectors.EVENT_WRITE)
             self._dialling.connect(address)
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
             self._hang_up(reason_of(error))
             return
-        self._answered()
+        self._on_ready()
 
-    def _answered(self) -> None:
+    def _on_ready(self) -> None:
+        """The connection that was dialled is there, or has failed."""
         sock = self._dialling
         assert sock is not None
         failed = sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
@@ -93,22 +94,22 @@ class TcpOutLink(TcpLink):
                 raise OSError(failed, "")
             if sock.getsockname() == sock.getpeername():  # TCP simultaneous open with itself
                 raise ConnectionRefusedError("nobody but this end")
-            self._connections.selector.unregister(sock)
+            self._selector.unregister(sock)
             self._dialling = None
-            self._connections.add(sock, self._peer, self._attempts.succeeded())
+            self._add(sock, self._peer, self._attempts.succeeded())
         except OSError as error:
             self._dialling = sock
             self._hang_up(reason_of(error))
 
     def _hang_up(self, reason: str) -> None:
         if self._dialling is not None:
-            if self._dialling in self._connections.selector.get_map():
-                self._connections.selector.unregister(self._dialling)
+            if self._dialling in self._selector.get_map():
+                self._selector.unregister(self._dialling)
             self._dialling.close()
             self._dialling = None
         words = self._attempts.failed(reason)
         if words is not None:
-            self._connections.note(PeerChange(self._peer, PeerState.DOWN, words))
+            self._changes.append(PeerChange(self._peer, PeerState.DOWN, words))
 
-    def _end(self, connection: Connection, reason: str) -> None:
-        self._connections.end(connection, self._attempts.failed(reason))
+    def _on_ended(self, connection: Connection, reason: str) -> None:
+        self._end(connection, self._attempts.failed(reason))

@@ -210,7 +210,7 @@ def test_connections_are_bounded() -> None:
 def test_a_connection_sends_at_once_and_notices_when_nobody_is_there(limits: LinkLimits) -> None:
     listening = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=limits)
     _, (client,) = up(listening, 1)
-    (connection,) = listening._connections._by_peer.values()
+    (connection,) = listening._by_peer.values()
     option = connection.socket.getsockopt
     assert option(socket.IPPROTO_TCP, socket.TCP_NODELAY)
     assert option(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
@@ -274,7 +274,7 @@ def test_a_slow_reader_delays_nobody_and_gets_whole_packets_the_newest_last(
     listening.poll()  # before the system has sent some of what it had taken
     watched.changes += listening.take_changes()
     assert watched.changes[-1] == PeerChange(slow.getsockname(), PeerState.CONGESTED)
-    connection = listening._connections._by_peer[slow.getsockname()]
+    connection = listening._by_peer[slow.getsockname()]
     assert connection.queue.size <= (1 << 16) + 200  # and the rest of one that was begun
     numbers: list[int] = []
     while not numbers or numbers[-1] != sent - 1:
@@ -377,7 +377,7 @@ def test_it_dials_no_more_than_once_a_second(server: socket.socket, clock: Clock
     for _ in range(10):
         link.poll()
         assert link._dialling is None
-        assert not len(link._connections)
+        assert not link._by_peer
         clock.now += RETRY / 11
     clock.now += RETRY / 11
     watched.until(lambda: watched.states[-1] is PeerState.UP)
