@@ -97,27 +97,18 @@ class Database:
                 "INTO journal (number, utc, kind, task_id, vehicle, body)",
                 batch.journal,
             )
-            if batch.changed:  # an executemany without rows still takes time
-                connection.executemany(
+            for statement, rows in (
+                (
                     "UPDATE tasks SET state = ?, changed_at = ?, changed = ? WHERE id = ?",
-                    batch.changed.values(),
-                )
-            if batch.modified:
-                connection.executemany(
-                    "UPDATE tasks SET modified = ? WHERE id = ?", batch.modified.values()
-                )
-            if batch.advanced:
-                connection.executemany(
-                    "UPDATE tasks SET advanced = ? WHERE id = ?", batch.advanced.values()
-                )
-            if batch.plans:
-                connection.executemany(
-                    "INSERT OR REPLACE INTO plans VALUES (?, ?, ?, ?)", batch.plans.values()
-                )
-            if batch.parameters:
-                connection.executemany(
-                    "INSERT OR REPLACE INTO parameters VALUES (?, ?)", batch.parameters.values()
-                )
+                    batch.changed,
+                ),
+                ("UPDATE tasks SET modified = ? WHERE id = ?", batch.modified),
+                ("UPDATE tasks SET advanced = ? WHERE id = ?", batch.advanced),
+                ("INSERT OR REPLACE INTO plans VALUES (?, ?, ?, ?)", batch.plans),
+                ("INSERT OR REPLACE INTO parameters VALUES (?, ?)", batch.parameters),
+            ):
+                if rows:  # an executemany without rows still takes time
+                    connection.executemany(statement, rows.values())
             if batch.withdrawn:
                 self._withdraw(batch.withdrawn)
             for (column, vehicle), value in batch.vehicles.items():

@@ -41,7 +41,8 @@ _OF_TASK = {
 
 def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -> Restored:
     """Return the state in a store file, times reduced by ``offset``; raise StoreError."""
-    with _opened(path) as (connection, rows):
+    with _connected(path, mode="rw") as connection:
+        rows = Rows(connection)
         next_id, signed_until = connection.execute(
             "SELECT next_id, signed_until FROM meta"
         ).fetchone()
@@ -133,12 +134,6 @@ def _changed(task: Task, rows: Rows, texts: Sequence[str | None], offset: float)
             new["state"], new["changed_at"] = event.new, event.at
         task = replace(task, **new)
     return task
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[tuple[sqlite3.Connection, Rows]]:
-    with _connected(path, mode="rw") as connection:
-        yield connection, Rows(connection)
 
 
 @contextmanager
