@@ -8,13 +8,13 @@ from typing import NamedTuple, Protocol
 
 from mav_tasks.errors import UsageError
 from mav_tasks.links.endpoint import is_loopback, parse_endpoint
-from mav_tasks.links.policy import LinkPolicy, Side, check, policy_of, unsigned_beyond
+from mav_tasks.links.policy import LinkPolicy, Rules, Side, check, policy_of, unsigned_beyond
 from mav_tasks.links.url import LinkUrl, parse_url
 
 SIDES: tuple[Side, ...] = ("clients", "vehicles")
 
 
-class LinkSettings(Protocol):
+class LinkSettings(Rules, Protocol):
     """The links of a server as text, as in the settings."""
 
     @property
@@ -28,14 +28,6 @@ class LinkSettings(Protocol):
     @property
     def vehicles(self) -> tuple[str, ...]:
         """URLs."""
-
-    @property
-    def insecure(self) -> bool:
-        """Whether other machines may reach a link without signing."""
-
-    @property
-    def unsigned(self) -> str:
-        """Where unsigned packets are accepted: "loopback" or "nowhere"."""
 
 
 class ConfiguredLink(NamedTuple):
