@@ -14,8 +14,7 @@ class HeartbeatMonitor:
     def __init__(self, first: Heartbeat, *, lost_after: float, now: float) -> None:
         #: s of silence after which it is not heard any more
         self.lost_after = lost_after
-        self.heard_at = now
-        self._take(first)
+        self.receive(first, now=now)
 
     def __repr__(self) -> str:
         return f"HeartbeatMonitor(mode={self.custom_mode}, armed={self.armed})"
@@ -32,17 +31,14 @@ class HeartbeatMonitor:
 
     def receive(self, heartbeat: Heartbeat, *, now: float) -> None:
         """Take a heartbeat in."""
-        self._take(heartbeat)
+        self.latest = heartbeat
+        #: whether the vehicle says that it is armed
+        self.armed = self.may_be_armed
         self.heard_at = now
 
     def restarted(self) -> None:
         """It has restarted, and a restart disarms, whatever it has said before."""
         self.armed = False
-
-    def _take(self, heartbeat: Heartbeat) -> None:
-        self.latest = heartbeat
-        #: whether the vehicle says that it is armed
-        self.armed = self.may_be_armed
 
     def is_heard(self, *, now: float) -> bool:
         """Whether heartbeats are coming."""
