@@ -6,7 +6,6 @@ the driving, zeros and HOLD follow, and it is disarmed if it was us who armed it
 
 from math import inf
 
-from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.probe.conversation import Conversation
 from mav_tasks.probe.driving_area import DrivingArea
@@ -16,6 +15,7 @@ from mav_tasks.services.offboard import OffboardControl, Refused
 from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.driving.guidance import Motion
+from mav_tasks.tasks.driving.legs import distance
 
 TAKE_WITHIN = 12.0  # s; PX4 takes four heartbeats
 REST_WITHIN = 10.0  # s, for zeros, HOLD and disarming
@@ -119,7 +119,8 @@ class DriveController:
         if not self.control.is_engaged:
             self._drive.left = self._left()
             return
-        if self._is_manual():  # a person has it: nothing of ours may work against that
+        if self._is_ours and self._talk.mode in self._persona.manual_modes:
+            # a person has it: nothing of ours may work against that
             self.control.drive(STANDING)
             yield pause(self._talk.watch.setpoint_period)
             self.control.lose()
@@ -146,16 +147,15 @@ class DriveController:
         armed = "ARMED" if self._talk.armed else "disarmed"
         return f"{self._persona.mode_name(self._talk.mode)}, {armed}"
 
-    def _is_manual(self) -> bool:
-        return self._is_ours and self._talk.mode in self._persona.manual_modes
-
     def _tick(self) -> Steps[None]:
         self._tick_at = self.now
         if self.now >= self._show_at:  # by itself it shows once a second whose it is
             self._show_at = self.now + SHOW_EACH
             self._talk.ask_to_show()
         yield pause(self._talk.watch.setpoint_period)
-        self._drive.farthest = max(self._drive.farthest, self.area.distance_of(self.motion.pose))
+        self._drive.farthest = max(
+            self._drive.farthest, distance(self.area.middle, self.motion.pose)
+        )
 
     def _check(self) -> None:
         """Raise DriveEnded for anything that is not as it must be."""
@@ -187,12 +187,6 @@ class DriveController:
 
 
 _REFUSED = {Refused.MODE: "mode", Refused.ARM: "arming"}
-
-
-def is_fresh(motion: MotionMonitor, *, now: float, within: float) -> bool:
-    """Whether it is known where the rover is."""
-    latest = motion.latest()
-    return latest is not None and now - latest.at <= within
 
 
 def _with_texts(words: str, texts: list[str]) -> str:

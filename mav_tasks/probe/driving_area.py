@@ -1,7 +1,7 @@
 """The square in which a rover stays while it is probed: about the place where it stood. Pure."""
 
 from dataclasses import dataclass
-from math import cos, hypot, inf, sin
+from math import cos, inf, sin
 
 from mav_tasks.settings import Turning
 from mav_tasks.tasks.driving.guidance import Motion
@@ -33,10 +33,6 @@ class DrivingArea:
         north, east = pose.north - self.middle.north, pose.east - self.middle.east
         yaw = self.middle.yaw
         return north * cos(yaw) + east * sin(yaw), east * cos(yaw) - north * sin(yaw)
-
-    def distance_of(self, pose: Pose) -> float:
-        """Return the metres to the middle."""
-        return hypot(*self.place_of(pose))
 
     def holds(self, motion: Motion) -> bool:
         """Whether a rover is inside, and would be if it began to stop now."""

@@ -18,6 +18,7 @@ FORMATS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}  # by
 ASKS, ASK_AGAIN = 3, 0.4  # s
 #: what an ArduPilot Rover does, whatever its parameters say
 FIXED = "stops 3 s after the last setpoint, as ArduPilot does (fixed; observed on 4.6.3)"
+UNREPORTED = "does not report whether it stops when setpoints stop"
 
 
 def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
@@ -40,7 +41,10 @@ def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
             findings.missing_parameters.append(name)
         else:
             findings.parameters[name] = value_of(value, is_bytewise=is_bytewise)
-    findings.loss_by_parameters = _loss_of(talk)
+    findings.loss_by_parameters = FIXED
+    if persona.has_loss_failsafe:
+        says = loss_failsafe_of(talk).what_it_does
+        findings.loss_by_parameters = says or UNREPORTED
     kind = TurningKind(
         talk.target,
         persona.turning_parameters,
@@ -69,16 +73,6 @@ def loss_failsafe_of(talk: Conversation) -> LossFailsafe:
     for message in talk.parameters.values():
         failsafe.receive(message)
     return failsafe
-
-
-def _loss_of(talk: Conversation) -> str:
-    persona = talk.persona
-    if persona is None:
-        return ""
-    if not persona.has_loss_failsafe:
-        return FIXED
-    failsafe = loss_failsafe_of(talk)
-    return failsafe.what_it_does or "does not report whether it stops when setpoints stop"
 
 
 def loss_time_of(findings: Findings) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.probe.conversation import Conversation
-from mav_tasks.probe.drive_controller import DriveController, DriveEnded, is_fresh
+from mav_tasks.probe.drive_controller import DriveController, DriveEnded
 from mav_tasks.probe.driving_area import DrivingArea
 from mav_tasks.probe.failsafe import NotSet, set_failsafe
 from mav_tasks.probe.findings import Drive, Findings
@@ -176,7 +176,9 @@ class Probe:
         found = self.findings
         area = DrivingArea.about(motion.pose, turning=found.turning, radius=found.turning_radius)
         controller = DriveController(talk, persona, drive, area)
-        with_loss = self._may_try_loss(drive)
+        keeps_moving = loss_failsafe_of(talk).why_off
+        if keeps_moving:  # the server reads that itself: no profile is to outlive its cure
+            drive.loss_note = f"not tried: {keeps_moving}"
         self.stage = f"driving within {area.half:g} m of its place: keep clear; Ctrl-C stops it"
         try:
             yield from controller.take()
@@ -188,20 +190,13 @@ class Probe:
                 loss_time=loss_time_of(found),
                 is_car=found.turning == Turning.STEERED.value,
             )
-            yield from trials.run(with_loss=with_loss)
+            yield from trials.run(with_loss=not keeps_moving)
         except DriveEnded as end:
             drive.ended = str(end)
         except Interrupted as error:
             drive.ended, self.error = str(error), error
         self._is_clearing_up = True
         yield from controller.give_back()
-
-    def _may_try_loss(self, drive: Drive) -> bool:
-        """Whether it is seen what it does without setpoints; not if it would drive far for it."""
-        failsafe = loss_failsafe_of(self.talk)
-        if failsafe.why_off:  # the server reads that itself: no profile is to outlive its cure
-            drive.loss_note = f"not tried: {failsafe.why_off}"
-        return not drive.loss_note
 
     def _why_not_drive(self) -> str:
         talk, findings = self.talk, self.findings
@@ -214,11 +209,11 @@ class Probe:
             return "the server does not drive this type of rover"
         if talk.armed:
             return "it is armed already"
-        if not is_fresh(talk.motion, now=talk.now, within=talk.watch.motion_fresh):
+        if motion is None or talk.now - motion.at > talk.watch.motion_fresh:
             return "its position is unknown or too old"
         if slow:
             each = ", ".join(f"{rate.name} at {rate.granted:.1f} Hz" for rate in slow)
             return f"{each}: too slow to drive by"
-        if motion is None or motion.speed >= talk.watch.still_speed:
+        if motion.speed >= talk.watch.still_speed:
             return "it is moving"
         return ""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, degrees, hypot, pi, sin
+from math import cos, degrees, pi, sin
 
 from mav_tasks.mavlink.enums import MavFrame
 from mav_tasks.probe.drive_controller import DriveController, DriveEnded
@@ -11,6 +11,7 @@ from mav_tasks.probe.steps import Steps
 from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import BY_COURSE, WITH_YAW_RATE, Persona
 from mav_tasks.tasks.driving.guidance import wrap
+from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.task import Pose
 
 TRIAL_SPEED = 0.2  # m/s
@@ -115,9 +116,9 @@ class Trials:
         controller = self._controller
         before = controller.motion.pose
         wanted = kind.speeds(TRIAL_SPEED, before.yaw)
-        yield from self._with(kind, wanted, lambda: _way(before, controller))
+        yield from self._with(kind, wanted, lambda: distance(before, controller.motion.pose))
         yield from self._rest()
-        followed = _way(before, controller) >= FOLLOWED
+        followed = distance(before, controller.motion.pose) >= FOLLOWED
         (self._drive.accepted if followed else self._drive.refused).append(kind.name)
         if not followed and kind.name == self._own.name:
             raise DriveEnded(f"the rover does not follow {kind.name}")
@@ -201,7 +202,7 @@ class Trials:
         if not controller.is_still:
             raise DriveEnded(f"the rover does not stand within {STOP_TIME:g} s of zero setpoints")
         drive.speed = round(speed, 3)
-        drive.stopping_distance = round(_way(before, controller), 3)
+        drive.stopping_distance = round(distance(before, controller.motion.pose), 3)
         drive.stopping_time = round(stood_at - began, 2)
 
     def _measure_loss(self) -> Steps[None]:
@@ -229,7 +230,7 @@ class Trials:
             raise
         drive.loss_stop = "yes" if controller.is_still else "no"
         drive.loss_speed = round(speed, 3)
-        drive.loss_distance = round(_way(before, controller), 3)
+        drive.loss_distance = round(distance(before, controller.motion.pose), 3)
         if slowed_at is not None:
             drive.setpoint_timeout = round(slowed_at - began, 2)
         if drive.loss_stop == "no":
@@ -270,11 +271,6 @@ class Trials:
             ((c, controller.area.room(controller.motion.pose, c)) for c in courses),
             key=lambda x: x[1],
         )
-
-
-def _way(before: Pose, controller: DriveController) -> float:
-    pose = controller.motion.pose
-    return hypot(pose.north - before.north, pose.east - before.east)
 
 
 def _along(before: Pose, controller: DriveController) -> float:
