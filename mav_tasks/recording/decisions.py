@@ -59,7 +59,6 @@ class Decisions:
         self._why = ""  # why no more entries are queued; "": they are
         self._has_ended = False
         self._thread = WritingThread(str(self), write=self._write, end=self._finish)
-        self._thread.start()
 
     def __repr__(self) -> str:
         return f"Decisions({self._file}, {self._backlog})"

@@ -33,18 +33,13 @@ def stamp(utc: float) -> str:
     return f"{datetime.fromtimestamp(max(utc, 0.0), UTC):%Y-%m-%dT%H-%M-%SZ}"
 
 
-def name_of(start: str, number: int, suffix: str) -> str:
-    """Return the name of one file of a run."""
-    return f"{start}.{number}{suffix}" if number else f"{start}{suffix}"
-
-
 def new_file(folder: Path, start: str, number: int, suffix: str) -> tuple[int, Path, int]:
     """Create a file with the first free number from ``number`` on; raise OSError.
 
     Return its descriptor, path and number.
     """
     while True:
-        path = folder / name_of(start, number, suffix)
+        path = folder / (f"{start}.{number}{suffix}" if number else f"{start}{suffix}")
         try:
             return os.open(path, FLAGS, 0o600), path, number
         except FileExistsError:

@@ -22,29 +22,13 @@ them, which stands for a tuple. A record has no other clock, no path and no proc
 """
 
 from binascii import a2b_base64, b2a_base64
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from hashlib import blake2b
 from json import JSONEncoder
 from typing import Any, assert_never, get_args
 
-from mav_tasks.engine.inputs import (
-    AtOnce,
-    Backlog,
-    Committed,
-    Congestion,
-    HaltNotStored,
-    Input,
-    KeysChanged,
-    LinkChanged,
-    LinkSide,
-    Outgoing,
-    Packets,
-    PeerChanged,
-    SettingsChanged,
-    Shutdown,
-    StoreFailed,
-    WallClock,
-)
+from mav_tasks.engine import inputs
+from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Packets
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.recording.surroundings import settings_of, settings_to_json
 from mav_tasks.store.codec import Encoder, format_of
@@ -115,24 +99,24 @@ def input_of(line: Sequence[Any]) -> Input | None:
         case "packets":
             return _packets_of(*values)
         case "at once":
-            return AtOnce(tuple(_packets_of(*each) for each in values))
+            return inputs.AtOnce(tuple(_packets_of(*each) for each in values))
         case "backlog":
-            return Backlog(tuple(_packets_of(*each) for each in values))
+            return inputs.Backlog(tuple(_packets_of(*each) for each in values))
         case "link":
             link, side, up, peers, *rest = values
-            return LinkChanged(link, LinkSide[side], up, tuple(map(peer_of, peers)), *rest)
+            return inputs.LinkChanged(link, LinkSide[side], up, tuple(map(peer_of, peers)), *rest)
         case "keys":
             (keys,) = values
-            return KeysChanged(tuple(_key_of(*each) for each in keys))
+            return inputs.KeysChanged(tuple(_key_of(*each) for each in keys))
         case "peer":
             link, peer, up = values
-            return PeerChanged(link, peer_of(peer), up)
+            return inputs.PeerChanged(link, peer_of(peer), up)
         case "congestion":
             link, peer, is_congested = values
-            return Congestion(link, peer_of(peer), is_congested)
+            return inputs.Congestion(link, peer_of(peer), is_congested)
         case "settings":
             (settings,) = values
-            return SettingsChanged(settings_of(settings))
+            return inputs.SettingsChanged(settings_of(settings))
         case "committed" | "store failed" | "halt not stored" | "wall clock" | "shutdown":
             return _SIMPLE[kind](*values)
         case _:
@@ -145,12 +129,12 @@ def described(row: Sequence[Any]) -> str:
     return f"{name}({', '.join(f'{p}={v!r}' for p, v in zip(ROWS[name], values, strict=True))})"
 
 
-_SIMPLE: Mapping[str, type[Committed | StoreFailed | HaltNotStored | WallClock | Shutdown]] = {
-    "committed": Committed,
-    "store failed": StoreFailed,
-    "halt not stored": HaltNotStored,
-    "wall clock": WallClock,
-    "shutdown": Shutdown,
+_SIMPLE: Mapping[str, Callable[..., Input]] = {
+    "committed": inputs.Committed,
+    "store failed": inputs.StoreFailed,
+    "halt not stored": inputs.HaltNotStored,
+    "wall clock": inputs.WallClock,
+    "shutdown": inputs.Shutdown,
 }
 
 
@@ -160,32 +144,32 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["deadline", now]
         case Packets():
             return ["packets", now, *_packets_to_json(item)]
-        case AtOnce(packets=packets):
+        case inputs.AtOnce(packets=packets):
             return ["at once", now, *map(_packets_to_json, packets)]
-        case Backlog(packets=packets):
+        case inputs.Backlog(packets=packets):
             return ["backlog", now, *map(_packets_to_json, packets)]
-        case LinkChanged():
+        case inputs.LinkChanged():
             peers = [_peer_to_json(peer) for peer in item.peers]
             end = [item.is_local, item.is_stream, item.takes_unsigned, item.key, item.capacity]
             return ["link", now, item.link, item.side.name, item.up, peers, *end]
-        case KeysChanged(keys=keys):
+        case inputs.KeysChanged(keys=keys):
             told = [[key.name, key.role, key.fingerprint, bool(key.secret)] for key in keys]
             return ["keys", now, told]
-        case PeerChanged(link=link, peer=peer, up=up):
+        case inputs.PeerChanged(link=link, peer=peer, up=up):
             return ["peer", now, link, _peer_to_json(peer), up]
-        case Congestion(link=link, peer=peer, is_congested=is_congested):
+        case inputs.Congestion(link=link, peer=peer, is_congested=is_congested):
             return ["congestion", now, link, _peer_to_json(peer), is_congested]
-        case SettingsChanged(settings=settings):
+        case inputs.SettingsChanged(settings=settings):
             return ["settings", now, settings_to_json(settings)]
-        case Committed(through=through):
+        case inputs.Committed(through=through):
             return ["committed", now, through]
-        case StoreFailed(text=text):
+        case inputs.StoreFailed(text=text):
             return ["store failed", now, text]
-        case HaltNotStored(vehicle=vehicle):
+        case inputs.HaltNotStored(vehicle=vehicle):
             return ["halt not stored", now, vehicle]
-        case WallClock(offset=offset):
+        case inputs.WallClock(offset=offset):
             return ["wall clock", now, offset]
-        case Shutdown():
+        case inputs.Shutdown():
             return ["shutdown", now]
         case _:
             assert_never(item)

@@ -8,15 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mav_tasks.engine import inputs
-from mav_tasks.engine.inputs import (
-    AtOnce,
-    Input,
-    LinkChanged,
-    Outgoing,
-    Packets,
-    PeerChanged,
-    WallClock,
-)
+from mav_tasks.engine.inputs import Input, Outgoing, Packets
 from mav_tasks.recording.backlog import MOST, ROOM_OF_PACKET, SMALL, Backlog, room_of
 from mav_tasks.recording.losses import Losses
 from mav_tasks.recording.new_files import write_all
@@ -53,7 +45,6 @@ class Tlog:
         self._unwritten = Losses(self._name)
         self._retry_at = 0.0  # monotonic s
         self._thread = WritingThread(self._name, write=self._write, end=self._end)
-        self._thread.start()
 
     def __repr__(self) -> str:
         return f"Tlog({self._files}, {self._backlog})"
@@ -66,10 +57,10 @@ class Tlog:
         if isinstance(item, Packets):
             if not self._backlog.put((now, item), room_of(item)):
                 self._too_many.lose(len(item.datagrams), "the disk is too slow")
-        elif isinstance(item, AtOnce | inputs.Backlog):
+        elif isinstance(item, inputs.AtOnce | inputs.Backlog):
             for each in item.packets:
                 self.on_input(each, now=now)
-        elif isinstance(item, WallClock | LinkChanged | PeerChanged):
+        elif isinstance(item, inputs.WallClock | inputs.LinkChanged | inputs.PeerChanged):
             self._backlog.put((now, item), SMALL)
 
     def on_output(

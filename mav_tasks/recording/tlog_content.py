@@ -7,16 +7,8 @@ packets sent to clients it has only the server's own: forwarded telemetry was lo
 import struct
 from collections.abc import Iterator, Sequence
 
-from mav_tasks.engine.inputs import (
-    Input,
-    LinkChanged,
-    LinkSide,
-    Outgoing,
-    Packets,
-    Peer,
-    PeerChanged,
-    WallClock,
-)
+from mav_tasks.engine import inputs
+from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Packets, Peer
 from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import DecodeCounts, crc_fits
@@ -47,13 +39,13 @@ class TlogContent:
         match item:
             case Packets():
                 yield from self._received(item, now=now)
-            case WallClock(offset=offset):
+            case inputs.WallClock(offset=offset):
                 self._wall_offset = offset
-            case LinkChanged(link=link, side=side):
+            case inputs.LinkChanged(link=link, side=side):
                 self._intake.change_link(item)
                 if side is LinkSide.VEHICLES:
                     self._vehicle_links.add(link)
-            case PeerChanged():
+            case inputs.PeerChanged():
                 self._intake.change_peer(item)
 
     def of_output(self, packets: Sequence[Outgoing], *, now: float) -> Iterator[bytes]:

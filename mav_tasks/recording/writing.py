@@ -11,7 +11,7 @@ END_LIMIT = 2.0  # s, maximum wait for the last writes at shutdown
 
 
 class WritingThread:
-    """Calls ``write`` every PERIOD, and ``end`` at the end, in its own thread."""
+    """Calls ``write`` every PERIOD, and ``end`` at the end, in its own thread, from creation on."""
 
     def __init__(self, name: str, *, write: Callable[[], None], end: Callable[[], None]) -> None:
         self._name = name
@@ -19,13 +19,10 @@ class WritingThread:
         self._end = end
         self._is_closing = Event()
         self._thread = Thread(target=self._run, name="recorder", daemon=True)
+        self._thread.start()
 
     def __repr__(self) -> str:
         return f"WritingThread({self._name}, alive={self._thread.is_alive()})"
-
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
 
     def close(self) -> None:
         """Write the rest and end; wait at most END_LIMIT."""
