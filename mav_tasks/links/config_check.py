@@ -46,7 +46,8 @@ def links_of(asked: LinkSettings) -> list[ConfiguredLink]:
     for side in SIDES:
         for text in getattr(asked, side):
             url = parse_url(text)
-            is_far = side == "clients" and url == pushing and _pushes_far(asked)
+            pushes = side == "clients" and url == pushing
+            is_far = pushes and not all(map(_is_near, asked.push))
             links.append(
                 ConfiguredLink(side, url, policy_of(url, side, asked, pushes_far=is_far), is_far)
             )
@@ -94,10 +95,6 @@ def _faults_of_signing(asked: LinkSettings) -> Iterator[tuple[str, UsageError]]:
         if link.pushes_far and link.policy.takes_unsigned and not asked.insecure:
             far = next(text for text in asked.push if not _is_near(text))
             yield "push", unsigned_beyond(f"push {far}")
-
-
-def _pushes_far(asked: LinkSettings) -> bool:
-    return not all(map(_is_near, asked.push))
 
 
 def _is_near(text: str) -> bool:

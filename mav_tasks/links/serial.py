@@ -98,7 +98,7 @@ class SerialLink:
         try:
             self._open()
         except FAILURES as error:
-            if not _is_not_there(error):
+            if _number_of(error) not in NOT_THERE:
                 self._selector.close()
                 reason = _reason_of(error)
                 raise LinkOpenError(f"link {url} cannot be opened: {reason}") from error
@@ -231,10 +231,6 @@ class SerialLink:
         words = self._attempts.failed(_reason_of(error))
         if words is not None:
             self._changes.append(PeerChange(self._url.device, PeerState.DOWN, words))
-
-
-def _is_not_there(error: Exception) -> bool:
-    return _number_of(error) in NOT_THERE
 
 
 def _number_of(error: Exception) -> int | None:
