@@ -1,6 +1,6 @@
 """The report of a probe, as a table."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 from rich.table import Table
 from rich.text import Text
@@ -15,7 +15,7 @@ STYLES: Mapping[Mark, str] = {
 }
 
 
-def table_of(lines: Sequence[Line]) -> Table:
+def table_of(lines: Iterable[Line]) -> Table:
     """Return the lines as a table; long texts are wrapped."""
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, show_header=False)
     table.add_column(no_wrap=True)

@@ -37,11 +37,6 @@ class Line(NamedTuple):
     mark: Mark = Mark.PLAIN
 
 
-def lines_of(findings: Findings) -> list[Line]:
-    """Return the report, in the order of reading."""
-    return list(_lines(findings))
-
-
 def as_json(findings: Findings) -> dict[str, Any]:
     """Return all of it; what is not a number is null, and what is not known is null or empty."""
     values = asdict(findings)
@@ -51,7 +46,8 @@ def as_json(findings: Findings) -> dict[str, Any]:
     return values
 
 
-def _lines(findings: Findings) -> Iterator[Line]:
+def lines_of(findings: Findings) -> Iterator[Line]:
+    """Yield the report, in the order of reading."""
     make = findings.autopilot or "unsupported autopilot"
     kind = TYPES.get(findings.vehicle_type, f"type {findings.vehicle_type}, not a rover")
     is_known = bool(findings.autopilot) and findings.is_rover
@@ -163,7 +159,9 @@ def _drive(drive: Drive | None) -> Iterator[Line]:
     if drive.arming:
         yield Line("arming", drive.arming, _good(drive.arming == "accepted"))
     if drive.hold:
-        yield Line("HOLD", "accepted" if drive.hold == "yes" else "NOT seen", _bad(drive.hold))
+        is_held = drive.hold == "yes"
+        words, mark = ("accepted", Mark.GOOD) if is_held else ("NOT seen", Mark.BAD)
+        yield Line("HOLD", words, mark)
     for name in drive.accepted:
         yield Line("setpoint", f"{name}: followed", Mark.GOOD)
     for name in drive.refused:
@@ -203,7 +201,3 @@ def _loss(drive: Drive) -> Iterator[Line]:
 
 def _good(is_good: bool) -> Mark:
     return Mark.GOOD if is_good else Mark.WARNING
-
-
-def _bad(said: str) -> Mark:
-    return Mark.GOOD if said == "yes" else Mark.BAD
