@@ -227,8 +227,7 @@ class OffboardControl:
         It may be a failsafe's, which ends as soon as a setpoint that is under way comes.
         """
         self._news.hold_asked_at = now
-        until = now + self._watch.ask_vehicle
-        self._request(self._orders.hold(), until=until, now=now, immediate=True)
+        self._request(self._orders.hold(), now=now)
 
     def keep_armed(self) -> None:
         """A client arms the vehicle, too: handed back, it stays armed as that client asked."""
@@ -340,7 +339,7 @@ class OffboardControl:
         """
         if self._persona.drives_in_hold:
             staying = self._orders.staying(changes_mode=False)
-            self._request(staying, until=now + LEAD_IN, now=now)
+            self._sender.request(staying, now=now, give_up_after=LEAD_IN)
         self._begin_asking(Phase.LEADING_IN, now=now)
         self._lead_until, self._led_at = now + LEAD_IN, now
         self._send_setpoint(STANDING)
@@ -609,16 +608,14 @@ class OffboardControl:
     def _request_hold(self, *, now: float, again_after: float) -> None:
         self._news.hold_asked_at = now
         self._next_hold_at = now + again_after
-        until = now + self._watch.ask_vehicle
-        self._request(self.hold_request(), until=until, now=now, immediate=True)
+        self._request(self._orders.hold(), now=now)
         if self._persona.drives_in_hold and self._news.mode == self._persona.hold_mode:
             staying = self._orders.staying(changes_mode=True)
-            self._request(staying, until=until, now=now, immediate=True)
+            self._request(staying, now=now)
 
     def _request_disarming(self, *, now: float) -> None:
         self._news.disarming_asked_at = now
-        until = now + self._watch.ask_vehicle
-        self._request(self._orders.arming(arm=False), until=until, now=now, immediate=True)
+        self._request(self._orders.arming(arm=False), now=now)
 
     def _is_hold_in_vain(self, now: float) -> bool:
         """Whether a vehicle whose HOLD is not to be trusted has not shown it in time."""
@@ -632,15 +629,10 @@ class OffboardControl:
         is_news = self._news.is_settled or self._news.awaits_answer
         return self._persona.stop_disarms and is_news and not self._news.armed
 
-    def _request(
-        self,
-        command: CommandLong | CommandInt,
-        *,
-        until: float,
-        now: float,
-        immediate: bool = False,
-    ) -> None:
-        self._sender.request(command, now=now, give_up_after=until - now, immediate=immediate)
+    def _request(self, command: CommandLong | CommandInt, *, now: float) -> None:
+        """Send what makes it stand or disarms it, ahead of what waits."""
+        limit = self._watch.ask_vehicle
+        self._sender.request(command, now=now, give_up_after=limit, immediate=True)
 
     def _withdraw_requests(self) -> None:
         self._withdraw(MavCmd.DO_SET_MODE)
