@@ -42,19 +42,16 @@ class EngineObservers:
         return f"EngineObservers({list(self._all)})"
 
     def on_input(self, item: Input | None, *, now: float) -> None:
-        """Pass an input to each observer."""
         if self._all:
             self._tell(lambda observer: observer.on_input(item, now=now))
 
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
-        """Pass the engine's output to each observer."""
         if self._all:
             self._tell(lambda observer: observer.on_output(packets, events, now=now))
 
     def close(self) -> None:
-        """Close each observer."""
         self._tell(lambda observer: observer.close())
 
     def _tell(self, say: Callable[[EngineObserver], None]) -> None:

@@ -68,7 +68,6 @@ class Pump:
         self._note(noted)  # last, so that no answer waits for the log
 
     def close(self) -> None:
-        """Close the observers."""
         self._observers.close()
 
     def send_last_words(self) -> None:

@@ -86,7 +86,6 @@ def file_of(
     file_type: str = MAVLINK_ACTIONS,
     component: int = MavComponent.ONBOARD_COMPUTER,
 ) -> str:
-    """Return the text of an actions file."""
     entries = [
         {
             "label": action.label,

@@ -143,7 +143,6 @@ class SerialLink:
         self._flush()
 
     def take_changes(self) -> list[PeerChange]:
-        """Return the changes of the device's state since the last call."""
         changes, self._changes = self._changes, []
         return changes
 

@@ -62,7 +62,6 @@ class TcpLink:
         return self._selector.fileno()
 
     def take_changes(self) -> list[PeerChange]:
-        """Return the changes of peers since the last call."""
         changes, self._changes = self._changes, []
         return changes
 
@@ -197,7 +196,6 @@ def resolve(host: str, port: int) -> list[tuple[socket.AddressFamily, tuple[str,
 
 
 def reason_of(error: OSError) -> str:
-    """Return an error's text."""
     if error.errno is not None and error.errno > 0:
         return os.strerror(error.errno)
     return error.strerror or str(error)

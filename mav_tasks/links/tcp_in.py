@@ -48,7 +48,6 @@ class TcpInLink(TcpLink):
 
     @property
     def port(self) -> int:
-        """The local port on which the link listens."""
         return int(self._socket.getsockname()[1])
 
     def poll(self) -> None:
@@ -57,7 +56,6 @@ class TcpInLink(TcpLink):
         self._accept_again()
 
     def close(self) -> None:
-        """Close everything."""
         super().close()
         self._socket.close()
 

@@ -62,7 +62,6 @@ class TcpOutLink(TcpLink):
             self._dial(now)
 
     def close(self) -> None:
-        """Close everything."""
         if self._dialling is not None:
             self._dialling.close()
             self._dialling = None

@@ -93,11 +93,9 @@ class UdpLink:
             return _open(family, (host, 0))
 
     def fileno(self) -> int:
-        """Return the socket's descriptor."""
         return self._socket.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` available datagrams."""
         received: list[tuple[Peer, bytes]] = []
         receive_from = self._socket.recvfrom
         try:
@@ -137,7 +135,6 @@ class UdpLink:
             self.lost += 1
 
     def close(self) -> None:
-        """Close the socket."""
         self._socket.close()
 
 

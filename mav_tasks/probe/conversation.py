@@ -93,7 +93,6 @@ class Conversation:
     # time and packets
 
     def receive(self, packet: Packet, *, now: float) -> None:
-        """Take a packet in."""
         self.now = now
         is_rover = packet.source == self.rover
         if is_rover:

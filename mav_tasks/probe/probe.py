@@ -89,7 +89,6 @@ class Probe:
         return self.talk.control is not None and self.talk.control.phase is not Phase.IDLE
 
     def receive(self, packet: Packet, *, now: float) -> None:
-        """Take a packet in."""
         self.talk.receive(packet, now=now)
         self._walk.go_on(now=now)
 

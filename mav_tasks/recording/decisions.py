@@ -162,7 +162,6 @@ class Decisions:
 
 
 def project_version() -> str:
-    """Return the installed version of this package."""
     try:
         return version("mav-tasks")
     except PackageNotFoundError:

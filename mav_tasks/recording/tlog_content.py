@@ -35,7 +35,6 @@ class TlogContent:
         return now + self._wall_offset
 
     def of_input(self, item: Input, *, now: float) -> Iterator[bytes]:
-        """Yield the log entries of an input."""
         match item:
             case Packets():
                 yield from self._received(item, now=now)
@@ -49,7 +48,6 @@ class TlogContent:
                 self._intake.change_peer(item)
 
     def of_output(self, packets: Sequence[Outgoing], *, now: float) -> Iterator[bytes]:
-        """Yield the log entries of the packets sent in one turn."""
         when = self._when(now)
         told: dict[bytes, tuple[str, Peer]] = {}
         for link, peer, data, *_ in packets:

@@ -38,7 +38,6 @@ NO_MESSAGE = CommandInt(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
 def command_of(message: CommandLong | CommandInt) -> Command:
-    """Return the command that a message carries."""
     target = address_of(message.target_system, message.target_component)
     first = (message.param1, message.param2, message.param3, message.param4)
     if isinstance(message, CommandInt):
@@ -62,7 +61,6 @@ class Answer(NamedTuple):
     source: Address
 
     def ack(self, to: Address) -> CommandAck:
-        """Return the COMMAND_ACK for a client's address."""
         return CommandAck(
             self.command,
             self.result,
@@ -99,7 +97,6 @@ class CommandReceiver:
         return None
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
-        """Take a command in."""
         pending = Pending(command, packet, now)
         self._packets.pop(packet, None)
         self._packets[packet] = pending

@@ -30,7 +30,6 @@ class HeartbeatMonitor:
         return bool(self.latest.base_mode & MavModeFlag.SAFETY_ARMED)
 
     def receive(self, heartbeat: Heartbeat, *, now: float) -> None:
-        """Take a heartbeat in."""
         self.latest = heartbeat
         #: whether the vehicle says that it is armed
         self.armed = self.may_be_armed
@@ -41,7 +40,6 @@ class HeartbeatMonitor:
         self.armed = False
 
     def is_heard(self, *, now: float) -> bool:
-        """Whether heartbeats are coming."""
         return now - self.heard_at <= self.lost_after
 
 

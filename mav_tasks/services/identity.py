@@ -17,7 +17,6 @@ class VehicleIdentity:
 
 
 def identity_of(version: AutopilotVersion) -> VehicleIdentity:
-    """Return who this is."""
     return VehicleIdentity(uid_of(version), firmware_of(version))
 
 

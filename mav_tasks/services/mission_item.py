@@ -65,7 +65,6 @@ def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
 
 
 def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItemInt:
-    """Return the message that carries an item."""
     return m.MissionItemInt(to.system_id, to.component_id, seq, *item, mission_type)
 
 

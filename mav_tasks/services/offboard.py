@@ -153,7 +153,6 @@ class OffboardControl:
         return self._news.arming_asked_at
 
     def apply(self, watch: Watch) -> None:
-        """Take new settings."""
         self._watch = watch
 
     def adopt(self, persona: Persona) -> None:
@@ -505,7 +504,6 @@ class OffboardControl:
         return self._orders.velocity(self._standing)
 
     def hold_request(self) -> CommandLong:
-        """Return the command that asks for HOLD."""
         return self._orders.hold()
 
     @property

@@ -110,7 +110,6 @@ class Orders:
         return self._command(MavCmd.DO_SET_MODE, *self._persona.mode_params(mode))
 
     def hold(self) -> CommandLong:
-        """Return the command that asks for HOLD."""
         return self.mode(self._persona.hold_mode)
 
     def our_mode(self) -> CommandLong:
@@ -118,7 +117,6 @@ class Orders:
         return self.mode(self._persona.control_mode)
 
     def arming(self, *, arm: bool) -> CommandLong:
-        """Return the command to arm or disarm."""
         return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
 
     def staying(self, *, changes_mode: bool) -> CommandInt:

@@ -23,7 +23,6 @@ def value_of(values: Mapping[str, float], name: str) -> m.ParamValue:
 
 
 def all_values(values: Mapping[str, float]) -> list[m.ParamValue]:
-    """Return the messages that tell all of them."""
     return [value_of(values, name) for name in values]
 
 

@@ -35,7 +35,6 @@ class Parameter:
         return self.key.path.removeprefix(ENGINE)
 
     def value(self, settings: Settings) -> float:
-        """Return the value that settings have."""
         plain = self.key.shape.plain(value_at(settings, self.path))
         return as_sent(float(self.choices.index(str(plain)) if self.choices else str(plain)))
 

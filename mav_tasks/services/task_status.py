@@ -36,7 +36,6 @@ class TaskStatusSender:
         self._retry_at = 0.0
 
     def apply(self, *, rate: float) -> None:
-        """Take another rate."""
         self._rate = rate
         self._limit.apply(rate=rate)
 

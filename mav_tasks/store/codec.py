@@ -72,7 +72,6 @@ class Encoder:
         self._encoders: dict[type, Callable[[Any, float], list[Any]]] = {}
 
     def row(self, value: Any, *, offset: float) -> list[Any]:
-        """Return the row of a dataclass."""
         kind = type(value)
         encode = self._encoders.get(kind)
         if encode is None:

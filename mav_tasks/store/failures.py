@@ -25,7 +25,6 @@ def is_failure(error: Exception) -> bool:
 
 
 def words_for(error: Exception) -> str:
-    """Return the text for a disk failure."""
     if isinstance(error, OSError):
         return error.strerror or str(error)
     words = _WORDS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF)

@@ -46,7 +46,6 @@ class HaltKeeper:
         return f"HaltKeeper({self._record!r}, {len(self._unkept)} not kept)"
 
     def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def append(self, words: Sequence[Word]) -> None:

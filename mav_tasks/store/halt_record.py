@@ -171,7 +171,6 @@ class HaltRecord:
         self._put(Word(IDS, number, value=next_id))
 
     def close(self) -> None:
-        """Close the file."""
         os.close(self._fd)
 
     def _put(self, word: Word) -> None:

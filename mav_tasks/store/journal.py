@@ -54,7 +54,6 @@ class Journal:
             return int(self._connection.execute("PRAGMA data_version").fetchone()[0])
 
     def close(self) -> None:
-        """Close the file."""
         self._connection.close()
 
     def _page(self, offset: float) -> tuple[list[tuple[int, Event]], bool]:

@@ -52,7 +52,6 @@ class Lock:
         return "Lock(held)" if self._fd is not None else "Lock(released)"
 
     def release(self) -> None:
-        """Release the lock."""
         if self._fd is not None:
             os.close(self._fd)
             self._fd = None

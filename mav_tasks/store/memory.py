@@ -32,7 +32,6 @@ class MemoryStore:
         yield from enumerate(self.events, 1 + self._count - len(self.events))
 
     def append(self, events: Sequence[Event]) -> None:
-        """Add events."""
         self.events += events
         self._count += len(events)
         if len(self.events) > 2 * self._capacity:
@@ -55,7 +54,6 @@ class MemoryStore:
 def open_store(
     _place: str, _wall_offset: Callable[[], float], _retention: Retention
 ) -> MemoryStore:
-    """Return an empty store."""
     return MemoryStore()
 
 

@@ -150,7 +150,6 @@ def open_store(place: str, wall_offset: Callable[[], float], retention: Retentio
 
 
 def open_journal(place: str, which: Which) -> Journal:
-    """Open the journal of a file."""
     return Journal(_path_of(place), which)
 
 

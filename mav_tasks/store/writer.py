@@ -63,7 +63,6 @@ class Writer:
         return f"Writer({self._database!r}, {'failing' if self._must_reopen else 'well'})"
 
     def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def trim_for(self, seconds: float) -> None:
