@@ -32,11 +32,9 @@ class Action:
     params: tuple[float, ...]
 
 
-def _task(
-    label: str, description: str, command: MavCmd, *params: float, priority: float = PRIORITY
-) -> Action:
+def _task(label: str, description: str, command: MavCmd, *params: float) -> Action:
     first = (*params, 0.0, 0.0, 0.0)[:3]
-    return Action(label, description, command, (*first, 0.0, 0.0, 0.0, priority))
+    return Action(label, description, command, (*first, 0.0, 0.0, 0.0, PRIORITY))
 
 
 #: QGroundControl shows three in a row, and inserts one of its own in front while a rover is armed:
