@@ -102,6 +102,12 @@ class LossFailsafe:
         return self._asked < ASKS and bool(self._missing)
 
     @property
+    def stands(self) -> bool:
+        """Whether the vehicle has said that it stands when setpoints stop."""
+        is_known = self._asked != NEVER and not {AFTER, ACTION}.intersection(self._missing)
+        return is_known and not self.why_off
+
+    @property
     def why_off(self) -> str:
         """Return in words why it would not stand without us; "": it does, or is unknown."""
         return self._fault()[1]

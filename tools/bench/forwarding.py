@@ -122,7 +122,7 @@ def _telemetry() -> list[bytes]:
             473977420, 85455940, 488000, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0
         ),
         m.MissionCurrent.id: m.MissionCurrent(0),
-        m.RcChannels.id: m.RcChannels(1000, 8, *[1500] * 8, *[65535] * 10, 255),
+        m.RcChannels.id: m.RcChannels(1000, 8, *([1500] * 8 + [65535] * 10 + [255])),
     }
     due: list[tuple[float, m.Message]] = [(0.0, heartbeat)]
     for message_id, interval in WANTED.items():
