@@ -28,8 +28,8 @@ MANY = 60_000
 PATIENCE = 0.3  # s without an answer, after which outstanding commands count as lost
 BEAT = 0.5  # s, between the vehicle's heartbeats
 
-GOAL_RATIO = 4.0
-GOAL_RATE = 20_000
+GOAL_RATIO = 2.5  # these are the goals of a pure core
+GOAL_RATE = 15_000
 GOAL_DURABLE_RATIO = 2.0
 GOAL_DURABLE_RATE = 10_000
 SYNCS = 1_000

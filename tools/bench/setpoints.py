@@ -1,4 +1,4 @@
-"""Evenness of 20 Hz setpoints with 1, 20 and 100 kinematic rovers driven by one server."""
+"""Evenness of 20 Hz setpoints with 1, 20, 100 and 150 kinematic rovers driven by one server."""
 
 import json
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from .child import child, free_port, simulated_rovers, udp_socket
 from .scripted import CLIENT, loopback
 from .table import Row
 
-ROVERS = (1, 20, 100)
+ROVERS = (1, 20, 100, 150)
 DRIVING = 12.0  # s
 GATHER = 6.0  # s until all rovers are known and have sent a position
 GOAL = 5e-3  # s
