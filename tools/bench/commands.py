@@ -133,7 +133,7 @@ def _latency(what: str, ours: float, echo: float, *, goal: float | None) -> Row:
         f"{ours * 1e6:.0f} µs",
         f"{echo * 1e6:.0f} µs echo",
         f"{ours / echo:.1f}×",
-        "" if goal is None else f"≤ {goal:.0f}×",
+        "" if goal is None else f"≤ {goal:g}×",
         None if goal is None else ours <= goal * echo,
     )
 
