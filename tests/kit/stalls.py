@@ -1,16 +1,22 @@
-"""Detects stalls of the machine: a small process beside the tests only sleeps and checks the time.
+"""Detects stalls of the machine and of its disk, with a small process beside the tests.
 
-Run as a program, it writes a line for each time it was kept from running, until its parent ends.
+It sleeps, sometimes writes to the disk, and checks the time. Run as a program, it writes a line for
+each time that this took too long, until its parent ends.
 """
 
 import os
 import subprocess
 import sys
 from dataclasses import dataclass, field
+from itertools import count
+from tempfile import TemporaryFile
 from time import monotonic, sleep
 
-STALL = 0.25  # s; half of watch.late_tick, after which a server holds its tasks
+#: s; a server holds its tasks after watch.late_tick, 0.5 s, and refuses new ones if the disk takes
+#: watch.commit, 0.4 s
+STALL = 0.25
 PERIOD = 0.02  # s
+DISK = 10  # periods between two writes to the disk
 
 
 @dataclass(frozen=True)
@@ -71,12 +77,18 @@ def watch() -> None:
     """Write an empty line, then begin and end of each stall, until the parent ends."""
     parent, last = os.getppid(), monotonic()
     print(flush=True)
-    while os.getppid() == parent:
-        sleep(PERIOD)
-        now = monotonic()
-        if now - last > STALL:
-            print(last, now, flush=True)
-        last = now
+    with TemporaryFile() as file:  # where the tests have their files
+        for number in count():
+            sleep(PERIOD)
+            if number % DISK == 0:
+                os.pwrite(file.fileno(), b".", 0)
+                os.fsync(file.fileno())
+            now = monotonic()
+            if now - last > STALL:
+                print(last, now, flush=True)
+            last = now
+            if os.getppid() != parent:
+                return
 
 
 if __name__ == "__main__":

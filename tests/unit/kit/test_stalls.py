@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from time import monotonic, sleep
@@ -33,6 +35,22 @@ def test_a_stall_is_told_with_its_time(watch: StallWatch) -> None:
     assert stall.begin <= before + 0.1
     assert stall.end >= before + 2 * STALL
     assert not watch.since(max(after, stall.end))
+
+
+def test_a_disk_that_does_not_answer_is_a_stall() -> None:
+    program = f"""
+import os, time
+from tests.kit import stalls
+os.fsync = lambda _: time.sleep({2 * STALL})
+stalls.watch()
+"""
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watcher:
+        assert watcher.stdout is not None
+        assert watcher.stdout.readline() == "\n"
+        begin, end = map(float, watcher.stdout.readline().split())
+        watcher.kill()
+    assert end - begin >= 2 * STALL
 
 
 def test_a_watcher_that_ended_is_no_quiet_machine(watch: StallWatch) -> None:
