@@ -48,7 +48,7 @@ class Which:
 class Store(Protocol):
     """The interface between runner and disk. Disk failures are outcomes, never exceptions.
 
-    Only ``load`` raises: StoreError.
+    Only ``load`` and ``journal`` raise: StoreError.
     """
 
     #: what people call the store
@@ -61,6 +61,10 @@ class Store(Protocol):
 
         None: the store keeps no state over runs.
         """
+        ...
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        """Yield every stored event, numbered over the life of the store."""
         ...
 
     def append(self, events: Sequence[Event]) -> None:

@@ -49,7 +49,7 @@ class Database:
                 _set_up(self._connection)
                 schema.migrate(self._connection)
                 self.format_id = self._find_format()
-                row = self._meta("last_number, last_write, ended_well")
+                row = self._meta("next_id, last_number, last_write, ended_well")
                 with transaction(self._connection):  # durable before any rover is moved
                     self._connection.execute("UPDATE meta SET ended_well = 0")
                 self._files = _identities(path)
@@ -60,9 +60,10 @@ class Database:
             raise StoreError(f"store {path}: {error}") from None
         except (OSError, sqlite3.Error) as error:
             raise StoreError(f"store {path}: {words_for(error)}") from error
-        self.last_number: int = row[0]
-        self.last_write: float | None = row[1]  # UTC seconds, of an earlier process
-        self.ended_well = bool(row[2])
+        self.next_id: int = row[0]
+        self.last_number: int = row[1]
+        self.last_write: float | None = row[2]  # UTC seconds, of an earlier process
+        self.ended_well = bool(row[3])
 
     def __repr__(self) -> str:
         return f"Database({self._path.name}, event {self.last_number})"

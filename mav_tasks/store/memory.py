@@ -1,6 +1,6 @@
 """A store in memory, lost with the process."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from mav_tasks.errors import StoreError
 from mav_tasks.settings import Retention
@@ -26,6 +26,10 @@ class MemoryStore:
 
     def load(self) -> None:
         """Return None: nothing is kept over runs."""
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        """Yield the events that have not been dropped."""
+        yield from enumerate(self.events, 1 + self._count - len(self.events))
 
     def append(self, events: Sequence[Event]) -> None:
         self.events += events

@@ -2,8 +2,8 @@
 
 import os
 import stat
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 from platformdirs import user_data_path
@@ -87,6 +87,11 @@ class SqliteStore:
         return reading.read_restored(
             self._path, offset=self._wall_offset(), ended_well=self._ended_well, idle=self._idle
         )
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        """Yield every stored event, numbered over the life of the file; raise StoreError."""
+        with closing(Journal(self._path)) as journal:
+            yield from journal.take(offset=self._wall_offset())
 
     def append(self, events: Sequence[Event]) -> None:
         """Queue events to be made durable, without blocking; raise ValueError after ``close``."""

@@ -1,6 +1,6 @@
 """Another kind of store, ``shelf:FOLDER``. It has the methods of ``Store`` and no others."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from mav_tasks.settings import Retention
@@ -22,6 +22,9 @@ class Shelf:
 
     def load(self) -> Restored:
         return self._inner.load()
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        return self._inner.journal()
 
     def append(self, events: Sequence[Event]) -> None:
         self._inner.append(events)

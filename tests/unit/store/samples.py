@@ -3,14 +3,13 @@
 import select
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, NotKept, Outcome, Store
-from mav_tasks.store.journal import Journal
 from mav_tasks.store.sqlite import SqliteStore
-from mav_tasks.tasks.events import Event, TaskSubmitted
+from mav_tasks.tasks.events import TaskSubmitted
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
@@ -54,12 +53,6 @@ def opened(
         yield store
     finally:
         store.close()
-
-
-def journal_of(path: Path) -> list[tuple[int, Event]]:
-    """Return every event in a store's file, numbered over its life."""
-    with closing(Journal(path)) as journal:
-        return list(journal.take(offset=OFFSET))
 
 
 def wait_for(store: Store, through: int) -> list[Outcome]:

@@ -24,7 +24,6 @@ from tests.kit.processes import free_udp_ports
 from tests.unit.store.samples import (
     FOR_EVER,
     PATIENCE,
-    journal_of,
     opened,
     submitted,
     wait_for,
@@ -94,7 +93,7 @@ def test_what_was_kept_outlives_the_process(path: Path, life: int) -> None:
         assert ids == list(range(1, len(ids) + 1))
         assert len(ids) >= through
         assert found.next_id == len(ids) + 1
-        journal = journal_of(path)
+        journal = list(store.journal())
         assert [n for n, _ in journal] == ids
         assert [e.task for _, e in journal if isinstance(e, TaskSubmitted)] == list(found.tasks)
 
@@ -135,7 +134,7 @@ def test_a_full_disk_is_said_and_nothing_is_lost_over_it(path: Path) -> None:
         ids = [task.id for task in store.load().tasks]
         assert ids == list(range(1, len(ids) + 1))
         assert len(ids) >= through
-        assert [number for number, _ in journal_of(path)] == ids
+        assert [number for number, _ in store.journal()] == ids
 
 
 @pytest.mark.parametrize("way", ["moved away", "another in its place", "its log removed"])

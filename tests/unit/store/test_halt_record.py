@@ -16,7 +16,7 @@ from mav_tasks.store.halt_record import FIRST_ONES as CELLS
 from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused, VehicleArmingSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from tests.unit.store.full_disk import NO_NAMESPACE
-from tests.unit.store.samples import journal_of, next_outcomes, opened, submitted, wait_for
+from tests.unit.store.samples import next_outcomes, opened, submitted, wait_for
 
 R = TaskReason
 IN_ITS_OWN_MOUNTS = ("unshare", "--user", "--map-root-user", "--mount")
@@ -64,7 +64,7 @@ def test_a_stop_that_only_the_record_took_is_in_force_in_the_next_life(
     monkeypatch.undo()
     with opened(path) as store:
         found = store.load()
-        journal = journal_of(path)
+        journal = list(store.journal())
     assert (found.paused, found.ended_well) == ({1: R.STOPPED}, False)
     assert journal == [(3, STOP)]  # 1 and 2 are lost numbers, which no other event gets
     assert paused(path) == {1: R.STOPPED}

@@ -31,7 +31,6 @@ from mav_tasks.tasks.task import MAX_TASK_ID, Frame, Pose, Progress, TaskId, Ter
 from tests.unit.store.samples import (
     OFFSET,
     finish,
-    journal_of,
     opened,
     submitted,
     wait_for,
@@ -82,8 +81,8 @@ def test_what_comes_back_is_what_the_book_has(path: Path) -> None:
         store.append(later)
         wait_for(store, len(later))
         assert store.load().tasks == registry.all()
-        assert [event for _, event in journal_of(path)] == events + later
-        assert [number for number, _ in journal_of(path)] == list(range(1, 10))
+        assert [event for _, event in store.journal()] == events + later
+        assert [number for number, _ in store.journal()] == list(range(1, 10))
         assert store.load().next_id == 5
 
 
@@ -233,11 +232,11 @@ def test_retention_takes_the_oldest_that_are_over_and_their_events(path: Path) -
         store.append([*registry.take_events(), *events])
     with opened(path, retention=Retention(max_age=4005.0, max_count=None)) as store:
         assert [task.id for task in store.load().tasks] == list(range(200, 601))
-        texts = [e.text for _, e in journal_of(path) if isinstance(e, VehicleSeen)]
+        texts = [e.text for _, e in store.journal() if isinstance(e, VehicleSeen)]
         assert texts == ["new"]
     with opened(path, retention=Retention(max_age=None, max_count=10)) as store:
         assert [task.id for task in store.load().tasks] == list(range(491, 601))
-        about = {getattr(event, "task_id", 0) for _, event in journal_of(path)}
+        about = {getattr(event, "task_id", 0) for _, event in store.journal()}
         assert about - {0} == set(range(491, 501))
 
 
@@ -271,7 +270,7 @@ def test_a_locked_file_holds_nothing_up_and_nothing_is_lost(path: Path) -> None:
         assert longest < 0.1
         other.execute("ROLLBACK")
         assert wait_for(store, 100)[-1] == Kept(100)
-        assert [event for _, event in journal_of(path)] == [submitted(n) for n in range(1, 101)]
+        assert [event for _, event in store.journal()] == [submitted(n) for n in range(1, 101)]
     other.close()
 
 
@@ -308,7 +307,7 @@ def test_a_commit_that_failed_and_yet_was_made_is_not_made_twice(
         assert [type(outcome) for outcome in outcomes] == [NotKept, Kept]
         store.append([submitted(2)])
         wait_for(store, 3)
-        assert [number for number, _ in journal_of(path)] == [1, 2, 3]
+        assert [number for number, _ in store.journal()] == [1, 2, 3]
 
 
 def test_our_own_mistake_is_raised_where_outcomes_are_taken(path: Path) -> None:
@@ -322,7 +321,7 @@ def test_the_last_word_of_a_server_is_kept(path: Path) -> None:
     with opened(path) as store:
         store.append([ServerStopped((1, 2), 3.0)])
     with opened(path) as store:
-        assert journal_of(path) == [(1, ServerStopped((1, 2), 3.0))]
+        assert list(store.journal()) == [(1, ServerStopped((1, 2), 3.0))]
 
 
 def test_an_older_schema_is_brought_up_to_date() -> None:
