@@ -76,7 +76,7 @@ class Lineup:
         self.halts = Halts()
         #: the task that runs although the queue is paused
         self.immediate: TaskId | None = None
-        #: a task was killed: nothing starts before the vehicle stands, or somebody else has it
+        #: a task was killed: nothing starts before the vehicle stands, or a takeover
         self.stopping_after_kill = False
         self.begun_at = 0.0
         #: a held task that waits until the vehicle has rebooted, or the queue resumes

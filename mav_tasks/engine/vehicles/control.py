@@ -93,7 +93,7 @@ class Effect(Enum):
     # the tasks
     COUNT = auto()  # count a halt, so that older requests do not count
     PAUSE = auto()  # queue and active task; the result is its id
-    PAUSE_TAKEN = auto()  # the same, because somebody else has the vehicle
+    PAUSE_TAKEN = auto()  # the same, after a takeover
     LATCH = auto()  # kill the active task, and start none before a continue; the result is its id
     HOLD_TASK = auto()  # until somebody decides
     DO = auto()  # the request itself; if it raises Rejection, nothing follows
@@ -104,11 +104,11 @@ class Effect(Enum):
     OUTDATE_ARMING = auto()  # requests sent earlier, ours or a client's, also copies on their way
     OUTDATE_OUR_ARMING = auto()  # we need it armed no more
     EXPECT_DISARMED = auto()  # it counts as disarmed until it has shown that
-    DISARM = auto()  # ask for it until it is answered, whoever armed the vehicle
+    DISARM = auto()  # ask for it until it is answered, also if a person armed the vehicle
     LINGER = auto()  # leave its mode alone, a "go to" may follow
     HAND_OVER = auto()  # a client takes the vehicle while we hand it back
     KEEP_ARMED = auto()  # when we hand it back
-    DISARM_AT_END = auto()  # when we hand it back, whoever armed it
+    DISARM_AT_END = auto()  # when we hand it back, also if a person armed it
     NOTE_OTHERS = auto()  # somebody who is not our client is driving
     LEFT = auto()  # a set-point leaves late
     TELL = auto()
