@@ -101,6 +101,11 @@ class OffboardControl:
         return self.phase is Phase.CONTROL and self._news.armed and self._news.in_our_mode
 
     @property
+    def follows(self) -> bool:
+        """Whether setpoints move the vehicle, or zeros alone are braking it."""
+        return self.in_control or (self.phase is Phase.STOPPING and self._is_braking)
+
+    @property
     def is_not_ready(self) -> bool:
         """Return whether arming was refused in words that do not say "never"."""
         return self.refused is Refused.ARM and self._arm_result in NOT_READY

@@ -344,6 +344,13 @@ class World(VirtualWorld):
         """Return the phase of the server's control of the first rover."""
         return self.server.engine.snapshot(now=self.now).vehicles[0].control
 
+    def last_words(self) -> tuple[str, ...]:
+        """Return the packets that the server would send if its engine failed now, by name."""
+        listener = Observer()
+        for each in self.server.engine.emergency_stop_packets:
+            listener.sent(self.now, each.data)
+        return tuple(listener.sent_since(0))
+
     def paused(self) -> TaskReason:
         """Return the reason why the first rover's queue is paused."""
         return self.server.engine.snapshot(now=self.now).vehicles[0].paused

@@ -5,9 +5,11 @@ from dataclasses import replace
 from functools import partial
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from mav_tasks.engine.inputs import Shutdown
 from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -27,7 +29,7 @@ RADIUS = 1.2  # m
 WAYPOINT, RETURN, PAUSE, START = 16, 20, 193, 300
 PROFILES = {"ardupilot": ARDUPILOT_PROFILE, "px4": replace(PX4_PROFILE, yaw_rate="")}
 
-Drive = Callable[[Persona], World]
+Drive = Callable[..., World]
 each = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
 
 
@@ -37,9 +39,9 @@ def car_profile(persona: Persona) -> VehicleProfile:
 
 @pytest.fixture
 def make_car(make_world: MakeWorld) -> Drive:
-    def make(persona: Persona) -> World:
+    def make(persona: Persona, **settings_: Any) -> World:
         body = partial(Car, radius=RADIUS)
-        settings = Settings(profiles=(car_profile(persona),))
+        settings = Settings(profiles=(car_profile(persona),), **settings_)
         return make_world(persona=persona, settings=settings, body=body)
 
     return make
@@ -144,3 +146,45 @@ class TestOneOfWhichNobodyHasAProfile:
         world.run(0.5)
         assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
         assert any("steers like a car" in text for text in world.client.texts())
+
+
+def test_last_words_let_a_px4_brake_and_not_drive_back_to_where_hold_began(make_car: Drive) -> None:
+    """A zero alone while it follows setpoints, also while it is braked for the server's end."""
+    world = make_car(PROMPT_PX4)
+    control = world.server.engine._vehicles.by_id[1].control
+    seen: set[tuple[str, bool, tuple[str, ...]]] = set()
+    world.watch(lambda _now: seen.add((control.phase.name, control.follows, world.last_words())))
+    world.client.move(20, speed=1.0)
+    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
+    world.server.pump.handle(Shutdown(), now=world.now)
+    world.run(6)
+    following = {(phase, words) for phase, follows, words in seen if follows}
+    assert following == {("CONTROL", ("zero",)), ("STOPPING", ("zero",))}
+    others = {words for phase, follows, words in seen if phase != "IDLE" and not follows}
+    assert others == {("HOLD", "zero")}
+
+
+def test_last_words_hold_a_px4_that_a_clients_go_to_drives(make_car: Drive) -> None:
+    """It drives there in HOLD, and ignores setpoints."""
+    world = make_car(PROMPT_PX4, claim=False)
+    world.client.arm()
+    world.run(1)
+    go_to(world, 20.0, 0.0)
+    world.until(lambda: abs(world.truth.forward_speed) > 0.5, within=20)
+    world.client.stop()
+    world.run(0.05)
+    assert world.control() == "STOPPING"
+    assert world.last_words() == ("HOLD", "zero")
+
+
+def test_last_words_stop_a_px4(make_car: Drive) -> None:
+    world = make_car(PROMPT_PX4)
+    world.client.move(20, speed=1.0)
+    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
+    north = world.truth.north
+    world.leave(world.server)
+    world.server.pump.send_last_words()
+    world.observer.expects_gaps = True
+    world.run(6)
+    assert world.stands()
+    assert 0.0 < world.truth.north - north < 1.0

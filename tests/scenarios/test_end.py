@@ -10,22 +10,13 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.client import TEMPORARILY_REJECTED
-from tests.kit.observer import Observer
 from tests.kit.world import World, near_pose
-from tests.scenarios.attacks.test_words_passed_on import go_to
 from tests.scenarios.conftest import MakeWorld
 
 
 def shut_down(world: World) -> None:
     world.server.pump.handle(Shutdown(), now=world.now)
     world.server.turn(now=world.now)
-
-
-def last_words(world: World) -> tuple[str, ...]:
-    listener = Observer()
-    for each in world.server.engine.emergency_stop_packets:
-        listener.sent(world.now, each.data)
-    return tuple(listener.sent_since(0))
 
 
 def test_an_empty_queue_hands_the_rover_back_and_the_stream_ends(world: World) -> None:
@@ -131,42 +122,19 @@ def test_waiting_tasks_do_not_begin_on_the_way_out(make_world: MakeWorld) -> Non
 
 
 @pytest.mark.parametrize(
-    ("persona", "in_control", "otherwise"),
-    [
-        (ARDUPILOT, ("zero", "HOLD"), ("zero", "HOLD")),
-        (PX4, ("zero",), ("HOLD", "zero")),
-    ],
+    ("persona", "words"), [(ARDUPILOT, ("zero", "HOLD")), (PX4, ("HOLD", "zero"))]
 )
 def test_last_words_are_there_exactly_while_a_rover_is_engaged(
-    make_world: MakeWorld,
-    persona: Persona,
-    in_control: tuple[str, ...],
-    otherwise: tuple[str, ...],
+    make_world: MakeWorld, persona: Persona, words: tuple[str, ...]
 ) -> None:
-    """A PX4 under control brakes until its failsafe makes it stand; HOLD would let it go back."""
+    """A zero before HOLD would end the HOLD of a PX4's failsafe."""
     world = make_world(persona=persona)
-    seen: set[tuple[str, tuple[str, ...]]] = set()
-    world.watch(lambda _now: seen.add((world.control(), last_words(world))))
+    seen: set[tuple[bool, tuple[str, ...]]] = set()
+    world.watch(lambda _now: seen.add((world.control() != "IDLE", world.last_words())))
     world.client.move(0.5)
     world.until_idle(tasks=1)
     world.run(1)
-    engaged = {(phase, words) for phase, words in seen if phase != "IDLE"}
-    assert seen - engaged == {("IDLE", ())}
-    assert {words for phase, words in engaged if phase == "CONTROL"} == {in_control}
-    assert {words for phase, words in engaged if phase != "CONTROL"} == {otherwise}
-
-
-def test_last_words_hold_a_px4_that_a_clients_go_to_drives(make_world: MakeWorld) -> None:
-    """It drives there in HOLD, and ignores setpoints."""
-    world = make_world(persona=PX4, settings=Settings(claim=False))
-    world.client.arm()
-    world.run(1)
-    world.client.send(go_to(20, 0))
-    world.until(lambda: abs(world.truth.forward_speed) > 0.5, within=20)
-    world.client.stop()
-    world.run(0.05)
-    assert world.control() == "STOPPING"
-    assert last_words(world) == ("HOLD", "zero")
+    assert seen == {(True, words), (False, ())}
 
 
 @pytest.mark.parametrize("persona", [ARDUPILOT, PX4])

@@ -296,12 +296,13 @@ class VehicleRequests:
     def emergency_stop_packets(self) -> tuple[Outgoing, ...]:
         """The prepared packets that stop the vehicle if the engine fails.
 
-        One that follows our setpoints, and whose failsafe makes it stand, gets a zero only: it
-        brakes until the failsafe comes, and then stands. A PX4 car that gets HOLD while it drives
-        goes back to that place in a loop: 7 to 12 m at up to 2.6 m/s from 1.5 m/s, instead of 1.3 m
-        (PX4 1.17.0, SITL). Without our setpoints, as in a client's "go to", only HOLD stops it.
+        A PX4 car that follows setpoints, and whose failsafe makes it stand, gets a zero only: it
+        brakes until the failsafe comes, and then stands. HOLD while it drives would let it go back
+        to that place in a loop: 7 to 12 m at up to 2.6 m/s from 1.5 m/s, instead of 1.3 m (PX4
+        1.17.0, SITL). One that follows none, as in a client's "go to", gets HOLD.
         """
-        if self.control.in_control and self.loss_failsafe.stands:
+        rolls_in_hold = self._persona.brakes_by_setpoints and self.control.follows
+        if rolls_in_hold and self.loss_failsafe.stands:
             return self._last_words[1:]  # all but HOLD, which comes first for one with a failsafe
         return self._last_words
 
