@@ -71,6 +71,8 @@ class Reply:
 
 
 Done = Callable[[Reply | None], None]
+#: the messages that answer requests; ``on_answer`` gets each with its vehicle
+Answer = TaskStatus | TaskTiming | m.TaskQueueStatus
 
 
 @dataclass(slots=True)
@@ -94,7 +96,7 @@ class Session:
         self._encoder = Encoder(address)
         self._decoder = Decoder()
         self._heartbeat = HeartbeatSender(now=now)
-        self._calls = Calls()
+        self.calls = Calls()
         self._texts = TextReceiver()
         self._transfers: dict[Address, Transfers] = {}
         self._refused: list[_Refused] = []
@@ -102,13 +104,11 @@ class Session:
         self._listing: Call | None = None  # the unanswered request for the list of rovers
         self.on_served: Callable[[], None] = lambda: None
         self.on_news: Callable[[Followed], None] = lambda _followed: None
-        self.on_status: Callable[[TaskStatus], None] = lambda _status: None
-        self.on_queue: Callable[[m.TaskQueueStatus, int], None] = lambda _message, _vehicle: None
-        self.on_timing: Callable[[TaskTiming], None] = lambda _timing: None
+        self.on_answer: Callable[[Answer, int], None] = lambda _answer, _vehicle: None
         self.on_text: Callable[[Text], None] = lambda _text: None
 
     def __repr__(self) -> str:
-        return f"Session({self.address}, {self.fleet!r}, {self._calls!r})"
+        return f"Session({self.address}, {self.fleet!r}, {self.calls!r})"
 
     # time and packets
 
@@ -125,15 +125,15 @@ class Session:
             case m.Heartbeat():
                 self._heard(packet, message, now=now)
             case m.CommandAck():
-                self._calls.receive(message, vehicle=packet.system_id, now=now)
+                self.calls.receive(message, vehicle=packet.system_id, now=now)
             case m.TaskStatus():
                 self._task_status(task_status_of(message, packet.system_id), now=now)
             case m.TaskQueueStatus():
                 self.fleet.served_by(packet.source, heartbeat_age_of(message), now=now)
                 self.on_served()
-                self.on_queue(message, packet.system_id)
+                self.on_answer(message, packet.system_id)
             case m.TaskTiming():
-                self.on_timing(task_timing_of(message, packet.system_id))
+                self.on_answer(task_timing_of(message, packet.system_id), packet.system_id)
             case m.Statustext():
                 for text in self._texts.receive(packet.source, message, now=now):
                     self._text(text)
@@ -149,7 +149,7 @@ class Session:
             self._heartbeat.next_deadline(),
             *(refused.until for refused in self._refused),
         ]
-        maybe = [self._calls.next_deadline(), self.fleet.next_deadline()]
+        maybe = [self.calls.next_deadline(), self.fleet.next_deadline()]
         maybe += [self.watch.next_deadline()]
         maybe += [transfers.next_deadline() for transfers in self._transfers.values()]
         due += [at for at in maybe if at is not None]
@@ -165,7 +165,7 @@ class Session:
             self.ask_about(followed, now=now)
         for text in self._texts.handle_deadline(now=now):
             self._text(text)
-        self._calls.handle_deadline(now=now)
+        self.calls.handle_deadline(now=now)
         for transfers in self._transfers.values():
             transfers.handle_deadline(now=now)
         for refused in [each for each in self._refused if now >= each.until]:
@@ -174,7 +174,7 @@ class Session:
 
     def take_packets(self) -> list[bytes]:
         """Return the packets to send since the last call, in order."""
-        for command in self._calls.take():
+        for command in self.calls.take():
             self.send(command)
         for transfers in self._transfers.values():
             for message in transfers.take():
@@ -197,7 +197,7 @@ class Session:
             self.on_served()
 
         if self._listing is not None:  # the link came up only now
-            self._calls.settle(self._listing, is_answered=True, now=now)
+            self.calls.settle(self._listing, is_answered=True, now=now)
         request = request_message(EVERYBODY, m.TaskQueueStatus.id)
         self._listing = self.call(request, done, now=now, within=inf)
 
@@ -241,12 +241,8 @@ class Session:
                 self._refused.append(_Refused(vehicle, ack, done, now + WORDS_WITHIN))
 
         call = Call(message, ended, within, fits, again, is_told_apart, is_urgent)
-        self._calls.begin(call, now=now)
+        self.calls.begin(call, now=now)
         return call
-
-    def settle(self, call: Call, *, is_answered: bool, now: float) -> None:
-        """End a call that another message answered, or whose caller stopped waiting."""
-        self._calls.settle(call, is_answered=is_answered, now=now)
 
     def transfers(self, target: Address) -> Transfers:
         """Return the uploads and downloads of a component."""
@@ -319,7 +315,7 @@ class Session:
 
     def _task_status(self, status: TaskStatus, *, now: float) -> None:
         followed = self.watch.receive(status, now=now)
-        self.on_status(status)
+        self.on_answer(status, status.vehicle)
         if followed is not None:
             self.on_news(followed)
 
