@@ -19,7 +19,7 @@ from mav_tasks.client.values import (
     Text,
     VehicleStatus,
     heartbeat_age_of,
-    reason_of,
+    member_of,
     task_status_of,
     task_timing_of,
 )
@@ -340,6 +340,6 @@ def request_message(vehicle: int, message_id: int, *params: float) -> m.CommandL
 
 def _reply(ack: m.CommandAck, words: str) -> Reply:
     if ack.result != MavResult.ACCEPTED and not words:
-        reason = reason_of(ack.result_param2)
+        reason = member_of(ack.result_param2, TaskReason.NONE)
         words = words_of(reason) if reason else f"result {ack.result}"
     return Reply(ack.result, ack.result_param2, words)
