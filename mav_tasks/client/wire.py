@@ -62,11 +62,6 @@ def check_nonce(nonce: int) -> None:
     _whole("nonce", nonce, 0, MAX_NONCE)
 
 
-def is_command(goal: Goal) -> bool:
-    """Return whether a goal has a command of its own."""
-    return isinstance(goal, Move | Rotate | Drive)
-
-
 def command_of(
     goal: Move | Rotate | Drive, terms: TaskOptions, *, target: tuple[int, int], nonce: int
 ) -> m.CommandLong:
