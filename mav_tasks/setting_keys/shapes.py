@@ -40,6 +40,20 @@ class Shape(Protocol):
         """Return the plain value of a text; raise SettingError if it cannot be parsed."""
 
 
+class _AsWritten:
+    """What is kept as people write it."""
+
+    __slots__ = ()
+
+    def plain(self, kept: object) -> object:
+        """Return the kept value."""
+        return kept
+
+    def read(self, text: str) -> object:
+        """Return the text; ``kept`` refuses a wrong one."""
+        return text
+
+
 @dataclass(frozen=True, slots=True)
 class Number:
     """A number from ``low`` to ``high``; the kept value is multiplied by ``scale``.
@@ -97,7 +111,7 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(_AsWritten):
     """One of several words."""
 
     words: tuple[str, ...]
@@ -114,17 +128,9 @@ class Choice:
             raise SettingError(f"expected one of {', '.join(self.words)}")
         return str(plain)
 
-    def plain(self, kept: str) -> object:
-        """Return the word."""
-        return kept
-
-    def read(self, text: str) -> object:
-        """Take it as it is."""
-        return text
-
 
 @dataclass(frozen=True, slots=True)
-class Flag:
+class Flag(_AsWritten):
     """A boolean."""
 
     unit: str = ""
@@ -136,17 +142,13 @@ class Flag:
             raise SettingError("expected true or false")
         return plain
 
-    def plain(self, kept: bool) -> object:
-        """Return the boolean."""
-        return kept
-
     def read(self, text: str) -> object:
         """Parse "true" or "false", in any case; return other texts for ``kept`` to refuse."""
         return {"true": True, "false": False}.get(text.lower(), text)
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class Text(_AsWritten):
     """A text; ``valid`` describes it. An empty text is valid."""
 
     valid: str
@@ -157,14 +159,6 @@ class Text:
         if not isinstance(plain, str) or "\0" in plain:
             raise SettingError(f"not a text: {self.valid}")
         return plain
-
-    def plain(self, kept: str) -> object:
-        """Return the text."""
-        return kept
-
-    def read(self, text: str) -> object:
-        """Take it as it is."""
-        return text
 
 
 @dataclass(frozen=True, slots=True)
