@@ -131,9 +131,7 @@ async def probe(
     done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=_say)
     if isinstance(done.error, NothingHeard):
         raise NoAnswer(str(done.error))
-    if isinstance(done.error, Occupied):
-        raise UsageError(str(done.error))
-    if isinstance(done.error, NotSet):
+    if isinstance(done.error, Occupied | NotSet):
         raise UsageError(str(done.error))
     if set_failsafe:
         _show_failsafe(done, as_json=as_json)

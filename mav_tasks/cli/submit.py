@@ -60,7 +60,7 @@ async def rotate(
     rate: Rate = None,
 ) -> None:
     """Turn on the spot by an angle."""
-    await _submit([Rotate(_radians(angle), _maybe_radians(rate))], terms, common)
+    await _submit([Rotate(radians(angle), _maybe_radians(rate))], terms, common)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -76,7 +76,7 @@ async def drive(
 ) -> None:
     """Drive at a constant velocity for some time."""
     seconds = parse_duration("DURATION", duration)
-    await _submit([Drive(forward, _radians(yaw_rate), seconds)], terms, common)
+    await _submit([Drive(forward, radians(yaw_rate), seconds)], terms, common)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -126,7 +126,7 @@ async def face(
     rate: Rate = None,
 ) -> None:
     """Turn on the spot to a heading."""
-    await _submit([Face(_radians(heading), rate=_maybe_radians(rate))], terms, common)
+    await _submit([Face(radians(heading), rate=_maybe_radians(rate))], terms, common)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -186,9 +186,5 @@ async def _why_it_waits(client: Client, task: Task, common: Common) -> str:
     return words.why_it_waits(status, queue, is_alone=is_alone(client, common))
 
 
-def _radians(angle: float) -> float:
-    return radians(angle)
-
-
 def _maybe_radians(angle: float | None) -> float | None:
-    return None if angle is None else _radians(angle)
+    return None if angle is None else radians(angle)

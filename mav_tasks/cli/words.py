@@ -301,14 +301,8 @@ def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
     """Return the timing as JSON, in seconds; null if it is unknown."""
     if timing is None:
         return None
-    return {
-        "rate": _rounded(timing.rate),
-        "count": timing.count,
-        "p50": _rounded(timing.p50),
-        "p99": _rounded(timing.p99),
-        "max": _rounded(timing.max),
-        "late": timing.late,
-    }
+    names = ("rate", "count", "p50", "p99", "max", "late")
+    return {name: _rounded(getattr(timing, name)) for name in names}
 
 
 def queue_json(queue: QueueStatus) -> dict[str, Any]:
