@@ -111,7 +111,7 @@ async def upload_fence(file: PlanIn, common: Common, empty: EmptyFence = False) 
         raise UsageError(f"{file} has no fence; use --empty to remove the rover's fence")
     async with opened(common) as client:
         count = await client.set_fence(plan)
-    _uploaded(common, "fence", count)
+    output.say_done(common.json, "fence upload", f"fence: {count} items", items=count)
 
 
 @fence.command("download")
@@ -134,7 +134,7 @@ async def upload_rally_points(file: PlanIn, common: Common, empty: EmptyRally = 
         raise UsageError(f"{file} has no rally points; use --empty to remove the rover's")
     async with opened(common) as client:
         count = await client.set_rally_points(plan)
-    _uploaded(common, "rally", count)
+    output.say_done(common.json, "rally upload", f"rally: {count} items", items=count)
 
 
 def _check_place(file: str, *, force: bool) -> None:
@@ -158,10 +158,3 @@ def _write(plan: PlanFile, file: str, what: str, common: Common) -> None:
         output.say_json({"file": file, "items": len(plan.items) or len(plan.fence)})
     else:
         output.say(f"{file}: {what}")
-
-
-def _uploaded(common: Common, kind: str, count: int) -> None:
-    if common.json:
-        output.say_json({"done": f"{kind} upload", "items": count})
-    else:
-        output.say(f"{kind}: {count} items")
