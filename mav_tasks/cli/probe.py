@@ -8,7 +8,7 @@ import typer
 
 from mav_tasks.cli import output as out
 from mav_tasks.cli.command import command
-from mav_tasks.cli.options import DEFAULT_SERVER
+from mav_tasks.cli.options import DEFAULT_SERVER, RingFile
 from mav_tasks.cli.ring import key_to_sign_with
 from mav_tasks.config import profiles
 from mav_tasks.errors import ConfigError, NoAnswer, UsageError
@@ -81,10 +81,6 @@ Sign = Annotated[
         help="Sign with this key, and accept only packets signed with it.",
     ),
 ]
-Keys = Annotated[
-    str,
-    typer.Option(metavar="FILE", help="Key ring file; default: signing.keys of the configuration."),
-]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 QUESTION = """\
 This arms the rover and drives it at up to {speed:g} m/s, within 1 m of its place, or 4 m and more
@@ -106,7 +102,7 @@ async def probe(
     output: Output = None,
     insecure: Insecure = False,
     sign: Sign = "",
-    keys: Keys = "",
+    keys: RingFile = "",
     as_json: Json = False,
 ) -> None:
     """Test what a rover can do, without a server.
