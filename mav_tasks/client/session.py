@@ -119,7 +119,7 @@ class Session:
         if packet.message_id not in DECODED:
             return
         message = self._decoder.decode(packet)
-        if message is None or not self._is_meant(message):
+        if message is None or not target_of(message).reaches(self.address):
             return
         match message:
             case m.Heartbeat():
@@ -160,7 +160,8 @@ class Session:
         if self._heartbeat.is_due(now=now):
             self.greet()
         for vehicle in self.fleet.to_ask(now=now):
-            self._ask_server(vehicle, now=now)
+            request = request_message(vehicle, m.TaskQueueStatus.id)
+            self.call(request, lambda _reply: None, now=now, within=AGAIN)
         for followed in self.watch.to_ask(now=now):
             self.ask_about(followed, now=now)
         for text in self._texts.handle_deadline(now=now):
@@ -296,9 +297,6 @@ class Session:
 
     # received messages
 
-    def _is_meant(self, message: m.Message) -> bool:
-        return target_of(message).reaches(self.address)
-
     def _heard(self, packet: Packet, message: m.Heartbeat, *, now: float) -> None:
         if not self.fleet.heartbeat(packet, message, now=now):
             return
@@ -308,10 +306,6 @@ class Session:
         interval = self.watch.stream_of(vehicle)
         if interval is not None:
             self.set_stream(vehicle, interval, now=now)
-
-    def _ask_server(self, vehicle: int, *, now: float) -> None:
-        request = request_message(vehicle, m.TaskQueueStatus.id)
-        self.call(request, lambda _reply: None, now=now, within=AGAIN)
 
     def _task_status(self, status: TaskStatus, *, now: float) -> None:
         followed = self.watch.receive(status, now=now)
