@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from mav_tasks.cli import output
-from mav_tasks.cli.lazy import completing
+from mav_tasks.cli.lazy import completing, group
 from mav_tasks.cli.options import Json, RingFile
 from mav_tasks.cli.ring import ring_path
 from mav_tasks.errors import KeyRingError, UsageError
@@ -20,11 +20,7 @@ from mav_tasks.key_ring import derivation as how
 from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
 from mav_tasks.key_ring.ring_file import change, load
 
-app = typer.Typer(
-    help="Add, list and revoke signing keys.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+app = group("Add, list and revoke signing keys.")
 LONGEST = 4096  # characters of a passphrase that are read
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key.")]

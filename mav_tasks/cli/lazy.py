@@ -1,4 +1,4 @@
-"""Commands and completions that import their modules when they are used.
+"""Groups of commands, and commands and completions that import their modules when they are used.
 
 Each call of the command line pays for what it imports; a module of a command may therefore import
 at its top whatever the command always needs. A *home* is "module:name" of a value.
@@ -32,6 +32,11 @@ def completing(home: str) -> Callable[[str], list[str]]:
 def beginning_with(typed: str, words: Any) -> list[str]:
     """Return the words that begin with what was typed."""
     return [word for word in words if word.startswith(typed)]
+
+
+def group(summary: str, *, epilog: str | None = None) -> typer.Typer:
+    """Return a group of commands, which shows its plain help if none is named."""
+    return typer.Typer(no_args_is_help=True, rich_markup_mode=None, help=summary, epilog=epilog)
 
 
 class LazyCommand(TyperCommand):

@@ -9,6 +9,7 @@ import typer
 
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
+from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import Common, TaskOptions, Wait
 from mav_tasks.cli.session import opened, read, values_checked
 from mav_tasks.cli.submit import tell_submitted
@@ -39,13 +40,9 @@ EmptyRally = Annotated[
     bool, typer.Option("--empty", help="Delete the rover's rally points if the file has none.")
 ]
 
-mission = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Upload, start and download missions."
-)
-fence = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Upload and download the fence."
-)
-rally = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Upload rally points.")
+mission = group("Upload, start and download missions.")
+fence = group("Upload and download the fence.")
+rally = group("Upload rally points.")
 
 
 @mission.command("upload")

@@ -8,6 +8,7 @@ import typer
 
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
+from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import Common, TaskOptions
 from mav_tasks.cli.places import parse_place
 from mav_tasks.cli.session import is_alone, opened, read, values_checked
@@ -34,7 +35,7 @@ Rate = Annotated[
     typer.Option(metavar="DEG/S", help="Turn rate; default: driving.turn_rate_deg of the server."),
 ]
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, epilog=EPILOG, help="Submit a task.")
+app = group("Submit a task.", epilog=EPILOG)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
