@@ -124,7 +124,7 @@ async def probe(
         find_within=find_within,
     )
     where = url or DEFAULT_SERVER
-    done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=_say)
+    done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=out.warn)
     if isinstance(done.error, NothingHeard):
         raise NoAnswer(str(done.error))
     if isinstance(done.error, Occupied | NotSet):
@@ -181,8 +181,3 @@ def _keep(done: Probe, output: str | None) -> str:
     """Write the profile. Return its path."""
     profile = profile_of(done.findings, probed=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")
     return str(profiles.write(profile, output))
-
-
-def _say(words: str) -> None:
-    sys.stderr.write(f"mav-tasks: {words}\n")
-    sys.stderr.flush()
