@@ -14,8 +14,6 @@ from mav_tasks.cli.commands import COMMANDS
 
 
 class Root(TyperGroup):
-    """The group of all commands."""
-
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
         for each in COMMANDS:

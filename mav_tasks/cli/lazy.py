@@ -14,7 +14,6 @@ from typer.main import get_command, get_group
 
 
 def loaded(home: str) -> Any:
-    """Return the value with this home."""
     module, _, name = home.partition(":")
     return getattr(import_module(module), name)
 
@@ -55,7 +54,6 @@ class LazyCommand(TyperCommand):
         return self.load().make_context(info_name, args, parent=parent, **extra)
 
     def load(self) -> Any:
-        """Import and return the command."""
         value = loaded(self._home)
         if isinstance(value, typer.Typer):
             return get_group(value)

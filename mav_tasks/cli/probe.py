@@ -178,6 +178,5 @@ def _show(done: Probe, output: str | None, *, as_json: bool) -> None:
 
 
 def _keep(done: Probe, output: str | None) -> str:
-    """Write the profile. Return its path."""
     profile = profile_of(done.findings, probed=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")
     return str(profiles.write(profile, output))

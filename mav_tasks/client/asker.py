@@ -108,7 +108,6 @@ class Asker:
                 future.set_exception(ClientError(why))
 
     async def status(self, task_id: int, vehicle: int) -> TaskStatus:
-        """Return the status of a task."""
         request = request_message(vehicle, m.TaskStatus.id, to_param(task_id))
 
         def is_meant(status: TaskStatus, _source: int) -> bool:
@@ -127,7 +126,6 @@ class Asker:
         return await self._shown(request, what, TaskTiming, is_meant)
 
     async def overview(self, vehicle: int) -> m.TaskQueueStatus:
-        """Return the TASK_QUEUE_STATUS of a rover."""
         request = request_message(vehicle, m.TaskQueueStatus.id)
 
         def is_meant(_message: m.TaskQueueStatus, source: int) -> bool:
@@ -231,7 +229,6 @@ class Asker:
             return opaque_id
 
     async def download(self, target: Address, kind: MavMissionType) -> tuple[Item, ...]:
-        """Download a plan."""
         with self._future(tuple[Item, ...]) as future:
 
             def done(items: tuple[Item, ...] | None, refused: MavMissionResult | None) -> None:

@@ -66,7 +66,6 @@ class Reply:
 
     @property
     def is_accepted(self) -> bool:
-        """Whether the command was accepted."""
         return self.result == MavResult.ACCEPTED
 
 

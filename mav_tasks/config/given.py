@@ -67,7 +67,6 @@ class Layer:
             self.take(key, plain, where)
 
     def refuse(self, key: Key, fault: str) -> None:
-        """Note a fault of a key."""
         self.faulty.add(key.name)
         self.faults.append(fault)
 

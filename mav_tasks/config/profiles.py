@@ -26,7 +26,6 @@ _NEEDED = ("system_id", "autopilot", "firmware", "probed")
 
 
 def usual_folder() -> Path:
-    """Return the default folder of profiles."""
     return user_config_path("mav-tasks", appauthor=False) / "vehicles"
 
 

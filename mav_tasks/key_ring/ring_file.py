@@ -42,7 +42,6 @@ def path_of_ring(text: str) -> Path:
 
 
 def mark_of(found: os.stat_result) -> Mark:
-    """Return the mark of a file."""
     times = (found.st_mtime_ns, found.st_ctime_ns)
     return (found.st_dev, found.st_ino, *times, found.st_size)
 

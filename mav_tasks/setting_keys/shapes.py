@@ -46,7 +46,6 @@ class _AsWritten:
     __slots__ = ()
 
     def plain(self, kept: object) -> object:
-        """Return the kept value."""
         return kept
 
     def read(self, text: str) -> object:
@@ -70,7 +69,6 @@ class Number:
 
     @property
     def valid(self) -> str:
-        """The range."""
         words = f"{in_digits(self.low)}..{in_digits(self.high)}"
         words += f" {self.unit}" if self.unit else ""
         words += ", whole" if self.is_whole else ""
@@ -119,7 +117,6 @@ class Choice(_AsWritten):
 
     @property
     def valid(self) -> str:
-        """The words."""
         return " | ".join(f'"{word}"' for word in self.words)
 
     def kept(self, plain: object) -> str:
@@ -131,8 +128,6 @@ class Choice(_AsWritten):
 
 @dataclass(frozen=True, slots=True)
 class Flag(_AsWritten):
-    """A boolean."""
-
     unit: str = ""
     valid: str = "true | false"
 
@@ -155,7 +150,6 @@ class Text(_AsWritten):
     unit: str = ""
 
     def kept(self, plain: object) -> str:
-        """Return the text."""
         if not isinstance(plain, str) or "\0" in plain:
             raise SettingError(f"not a text: {self.valid}")
         return plain
@@ -171,7 +165,6 @@ class Texts:
     unit: str = ""
 
     def kept(self, plain: object) -> tuple[str, ...]:
-        """Return the texts as a tuple."""
         if not isinstance(plain, list) or not all(isinstance(each, str) for each in plain):
             raise SettingError(f"not a list of texts: {self.valid}")
         if len(plain) < self.least:
@@ -182,7 +175,6 @@ class Texts:
         return tuple(plain)
 
     def plain(self, kept: tuple[str, ...]) -> object:
-        """Return the texts as a list."""
         return list(kept)
 
     def read(self, text: str) -> object:
@@ -206,7 +198,6 @@ class ByClient:
         return f"{clients}, each {self.each.valid}"
 
     def kept(self, plain: object) -> Mapping[str, Any]:
-        """Return the kept values by client."""
         if not isinstance(plain, dict):
             raise SettingError(f"not a table: {self.valid}")
         kept = {}
@@ -221,7 +212,6 @@ class ByClient:
         return kept
 
     def plain(self, kept: Mapping[str, Any]) -> object:
-        """Return the plain values as a table."""
         return {client: self.each.plain(value) for client, value in kept.items()}
 
     def read(self, text: str) -> object:
