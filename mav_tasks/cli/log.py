@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from mav_tasks.cli import output
+from mav_tasks.cli.options import Json
 from mav_tasks.config.configuration import Sources
 from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.logs import export
@@ -44,9 +45,7 @@ def log(
             help="Print only events of the last 30m, 2h or 7d, or since a time (UTC).",
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON, one object per line.")
-    ] = False,
+    as_json: Json = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
     follow: Annotated[
         bool, typer.Option("--follow", "-f", help="Keep printing new events until Ctrl-C.")

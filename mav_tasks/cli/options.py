@@ -36,6 +36,13 @@ Wait = Annotated[
         "--wait", "-w", help="Show the task until it ends; exit with 1 unless it completes."
     ),
 ]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")]
+RingFile = Annotated[
+    str,
+    typer.Option(
+        "--keys", metavar="FILE", help="Key ring file; default: signing.keys of the configuration."
+    ),
+]
 TaskId = Annotated[int, typer.Argument(metavar="ID", min=1, help="Id of the task.")]
 
 
@@ -63,7 +70,7 @@ class Common:
         float,
         typer.Option(min=0.1, metavar="SECONDS", help="How long to look for the server."),
     ] = 5.0
-    json: Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")] = False
+    json: Json = False
     sign: Annotated[
         str,
         typer.Option(
@@ -73,12 +80,7 @@ class Common:
             help="Sign with this key of the key ring.",
         ),
     ] = ""
-    keys: Annotated[
-        str,
-        typer.Option(
-            metavar="FILE", help="Key ring file; default: signing.keys of the configuration."
-        ),
-    ] = ""
+    keys: RingFile = ""
 
 
 @dataclass(frozen=True, slots=True)

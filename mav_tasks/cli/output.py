@@ -73,7 +73,6 @@ def show(what: "RenderableType") -> None:
 
 
 def columns() -> int:
-    """Return the width of the terminal."""
     return shutil.get_terminal_size().columns
 
 

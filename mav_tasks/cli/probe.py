@@ -8,7 +8,7 @@ import typer
 
 from mav_tasks.cli import output as out
 from mav_tasks.cli.command import command
-from mav_tasks.cli.options import DEFAULT_SERVER
+from mav_tasks.cli.options import DEFAULT_SERVER, RingFile
 from mav_tasks.cli.ring import key_to_sign_with
 from mav_tasks.config import profiles
 from mav_tasks.errors import ConfigError, NoAnswer, UsageError
@@ -81,10 +81,6 @@ Sign = Annotated[
         help="Sign with this key, and accept only packets signed with it.",
     ),
 ]
-Keys = Annotated[
-    str,
-    typer.Option(metavar="FILE", help="Key ring file; default: signing.keys of the configuration."),
-]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 QUESTION = """\
 This arms the rover and drives it at up to {speed:g} m/s, within 1 m of its place, or 4 m and more
@@ -106,7 +102,7 @@ async def probe(
     output: Output = None,
     insecure: Insecure = False,
     sign: Sign = "",
-    keys: Keys = "",
+    keys: RingFile = "",
     as_json: Json = False,
 ) -> None:
     """Test what a rover can do, without a server.
@@ -128,12 +124,10 @@ async def probe(
         find_within=find_within,
     )
     where = url or DEFAULT_SERVER
-    done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=_say)
+    done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=out.warn)
     if isinstance(done.error, NothingHeard):
         raise NoAnswer(str(done.error))
-    if isinstance(done.error, Occupied):
-        raise UsageError(str(done.error))
-    if isinstance(done.error, NotSet):
+    if isinstance(done.error, Occupied | NotSet):
         raise UsageError(str(done.error))
     if set_failsafe:
         _show_failsafe(done, as_json=as_json)
@@ -184,11 +178,5 @@ def _show(done: Probe, output: str | None, *, as_json: bool) -> None:
 
 
 def _keep(done: Probe, output: str | None) -> str:
-    """Write the profile. Return its path."""
     profile = profile_of(done.findings, probed=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")
     return str(profiles.write(profile, output))
-
-
-def _say(words: str) -> None:
-    sys.stderr.write(f"mav-tasks: {words}\n")
-    sys.stderr.flush()

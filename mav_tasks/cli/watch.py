@@ -92,7 +92,6 @@ class Window:
         self._at = self._loop.time()
 
     def drawn(self) -> Group:
-        """Return the lines of the screen."""
         if self.live is None:
             return Group()
         width, height = self.live.console.size

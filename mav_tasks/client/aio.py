@@ -280,7 +280,9 @@ class Client:
         for name, value in changes:
             await self._control(vehicle, MavCmd.TASK_MODIFY, to_param(task_id), float(name), value)
         if at is not None:
-            await self._start_at(task_id, at, self._which(vehicle))
+            await self._modify_exactly(
+                task_id, TaskProperty.START_UTC, round(utc_of(at)), 0, nan, vehicle=vehicle
+            )
         for piece in pieces_of(label) if label is not None else ():
             await self._modify_exactly(
                 task_id, TaskProperty.LABEL, piece.x, piece.y, float(piece.offset), vehicle=vehicle
@@ -584,10 +586,6 @@ class Client:
         )
         return task_id
 
-    async def _start_at(self, task_id: int, at: datetime, vehicle: int) -> None:
-        moment = round(utc_of(at))
-        await self._modify_exactly(task_id, TaskProperty.START_UTC, moment, 0, nan, vehicle=vehicle)
-
     async def _modify_exactly(
         self,
         task_id: int,
@@ -642,31 +640,19 @@ class Client:
         task_id = await self._ask.upload(target, items, MavMissionType.MISSION, nonce=mark or 0)
         return self._submitted_as(task_id, vehicle, mark or 0)
 
-    async def _set_deadline(self, task: Task, deadline: float) -> None:
-        try:
-            await task.modify(deadline=deadline)
-        except Refused as refused:
-            if refused.reason != TaskReason.WRONG_STATE:
-                raise  # else it has started in time already
-
-    async def _set_label(self, task: Task, label: str) -> None:
-        try:
-            await task.modify(label=label)
-        except Refused as refused:
-            if refused.reason != TaskReason.WRONG_STATE:
-                raise  # else it has ended already
-
     async def _complete(
         self, task: Task, *, deadline: float, at: datetime | None, label: str, nonce: int
     ) -> None:
         """Set the properties that the submission could not carry."""
         try:
             if deadline:
-                await self._set_deadline(task, deadline)
+                with _in_any_state():  # it may have started in time already
+                    await task.modify(deadline=deadline)
             if at is not None:
                 await task.modify(at=at)
             if label:
-                await self._set_label(task, label)
+                with _in_any_state():  # it may have ended already
+                    await task.modify(label=label)
         except NoAnswer as error:  # the task exists: a second try needs its nonce
             raise NoAnswer(str(error), nonce=nonce) from None
 
@@ -690,6 +676,15 @@ class Client:
         task = self._tasks.get(followed)
         if task is not None:
             task.wake()
+
+
+@contextmanager
+def _in_any_state() -> Iterator[None]:
+    try:
+        yield
+    except Refused as refused:
+        if refused.reason != TaskReason.WRONG_STATE:
+            raise
 
 
 def _id_of(task: int | Task) -> int:

@@ -191,7 +191,6 @@ async def called(function: Callable[[], T]) -> T:
 
 
 def id_of(task: int | BlockingTask) -> int:
-    """Return the id of a task."""
     return task._aio.id if isinstance(task, BlockingTask) else task
 
 
