@@ -73,19 +73,10 @@ class Asker:
         loop = asyncio.get_running_loop()
         end, refused, left = loop.time() + within, None, within
         while True:
+            call = Call(command, left, fits, again, is_told_apart, is_urgent)
             try:
                 with self._future(int, command) as future:
-                    call = self._call(
-                        command,
-                        future,
-                        what,
-                        within=left,
-                        again=again,
-                        fits=fits,
-                        nonce=nonce,
-                        is_told_apart=is_told_apart,
-                        is_urgent=is_urgent,
-                    )
+                    self._begin(call, future, what, nonce=nonce)
                     try:
                         return await future
                     finally:
@@ -286,7 +277,8 @@ class Asker:
                     future.set_result(message)
 
             with _added(self._takers, take):
-                call = self._call(request, answer, what, fits=lambda _ack: future.done())
+                call = Call(request, ANSWER_WITHIN, lambda _ack: future.done())
+                self._begin(call, answer, what)
                 try:
                     await asyncio.wait((future, answer), return_when=asyncio.FIRST_COMPLETED)
                     return future.result() if future.done() else _raised(answer)
@@ -294,24 +286,12 @@ class Asker:
                     answer.cancel()
                     self._connection.settle(call, is_answered=True)
 
-    def _call(
-        self,
-        command: Command,
-        future: asyncio.Future[int],
-        what: str,
-        *,
-        within: float = ANSWER_WITHIN,
-        again: float = AGAIN,
-        fits: Callable[[m.CommandAck], bool] = lambda _ack: True,
-        nonce: int = 0,
-        is_told_apart: bool = True,
-        is_urgent: bool = False,
-    ) -> Call:
+    def _begin(self, call: Call, future: asyncio.Future[int], what: str, *, nonce: int = 0) -> None:
         def done(reply: Reply | None) -> None:
             if future.done():
                 return
             if reply is None:
-                words = f"{what}: no answer within {within:g} s"
+                words = f"{what}: no answer within {call.give_up_after:g} s"
                 future.set_exception(NoAnswer(words, nonce=nonce))
             elif reply.is_accepted:
                 future.set_result(reply.value)
@@ -319,19 +299,8 @@ class Asker:
                 error = Refused(reply.words, result=reply.result, reason=reply.value)
                 future.set_exception(error)
 
-        connection = self._connection
-        call = connection.session.call(
-            command,
-            done,
-            now=connection.now,
-            within=within,
-            again=again,
-            fits=fits,
-            is_told_apart=is_told_apart,
-            is_urgent=is_urgent,
-        )
-        connection.turn()
-        return call
+        self._connection.session.call(call, done, now=self._connection.now)
+        self._connection.turn()
 
     # session callbacks
 

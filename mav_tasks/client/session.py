@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
-from mav_tasks.client.calls import AGAIN, Call, Calls, Command
+from mav_tasks.client.calls import AGAIN, Call, Calls
 from mav_tasks.client.fleet_view import KEPT, FleetView
 from mav_tasks.client.transfers import MESSAGES as TRANSFER_MESSAGES
 from mav_tasks.client.transfers import Transfers
@@ -160,7 +160,7 @@ class Session:
             self.greet()
         for vehicle in self.fleet.to_ask(now=now):
             request = request_message(vehicle, m.TaskQueueStatus.id)
-            self.call(request, lambda _reply: None, now=now, within=AGAIN)
+            self.call(Call(request, AGAIN), lambda _reply: None, now=now)
         for followed in self.watch.to_ask(now=now):
             self.ask_about(followed, now=now)
         for text in self._texts.handle_deadline(now=now):
@@ -199,7 +199,8 @@ class Session:
         if self._listing is not None:  # the link came up only now
             self.calls.settle(self._listing, is_answered=True, now=now)
         request = request_message(EVERYBODY, m.TaskQueueStatus.id)
-        self._listing = self.call(request, done, now=now, within=inf)
+        self._listing = Call(request, give_up_after=inf)
+        self.call(self._listing, done, now=now)
 
     def send(self, message: m.Message) -> None:
         """Send a message now."""
@@ -213,24 +214,13 @@ class Session:
             words = f"a number of {type(message).__name__} is too large to be sent: {error}"
             raise ValueError(words) from None
 
-    def call(
-        self,
-        message: Command,
-        done: Done,
-        *,
-        now: float,
-        within: float,
-        fits: Callable[[m.CommandAck], bool] = lambda _ack: True,
-        again: float = AGAIN,
-        is_told_apart: bool = True,
-        is_urgent: bool = False,
-    ) -> Call:
+    def call(self, call: Call, done: Done, *, now: float) -> None:
         """Send a command until it is answered. Call ``done`` once, with None after a time-out.
 
-        See Call for the other arguments. Raise ValueError if a number does not fit its field.
+        Raise ValueError if a number does not fit its field.
         """
-        self.check(message)
-        vehicle = message.target_system
+        self.check(call.message)
+        vehicle = call.message.target_system
 
         def ended(ack: m.CommandAck | None, *, now: float) -> None:
             if ack is None:
@@ -240,9 +230,8 @@ class Session:
             else:
                 self._refused.append(_Refused(vehicle, ack, done, now + WORDS_WITHIN))
 
-        call = Call(message, ended, within, fits, again, is_told_apart, is_urgent)
+        call.done = ended
         self.calls.begin(call, now=now)
-        return call
 
     def transfers(self, target: Address) -> Transfers:
         """Return the uploads and downloads of a component."""
@@ -281,7 +270,7 @@ class Session:
                 self.on_news(followed)
 
         request = request_message(vehicle, m.TaskStatus.id, to_param(followed.id))
-        self.call(request, done, now=now, within=FOLLOWED_AGAIN)
+        self.call(Call(request, FOLLOWED_AGAIN), done, now=now)
         interval = self.watch.stream_of(vehicle)
         if interval is not None and followed.status is not None and followed.status.is_active:
             self.set_stream(vehicle, interval, now=now)
@@ -292,7 +281,7 @@ class Session:
         command = m.CommandLong(
             vehicle, AUTOPILOT, MavCmd.SET_MESSAGE_INTERVAL, 0, m.TaskStatus.id, us, 0, 0, 0, 0, 0
         )
-        self.call(command, lambda _reply: None, now=now, within=FOLLOWED_AGAIN)
+        self.call(Call(command, FOLLOWED_AGAIN), lambda _reply: None, now=now)
 
     # received messages
 
