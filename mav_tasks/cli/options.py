@@ -109,21 +109,16 @@ class TaskOptions:
     wait: Wait = False
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
-    """A start delay in seconds, a start time, or neither."""
+def start_of(start_in: str, start_at: str) -> tuple[float | None, datetime | None]:
+    """Return the delay, s, of ``--in``, and the time of ``--at``; None: not given.
 
-    delay: float | None
-    at: "datetime | None"
-
-
-def start_of(start_in: str, start_at: str) -> Start:
-    """Return the parsed ``--in`` or ``--at``. Raise UsageError if invalid, or if both are given."""
+    Raise UsageError if one is invalid, or if both are given.
+    """
     if start_in and start_at:
         raise UsageError("--in and --at: choose one of them")
     if not start_at:
-        return Start(seconds_of("--in", start_in), None)
-    return Start(None, parse_moment("--at", start_at, now=datetime.now(UTC)))
+        return seconds_of("--in", start_in), None
+    return None, parse_moment("--at", start_at, now=datetime.now(UTC))
 
 
 def seconds_of(name: str, text: str) -> float | None:

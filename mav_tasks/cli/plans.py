@@ -67,7 +67,7 @@ async def upload_mission(
             if stage:
                 task = await client.stage_mission(plan)
             else:
-                task = await client.submit_mission(plan, **wished._asdict())
+                task = await client.submit_mission(plan, **wished)
         hint = " waits: mav-tasks mission start" if stage else ""
         await tell_submitted(client, task, common, is_awaited=terms.wait, hint=hint)
 

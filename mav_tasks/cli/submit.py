@@ -154,7 +154,7 @@ async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> 
     wished = read(terms)
     async with opened(common) as client:
         with values_checked(), in_typed_words():
-            task = await client.submit(goals, **wished._asdict())
+            task = await client.submit(goals, **wished)
         await tell_submitted(client, task, common, is_awaited=terms.wait)
 
 
