@@ -527,10 +527,11 @@ class Client:
     def _has_home_item(self, vehicle: int) -> bool:
         """Return whether a rover's missions begin with home. Raise NoAnswer if not known."""
         view = self._open.session.fleet.get(vehicle)
-        if view is None or not view.is_known:
+        has_home_item = None if view is None else view.has_home_item
+        if has_home_item is None:
             words = f"rover {vehicle} is silent: unknown whether its missions begin with home"
             raise NoAnswer(words)
-        return view.has_home_item
+        return has_home_item
 
     def _handle(self, followed: Followed) -> Task:
         task = self._tasks.get(followed)

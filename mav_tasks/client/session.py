@@ -235,10 +235,7 @@ class Session:
 
     def transfers(self, target: Address) -> Transfers:
         """Return the uploads and downloads of a component."""
-        transfers = self._transfers.get(target)
-        if transfers is None:
-            transfers = self._transfers[target] = Transfers(target)
-        return transfers
+        return self._transfers.setdefault(target, Transfers(target))
 
     def vehicles(self, *, now: float) -> tuple[VehicleStatus, ...]:
         """Return the rovers whose task server has answered, by id."""
