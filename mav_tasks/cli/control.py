@@ -20,16 +20,14 @@ RELEASED = {
     "skip": "skipped",
 }
 
-MaybeTaskId = Annotated[
-    int | None,
-    typer.Argument(metavar="[ID]", min=1, help="Id of the task; default: the running task."),
-]
-
 
 @command
 async def cancel(
     common: Common,
-    task_id: MaybeTaskId = None,
+    task_id: Annotated[
+        int | None,
+        typer.Argument(metavar="[ID]", min=1, help="Id of the task; default: the running task."),
+    ] = None,
     kill: Annotated[
         bool, typer.Option("--kill", help="Also put the rover into HOLD at once.")
     ] = False,
