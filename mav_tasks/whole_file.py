@@ -20,14 +20,22 @@ def write_whole(path: Path, text: str) -> None:
     if mode is not None and not stat.S_ISREG(mode):
         path.write_text(text, encoding="utf-8")
         return
+    replace_whole(path, text, mode=0o666, kept=None if mode is None else stat.S_IMODE(mode))
+
+
+def replace_whole(path: Path, text: str, *, mode: int, kept: int | None = None) -> None:
+    """Put a new file in the place of a file or link; raise OSError as ``write_whole`` does.
+
+    It has the mode ``kept``; None: ``mode``, without what the umask forbids.
+    """
     beside = path.with_name(f".{path.name[:100]}.{token_hex(8)}")
-    fd = os.open(beside, FLAGS, 0o666)
+    fd = os.open(beside, FLAGS, mode)
     try:
         with os.fdopen(fd, "w", encoding="utf-8") as file:
             file.write(text)
             file.flush()
-            if mode is not None:
-                os.fchmod(fd, stat.S_IMODE(mode))
+            if kept is not None:
+                os.fchmod(fd, kept)
             os.fsync(fd)
         beside.replace(path)
     except BaseException:

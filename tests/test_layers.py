@@ -117,6 +117,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.setting_keys",
             "mav_tasks.settings",
             "mav_tasks.folders",
+            "mav_tasks.whole_file",
             "mav_tasks.errors",
         }
     ),
@@ -126,6 +127,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.mavlink",
             "mav_tasks.settings",
             "mav_tasks.folders",
+            "mav_tasks.whole_file",
             "mav_tasks.errors",
         }
     ),

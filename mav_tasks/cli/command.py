@@ -1,7 +1,7 @@
 """Typer commands from async functions, with shared groups of options.
 
-A group is a frozen dataclass with Typer annotations. A parameter of that type stands for all fields
-of the group as options.
+A group is a frozen dataclass with Typer annotations and defaults. A parameter of that type stands
+for all fields of the group as options.
 """
 
 import asyncio
@@ -70,17 +70,12 @@ def _spread(body: Callable[..., Any]) -> list[inspect.Parameter]:
     spread: list[inspect.Parameter] = []
     for parameter in inspect.signature(body).parameters.values():
         if dataclasses.is_dataclass(parameter.annotation):
-            spread += [_parameter(field) for field in dataclasses.fields(parameter.annotation)]
+            spread += [
+                inspect.Parameter(
+                    each.name, parameter.KEYWORD_ONLY, default=each.default, annotation=each.type
+                )
+                for each in dataclasses.fields(parameter.annotation)
+            ]
         else:
             spread.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
     return spread
-
-
-def _parameter(field: "dataclasses.Field[Any]") -> inspect.Parameter:
-    is_needed = field.default is dataclasses.MISSING
-    return inspect.Parameter(
-        field.name,
-        inspect.Parameter.KEYWORD_ONLY,
-        default=inspect.Parameter.empty if is_needed else field.default,
-        annotation=field.type,
-    )

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from mav_tasks.cli.lazy import group
 from mav_tasks.config import configuration, report, toml_file
 from mav_tasks.config.configuration import Sources
 from mav_tasks.config.sample import sample
@@ -14,11 +15,7 @@ from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.settings import KEYS, ServerSettings
 from mav_tasks.store.opening import kind_of
 
-app = typer.Typer(
-    help="Show, check and create the configuration of the server.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+app = group("Show, check and create the configuration of the server.")
 STANDARD_INPUT = STANDARD_OUTPUT = "-"
 
 

@@ -20,16 +20,14 @@ RELEASED = {
     "skip": "skipped",
 }
 
-MaybeTaskId = Annotated[
-    int | None,
-    typer.Argument(metavar="[ID]", min=1, help="Id of the task; default: the running task."),
-]
-
 
 @command
 async def cancel(
     common: Common,
-    task_id: MaybeTaskId = None,
+    task_id: Annotated[
+        int | None,
+        typer.Argument(metavar="[ID]", min=1, help="Id of the task; default: the running task."),
+    ] = None,
     kill: Annotated[
         bool, typer.Option("--kill", help="Also put the rover into HOLD at once.")
     ] = False,
@@ -100,9 +98,9 @@ async def modify(
 
     Options that you omit leave the task unchanged.
     """
-    start = start_of(start_in, start_at)
+    delay, at = start_of(start_in, start_at)
     until = seconds_of("--deadline", deadline)
-    wishes = (priority, start.delay, start.at, until, after, preemptible, preemptive, label)
+    wishes = (priority, delay, at, until, after, preemptible, preemptive, label)
     if all(wish is None for wish in wishes):
         raise UsageError(f"modify {task_id}: nothing to change; give --priority or another option")
     async with opened(common) as client:
@@ -110,12 +108,12 @@ async def modify(
         with values_checked(), in_typed_words():
             await task.modify(
                 priority=priority,
-                delay=start.delay,
+                delay=delay,
                 deadline=until,
                 after=after,
                 preemptible=preemptible,
                 preemptive=preemptive,
-                at=start.at,
+                at=at,
                 label=label,
             )
     words = f"rover {task.vehicle}: task {task_id} changed"

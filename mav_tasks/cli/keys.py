@@ -12,27 +12,18 @@ from typing import Annotated, Any
 import typer
 
 from mav_tasks.cli import output
-from mav_tasks.cli.lazy import completing
+from mav_tasks.cli.lazy import completing, group
+from mav_tasks.cli.options import Json, RingFile
 from mav_tasks.cli.ring import ring_path
 from mav_tasks.errors import KeyRingError, UsageError
 from mav_tasks.key_ring import derivation as how
 from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
 from mav_tasks.key_ring.ring_file import change, load
 
-app = typer.Typer(
-    help="Add, list and revoke signing keys.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+app = group("Add, list and revoke signing keys.")
 LONGEST = 4096  # characters of a passphrase that are read
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key.")]
-File = Annotated[
-    str,
-    typer.Option(
-        "--keys", metavar="FILE", help="Key ring file; default: signing.keys of the configuration."
-    ),
-]
 
 
 @app.command()
@@ -61,7 +52,7 @@ def add(
             "MAVProxy) or pbkdf2 (later QGroundControl).",
         ),
     ] = None,
-    keys: File = "",
+    keys: RingFile = "",
 ) -> None:
     """Add a key; a running server accepts it at once.
 
@@ -97,10 +88,8 @@ def add(
 
 @app.command("list")
 def list_(
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON, one object per line.")
-    ] = False,
-    keys: File = "",
+    as_json: Json = False,
+    keys: RingFile = "",
 ) -> None:
     """List the keys with their fingerprints, without the secrets."""
     path = ring_path(keys)
@@ -125,7 +114,7 @@ def revoke(
             help="Also delete the secret; records that need the key can no longer be replayed.",
         ),
     ] = False,
-    keys: File = "",
+    keys: RingFile = "",
 ) -> None:
     """Revoke a key; a running server rejects it at once.
 

@@ -1,4 +1,4 @@
-"""Commands and completions that import their modules when they are used.
+"""Groups of commands, and commands and completions that import their modules when they are used.
 
 Each call of the command line pays for what it imports; a module of a command may therefore import
 at its top whatever the command always needs. A *home* is "module:name" of a value.
@@ -14,7 +14,6 @@ from typer.main import get_command, get_group
 
 
 def loaded(home: str) -> Any:
-    """Return the value with this home."""
     module, _, name = home.partition(":")
     return getattr(import_module(module), name)
 
@@ -34,6 +33,11 @@ def beginning_with(typed: str, words: Any) -> list[str]:
     return [word for word in words if word.startswith(typed)]
 
 
+def group(summary: str, *, epilog: str | None = None) -> typer.Typer:
+    """Return a group of commands, which shows its plain help if none is named."""
+    return typer.Typer(no_args_is_help=True, rich_markup_mode=None, help=summary, epilog=epilog)
+
+
 class LazyCommand(TyperCommand):
     """Stands for a command, or a group of commands, in the help and in completions."""
 
@@ -50,7 +54,6 @@ class LazyCommand(TyperCommand):
         return self.load().make_context(info_name, args, parent=parent, **extra)
 
     def load(self) -> Any:
-        """Import and return the command."""
         value = loaded(self._home)
         if isinstance(value, typer.Typer):
             return get_group(value)

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from mav_tasks.cli import output
+from mav_tasks.cli.options import Json
 from mav_tasks.config.configuration import Sources
 from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.logs import export
@@ -44,9 +45,7 @@ def log(
             help="Print only events of the last 30m, 2h or 7d, or since a time (UTC).",
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON, one object per line.")
-    ] = False,
+    as_json: Json = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
     follow: Annotated[
         bool, typer.Option("--follow", "-f", help="Keep printing new events until Ctrl-C.")
@@ -64,12 +63,13 @@ def log(
     begin = None if since is None else export.parse_since(since, now=time.time())
     if store == "":
         raise StoreError("--store: expected the path of a store file")
-    place = _store_of_server() if store is None else store
+    if store is None:
+        store = Sources(None, dict(os.environ)).load().settings.store or latest_store() or ""
     which = Which(task=task, vehicle=vehicle, since=begin)
     entry_of = export.json_entry if as_json else export.csv_entry if as_csv else export.text_entry
     # a program gets whole lines
     columns = output.columns() if not as_json and not as_csv and sys.stdout.isatty() else None
-    with closing(kind_of(place).open_journal(place, which)) as journal:
+    with closing(kind_of(store).open_journal(store, which)) as journal:
         try:
             if as_csv:
                 sys.stdout.write(export.csv_row(export.COLUMNS))
@@ -101,9 +101,3 @@ def _is_written_to(journal: JournalReader, seen: int) -> bool:
         if poller.poll(LOOK * 1000):
             return False
     return True
-
-
-def _store_of_server() -> str:
-    """Return the configured store, else the store of the server that was started last."""
-    configured = Sources(None, dict(os.environ)).load().settings.store
-    return configured or latest_store() or ""

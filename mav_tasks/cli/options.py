@@ -36,6 +36,13 @@ Wait = Annotated[
         "--wait", "-w", help="Show the task until it ends; exit with 1 unless it completes."
     ),
 ]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")]
+RingFile = Annotated[
+    str,
+    typer.Option(
+        "--keys", metavar="FILE", help="Key ring file; default: signing.keys of the configuration."
+    ),
+]
 TaskId = Annotated[int, typer.Argument(metavar="ID", min=1, help="Id of the task.")]
 
 
@@ -63,7 +70,7 @@ class Common:
         float,
         typer.Option(min=0.1, metavar="SECONDS", help="How long to look for the server."),
     ] = 5.0
-    json: Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")] = False
+    json: Json = False
     sign: Annotated[
         str,
         typer.Option(
@@ -73,12 +80,7 @@ class Common:
             help="Sign with this key of the key ring.",
         ),
     ] = ""
-    keys: Annotated[
-        str,
-        typer.Option(
-            metavar="FILE", help="Key ring file; default: signing.keys of the configuration."
-        ),
-    ] = ""
+    keys: RingFile = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,21 +109,16 @@ class TaskOptions:
     wait: Wait = False
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
-    """A start delay in seconds, a start time, or neither."""
+def start_of(start_in: str, start_at: str) -> tuple[float | None, datetime | None]:
+    """Return the delay, s, of ``--in``, and the time of ``--at``; None: not given.
 
-    delay: float | None
-    at: "datetime | None"
-
-
-def start_of(start_in: str, start_at: str) -> Start:
-    """Return the parsed ``--in`` or ``--at``. Raise UsageError if invalid, or if both are given."""
+    Raise UsageError if one is invalid, or if both are given.
+    """
     if start_in and start_at:
         raise UsageError("--in and --at: choose one of them")
     if not start_at:
-        return Start(seconds_of("--in", start_in), None)
-    return Start(None, parse_moment("--at", start_at, now=datetime.now(UTC)))
+        return seconds_of("--in", start_in), None
+    return None, parse_moment("--at", start_at, now=datetime.now(UTC))
 
 
 def seconds_of(name: str, text: str) -> float | None:

@@ -25,6 +25,7 @@ def console() -> "Console":
     from rich.console import Console  # noqa: PLC0415
 
     is_drawn = is_drawn_on()
+    plain_width = columns() if sys.stdout.isatty() else PIPE_WIDTH
     has_colour = is_drawn and not os.environ.get("NO_COLOR")
     return Console(
         force_terminal=is_drawn,
@@ -32,7 +33,7 @@ def console() -> "Console":
         highlight=False,
         markup=False,
         emoji=False,
-        width=None if is_drawn else _plain_width(),
+        width=None if is_drawn else plain_width,
     )
 
 
@@ -73,7 +74,6 @@ def show(what: "RenderableType") -> None:
 
 
 def columns() -> int:
-    """Return the width of the terminal."""
     return shutil.get_terminal_size().columns
 
 
@@ -93,7 +93,3 @@ def wrapped(line: str, width: int) -> str:
             break_on_hyphens=False,
         )
     )
-
-
-def _plain_width() -> int:
-    return columns() if sys.stdout.isatty() else PIPE_WIDTH

@@ -9,6 +9,7 @@ import typer
 
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
+from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import Common, TaskOptions, Wait
 from mav_tasks.cli.session import opened, read, values_checked
 from mav_tasks.cli.submit import tell_submitted
@@ -39,13 +40,9 @@ EmptyRally = Annotated[
     bool, typer.Option("--empty", help="Delete the rover's rally points if the file has none.")
 ]
 
-mission = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Upload, start and download missions."
-)
-fence = typer.Typer(
-    no_args_is_help=True, rich_markup_mode=None, help="Upload and download the fence."
-)
-rally = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Upload rally points.")
+mission = group("Upload, start and download missions.")
+fence = group("Upload and download the fence.")
+rally = group("Upload rally points.")
 
 
 @mission.command("upload")
@@ -70,7 +67,7 @@ async def upload_mission(
             if stage:
                 task = await client.stage_mission(plan)
             else:
-                task = await client.submit_mission(plan, **wished._asdict())
+                task = await client.submit_mission(plan, **wished)
         hint = " waits: mav-tasks mission start" if stage else ""
         await tell_submitted(client, task, common, is_awaited=terms.wait, hint=hint)
 
@@ -111,7 +108,7 @@ async def upload_fence(file: PlanIn, common: Common, empty: EmptyFence = False) 
         raise UsageError(f"{file} has no fence; use --empty to remove the rover's fence")
     async with opened(common) as client:
         count = await client.set_fence(plan)
-    _uploaded(common, "fence", count)
+    output.say_done(common.json, "fence upload", f"fence: {count} items", items=count)
 
 
 @fence.command("download")
@@ -134,7 +131,7 @@ async def upload_rally_points(file: PlanIn, common: Common, empty: EmptyRally = 
         raise UsageError(f"{file} has no rally points; use --empty to remove the rover's")
     async with opened(common) as client:
         count = await client.set_rally_points(plan)
-    _uploaded(common, "rally", count)
+    output.say_done(common.json, "rally upload", f"rally: {count} items", items=count)
 
 
 def _check_place(file: str, *, force: bool) -> None:
@@ -158,10 +155,3 @@ def _write(plan: PlanFile, file: str, what: str, common: Common) -> None:
         output.say_json({"file": file, "items": len(plan.items) or len(plan.fence)})
     else:
         output.say(f"{file}: {what}")
-
-
-def _uploaded(common: Common, kind: str, count: int) -> None:
-    if common.json:
-        output.say_json({"done": f"{kind} upload", "items": count})
-    else:
-        output.say(f"{kind}: {count} items")

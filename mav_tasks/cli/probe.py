@@ -8,7 +8,7 @@ import typer
 
 from mav_tasks.cli import output as out
 from mav_tasks.cli.command import command
-from mav_tasks.cli.options import DEFAULT_SERVER
+from mav_tasks.cli.options import DEFAULT_SERVER, RingFile
 from mav_tasks.cli.ring import key_to_sign_with
 from mav_tasks.config import profiles
 from mav_tasks.errors import ConfigError, NoAnswer, UsageError
@@ -16,76 +16,8 @@ from mav_tasks.probe import report
 from mav_tasks.probe.failsafe import NotSet
 from mav_tasks.probe.probe import NothingHeard, Occupied, Options, Probe
 from mav_tasks.probe.profile import profile_of, why_none
-from mav_tasks.probe.report import as_json as values_of
 from mav_tasks.probing import run_probe
 
-Url = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="URL",
-        help="URL of the rover: udpout:host:port, udpin:host:port, tcp:host:port, "
-        "serial:/dev/ttyUSB0:57600.",
-    ),
-]
-SetFailsafe = Annotated[
-    bool,
-    typer.Option(
-        "--set-failsafe",
-        help="Set the parameters that stop the rover when setpoints stop, and test nothing. "
-        "URL may be that of a task server (default: the server on this machine).",
-    ),
-]
-DriveFlag = Annotated[
-    bool,
-    typer.Option(
-        "--drive",
-        help="Arm the rover and drive it slowly, within 1 m of where it stands (4 m or more if it "
-        "steers like a car).",
-    ),
-]
-Yes = Annotated[bool, typer.Option("--yes", "-y", help="With --drive: do not ask first.")]
-Speed = Annotated[
-    float,
-    typer.Option(
-        min=0.1,
-        max=0.5,
-        metavar="M/S",
-        help="With --drive: speed from which to measure the stopping distance.",
-    ),
-]
-Number = Annotated[
-    int | None,
-    typer.Option(min=1, max=255, metavar="N", help="System id of the rover, if several are heard."),
-]
-Timeout = Annotated[
-    float,
-    typer.Option("--timeout", min=1.0, metavar="SECONDS", help="How long to wait for a rover."),
-]
-Output = Annotated[
-    str | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="File for the profile; default: in the folder vehicles of your configuration folder.",
-    ),
-]
-Insecure = Annotated[
-    bool, typer.Option("--insecure", help="Allow an unsigned link that other machines can reach.")
-]
-Sign = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME",
-        envvar="MAV_TASKS_SIGN",
-        help="Sign with this key, and accept only packets signed with it.",
-    ),
-]
-Keys = Annotated[
-    str,
-    typer.Option(metavar="FILE", help="Key ring file; default: signing.keys of the configuration."),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 QUESTION = """\
 This arms the rover and drives it at up to {speed:g} m/s, within 1 m of its place, or 4 m and more
 if its parameters say that it steers like a car. Is there room, is nobody near it, and can you stop
@@ -96,18 +28,76 @@ SIGNALLED = 128  # as a shell reports a signal
 
 @command
 async def probe(
-    url: Url = None,
-    set_failsafe: SetFailsafe = False,
-    drive: DriveFlag = False,
-    yes: Yes = False,
-    speed: Speed = 0.3,
-    vehicle: Number = None,
-    find_within: Timeout = 10.0,
-    output: Output = None,
-    insecure: Insecure = False,
-    sign: Sign = "",
-    keys: Keys = "",
-    as_json: Json = False,
+    url: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="URL",
+            help="URL of the rover: udpout:host:port, udpin:host:port, tcp:host:port, "
+            "serial:/dev/ttyUSB0:57600.",
+        ),
+    ] = None,
+    set_failsafe: Annotated[
+        bool,
+        typer.Option(
+            "--set-failsafe",
+            help="Set the parameters that stop the rover when setpoints stop, and test nothing. "
+            "URL may be that of a task server (default: the server on this machine).",
+        ),
+    ] = False,
+    drive: Annotated[
+        bool,
+        typer.Option(
+            "--drive",
+            help="Arm the rover and drive it slowly, within 1 m of where it stands (4 m or more if "
+            "it steers like a car).",
+        ),
+    ] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", help="With --drive: do not ask first.")
+    ] = False,
+    speed: Annotated[
+        float,
+        typer.Option(
+            min=0.1,
+            max=0.5,
+            metavar="M/S",
+            help="With --drive: speed from which to measure the stopping distance.",
+        ),
+    ] = 0.3,
+    vehicle: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=255, metavar="N", help="System id of the rover, if several are heard."
+        ),
+    ] = None,
+    find_within: Annotated[
+        float,
+        typer.Option("--timeout", min=1.0, metavar="SECONDS", help="How long to wait for a rover."),
+    ] = 10.0,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="File for the profile; default: in the folder vehicles of your "
+            "configuration folder.",
+        ),
+    ] = None,
+    insecure: Annotated[
+        bool,
+        typer.Option("--insecure", help="Allow an unsigned link that other machines can reach."),
+    ] = False,
+    sign: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            envvar="MAV_TASKS_SIGN",
+            help="Sign with this key, and accept only packets signed with it.",
+        ),
+    ] = "",
+    keys: RingFile = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Test what a rover can do, without a server.
 
@@ -128,12 +118,10 @@ async def probe(
         find_within=find_within,
     )
     where = url or DEFAULT_SERVER
-    done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=_say)
+    done, signal = await run_probe(where, options, insecure=insecure, key=key, on_stage=out.warn)
     if isinstance(done.error, NothingHeard):
         raise NoAnswer(str(done.error))
-    if isinstance(done.error, Occupied):
-        raise UsageError(str(done.error))
-    if isinstance(done.error, NotSet):
+    if isinstance(done.error, Occupied | NotSet):
         raise UsageError(str(done.error))
     if set_failsafe:
         _show_failsafe(done, as_json=as_json)
@@ -158,7 +146,7 @@ def _show_failsafe(done: Probe, *, as_json: bool) -> None:
     """Print the parameters set, and what the rover does now when setpoints stop."""
     found = done.findings
     if as_json:
-        out.say_json(values_of(found))
+        out.say_json(report.as_json(found))
     else:
         out.say(f"rover {found.system_id}: {found.failsafe_set}; {found.loss_by_parameters}")
 
@@ -184,11 +172,5 @@ def _show(done: Probe, output: str | None, *, as_json: bool) -> None:
 
 
 def _keep(done: Probe, output: str | None) -> str:
-    """Write the profile. Return its path."""
     profile = profile_of(done.findings, probed=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")
     return str(profiles.write(profile, output))
-
-
-def _say(words: str) -> None:
-    sys.stderr.write(f"mav-tasks: {words}\n")
-    sys.stderr.flush()

@@ -46,12 +46,7 @@ def qgc_actions(
         file_type = files.CUSTOM_ACTIONS if custom else files.MAVLINK_ACTIONS
         sys.stdout.write(files.file_of(actions, file_type=file_type, component=component))
         return
-    for path in files.install(_documents(documents), actions, component=component):
+    folder = user_documents_path() if documents is None else Path(documents)
+    for path in files.install(folder, actions, component=component):
         sys.stdout.write(f"wrote {path}\n")
     sys.stdout.write("Now select the file in QGroundControl: Application Settings, Fly View\n")
-
-
-def _documents(folder: str | None) -> Path:
-    if folder is not None:
-        return Path(folder)
-    return user_documents_path()

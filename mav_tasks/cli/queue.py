@@ -46,7 +46,6 @@ async def fetch(client: Client, common: Common, *, limit: int) -> list[QueueStat
 
 
 def show(queues: list[QueueStatus], common: Common, *, is_alone: bool) -> None:
-    """Print queues as tables, or as JSON."""
     if common.json:
         for each in queues:
             output.say_json(words.queue_json(each))

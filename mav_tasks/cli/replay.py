@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from mav_tasks.cli import exit_codes
+from mav_tasks.cli.options import Json
 from mav_tasks.key_ring.ring_file import load, path_of_ring
 from mav_tasks.recording.reading import read
 from mav_tasks.recording.replay import Replay
@@ -15,7 +16,7 @@ from mav_tasks.recording.report import Report
 
 def replay(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Record made by serve --record.")],
-    json: Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")] = False,
+    json: Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print only the result.")] = False,
     keys: Annotated[
         str,

@@ -25,7 +25,6 @@ class ServeCommand(TyperCommand):
         ]
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """Return all options."""
         return [*(made for _, _, made in self._options), *super().get_params(ctx)]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

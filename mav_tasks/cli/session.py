@@ -3,8 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from datetime import datetime
-from typing import NamedTuple
+from typing import Any
 
 from mav_tasks.cli.options import Common, TaskOptions, seconds_of, start_of
 from mav_tasks.cli.words import silence_of
@@ -17,24 +16,12 @@ LOOK = 0.01  # s between two checks
 LOOKS = 150
 
 
-class Read(NamedTuple):
-    """TaskOptions parsed for ``Client.submit``."""
-
-    priority: int
-    after: int
-    delay: float
-    at: datetime | None
-    deadline: float
-    nonce: int
-    label: str
-
-
-def read(terms: TaskOptions) -> Read:
-    """Return the parsed options of a task. Raise UsageError if one is invalid."""
-    start = start_of(terms.start_in, terms.start_at)
+def read(terms: TaskOptions) -> dict[str, Any]:
+    """Return the arguments of ``Client.submit`` for a task. Raise UsageError if one is invalid."""
+    delay, at = start_of(terms.start_in, terms.start_at)
     deadline = seconds_of("--deadline", terms.deadline) or 0.0
-    delay = start.delay or 0.0
-    return Read(terms.priority, terms.after, delay, start.at, deadline, terms.nonce, terms.label)
+    shared = {name: getattr(terms, name) for name in ("priority", "after", "nonce", "label")}
+    return {"delay": delay or 0.0, "at": at, "deadline": deadline, **shared}
 
 
 @asynccontextmanager

@@ -27,7 +27,8 @@ async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
         if common.json:
             output.say_json(words.task_json(answer) | {"setpoints": words.timing_json(timing)})
             return
-        silence = words.silence_of(_heartbeat_age(client, answer.vehicle))
+        ages = {each.id: each.heartbeat_age for each in client.vehicles()}
+        silence = words.silence_of(ages.get(answer.vehicle))
         to_do = await _to_do(client, common, answer)
         for name, value in _fields(answer, timing, silence, to_do):
             if value:
@@ -48,10 +49,6 @@ async def _timing_of(task: Task) -> TaskTiming | None:
         return await task.timing()
     except Refused:  # an older server does not support the request
         return None
-
-
-def _heartbeat_age(client: Client, vehicle: int) -> float | None:
-    return next((each.heartbeat_age for each in client.vehicles() if each.id == vehicle), None)
 
 
 def _fields(

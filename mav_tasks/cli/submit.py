@@ -8,6 +8,7 @@ import typer
 
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
+from mav_tasks.cli.lazy import group
 from mav_tasks.cli.options import Common, TaskOptions
 from mav_tasks.cli.places import parse_place
 from mav_tasks.cli.session import is_alone, opened, read, values_checked
@@ -34,7 +35,7 @@ Rate = Annotated[
     typer.Option(metavar="DEG/S", help="Turn rate; default: driving.turn_rate_deg of the server."),
 ]
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, epilog=EPILOG, help="Submit a task.")
+app = group("Submit a task.", epilog=EPILOG)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -60,7 +61,7 @@ async def rotate(
     rate: Rate = None,
 ) -> None:
     """Turn on the spot by an angle."""
-    await _submit([Rotate(_radians(angle), _maybe_radians(rate))], terms, common)
+    await _submit([Rotate(radians(angle), _maybe_radians(rate))], terms, common)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -76,7 +77,7 @@ async def drive(
 ) -> None:
     """Drive at a constant velocity for some time."""
     seconds = parse_duration("DURATION", duration)
-    await _submit([Drive(forward, _radians(yaw_rate), seconds)], terms, common)
+    await _submit([Drive(forward, radians(yaw_rate), seconds)], terms, common)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -126,7 +127,7 @@ async def face(
     rate: Rate = None,
 ) -> None:
     """Turn on the spot to a heading."""
-    await _submit([Face(_radians(heading), rate=_maybe_radians(rate))], terms, common)
+    await _submit([Face(radians(heading), rate=_maybe_radians(rate))], terms, common)
 
 
 @app.command(cls=NumbersCommand, context_settings=NUMBERS)
@@ -153,7 +154,7 @@ async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> 
     wished = read(terms)
     async with opened(common) as client:
         with values_checked(), in_typed_words():
-            task = await client.submit(goals, **wished._asdict())
+            task = await client.submit(goals, **wished)
         await tell_submitted(client, task, common, is_awaited=terms.wait)
 
 
@@ -186,9 +187,5 @@ async def _why_it_waits(client: Client, task: Task, common: Common) -> str:
     return words.why_it_waits(status, queue, is_alone=is_alone(client, common))
 
 
-def _radians(angle: float) -> float:
-    return radians(angle)
-
-
 def _maybe_radians(angle: float | None) -> float | None:
-    return None if angle is None else _radians(angle)
+    return None if angle is None else radians(angle)

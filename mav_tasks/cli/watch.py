@@ -2,8 +2,7 @@
 
 import asyncio
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 from rich.console import Group
 from rich.live import Live
@@ -42,14 +41,12 @@ async def _print_changes(client: Client, common: Common, *, limit: int) -> None:
 
 
 async def _draw(client: Client, common: Common, *, limit: int) -> None:
-    window = Window()
-    with (
-        Live(
-            console=output.console(), screen=True, auto_refresh=False, get_renderable=window.drawn
-        ) as live,
-        _on_resize(live.refresh),
-    ):
+    window, loop = Window(), asyncio.get_running_loop()
+    with Live(
+        console=output.console(), screen=True, auto_refresh=False, get_renderable=window.drawn
+    ) as live:
         window.live = live
+        loop.add_signal_handler(signal.SIGWINCH, live.refresh)
         refreshing = asyncio.create_task(_refresh(window))
         try:
             while True:
@@ -61,6 +58,7 @@ async def _draw(client: Client, common: Common, *, limit: int) -> None:
                 await asyncio.sleep(PERIOD)
         finally:
             refreshing.cancel()
+            loop.remove_signal_handler(signal.SIGWINCH)
 
 
 async def _refresh(window: "Window") -> None:
@@ -92,7 +90,6 @@ class Window:
         self._at = self._loop.time()
 
     def drawn(self) -> Group:
-        """Return the lines of the screen."""
         if self.live is None:
             return Group()
         width, height = self.live.console.size
@@ -114,14 +111,3 @@ def _essence(queue: QueueStatus) -> object:
     current = queue.current and (queue.current.id, words.state_of(queue.current))
     tasks = [(t.id, t.state, t.reason, t.priority, t.after) for t in queue.waiting]
     return current, queue.running, queue.paused, dict(queue.counts), tasks
-
-
-@contextmanager
-def _on_resize(redraw: "object") -> Iterator[None]:
-    assert callable(redraw)
-    loop = asyncio.get_running_loop()
-    loop.add_signal_handler(signal.SIGWINCH, redraw)
-    try:
-        yield
-    finally:
-        loop.remove_signal_handler(signal.SIGWINCH)

@@ -41,7 +41,6 @@ COMES_BY_ITSELF = (
 
 
 def state_of(status: TaskStatus) -> str:
-    """Return the name of a task's state."""
     return status.state.name.lower()
 
 
@@ -119,7 +118,6 @@ def way_on_of(status: TaskStatus, *, is_alone: bool = True) -> str:
 
 
 def line_of(status: TaskStatus, *, is_alone: bool = True) -> str:
-    """Return a task in one line."""
     why = f" ({end_of(status)})" if end_of(status) else ""
     took = f", in {took_of(status)}" if status.is_over and took_of(status) else ""
     way_on = way_on_of(status, is_alone=is_alone)
@@ -301,18 +299,11 @@ def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
     """Return the timing as JSON, in seconds; null if it is unknown."""
     if timing is None:
         return None
-    return {
-        "rate": _rounded(timing.rate),
-        "count": timing.count,
-        "p50": _rounded(timing.p50),
-        "p99": _rounded(timing.p99),
-        "max": _rounded(timing.max),
-        "late": timing.late,
-    }
+    names = ("rate", "count", "p50", "p99", "max", "late")
+    return {name: _rounded(getattr(timing, name)) for name in names}
 
 
 def queue_json(queue: QueueStatus) -> dict[str, Any]:
-    """Return a queue as JSON."""
     waits = waits_of(queue)
     return {
         "vehicle": queue.vehicle,
@@ -330,7 +321,6 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
 
 
 def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
-    """Return a rover as JSON."""
     heading = None if vehicle.yaw is None else round(degrees(vehicle.yaw), 4) % 360.0
     return {
         "vehicle": vehicle.id,

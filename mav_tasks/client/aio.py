@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from datetime import datetime
 from math import nan
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 from weakref import WeakValueDictionary
 
@@ -121,12 +120,7 @@ class Client:
             raise
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, *_error: object) -> None:
         await self.close()
 
     def open(self) -> None:
@@ -280,7 +274,9 @@ class Client:
         for name, value in changes:
             await self._control(vehicle, MavCmd.TASK_MODIFY, to_param(task_id), float(name), value)
         if at is not None:
-            await self._start_at(task_id, at, self._which(vehicle))
+            await self._modify_exactly(
+                task_id, TaskProperty.START_UTC, round(utc_of(at)), 0, nan, vehicle=vehicle
+            )
         for piece in pieces_of(label) if label is not None else ():
             await self._modify_exactly(
                 task_id, TaskProperty.LABEL, piece.x, piece.y, float(piece.offset), vehicle=vehicle
@@ -531,10 +527,11 @@ class Client:
     def _has_home_item(self, vehicle: int) -> bool:
         """Return whether a rover's missions begin with home. Raise NoAnswer if not known."""
         view = self._open.session.fleet.get(vehicle)
-        if view is None or not view.is_known:
+        has_home_item = None if view is None else view.has_home_item
+        if has_home_item is None:
             words = f"rover {vehicle} is silent: unknown whether its missions begin with home"
             raise NoAnswer(words)
-        return view.has_home_item
+        return has_home_item
 
     def _handle(self, followed: Followed) -> Task:
         task = self._tasks.get(followed)
@@ -583,10 +580,6 @@ class Client:
             fits=lambda ack: ack.result_param2 == task_id,
         )
         return task_id
-
-    async def _start_at(self, task_id: int, at: datetime, vehicle: int) -> None:
-        moment = round(utc_of(at))
-        await self._modify_exactly(task_id, TaskProperty.START_UTC, moment, 0, nan, vehicle=vehicle)
 
     async def _modify_exactly(
         self,
@@ -642,31 +635,19 @@ class Client:
         task_id = await self._ask.upload(target, items, MavMissionType.MISSION, nonce=mark or 0)
         return self._submitted_as(task_id, vehicle, mark or 0)
 
-    async def _set_deadline(self, task: Task, deadline: float) -> None:
-        try:
-            await task.modify(deadline=deadline)
-        except Refused as refused:
-            if refused.reason != TaskReason.WRONG_STATE:
-                raise  # else it has started in time already
-
-    async def _set_label(self, task: Task, label: str) -> None:
-        try:
-            await task.modify(label=label)
-        except Refused as refused:
-            if refused.reason != TaskReason.WRONG_STATE:
-                raise  # else it has ended already
-
     async def _complete(
         self, task: Task, *, deadline: float, at: datetime | None, label: str, nonce: int
     ) -> None:
         """Set the properties that the submission could not carry."""
         try:
             if deadline:
-                await self._set_deadline(task, deadline)
+                with _in_any_state():  # it may have started in time already
+                    await task.modify(deadline=deadline)
             if at is not None:
                 await task.modify(at=at)
             if label:
-                await self._set_label(task, label)
+                with _in_any_state():  # it may have ended already
+                    await task.modify(label=label)
         except NoAnswer as error:  # the task exists: a second try needs its nonce
             raise NoAnswer(str(error), nonce=nonce) from None
 
@@ -690,6 +671,15 @@ class Client:
         task = self._tasks.get(followed)
         if task is not None:
             task.wake()
+
+
+@contextmanager
+def _in_any_state() -> Iterator[None]:
+    try:
+        yield
+    except Refused as refused:
+        if refused.reason != TaskReason.WRONG_STATE:
+            raise
 
 
 def _id_of(task: int | Task) -> int:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from mav_tasks.client.calls import AGAIN, Call, Command
 from mav_tasks.client.connection import Connection
-from mav_tasks.client.session import WORDS_WITHIN, Reply, request_message
+from mav_tasks.client.session import WORDS_WITHIN, Answer, Reply, request_message
 from mav_tasks.client.values import TaskStatus, TaskTiming, Text
 from mav_tasks.errors import ClientError, NoAnswer, Refused
 from mav_tasks.mavlink import messages as m
@@ -33,17 +33,12 @@ class Asker:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._pending: set[asyncio.Future[Any]] = set()
-        self._statuses: set[Callable[[TaskStatus], None]] = set()
-        self._queues: set[Callable[[m.TaskQueueStatus, int], None]] = set()
-        self._timings: set[Callable[[TaskTiming], None]] = set()
-        self._asked: dict[asyncio.Future[int], Command] = {}
+        #: with the command that calling it off ends
+        self._pending: dict[asyncio.Future[Any], Command | None] = {}
+        self._takers: set[Callable[[Answer, int], None]] = set()
         self._listening: set[asyncio.Queue[Text | None]] = set()
-        session = connection.session
-        session.on_status = self._on_status
-        session.on_queue = self._on_queue
-        session.on_timing = self._on_timing
-        session.on_text = self._on_text
+        connection.session.on_answer = self._on_answer
+        connection.session.on_text = self._on_text
 
     def __repr__(self) -> str:
         return f"Asker({self._connection!r}, {len(self._pending)} pending)"
@@ -78,17 +73,14 @@ class Asker:
         loop = asyncio.get_running_loop()
         end, refused, left = loop.time() + within, None, within
         while True:
+            call = Call(command, left, fits, again, is_told_apart, is_urgent)
             try:
-                return await self._ask_once(
-                    command,
-                    what,
-                    within=left,
-                    again=again,
-                    fits=fits,
-                    nonce=nonce,
-                    is_told_apart=is_told_apart,
-                    is_urgent=is_urgent,
-                )
+                with self._future(int, command) as future:
+                    self._begin(call, future, what, nonce=nonce)
+                    try:
+                        return await future
+                    finally:
+                        self._connection.settle(call, is_answered=False)
             except Refused as error:
                 if error.reason != TaskReason.RATE_LIMITED or loop.time() + LATER > end:
                     raise
@@ -100,80 +92,38 @@ class Asker:
             await asyncio.sleep(LATER)
             left = end - loop.time()
 
-    async def _ask_once(
-        self,
-        command: Command,
-        what: str,
-        *,
-        within: float,
-        again: float,
-        fits: Callable[[m.CommandAck], bool],
-        nonce: int,
-        is_told_apart: bool,
-        is_urgent: bool,
-    ) -> int:
-        with self._future(int) as future:
-            call = self._call(
-                command,
-                future,
-                what,
-                within=within,
-                again=again,
-                fits=fits,
-                nonce=nonce,
-                is_told_apart=is_told_apart,
-                is_urgent=is_urgent,
-            )
-            self._asked[future] = command
-            try:
-                return await future
-            finally:
-                del self._asked[future]
-                self._connection.settle(call, is_answered=False)
-
     def call_off(self, is_meant: Callable[[Command], bool], why: str) -> None:
         """Stop sending the unanswered commands that match; their callers get ClientError(why)."""
-        for future, command in self._asked.items():
-            if is_meant(command) and not future.done():
+        for future, command in self._pending.items():
+            if command is not None and is_meant(command) and not future.done():
                 future.set_exception(ClientError(why))
 
     async def status(self, task_id: int, vehicle: int) -> TaskStatus:
-        """Return the status of a task."""
         request = request_message(vehicle, m.TaskStatus.id, to_param(task_id))
-        with self._future(TaskStatus) as future:
 
-            def take(status: TaskStatus) -> None:
-                if status.id == task_id and not future.done():
-                    future.set_result(status)
+        def is_meant(status: TaskStatus, _source: int) -> bool:
+            return status.id == task_id
 
-            with _added(self._statuses, take):
-                return await self._shown(future, request, f"task {task_id}")
+        return await self._shown(request, f"task {task_id}", TaskStatus, is_meant)
 
     async def timing(self, task_id: int, vehicle: int) -> TaskTiming:
         """Return how evenly the setpoints of a task left; 0: of the running task."""
         request = request_message(vehicle, m.TaskTiming.id, to_param(task_id))
-        with self._future(TaskTiming) as future:
 
-            def take(timing: TaskTiming) -> None:
-                is_meant = timing.id == task_id if task_id else timing.vehicle == vehicle
-                if is_meant and not future.done():
-                    future.set_result(timing)
+        def is_meant(timing: TaskTiming, source: int) -> bool:
+            return timing.id == task_id if task_id else source == vehicle
 
-            with _added(self._timings, take):
-                what = f"the timing of task {task_id or 'that runs'}"
-                return await self._shown(future, request, what)
+        what = f"the timing of task {task_id or 'that runs'}"
+        return await self._shown(request, what, TaskTiming, is_meant)
 
     async def overview(self, vehicle: int) -> m.TaskQueueStatus:
-        """Return the TASK_QUEUE_STATUS of a rover."""
         request = request_message(vehicle, m.TaskQueueStatus.id)
-        with self._future(m.TaskQueueStatus) as future:
 
-            def take(message: m.TaskQueueStatus, source: int) -> None:
-                if source == vehicle and not future.done():
-                    future.set_result(message)
+        def is_meant(_message: m.TaskQueueStatus, source: int) -> bool:
+            return source == vehicle
 
-            with _added(self._queues, take):
-                return await self._shown(future, request, f"the queue of rover {vehicle}")
+        what = f"the queue of rover {vehicle}"
+        return await self._shown(request, what, m.TaskQueueStatus, is_meant)
 
     async def page(
         self, vehicle: int, first: int, count: int, *, begun: int, known: Container[int]
@@ -183,23 +133,16 @@ class Asker:
         ``begun`` is the number of active tasks: a task's position counts them, its place in the
         queue does not. ``known`` are the ids of earlier pages, whose statuses may still arrive.
         """
-        found: dict[int, TaskStatus] = {}
         # meanwhile any of the active tasks may end, and one task may start
         positions = range(first, first + count + begun + 1)
-        whole = asyncio.Event()
 
-        def take(status: TaskStatus) -> None:
-            if status.vehicle != vehicle or not status.is_waiting or status.id in known:
-                return
+        def is_meant(status: TaskStatus) -> bool:
             is_unplaced = status.position is None and status.state is not TaskState.QUEUED
-            if is_unplaced or status.position in positions:
-                found[status.id] = status
-                if len(found) >= count:
-                    whole.set()
+            return status.is_waiting and (is_unplaced or status.position in positions)
 
         request = request_message(vehicle, m.TaskStatus.id, 0.0, float(first))
-        await self._until_whole(request, take, whole, vehicle)
-        return sorted(found.values(), key=_place)
+        found = await self._gathered(request, vehicle, count, known=known, is_meant=is_meant)
+        return sorted((status for status, _ in found), key=_place)
 
     async def finished(
         self, vehicle: int, first: int, count: int, *, known: Container[int]
@@ -208,36 +151,45 @@ class Asker:
 
         ``known`` are the ids of earlier pages, whose statuses may still arrive.
         """
-        found: dict[int, tuple[float, TaskStatus]] = {}  # with its end time
-        whole, loop = asyncio.Event(), asyncio.get_running_loop()
 
-        def take(status: TaskStatus) -> None:
-            if status.vehicle != vehicle or status.ended_ago is None or status.id in known:
-                return  # without ``ended_ago`` it is a change notification, not an answer
-            found.setdefault(status.id, (loop.time() - status.ended_ago, status))
-            if len(found) >= count:
-                whole.set()
+        def is_meant(status: TaskStatus) -> bool:
+            return status.ended_ago is not None  # else it is a change notification, not an answer
 
         request = request_message(vehicle, m.TaskStatus.id, 0.0, float(first), FINISHED)
-        await self._until_whole(request, take, whole, vehicle)
-        newest = sorted(found.values(), key=lambda each: each[0], reverse=True)
-        return [status for _, status in newest]
+        found = await self._gathered(request, vehicle, count, known=known, is_meant=is_meant)
+        found.sort(key=lambda each: each[1] - (each[0].ended_ago or 0.0), reverse=True)
+        return [status for status, _ in found]
 
-    async def _until_whole(
+    async def _gathered(
         self,
         request: m.CommandLong,
-        take: Callable[[TaskStatus], None],
-        whole: asyncio.Event,
         vehicle: int,
-    ) -> None:
-        with _added(self._statuses, take):
+        count: int,
+        *,
+        known: Container[int],
+        is_meant: Callable[[TaskStatus], bool],
+    ) -> list[tuple[TaskStatus, float]]:
+        """Return the statuses that answer a request, each with its time of arrival."""
+        found: dict[int, tuple[TaskStatus, float]] = {}
+        whole, loop = asyncio.Event(), asyncio.get_running_loop()
+
+        def take(status: Answer, source: int) -> None:
+            if not isinstance(status, TaskStatus) or source != vehicle or status.id in known:
+                return
+            if is_meant(status):
+                found[status.id] = status, loop.time()
+                if len(found) >= count:
+                    whole.set()
+
+        with _added(self._takers, take):
             for _ in range(PAGE_TRIES):
                 await self.ask(request, f"the tasks of rover {vehicle}", is_told_apart=True)
                 with suppress(TimeoutError):  # the ack may arrive before the statuses
                     async with asyncio.timeout(PAGE_WITHIN):
                         await whole.wait()
                 if whole.is_set():
-                    return
+                    break
+        return list(found.values())
 
     async def upload(
         self, target: Address, items: tuple[Item, ...], kind: MavMissionType, *, nonce: int = 0
@@ -268,7 +220,6 @@ class Asker:
             return opaque_id
 
     async def download(self, target: Address, kind: MavMissionType) -> tuple[Item, ...]:
-        """Download a plan."""
         with self._future(tuple[Item, ...]) as future:
 
             def done(items: tuple[Item, ...] | None, refused: MavMissionResult | None) -> None:
@@ -300,40 +251,47 @@ class Asker:
     # internal
 
     @contextmanager
-    def _future(self, _kind: type[T]) -> Iterator[asyncio.Future[T]]:
+    def _future(
+        self, _kind: type[T], command: Command | None = None
+    ) -> Iterator[asyncio.Future[T]]:
         future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
-        with _added(self._pending, future):
+        self._pending[future] = command
+        try:
             yield future
+        finally:
+            del self._pending[future]
 
-    async def _shown(self, future: asyncio.Future[T], request: m.CommandLong, what: str) -> T:
+    async def _shown(
+        self,
+        request: m.CommandLong,
+        what: str,
+        kind: type[T],
+        is_meant: Callable[[T, int], bool],
+    ) -> T:
         """Send a request until its message arrives. Its ack alone is no answer: it may be first."""
         answer: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-        call = self._call(request, answer, what, fits=lambda _ack: future.done())
-        try:
-            await asyncio.wait((future, answer), return_when=asyncio.FIRST_COMPLETED)
-            return future.result() if future.done() else _raised(answer)
-        finally:
-            answer.cancel()
-            self._connection.settle(call, is_answered=True)
+        with self._future(kind) as future:
 
-    def _call(
-        self,
-        command: Command,
-        future: asyncio.Future[int],
-        what: str,
-        *,
-        within: float = ANSWER_WITHIN,
-        again: float = AGAIN,
-        fits: Callable[[m.CommandAck], bool] = lambda _ack: True,
-        nonce: int = 0,
-        is_told_apart: bool = True,
-        is_urgent: bool = False,
-    ) -> Call:
+            def take(message: Answer, source: int) -> None:
+                if isinstance(message, kind) and is_meant(message, source) and not future.done():
+                    future.set_result(message)
+
+            with _added(self._takers, take):
+                call = Call(request, ANSWER_WITHIN, lambda _ack: future.done())
+                self._begin(call, answer, what)
+                try:
+                    await asyncio.wait((future, answer), return_when=asyncio.FIRST_COMPLETED)
+                    return future.result() if future.done() else _raised(answer)
+                finally:
+                    answer.cancel()
+                    self._connection.settle(call, is_answered=True)
+
+    def _begin(self, call: Call, future: asyncio.Future[int], what: str, *, nonce: int = 0) -> None:
         def done(reply: Reply | None) -> None:
             if future.done():
                 return
             if reply is None:
-                words = f"{what}: no answer within {within:g} s"
+                words = f"{what}: no answer within {call.give_up_after:g} s"
                 future.set_exception(NoAnswer(words, nonce=nonce))
             elif reply.is_accepted:
                 future.set_result(reply.value)
@@ -341,33 +299,14 @@ class Asker:
                 error = Refused(reply.words, result=reply.result, reason=reply.value)
                 future.set_exception(error)
 
-        connection = self._connection
-        call = connection.session.call(
-            command,
-            done,
-            now=connection.now,
-            within=within,
-            again=again,
-            fits=fits,
-            is_told_apart=is_told_apart,
-            is_urgent=is_urgent,
-        )
-        connection.turn()
-        return call
+        self._connection.session.call(call, done, now=self._connection.now)
+        self._connection.turn()
 
     # session callbacks
 
-    def _on_status(self, status: TaskStatus) -> None:
-        for take in list(self._statuses):
-            take(status)
-
-    def _on_queue(self, message: m.TaskQueueStatus, vehicle: int) -> None:
-        for take in list(self._queues):
-            take(message, vehicle)
-
-    def _on_timing(self, timing: TaskTiming) -> None:
-        for take in list(self._timings):
-            take(timing)
+    def _on_answer(self, answer: Answer, vehicle: int) -> None:
+        for take in list(self._takers):
+            take(answer, vehicle)
 
     def _on_text(self, text: Text) -> None:
         for queue in self._listening:

@@ -8,7 +8,6 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import suppress
-from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
 from mav_tasks.client.aio import Client
@@ -26,11 +25,9 @@ class Portal(Protocol):
 
     def call(self, coroutine: Coroutine[Any, Any, T]) -> T:
         """Run a coroutine to its end. Return its result, or raise its exception."""
-        ...
 
     def close(self) -> None:
         """Free the portal's resources."""
-        ...
 
 
 class ThreadPortal:
@@ -131,12 +128,7 @@ class BlockingClient:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._end()
 
     @property
@@ -191,7 +183,6 @@ async def called(function: Callable[[], T]) -> T:
 
 
 def id_of(task: int | BlockingTask) -> int:
-    """Return the id of a task."""
     return task._aio.id if isinstance(task, BlockingTask) else task
 
 

@@ -30,20 +30,20 @@ class Answered(Protocol):
 
 @dataclass(slots=True)
 class Call:
-    """One command and the callback for its answer.
+    """One command and the callback for its answer, ``done``, which is called at most once.
 
-    ``done`` is called at most once. ``fits`` returns whether an accepting ack can belong to this
-    call. ``is_told_apart``: ``fits`` identifies the ack, or a wrong match does no harm.
-    ``is_urgent``: an immediate call sends one copy at once, even if its lane is busy.
+    ``fits`` returns whether an accepting ack can belong to this call. ``is_told_apart``: ``fits``
+    identifies the ack, or a wrong match does no harm. ``is_urgent``: an immediate call sends one
+    copy at once, even if its lane is busy.
     """
 
     message: Command
-    done: Answered
     give_up_after: float  # s from the first copy
     fits: Callable[[m.CommandAck], bool] = lambda _ack: True
     again: float = AGAIN
-    is_told_apart: bool = False
+    is_told_apart: bool = True
     is_urgent: bool = False
+    done: Answered = field(init=False)
     begun_at: float = 0.0
     retry: Retry | None = None
 

@@ -35,7 +35,7 @@ class Connection(LinkDriver):
 
     def settle(self, call: Call, *, is_answered: bool) -> None:
         """End a call: see ``Calls.settle``. The connection may be closed."""
-        self.session.settle(call, is_answered=is_answered, now=self.now)
+        self.session.calls.settle(call, is_answered=is_answered, now=self.now)
         self.turn()
 
     def _on_up(self) -> None:

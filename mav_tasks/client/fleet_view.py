@@ -29,7 +29,7 @@ class VehicleView:
         self.system_id = system_id
         self._monitor: HeartbeatMonitor | None = None  # None: no heartbeat yet
         #: when the rover's last heartbeat reached the server; None: unknown
-        self._server_heard_at: float | None = None
+        self.server_heard_at: float | None = None
         #: component id of its task server; None until the server has answered
         self.server_component: int | None = None
         self.ask_at = now
@@ -39,15 +39,11 @@ class VehicleView:
         return f"VehicleView({self.system_id}, server {self.server_component})"
 
     @property
-    def is_known(self) -> bool:
-        """Whether a heartbeat was received, so that the autopilot is known."""
-        return self._monitor is not None
-
-    @property
-    def has_home_item(self) -> bool:
-        """Whether its missions begin with a home item."""
-        persona = self._persona
-        return persona is not None and persona.has_home_item
+    def has_home_item(self) -> bool | None:
+        """Whether its missions begin with a home item; None before the first heartbeat."""
+        if self._monitor is None:
+            return None
+        return self._persona is not None and self._persona.has_home_item
 
     def heartbeat(self, message: m.Heartbeat, *, now: float) -> bool:
         """Process a heartbeat. Return whether it is the first, or the first after a gap."""
@@ -58,14 +54,10 @@ class VehicleView:
         self._monitor.receive(message, now=now)
         return is_back
 
-    def told_by_server(self, age: float | None, *, now: float) -> None:
-        """Store the age in seconds of the rover's last heartbeat at the server; None: unknown."""
-        self._server_heard_at = None if age is None else now - age
-
     def heartbeat_age(self, *, now: float) -> float | None:
         """Return seconds since the last heartbeat; inf: none in the server's run; None: unknown."""
         heard = [] if self._monitor is None else [self._monitor.heard_at]
-        heard += [] if self._server_heard_at is None else [self._server_heard_at]
+        heard += [] if self.server_heard_at is None else [self.server_heard_at]
         return now - max(heard) if heard else None
 
     def status(self, decoder: Decoder, *, now: float) -> VehicleStatus:
@@ -179,7 +171,7 @@ class FleetView:
         """
         view = self._view(source.system_id, now=now)
         view.server_component = source.component_id
-        view.told_by_server(age, now=now)
+        view.server_heard_at = None if age is None else now - age
 
     def telemetry(self, packet: Packet) -> None:
         """Keep a vehicle's telemetry packet; ``status`` decodes it."""

@@ -22,19 +22,15 @@ class Talk(Protocol):
 
     def receive(self, packet: Packet, *, now: float) -> None:
         """Process one packet."""
-        ...
 
     def next_deadline(self) -> float:
         """Return when to call ``handle_deadline``."""
-        ...
 
     def handle_deadline(self, *, now: float) -> None:
         """Do what is due."""
-        ...
 
     def take_packets(self) -> list[bytes]:
         """Return the packets to send since the last call, in order."""
-        ...
 
 
 class LinkDriver:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
-from mav_tasks.client.calls import AGAIN, Call, Calls, Command
+from mav_tasks.client.calls import AGAIN, Call, Calls
 from mav_tasks.client.fleet_view import KEPT, FleetView
 from mav_tasks.client.transfers import MESSAGES as TRANSFER_MESSAGES
 from mav_tasks.client.transfers import Transfers
@@ -19,7 +19,7 @@ from mav_tasks.client.values import (
     Text,
     VehicleStatus,
     heartbeat_age_of,
-    reason_of,
+    member_of,
     task_status_of,
     task_timing_of,
 )
@@ -66,11 +66,12 @@ class Reply:
 
     @property
     def is_accepted(self) -> bool:
-        """Whether the command was accepted."""
         return self.result == MavResult.ACCEPTED
 
 
 Done = Callable[[Reply | None], None]
+#: the messages that answer requests; ``on_answer`` gets each with its vehicle
+Answer = TaskStatus | TaskTiming | m.TaskQueueStatus
 
 
 @dataclass(slots=True)
@@ -94,7 +95,7 @@ class Session:
         self._encoder = Encoder(address)
         self._decoder = Decoder()
         self._heartbeat = HeartbeatSender(now=now)
-        self._calls = Calls()
+        self.calls = Calls()
         self._texts = TextReceiver()
         self._transfers: dict[Address, Transfers] = {}
         self._refused: list[_Refused] = []
@@ -102,13 +103,11 @@ class Session:
         self._listing: Call | None = None  # the unanswered request for the list of rovers
         self.on_served: Callable[[], None] = lambda: None
         self.on_news: Callable[[Followed], None] = lambda _followed: None
-        self.on_status: Callable[[TaskStatus], None] = lambda _status: None
-        self.on_queue: Callable[[m.TaskQueueStatus, int], None] = lambda _message, _vehicle: None
-        self.on_timing: Callable[[TaskTiming], None] = lambda _timing: None
+        self.on_answer: Callable[[Answer, int], None] = lambda _answer, _vehicle: None
         self.on_text: Callable[[Text], None] = lambda _text: None
 
     def __repr__(self) -> str:
-        return f"Session({self.address}, {self.fleet!r}, {self._calls!r})"
+        return f"Session({self.address}, {self.fleet!r}, {self.calls!r})"
 
     # time and packets
 
@@ -119,21 +118,21 @@ class Session:
         if packet.message_id not in DECODED:
             return
         message = self._decoder.decode(packet)
-        if message is None or not self._is_meant(message):
+        if message is None or not target_of(message).reaches(self.address):
             return
         match message:
             case m.Heartbeat():
                 self._heard(packet, message, now=now)
             case m.CommandAck():
-                self._calls.receive(message, vehicle=packet.system_id, now=now)
+                self.calls.receive(message, vehicle=packet.system_id, now=now)
             case m.TaskStatus():
                 self._task_status(task_status_of(message, packet.system_id), now=now)
             case m.TaskQueueStatus():
                 self.fleet.served_by(packet.source, heartbeat_age_of(message), now=now)
                 self.on_served()
-                self.on_queue(message, packet.system_id)
+                self.on_answer(message, packet.system_id)
             case m.TaskTiming():
-                self.on_timing(task_timing_of(message, packet.system_id))
+                self.on_answer(task_timing_of(message, packet.system_id), packet.system_id)
             case m.Statustext():
                 for text in self._texts.receive(packet.source, message, now=now):
                     self._text(text)
@@ -149,7 +148,7 @@ class Session:
             self._heartbeat.next_deadline(),
             *(refused.until for refused in self._refused),
         ]
-        maybe = [self._calls.next_deadline(), self.fleet.next_deadline()]
+        maybe = [self.calls.next_deadline(), self.fleet.next_deadline()]
         maybe += [self.watch.next_deadline()]
         maybe += [transfers.next_deadline() for transfers in self._transfers.values()]
         due += [at for at in maybe if at is not None]
@@ -160,12 +159,13 @@ class Session:
         if self._heartbeat.is_due(now=now):
             self.greet()
         for vehicle in self.fleet.to_ask(now=now):
-            self._ask_server(vehicle, now=now)
+            request = request_message(vehicle, m.TaskQueueStatus.id)
+            self.call(Call(request, AGAIN), lambda _reply: None, now=now)
         for followed in self.watch.to_ask(now=now):
             self.ask_about(followed, now=now)
         for text in self._texts.handle_deadline(now=now):
             self._text(text)
-        self._calls.handle_deadline(now=now)
+        self.calls.handle_deadline(now=now)
         for transfers in self._transfers.values():
             transfers.handle_deadline(now=now)
         for refused in [each for each in self._refused if now >= each.until]:
@@ -174,7 +174,7 @@ class Session:
 
     def take_packets(self) -> list[bytes]:
         """Return the packets to send since the last call, in order."""
-        for command in self._calls.take():
+        for command in self.calls.take():
             self.send(command)
         for transfers in self._transfers.values():
             for message in transfers.take():
@@ -197,9 +197,10 @@ class Session:
             self.on_served()
 
         if self._listing is not None:  # the link came up only now
-            self._calls.settle(self._listing, is_answered=True, now=now)
+            self.calls.settle(self._listing, is_answered=True, now=now)
         request = request_message(EVERYBODY, m.TaskQueueStatus.id)
-        self._listing = self.call(request, done, now=now, within=inf)
+        self._listing = Call(request, give_up_after=inf)
+        self.call(self._listing, done, now=now)
 
     def send(self, message: m.Message) -> None:
         """Send a message now."""
@@ -213,24 +214,13 @@ class Session:
             words = f"a number of {type(message).__name__} is too large to be sent: {error}"
             raise ValueError(words) from None
 
-    def call(
-        self,
-        message: Command,
-        done: Done,
-        *,
-        now: float,
-        within: float,
-        fits: Callable[[m.CommandAck], bool] = lambda _ack: True,
-        again: float = AGAIN,
-        is_told_apart: bool = True,
-        is_urgent: bool = False,
-    ) -> Call:
+    def call(self, call: Call, done: Done, *, now: float) -> None:
         """Send a command until it is answered. Call ``done`` once, with None after a time-out.
 
-        See Call for the other arguments. Raise ValueError if a number does not fit its field.
+        Raise ValueError if a number does not fit its field.
         """
-        self.check(message)
-        vehicle = message.target_system
+        self.check(call.message)
+        vehicle = call.message.target_system
 
         def ended(ack: m.CommandAck | None, *, now: float) -> None:
             if ack is None:
@@ -240,20 +230,12 @@ class Session:
             else:
                 self._refused.append(_Refused(vehicle, ack, done, now + WORDS_WITHIN))
 
-        call = Call(message, ended, within, fits, again, is_told_apart, is_urgent)
-        self._calls.begin(call, now=now)
-        return call
-
-    def settle(self, call: Call, *, is_answered: bool, now: float) -> None:
-        """End a call that another message answered, or whose caller stopped waiting."""
-        self._calls.settle(call, is_answered=is_answered, now=now)
+        call.done = ended
+        self.calls.begin(call, now=now)
 
     def transfers(self, target: Address) -> Transfers:
         """Return the uploads and downloads of a component."""
-        transfers = self._transfers.get(target)
-        if transfers is None:
-            transfers = self._transfers[target] = Transfers(target)
-        return transfers
+        return self._transfers.setdefault(target, Transfers(target))
 
     def vehicles(self, *, now: float) -> tuple[VehicleStatus, ...]:
         """Return the rovers whose task server has answered, by id."""
@@ -285,7 +267,7 @@ class Session:
                 self.on_news(followed)
 
         request = request_message(vehicle, m.TaskStatus.id, to_param(followed.id))
-        self.call(request, done, now=now, within=FOLLOWED_AGAIN)
+        self.call(Call(request, FOLLOWED_AGAIN), done, now=now)
         interval = self.watch.stream_of(vehicle)
         if interval is not None and followed.status is not None and followed.status.is_active:
             self.set_stream(vehicle, interval, now=now)
@@ -296,12 +278,9 @@ class Session:
         command = m.CommandLong(
             vehicle, AUTOPILOT, MavCmd.SET_MESSAGE_INTERVAL, 0, m.TaskStatus.id, us, 0, 0, 0, 0, 0
         )
-        self.call(command, lambda _reply: None, now=now, within=FOLLOWED_AGAIN)
+        self.call(Call(command, FOLLOWED_AGAIN), lambda _reply: None, now=now)
 
     # received messages
-
-    def _is_meant(self, message: m.Message) -> bool:
-        return target_of(message).reaches(self.address)
 
     def _heard(self, packet: Packet, message: m.Heartbeat, *, now: float) -> None:
         if not self.fleet.heartbeat(packet, message, now=now):
@@ -313,13 +292,9 @@ class Session:
         if interval is not None:
             self.set_stream(vehicle, interval, now=now)
 
-    def _ask_server(self, vehicle: int, *, now: float) -> None:
-        request = request_message(vehicle, m.TaskQueueStatus.id)
-        self.call(request, lambda _reply: None, now=now, within=AGAIN)
-
     def _task_status(self, status: TaskStatus, *, now: float) -> None:
         followed = self.watch.receive(status, now=now)
-        self.on_status(status)
+        self.on_answer(status, status.vehicle)
         if followed is not None:
             self.on_news(followed)
 
@@ -344,6 +319,6 @@ def request_message(vehicle: int, message_id: int, *params: float) -> m.CommandL
 
 def _reply(ack: m.CommandAck, words: str) -> Reply:
     if ack.result != MavResult.ACCEPTED and not words:
-        reason = reason_of(ack.result_param2)
+        reason = member_of(ack.result_param2, TaskReason.NONE)
         words = words_of(reason) if reason else f"result {ack.result}"
     return Reply(ack.result, ack.result_param2, words)

@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from math import inf, isfinite
+from typing import TypeVar
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
+
+E = TypeVar("E", bound=IntEnum)
 
 UNKNOWN_POSITION = 65535
 UNKNOWN_PROGRESS = 255
@@ -156,13 +159,13 @@ class Text:
 
 def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
     """Return a decoded TASK_STATUS; ``vehicle`` is the sender's system id."""
-    reason = reason_of(message.reason)
+    reason = member_of(message.reason, TaskReason.NONE)
     finish = known(message.time_to_finish)
     is_over = message.state in TERMINAL
     return TaskStatus(
         id=message.task_id,
         vehicle=vehicle,
-        state=state_of(message.state),
+        state=member_of(message.state, TaskState.UNKNOWN),
         reason=reason,
         words=_text(message._text_raw) or words_of(reason),
         priority=message.priority,
@@ -171,7 +174,7 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         command=message.command,
         progress=None if message.progress == UNKNOWN_PROGRESS else message.progress / 100,
         remaining=known(message.remaining),
-        unit=unit_of(message.remaining_unit),
+        unit=member_of(message.remaining_unit, Unit.NONE),
         position=None if message.queue_position == UNKNOWN_POSITION else message.queue_position,
         time_to_start=known(message.time_to_start),
         time_to_finish=None if is_over else finish,
@@ -216,7 +219,7 @@ def queue_status_of(
         next=message.next_id or None,
         capacity=message.capacity,
         counts=counts,
-        paused=reason_of(message.paused_reason) if message.paused_reason else None,
+        paused=member_of(message.paused_reason, TaskReason.NONE) if message.paused_reason else None,
         waiting=waiting,
         current=current,
         version=message.version,
@@ -232,19 +235,10 @@ def heartbeat_age_of(message: m.TaskQueueStatus) -> float | None:
     return inf if message.heartbeat_age == NO_HEARTBEAT else message.heartbeat_age / 1000
 
 
-def reason_of(number: int) -> TaskReason:
-    """Return a TASK_REASON; NONE for an unknown number of a newer server."""
-    return TaskReason(number) if number in TaskReason._value2member_map_ else TaskReason.NONE
-
-
-def state_of(number: int) -> TaskState:
-    """Return a TASK_STATE; UNKNOWN for an unknown number."""
-    return TaskState(number) if number in TaskState._value2member_map_ else TaskState.UNKNOWN
-
-
-def unit_of(number: int) -> Unit:
-    """Return a TASK_UNIT; NONE for an unknown number."""
-    return Unit(number) if number in Unit._value2member_map_ else Unit.NONE
+def member_of(number: int, otherwise: E) -> E:
+    """Return the enum's member with a number; ``otherwise`` for one of a newer server."""
+    kind = type(otherwise)
+    return kind(number) if number in kind._value2member_map_ else otherwise
 
 
 def known(value: float) -> float | None:

@@ -62,28 +62,13 @@ def check_nonce(nonce: int) -> None:
     _whole("nonce", nonce, 0, MAX_NONCE)
 
 
-def is_command(goal: Goal) -> bool:
-    """Return whether a goal has a command of its own."""
-    return isinstance(goal, Move | Rotate | Drive)
-
-
 def command_of(
     goal: Move | Rotate | Drive, terms: TaskOptions, *, target: tuple[int, int], nonce: int
 ) -> m.CommandLong:
     """Return the command that submits a goal. The deadline is set afterwards."""
-    command, first, second, third = _own(goal)
-    return m.CommandLong(
-        *target,
-        command,
-        0,
-        first,
-        second,
-        third,
-        to_param(nonce),
-        to_param(terms.after),
-        terms.delay,
-        float(terms.priority),
-    )
+    own = _own(goal)
+    options = to_param(nonce), to_param(terms.after), terms.delay, float(terms.priority)
+    return m.CommandLong(*target, own[0], 0, *own[1:], *options)
 
 
 def items_of_goals(goals: Sequence[Goal]) -> tuple[Item, ...]:
@@ -133,19 +118,9 @@ def options_of(terms: TaskOptions, *, nonce: int) -> Item:
     It goes last, so that the targets of jumps stay right. The nonce tells this plan from an equal
     one, and lets the server recognize a late copy.
     """
-    return Item(
-        MavFrame.MISSION,
-        MavCmd.TASK_OPTIONS,
-        0,
-        1,
-        float(terms.priority),
-        terms.delay,
-        terms.deadline,
-        to_param(terms.after),
-        nonce,
-        0,
-        0.0,
-    )
+    after, priority = to_param(terms.after), float(terms.priority)
+    options = _item(MavCmd.TASK_OPTIONS, priority, terms.delay, terms.deadline, after)
+    return options._replace(x=nonce)
 
 
 def _own(goal: Move | Rotate | Drive) -> tuple[int, float, float, float]:
@@ -164,8 +139,7 @@ def _own(goal: Move | Rotate | Drive) -> tuple[int, float, float, float]:
 def _items(goal: Goal) -> tuple[Item, ...]:
     match goal:
         case Move() | Rotate() | Drive():
-            command, first, second, third = _own(goal)
-            return (_item(command, first, second, third, 0.0),)
+            return (_item(*_own(goal), 0.0),)
         case Wait(duration=duration):
             _numbers(goal, duration=duration)
             return (_item(MavCmd.NAV_DELAY, duration, 0.0, 0.0, 0.0),)

@@ -38,7 +38,8 @@ class Sources:
 
     def load(self) -> Configuration:
         """Read all sources; raise ConfigError with all their faults."""
-        path = chosen_file(self.file, self.environment)
+        named = self.environment.get(words.FILE_VARIABLE) if self.file is None else self.file
+        path = _chosen_file(named)
         layers = [words.of_environment(self.environment), words.of_flags(self.flags)]
         if path is not None:
             try:
@@ -48,24 +49,14 @@ class Sources:
             layers.insert(0, toml_file.layer_of(text, name=str(path)))
         configuration = merged(layers, file=path)
         settings = configuration.settings
-        if not settings.profiles and names_no_file(self.file, self.environment):
+        if not settings.profiles and named == "":  # no file at all
             return configuration
         engine = replace(settings.engine, profiles=profiles.read(settings.profiles))
         return replace(configuration, settings=replace(settings, engine=engine))
 
 
-def names_no_file(asked: str | None, environment: Mapping[str, str]) -> bool:
-    """Whether the user requested no file ("")."""
-    return _named(asked, environment) == ""
-
-
-def _named(asked: str | None, environment: Mapping[str, str]) -> str | None:
-    return asked if asked is not None else environment.get(words.FILE_VARIABLE)
-
-
-def chosen_file(asked: str | None, environment: Mapping[str, str]) -> Path | None:
-    """Return the requested file, or the environment's, or the one in the user's folder, or None."""
-    named = _named(asked, environment)
+def _chosen_file(named: str | None) -> Path | None:
+    """Return the named file, None for "", or without a name the one in the user's folder."""
     if named is not None:
         return Path(named) if named else None
     usual = usual_file()

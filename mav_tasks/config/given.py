@@ -1,6 +1,6 @@
 """The values that one source gives to keys, and the faults of the source."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from enum import Enum
@@ -67,7 +67,6 @@ class Layer:
             self.take(key, plain, where)
 
     def refuse(self, key: Key, fault: str) -> None:
-        """Note a fault of a key."""
         self.faulty.add(key.name)
         self.faults.append(fault)
 
@@ -88,8 +87,3 @@ def suggestion(name: str, known: Iterable[str]) -> str:
         each for each in names if each.rpartition(".")[2] == name
     ]
     return f"; did you mean {near[0]}?" if near else ""
-
-
-def by_path(keys: Mapping[str, Key]) -> dict[tuple[str, ...], Key]:
-    """Return keys by the parts of their names."""
-    return {tuple(name.split(".")): key for name, key in keys.items()}

@@ -3,8 +3,6 @@
 Every value is checked, because a profile changes how a rover is driven.
 """
 
-import os
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ from mav_tasks.folders import make_private
 from mav_tasks.setting_keys.key import declared_in
 from mav_tasks.setting_keys.literals import literal
 from mav_tasks.settings import VehicleProfile
+from mav_tasks.whole_file import replace_whole
 
 NONE = "none"
 SUFFIX = ".toml"
@@ -27,7 +26,6 @@ _NEEDED = ("system_id", "autopilot", "firmware", "probed")
 
 
 def usual_folder() -> Path:
-    """Return the default folder of profiles."""
     return user_config_path("mav-tasks", appauthor=False) / "vehicles"
 
 
@@ -106,21 +104,10 @@ def write(profile: VehicleProfile, output: str | None) -> Path:
     The file is private, and replaced atomically.
     """
     path = usual_folder() / file_name(profile) if output is None else _expanded(output)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         if output is None:
             make_private(path.parent)
-        fd = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, MODE)
-        try:
-            with os.fdopen(fd, "w", encoding="utf-8") as file:
-                file.write(text_of(profile))
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(path)
-        except BaseException:
-            with suppress(OSError):
-                part.unlink()
-            raise
+        replace_whole(path, text_of(profile), mode=MODE)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror}") from error
     return path

@@ -45,9 +45,7 @@ class Reload:
     def __init__(self, sources: Sources, configuration: Configuration) -> None:
         self._sources = sources
         if configuration.file is not None:  # read the same file, even if it is gone
-            self._sources = Sources(
-                str(configuration.file), sources.environment, flags=sources.flags
-            )
+            self._sources = replace(sources, file=str(configuration.file))
         self._in_force = configuration.settings
         self._is_reading = False
         self._is_asked_again = False

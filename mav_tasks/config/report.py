@@ -52,7 +52,6 @@ class Report:
         self.not_in_force = tuple(why for _, why in sorted(why_not.items()))
 
     def entry(self, name: str) -> Entry:
-        """Return the entry of one key."""
         key, given = KEYS[name], self._configuration.given.get(name)
         parameter = NAMES.get(name, "")
         value = key.plain_of(self._in_force)

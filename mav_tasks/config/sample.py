@@ -20,7 +20,6 @@ OPENING = f"""\
 
 
 def sample() -> str:
-    """Return the text of the sample file."""
     parts = [OPENING]
     for table, keys in groupby(KEYS.values(), key=lambda key: key.table):
         parts += [f"\n[{table}]\n", *map(_entry, keys)]

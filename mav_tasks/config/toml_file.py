@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mav_tasks.config import toml_lines
-from mav_tasks.config.given import Layer, Source, by_path, shown, suggestion
+from mav_tasks.config.given import Layer, Source, shown, suggestion
 from mav_tasks.errors import ConfigError
 from mav_tasks.setting_keys.literals import literal
 from mav_tasks.settings import KEYS, TABLES
@@ -19,7 +19,7 @@ MOST_FAULTS = 50  # reported for one file
 _DEEP = re.compile(r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _AT_LINE = re.compile(r"(.*) \(at (?:line (\d+), column \d+|end of document)\)", re.DOTALL)
-_KEYS = by_path(KEYS)
+_KEYS = {tuple(name.split(".")): key for name, key in KEYS.items()}
 _TABLES = {path[:count] for path in _KEYS for count in range(1, len(path))}
 
 

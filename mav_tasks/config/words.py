@@ -15,7 +15,6 @@ OTHERS = (FILE_VARIABLE, SERVER_VARIABLE, SIGN_VARIABLE)
 
 
 def variable_of(name: str) -> str:
-    """Return the environment variable of a key."""
     return KEYS[name].variable or PREFIX + name.upper().replace(".", "_")
 
 
@@ -32,7 +31,6 @@ class Flag:
 
 
 def of_environment(environment: Mapping[str, str]) -> Layer:
-    """Return the layer of the environment variables."""
     layer = Layer(Source.ENVIRONMENT)
     for variable in sorted(environment):
         if variable in OTHERS or not variable.startswith(PREFIX):

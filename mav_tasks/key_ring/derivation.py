@@ -26,7 +26,6 @@ _DIGITS = re.compile(rf"[0-9a-fA-F]{{{2 * KEY_LENGTH}}}")
 
 
 def generated() -> bytes:
-    """Return a random secret."""
     return secrets.token_bytes(KEY_LENGTH)
 
 

@@ -86,10 +86,9 @@ class KeyRing:
 
     def with_revoked(self, name: str, *, at: datetime) -> "KeyRing":
         """Return the ring with a key revoked; raise KeyRingError if it is missing or revoked."""
-        secret = self.usable_key(name).secret
-        return self._with(
-            name, lambda it: replace(it, key=without_secret(it.key), revoked=at, retired=secret)
-        )
+        key = self.usable_key(name)
+        bare = Key(name, b"", role=key.role, fingerprint=key.fingerprint)
+        return self._with(name, lambda it: replace(it, key=bare, revoked=at, retired=key.secret))
 
     def with_forgotten(self, name: str) -> "KeyRing":
         """Return the ring without a revoked key's secret; raise KeyRingError if it is in use."""
@@ -118,11 +117,6 @@ def key_of(name: str, kind: str, secret: bytes) -> Key:
     if kind not in KINDS:
         raise KeyRingError(f"key {name}: expected a role, one of {', '.join(KINDS)}")
     return Key(name, secret, role="" if kind == VEHICLE else kind)
-
-
-def without_secret(key: Key) -> Key:
-    """Return a key without its secret, as revoked keys are."""
-    return Key(key.name, b"", role=key.role, fingerprint=key.fingerprint)
 
 
 def _on(date: datetime | None) -> str:

@@ -3,7 +3,7 @@
 import os
 import stat
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from mav_tasks.errors import ConfigError, KeyRingError
 from mav_tasks.folders import make_private
 from mav_tasks.key_ring.ring import KeyRing
 from mav_tasks.key_ring.toml_form import ring_of, text_of
+from mav_tasks.whole_file import replace_whole
 
 FILE_NAME = "keys.toml"
 OTHERS = stat.S_IRWXG | stat.S_IRWXO
@@ -41,7 +42,6 @@ def path_of_ring(text: str) -> Path:
 
 
 def mark_of(found: os.stat_result) -> Mark:
-    """Return the mark of a file."""
     times = (found.st_mtime_ns, found.st_ctime_ns)
     return (found.st_dev, found.st_ino, *times, found.st_size)
 
@@ -80,7 +80,7 @@ def change(path: Path, to: Callable[[KeyRing], KeyRing]) -> None:
         make_private(path.parent)
         with _locked(path.parent):
             ring = load(path).ring if path.exists() else KeyRing()
-            _write(path, text_of(to(ring)))
+            replace_whole(path, text_of(to(ring)), mode=0o600)
     except (OSError, RuntimeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "too many links"
         raise KeyRingError(f"key ring {path}: {reason}") from error
@@ -110,19 +110,3 @@ def _locked(folder: Path) -> Iterator[int]:
         os.fsync(number)
     finally:
         os.close(number)
-
-
-def _write(path: Path, text: str) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    with suppress(FileNotFoundError):  # left by a crashed process
-        beside.unlink()
-    number = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
-    try:
-        with os.fdopen(number, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(number)
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise

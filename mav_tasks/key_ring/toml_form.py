@@ -50,7 +50,6 @@ def ring_of(text: str, *, name: str) -> KeyRing:
 
 
 def text_of(ring: KeyRing) -> str:
-    """Return a ring as TOML."""
     return HEADER + "".join(f"\n{table}" for table in map(_table, ring.entries))
 
 

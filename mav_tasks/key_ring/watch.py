@@ -47,7 +47,6 @@ class RingWatch:
         threading.Thread(target=self._watch, args=(loop, put), name="key ring", daemon=True).start()
 
     def close(self) -> None:
-        """Stop watching."""
         self._is_over.set()
 
     # in the thread

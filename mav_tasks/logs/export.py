@@ -44,7 +44,6 @@ def text_entry(_number: int, event: Event) -> str:
 
 
 def json_entry(number: int, event: Event) -> str:
-    """Return a line with one JSON object."""
     return _encode({"number": number} | event_values(event, offset=0.0)) + "\n"
 
 
@@ -58,7 +57,6 @@ def csv_entry(number: int, event: Event) -> str:
 
 
 def csv_row(cells: Sequence[Any]) -> str:
-    """Return a row of CSV."""
     row = io.StringIO()
     csv.writer(row, lineterminator="\n").writerow(cells)
     return row.getvalue()

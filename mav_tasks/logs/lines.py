@@ -34,7 +34,6 @@ class TextLines:
     def __call__(
         self, record: logging.LogRecord, words: str, repeated: tuple[int, float] | None
     ) -> str:
-        """Return the line."""
         second = int(record.created)
         if second != self._second:
             self._second = second

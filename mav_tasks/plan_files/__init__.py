@@ -22,14 +22,9 @@ if TYPE_CHECKING:
     from mav_tasks.plan_files.writer import format_for, format_plan, format_wpl, write_plan
 
 _HOME_OF = {
-    "fence_of": "fetched",
-    "mission_of": "fetched",
-    "parse_plan": "reader",
-    "read_plan": "reader",
-    "format_for": "writer",
-    "format_plan": "writer",
-    "format_wpl": "writer",
-    "write_plan": "writer",
+    **dict.fromkeys(("fence_of", "mission_of"), "fetched"),
+    **dict.fromkeys(("parse_plan", "read_plan"), "reader"),
+    **dict.fromkeys(("format_for", "format_plan", "format_wpl", "write_plan"), "writer"),
 }
 
 __all__ = [

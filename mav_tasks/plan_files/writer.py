@@ -14,6 +14,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.plan_files.entries import GLOBAL_FRAMES, LATITUDE, LONGITUDE, PLACED
 from mav_tasks.plan_files.numbers import place, shortest, unscaled
 from mav_tasks.plan_files.values import (
+    NO_PARAMS,
     FenceCircle,
     FencePolygon,
     GeoPoint,
@@ -80,16 +81,7 @@ def format_wpl(plan: PlanFile) -> str:
     """
     if fence_items(plan) or plan.rally:
         raise PlanFileError("QGC WPL 110 can hold only a mission: choose a name that ends in .plan")
-    home = home_of(plan)
-    first = PlanItem(
-        MavCmd.NAV_WAYPOINT,
-        MavFrame.GLOBAL,
-        (0.0, 0.0, 0.0, 0.0),
-        home.latitude_degE7,
-        home.longitude_degE7,
-        home.altitude,
-        True,
-    )
+    first = PlanItem(MavCmd.NAV_WAYPOINT, MavFrame.GLOBAL, NO_PARAMS, *home_of(plan), True)
     lines = [_line(number, item) for number, item in enumerate((first, *plan.items))]
     return "\n".join(["QGC WPL 110", *lines]) + "\n"
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from operator import attrgetter
 from typing import Any, TypeVar
 
 from mav_tasks.errors import SettingError
@@ -121,9 +122,7 @@ def check_bounds(settings: object, key: Key, bound: Key) -> None:
 
 def value_at(settings: object, path: str) -> Any:
     """Return the value at a dotted path of field names."""
-    for name in path.split("."):
-        settings = getattr(settings, name)
-    return settings
+    return attrgetter(path)(settings)
 
 
 def with_value_at(settings: T, path: str, kept: object) -> T:

@@ -40,6 +40,19 @@ class Shape(Protocol):
         """Return the plain value of a text; raise SettingError if it cannot be parsed."""
 
 
+class _AsWritten:
+    """What is kept as people write it."""
+
+    __slots__ = ()
+
+    def plain(self, kept: object) -> object:
+        return kept
+
+    def read(self, text: str) -> object:
+        """Return the text; ``kept`` refuses a wrong one."""
+        return text
+
+
 @dataclass(frozen=True, slots=True)
 class Number:
     """A number from ``low`` to ``high``; the kept value is multiplied by ``scale``.
@@ -56,7 +69,6 @@ class Number:
 
     @property
     def valid(self) -> str:
-        """The range."""
         words = f"{in_digits(self.low)}..{in_digits(self.high)}"
         words += f" {self.unit}" if self.unit else ""
         words += ", whole" if self.is_whole else ""
@@ -97,7 +109,7 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(_AsWritten):
     """One of several words."""
 
     words: tuple[str, ...]
@@ -105,7 +117,6 @@ class Choice:
 
     @property
     def valid(self) -> str:
-        """The words."""
         return " | ".join(f'"{word}"' for word in self.words)
 
     def kept(self, plain: object) -> str:
@@ -114,19 +125,9 @@ class Choice:
             raise SettingError(f"expected one of {', '.join(self.words)}")
         return str(plain)
 
-    def plain(self, kept: str) -> object:
-        """Return the word."""
-        return kept
-
-    def read(self, text: str) -> object:
-        """Take it as it is."""
-        return text
-
 
 @dataclass(frozen=True, slots=True)
-class Flag:
-    """A boolean."""
-
+class Flag(_AsWritten):
     unit: str = ""
     valid: str = "true | false"
 
@@ -136,35 +137,22 @@ class Flag:
             raise SettingError("expected true or false")
         return plain
 
-    def plain(self, kept: bool) -> object:
-        """Return the boolean."""
-        return kept
-
     def read(self, text: str) -> object:
         """Parse "true" or "false", in any case; return other texts for ``kept`` to refuse."""
         return {"true": True, "false": False}.get(text.lower(), text)
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class Text(_AsWritten):
     """A text; ``valid`` describes it. An empty text is valid."""
 
     valid: str
     unit: str = ""
 
     def kept(self, plain: object) -> str:
-        """Return the text."""
         if not isinstance(plain, str) or "\0" in plain:
             raise SettingError(f"not a text: {self.valid}")
         return plain
-
-    def plain(self, kept: str) -> object:
-        """Return the text."""
-        return kept
-
-    def read(self, text: str) -> object:
-        """Take it as it is."""
-        return text
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +165,6 @@ class Texts:
     unit: str = ""
 
     def kept(self, plain: object) -> tuple[str, ...]:
-        """Return the texts as a tuple."""
         if not isinstance(plain, list) or not all(isinstance(each, str) for each in plain):
             raise SettingError(f"not a list of texts: {self.valid}")
         if len(plain) < self.least:
@@ -188,7 +175,6 @@ class Texts:
         return tuple(plain)
 
     def plain(self, kept: tuple[str, ...]) -> object:
-        """Return the texts as a list."""
         return list(kept)
 
     def read(self, text: str) -> object:
@@ -212,7 +198,6 @@ class ByClient:
         return f"{clients}, each {self.each.valid}"
 
     def kept(self, plain: object) -> Mapping[str, Any]:
-        """Return the kept values by client."""
         if not isinstance(plain, dict):
             raise SettingError(f"not a table: {self.valid}")
         kept = {}
@@ -227,7 +212,6 @@ class ByClient:
         return kept
 
     def plain(self, kept: Mapping[str, Any]) -> object:
-        """Return the plain values as a table."""
         return {client: self.each.plain(value) for client, value in kept.items()}
 
     def read(self, text: str) -> object:

@@ -33,12 +33,12 @@ class Rig:
         message = m.CommandLong(vehicle, 1, command, 0, float(len(name)), 0, 0, 0, 0, 0, 0)
         call = Call(
             message,
-            done,
             within,
             lambda ack: ack.result_param2 not in known,
             is_told_apart=is_told_apart,
             is_urgent=is_urgent,
         )
+        call.done = done
         self.calls.begin(call, now=now)
         self.take(now)
         return call
