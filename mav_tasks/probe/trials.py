@@ -40,6 +40,7 @@ class Kind:
 
     def __init__(self, persona: Persona, mask: int, frame: MavFrame, *, by_course: bool) -> None:
         self.name = f"{frame.name} 0x{mask:04X}"
+        self.mask, self.frame = mask, frame
         self.persona = replace(
             persona,
             honours_yaw_rate=not by_course,
@@ -63,13 +64,8 @@ def kinds_of(persona: Persona) -> list[Kind]:
         Kind(persona, BY_COURSE, MavFrame.BODY_NED, by_course=False),
         Kind(persona, WITH_YAW_RATE, MavFrame.BODY_NED, by_course=False),
     ]
-    return sorted(
-        kinds,
-        key=lambda kind: (
-            kind.persona.setpoint_mask != persona.setpoint_mask
-            or kind.persona.setpoint_frame != persona.setpoint_frame
-        ),
-    )
+    own = (persona.setpoint_mask, persona.setpoint_frame)
+    return sorted(kinds, key=lambda kind: (kind.mask, kind.frame) != own)
 
 
 class Trials:
