@@ -158,7 +158,7 @@ class HaltRecord:
     def write(self, word: Word) -> None:
         """Make a word durable; raise OSError if that fails, or if the file was replaced."""
         self._put(word)
-        _sync(self._fd)
+        getattr(os, "fdatasync", os.fsync)(self._fd)  # macOS has no fdatasync
         found, ours = self._path.stat(), os.fstat(self._fd)
         if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
             raise OSError(ENOENT, "it was removed or replaced while it was in use")
@@ -240,7 +240,3 @@ def _make(path: Path) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
-
-
-def _sync(fd: int) -> None:
-    getattr(os, "fdatasync", os.fsync)(fd)  # macOS has no fdatasync
