@@ -28,10 +28,7 @@ class UdpUrl(HostUrl):
 
     __slots__ = ()
 
-    @property
-    def can_push(self) -> bool:
-        """Return True: a datagram needs no connection."""
-        return True
+    can_push = True  # a datagram needs no connection
 
     def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
         """Open the socket; a rover is dialled from a port of its own."""
