@@ -62,14 +62,8 @@ class Answer(NamedTuple):
     source: Address
 
     def ack(self, to: Address) -> CommandAck:
-        return CommandAck(
-            self.command,
-            self.result,
-            0,
-            self.result_param2,
-            to.system_id,
-            to.component_id,
-        )
+        system, component = to
+        return CommandAck(self.command, self.result, 0, self.result_param2, system, component)
 
 
 class Pending:
