@@ -69,11 +69,10 @@ class Answer(NamedTuple):
 class Pending:
     """A command taken in; ``answer`` is None until it has been answered."""
 
-    __slots__ = ("answer", "at", "command", "packet")
+    __slots__ = ("answer", "at", "command")
 
-    def __init__(self, command: Command, packet: bytes, at: float) -> None:
+    def __init__(self, command: Command, at: float) -> None:
         self.command = command
-        self.packet = packet
         self.at = at
         self.answer: Answer | None = None
 
@@ -92,9 +91,8 @@ class CommandReceiver:
         return None
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
-        pending = Pending(command, packet, now)
         self._packets.pop(packet, None)
-        self._packets[packet] = pending
+        pending = self._packets[packet] = Pending(command, now)
         if len(self._packets) > REMEMBERED:
             self._packets.popitem(last=False)
         return pending
