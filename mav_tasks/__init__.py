@@ -41,40 +41,19 @@ if TYPE_CHECKING:
     from mav_tasks.tasks.lifecycle import TaskState as TaskState
 
 _HOMES = {
-    "mav_tasks.client.aio": ("Client",),
-    "mav_tasks.client.handle": ("Task",),
-    "mav_tasks.client.sync": ("SyncClient", "SyncTask"),
-    "mav_tasks.client.values": (
-        "QueueStatus",
-        "TaskStatus",
-        "TaskTiming",
-        "Text",
-        "VehicleStatus",
-    ),
+    "mav_tasks.client.aio": "Client",
+    "mav_tasks.client.handle": "Task",
+    "mav_tasks.client.sync": "SyncClient SyncTask",
+    "mav_tasks.client.values": "QueueStatus TaskStatus TaskTiming Text VehicleStatus",
     "mav_tasks.errors": (
-        "ClientError",
-        "MavTasksError",
-        "NoAnswer",
-        "NoSuchVehicle",
-        "Refused",
-        "TaskFailed",
-        "UsageError",
+        "ClientError MavTasksError NoAnswer NoSuchVehicle Refused TaskFailed UsageError"
     ),
-    "mav_tasks.mavlink.signing": ("Key",),
-    "mav_tasks.plan_files": ("read_plan", "write_plan"),
-    "mav_tasks.tasks.goal": (
-        "Drive",
-        "Face",
-        "GlobalPlace",
-        "GoTo",
-        "LocalPlace",
-        "Move",
-        "Rotate",
-        "Wait",
-    ),
-    "mav_tasks.tasks.lifecycle": ("TaskReason", "TaskState"),
+    "mav_tasks.mavlink.signing": "Key",
+    "mav_tasks.plan_files": "read_plan write_plan",
+    "mav_tasks.tasks.goal": "Drive Face GlobalPlace GoTo LocalPlace Move Rotate Wait",
+    "mav_tasks.tasks.lifecycle": "TaskReason TaskState",
 }
-_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
 
 __all__ = sorted(_HOME_OF)  # noqa: PLE0605  # all of them are strings
 

@@ -63,8 +63,7 @@ class Pump:
             if not outcomes:
                 break
             for outcome in outcomes:
-                self._note_outcome(outcome)
-                self.handle(_input_of(outcome), now=now)
+                self.handle(self._input_of(outcome), now=now)
         self._note(noted)  # last, so that no answer waits for the log
 
     def close(self) -> None:
@@ -79,29 +78,24 @@ class Pump:
             with suppress(Exception):  # one failure must not keep the others from stopping
                 self._send(sealed)
 
-    def _note_outcome(self, outcome: Outcome) -> None:
+    def _input_of(self, outcome: Outcome) -> Input:
+        """Return the engine's input for an outcome of the store; log a failure and its end."""
         match outcome:
-            case HaltNotKept(text=text):
+            case HaltNotKept(vehicle=vehicle, text=text):
                 log.error("%s", text)
-                return
+                return HaltNotStored(vehicle)
             case NotKept(text=text):
                 log.error("%s: new tasks are refused until the store works", text)
-            case Kept() if self._store_is_away:
-                log.warning("the store works again")
-        self._store_is_away = isinstance(outcome, NotKept)
+                self._store_is_away = True
+                return StoreFailed(text)
+            case Kept(through=through):
+                if self._store_is_away:
+                    log.warning("the store works again")
+                self._store_is_away = False
+                return Committed(through)
 
     def _note(self, events: list[Event]) -> None:
         for event in events:
             log.log(level_of(event), event)
             if isinstance(event, ServerStopped):
                 self.is_over = True
-
-
-def _input_of(outcome: Outcome) -> Input:
-    match outcome:
-        case Kept(through=through):
-            return Committed(through)
-        case NotKept(text=text):
-            return StoreFailed(text)
-        case HaltNotKept(vehicle=vehicle):
-            return HaltNotStored(vehicle)

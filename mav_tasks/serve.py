@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -85,7 +85,9 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             say("links.push not used: no link for clients is UDP")
         say(f"store {store.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
-            say(f"parameters of an earlier run: {_in_words(restored.parameters)}")
+            values = sorted(restored.parameters.items())
+            told = ", ".join(f"{name} {value:g}" for name, value in values)
+            say(f"parameters of an earlier run: {told}")
         running = _run(settings, store, restored, client_links, vehicle_links, reload, keys, say)
         return asyncio.run(running)
 
@@ -159,10 +161,6 @@ async def _run(
         keys=keys,
     )
     return await runner.run()
-
-
-def _in_words(parameters: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {value:g}" for name, value in sorted(parameters.items()))
 
 
 def _say(words: str, *, as_json: bool) -> None:

@@ -2,6 +2,7 @@
 
 import ipaddress
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from mav_tasks.errors import LinkUrlError
 from mav_tasks.links.url import NO_OPTIONS, UrlOptions
@@ -12,6 +13,8 @@ PORTS = range(1, 65_536)
 @dataclass(frozen=True, slots=True)
 class HostUrl:
     """A link URL of the form ``kind:host:port``; each kind has its own ``open``."""
+
+    can_push: ClassVar[bool] = False  # a connection needs somebody who dials
 
     kind: str
     host: str
@@ -25,11 +28,6 @@ class HostUrl:
     def is_nearby(self) -> bool:
         """Whether only this machine can be the other end."""
         return is_loopback(self.host)
-
-    @property
-    def can_push(self) -> bool:
-        """Return False: a connection needs somebody who dials."""
-        return False
 
 
 def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:

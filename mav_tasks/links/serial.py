@@ -11,6 +11,7 @@ import termios
 from contextlib import suppress
 from dataclasses import dataclass, field
 from errno import EIO, ENODEV, ENOENT, ENXIO
+from typing import ClassVar
 
 from serial import Serial, SerialException
 
@@ -37,6 +38,8 @@ NOT_THERE = frozenset({ENOENT, ENODEV, ENXIO, EIO})
 class SerialUrl:
     """The URL of a serial line: ``serial:device:baud``."""
 
+    can_push: ClassVar[bool] = False  # a line has one other end
+
     device: str
     baud: int  # bits per second; a byte takes ten
     options: UrlOptions = field(default=NO_OPTIONS, compare=False)
@@ -52,11 +55,6 @@ class SerialUrl:
         vehicles, are for radios.
         """
         return True
-
-    @property
-    def can_push(self) -> bool:
-        """Return False: a line has one other end."""
-        return False
 
     def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
         """Open the device; ``push`` must be empty."""

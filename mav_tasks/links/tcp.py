@@ -21,7 +21,7 @@ KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}  # s, s, t
 class Connection:
     """One connection, with its send queue."""
 
-    def __init__(self, sock: socket.socket, peer: Peer, limits: LinkLimits) -> None:
+    def __init__(self, sock: socket.socket, peer: tuple[str, int], limits: LinkLimits) -> None:
         self.socket = sock
         self.peer = peer
         self.queue = OutQueue(max_age=limits.max_age)
@@ -29,11 +29,6 @@ class Connection:
 
     def __repr__(self) -> str:
         return f"Connection({self.peer}, {self.queue})"
-
-    @property
-    def name(self) -> str:
-        """The peer as text."""
-        return ":".join(map(str, self.peer)) if isinstance(self.peer, tuple) else str(self.peer)
 
 
 class TcpLink:
@@ -135,7 +130,7 @@ class TcpLink:
         received.append((connection.peer, data))
         return None
 
-    def _add(self, sock: socket.socket, peer: Peer, words: str) -> None:
+    def _add(self, sock: socket.socket, peer: tuple[str, int], words: str) -> None:
         """Start to use an established connection; raise OSError if it has failed meanwhile."""
         _prepare(sock, self._limits)
         connection = Connection(sock, peer, self._limits)

@@ -85,7 +85,8 @@ class TcpInLink(TcpLink):
             self._is_accepting = True
 
     def _on_ended(self, connection: Connection, reason: str) -> None:
-        self._end(connection, f"{connection.name} disconnected: {reason}")
+        host, port = connection.peer
+        self._end(connection, f"{host}:{port} disconnected: {reason}")
 
 
 def _listen(family: socket.AddressFamily, address: tuple[str, int]) -> socket.socket:

@@ -6,7 +6,7 @@ from time import monotonic
 
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.attempts import Attempts
-from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
+from mav_tasks.links.base import Link, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.tcp import Connection, TcpLink, reason_of, resolve
@@ -38,7 +38,7 @@ class TcpOutLink(TcpLink):
     """
 
     def __init__(self, url: HostUrl, *, limits: LinkLimits) -> None:
-        self._peer: Peer = (url.host, url.port)
+        self._peer = (url.host, url.port)
         try:
             self._addresses = resolve(url.host, url.port)
         except OSError as error:

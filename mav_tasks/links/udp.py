@@ -2,12 +2,12 @@
 
 import socket
 import time
+from zlib import crc32
 
 from mav_tasks.errors import LinkOpenError, LinkUrlError
 from mav_tasks.links.base import Link, Peer
 from mav_tasks.links.endpoint import PORTS, HostUrl, is_loopback, number_in, parse_endpoint
 from mav_tasks.links.link_limits import TO_VEHICLES, LinkLimits
-from mav_tasks.links.local_port import port_for
 from mav_tasks.links.stamps import ROOM, ask_for_stamps, stamp_in
 from mav_tasks.links.url import UrlOptions
 
@@ -15,6 +15,9 @@ RECEIVE_BUFFER = 1 << 20  # bytes; a burst of telemetry waits here while the dis
 MAX_DATAGRAM = 65536
 ANY = {socket.AF_INET: "0.0.0.0", socket.AF_INET6: "::"}
 LOOPBACK = {socket.AF_INET: "127.0.0.1", socket.AF_INET6: "::1"}
+#: the local ports from which rovers are dialled: below the ephemeral ports (Linux: from 32768), and
+#: above those of autopilots (14xxx)
+FIRST, COUNT = 16_000, 2_000
 
 
 class UdpUrl(HostUrl):
@@ -25,10 +28,7 @@ class UdpUrl(HostUrl):
 
     __slots__ = ()
 
-    @property
-    def can_push(self) -> bool:
-        """Return True: a datagram needs no connection."""
-        return True
+    can_push = True  # a datagram needs no connection
 
     def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
         """Open the socket; a rover is dialled from a port of its own."""
@@ -136,6 +136,15 @@ class UdpLink:
 
     def close(self) -> None:
         self._socket.close()
+
+
+def port_for(host: str, port: int) -> int:
+    """Return the local port for a rover; neighbouring ports of one host get different ones.
+
+    It is always the same: PX4's simulation answers only the first sender that it heard, until it
+    restarts.
+    """
+    return FIRST + (crc32(host.encode()) + port) % COUNT
 
 
 def _open(family: socket.AddressFamily, bind_to: tuple[str, int]) -> socket.socket:

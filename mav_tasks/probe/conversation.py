@@ -10,7 +10,7 @@ from mav_tasks.mavlink.enums import MavCmd, MavResult, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.probe.other_traffic import SETPOINTS, OtherTraffic
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services.command_sender import Answered, CommandSender
+from mav_tasks.services.command_sender import CommandSender
 from mav_tasks.services.heartbeat import HeartbeatMonitor, HeartbeatSender, gcs_heartbeat
 from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.persona import Persona
@@ -145,7 +145,8 @@ class Conversation:
             return []
         words: list[m.Message] = [*control.zero_and_hold()]
         if control.we_armed:
-            words.append(_arm_request(self.target, arm=False))
+            disarm = MavCmd.COMPONENT_ARM_DISARM
+            words.append(m.CommandLong(*self.target, disarm, 0, 0, 0, 0, 0, 0, 0, 0))
         return [self._encoder.encode(message) for message in words]
 
     # what the steps ask
@@ -215,19 +216,12 @@ class Conversation:
         outgoing, answers = self.sender.take()
         self._requests += [each for each in outgoing if not isinstance(each, Packet)]
         for answer in answers:
-            self._dispatch(answer)
-
-    def _dispatch(self, answer: Answered) -> None:
-        if is_request_of(answer) and self.control is not None:
-            self.control.answered(answer, now=self.now)
-        self._answers[answer.command] = answer.ack
+            if is_request_of(answer) and self.control is not None:
+                self.control.answered(answer, now=self.now)
+            self._answers[answer.command] = answer.ack
 
 
 def result_name(result: int) -> str:
     """Return a MAV_RESULT in words."""
     known = {each.value: each.name for each in MavResult}
     return known.get(result, f"result {result}")
-
-
-def _arm_request(target: Address, *, arm: bool) -> m.CommandLong:
-    return m.CommandLong(*target, MavCmd.COMPONENT_ARM_DISARM, 0, float(arm), 0, 0, 0, 0, 0, 0)

@@ -18,6 +18,7 @@ from mav_tasks.tasks.driving.guidance import Motion
 from mav_tasks.tasks.driving.legs import distance
 
 TAKE_WITHIN = 12.0  # s; PX4 takes four heartbeats
+STAND_WITHIN = 4.0  # s of zeros
 REST_WITHIN = 10.0  # s, for zeros, HOLD and disarming
 SHOW_EACH = 0.25  # s, between requests for a heartbeat
 BRAKE_WITHIN = 3.0  # s in HOLD, after which one that is not seen to stand is disarmed all the same
@@ -85,8 +86,7 @@ class DriveController:
                     self._drive.arming = words
                 raise DriveEnded(words)
             if self.now >= end:
-                words = _with_texts("no control in time", self._talk.texts[mark:])
-                raise DriveEnded(words)
+                raise DriveEnded(_with_texts("no control in time", self._talk.texts[mark:]))
             yield from self._tick()
         self._drive.arming = "accepted"
         self._is_ours = True
@@ -107,9 +107,9 @@ class DriveController:
         self._check()
         yield from self._tick()
 
-    def stand(self, *, within: float = 4.0) -> Steps[bool]:
+    def stand(self) -> Steps[bool]:
         """Ask for zero until it stands; gives whether it does."""
-        end = self.now + within
+        end = self.now + STAND_WITHIN
         while not self.is_still and self.now < end:
             yield from self.drive(STANDING)
         return self.is_still

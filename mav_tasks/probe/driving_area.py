@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from math import cos, inf, sin
 
 from mav_tasks.settings import Turning
-from mav_tasks.tasks.driving.guidance import Motion
+from mav_tasks.tasks.driving.guidance import Motion, cross_track
+from mav_tasks.tasks.driving.path import forward_of
 from mav_tasks.tasks.task import Pose
 
 HALF = 1.0  # m, from the middle to each side: the area measures 2 m
@@ -30,9 +31,7 @@ class DrivingArea:
 
     def place_of(self, pose: Pose) -> tuple[float, float]:
         """Return where a pose is, metres ahead of and to the right of the middle."""
-        north, east = pose.north - self.middle.north, pose.east - self.middle.east
-        yaw = self.middle.yaw
-        return north * cos(yaw) + east * sin(yaw), east * cos(yaw) - north * sin(yaw)
+        return forward_of(self.middle, pose), cross_track(self.middle, pose)
 
     def holds(self, motion: Motion) -> bool:
         """Whether a rover is inside, and would be if it began to stop now."""

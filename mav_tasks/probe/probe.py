@@ -20,7 +20,6 @@ from mav_tasks.probe.questions import (
 )
 from mav_tasks.probe.steps import Steps, Wait, Walk
 from mav_tasks.probe.trials import Trials
-from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Identity, Turning, Watch
 
 FRESH_ENOUGH = 5.0  # Hz of position and attitude, below which it is not driven
@@ -57,15 +56,13 @@ class Options:
 class Probe:
     """Asks, and with ``options.drive`` drives; then gives back what it has changed."""
 
-    def __init__(self, options: Options, *, now: float, watch: Watch | None = None) -> None:
+    def __init__(self, options: Options, *, now: float) -> None:
         identity = Identity()
         source = Address(identity.system_id, identity.component_id)
         if options.set_failsafe:  # also through a server, which has that address itself
             source = SETTER
         self.findings = Findings()
-        self.talk = Conversation(
-            source, system_id=options.system_id, watch=watch or AT_REST, now=now
-        )
+        self.talk = Conversation(source, system_id=options.system_id, watch=AT_REST, now=now)
         self._options = options
         self._has_rates = False
         self._is_clearing_up = False
@@ -82,11 +79,6 @@ class Probe:
     def is_over(self) -> bool:
         """Whether it has done all that it does; ``take_packets`` once more."""
         return self._walk.is_over
-
-    @property
-    def is_driving(self) -> bool:
-        """Whether the rover is in our hands."""
-        return self.talk.control is not None and self.talk.control.phase is not Phase.IDLE
 
     def receive(self, packet: Packet, *, now: float) -> None:
         self.talk.receive(packet, now=now)

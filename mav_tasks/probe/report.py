@@ -50,31 +50,22 @@ def lines_of(findings: Findings) -> Iterator[Line]:
     """Yield the report, in the order of reading."""
     make = findings.autopilot or "unsupported autopilot"
     kind = TYPES.get(findings.vehicle_type, f"type {findings.vehicle_type}, not a rover")
-    is_known = bool(findings.autopilot) and findings.is_rover
-    yield Line(
-        "rover",
-        f"{findings.system_id}: {make}, {kind}",
-        Mark.GOOD if is_known else Mark.BAD,
-    )
-    yield Line(
-        "firmware",
-        findings.firmware or UNKNOWN,
-        Mark.GOOD if findings.firmware else Mark.WARNING,
-    )
+    mark = Mark.GOOD if findings.autopilot and findings.is_rover else Mark.BAD
+    yield Line("rover", f"{findings.system_id}: {make}, {kind}", mark)
+    yield Line("firmware", findings.firmware or UNKNOWN, _good(bool(findings.firmware)))
     yield Line("unique id", findings.uid or "not reported")
     yield from _capabilities(findings)
     yield Line("mode", f"{findings.mode or UNKNOWN}, {'ARMED' if findings.armed else 'disarmed'}")
     for other in findings.others:
         yield Line("also connected", other, Mark.WARNING)
-    yield Line(
-        "HEARTBEAT", f"{findings.heartbeat_rate:.1f} Hz", _good(findings.heartbeat_rate > 0.5)
-    )
+    beats = findings.heartbeat_rate
+    yield Line("HEARTBEAT", f"{beats:.1f} Hz", _good(beats > 0.5))
     for rate in findings.rates:
         yield _rate(rate)
-    if findings.rates_given_back:
-        is_bad = findings.rates_given_back.startswith("no")
-        words = findings.rates_given_back
-        yield Line("rates restored", words, Mark.WARNING if is_bad else Mark.PLAIN)
+    restored = findings.rates_given_back
+    if restored:
+        mark = Mark.WARNING if restored.startswith("no") else Mark.PLAIN
+        yield Line("rates restored", restored, mark)
     yield from _arming(findings)
     yield from _mission(findings)
     yield _without_setpoints(findings.loss_by_parameters)
@@ -122,11 +113,10 @@ def _capabilities(findings: Findings) -> Iterator[Line]:
 def _rate(rate: Rate) -> Line:
     if rate.granted is None:
         return Line(rate.name, f"{rate.unasked:.1f} Hz unasked")
-    is_enough = rate.granted >= 0.5 * rate.wanted
     words = f"{rate.granted:.1f} Hz of {rate.wanted:.1f} requested, {rate.unasked:.1f} unasked"
     if rate.answer != MavResult.ACCEPTED.name:
         words += f"; answer: {rate.answer}"
-    return Line(rate.name, words, _good(is_enough))
+    return Line(rate.name, words, _good(rate.granted >= 0.5 * rate.wanted))
 
 
 def _arming(findings: Findings) -> Iterator[Line]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, degrees, pi, sin
+from math import degrees, pi
 
 from mav_tasks.mavlink.enums import MavFrame
 from mav_tasks.probe.drive_controller import DriveController, DriveEnded
@@ -12,7 +12,7 @@ from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import BY_COURSE, WITH_YAW_RATE, Persona
 from mav_tasks.tasks.driving.guidance import wrap
 from mav_tasks.tasks.driving.legs import distance
-from mav_tasks.tasks.task import Pose
+from mav_tasks.tasks.driving.path import forward_of
 
 TRIAL_SPEED = 0.2  # m/s
 TRIAL_WAY = 0.1  # m; further a trial need not go
@@ -40,6 +40,7 @@ class Kind:
 
     def __init__(self, persona: Persona, mask: int, frame: MavFrame, *, by_course: bool) -> None:
         self.name = f"{frame.name} 0x{mask:04X}"
+        self.mask, self.frame = mask, frame
         self.persona = replace(
             persona,
             honours_yaw_rate=not by_course,
@@ -63,13 +64,8 @@ def kinds_of(persona: Persona) -> list[Kind]:
         Kind(persona, BY_COURSE, MavFrame.BODY_NED, by_course=False),
         Kind(persona, WITH_YAW_RATE, MavFrame.BODY_NED, by_course=False),
     ]
-    return sorted(
-        kinds,
-        key=lambda kind: (
-            kind.persona.setpoint_mask != persona.setpoint_mask
-            or kind.persona.setpoint_frame != persona.setpoint_frame
-        ),
-    )
+    own = (persona.setpoint_mask, persona.setpoint_frame)
+    return sorted(kinds, key=lambda kind: (kind.mask, kind.frame) != own)
 
 
 class Trials:
@@ -179,14 +175,15 @@ class Trials:
             drive.reverse = "no"
             return
         before = controller.motion.pose
-        yield from self._with(kind, Speeds(-TRIAL_SPEED), lambda: _along(before, controller))
-        backed = _along(before, controller) <= -FOLLOWED
+        backwards = Speeds(-TRIAL_SPEED)
+        yield from self._with(kind, backwards, lambda: forward_of(before, controller.motion.pose))
+        backed = forward_of(before, controller.motion.pose) <= -FOLLOWED
         straight = abs(wrap(controller.motion.pose.yaw - before.yaw)) < STRAIGHT
         drive.reverse = "yes" if backed and straight else "no"
         if drive.reverse == "yes":  # and on, for room ahead
             end = controller.now + RUN_UP
             while controller.ahead > BACK_TO and controller.now < end:
-                yield from controller.drive(Speeds(-TRIAL_SPEED))
+                yield from controller.drive(backwards)
         yield from self._rest()
 
     def _measure_stop(self) -> Steps[None]:
@@ -271,9 +268,3 @@ class Trials:
             ((c, controller.area.room(controller.motion.pose, c)) for c in courses),
             key=lambda x: x[1],
         )
-
-
-def _along(before: Pose, controller: DriveController) -> float:
-    pose = controller.motion.pose
-    north, east = pose.north - before.north, pose.east - before.east
-    return north * cos(before.yaw) + east * sin(before.yaw)

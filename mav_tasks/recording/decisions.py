@@ -4,6 +4,7 @@ import logging
 import platform
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from mav_tasks.recording.backlog import MOST, PAUSE, ROOM_OF_PACKET, Backlog, ro
 from mav_tasks.recording.new_files import new_file, stamp
 from mav_tasks.recording.record_file import RecordFile
 from mav_tasks.recording.record_lines import FORMAT, MAGIC, ROWS, LineWriter, Unwritable, dumps
-from mav_tasks.recording.surroundings import restored_to_json, settings_to_json
+from mav_tasks.recording.surroundings import restored_to_json
 from mav_tasks.recording.writing import WritingThread
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import Event
@@ -152,7 +153,7 @@ class Decisions:
             "python": platform.python_version(),
             "machine": f"{platform.system()} {platform.machine()}",
             "now": now,
-            "settings": settings_to_json(settings),
+            "settings": asdict(settings),
             "restored": None if restored is None else restored_to_json(restored),
             "rows": ROWS,
         }

@@ -7,6 +7,7 @@ error: its server crashed, or still writes.
 import stat
 import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import blake2b
 from itertools import islice
@@ -77,7 +78,6 @@ def read(path: Path) -> Record:
     """
     first = _first_line(path)
     lines, why_it_ends = _measure(path)
-    count = 0
     try:
         if first["rows"] != {name: list(places) for name, places in ROWS.items()}:
             raise RecordError(
@@ -88,7 +88,6 @@ def read(path: Path) -> Record:
         if type(first["now"]) not in (int, float) or not isfinite(first["now"]):
             raise ValueError("no time")
         given = first["restored"]
-        count = 0 if given is None else given["tasks"]
         return Record(
             path=path,
             version=first["version"],
@@ -96,7 +95,7 @@ def read(path: Path) -> Record:
             machine=first["machine"],
             now=first["now"],
             settings=settings_of(first["settings"]),
-            restored=None if given is None else restored_of(given, _tasks(path, count)),
+            restored=None if given is None else restored_of(given, _tasks(path, given["tasks"])),
             lines=lines,
             why_it_ends=why_it_ends,
         )
@@ -127,18 +126,13 @@ def _measure(path: Path) -> tuple[int, str | None]:
 
 
 def _first_line(path: Path) -> dict[str, Any]:
-    for _, raw in _numbered(path):
-        try:
-            first = loads(raw)
-            if isinstance(first, dict) and MAGIC in first:
-                if first[MAGIC] == FORMAT:
-                    return first
-                raise RecordError(
-                    f"{path}: its format is {first[MAGIC]}; this version reads {FORMAT}"
-                )
-        except NOT_OURS:
-            pass
-        break
+    _, raw = next(_numbered(path), (0, b""))
+    with suppress(*NOT_OURS):
+        first = loads(raw)
+        if isinstance(first, dict) and MAGIC in first:
+            if first[MAGIC] == FORMAT:
+                return first
+            raise RecordError(f"{path}: its format is {first[MAGIC]}; this version reads {FORMAT}")
     raise RecordError(f"{path}: not a record of decisions")
 
 

@@ -23,6 +23,7 @@ them, which stands for a tuple. A record has no other clock, no path and no proc
 
 from binascii import a2b_base64, b2a_base64
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import asdict
 from hashlib import blake2b
 from json import JSONEncoder
 from typing import Any, assert_never, get_args
@@ -30,7 +31,7 @@ from typing import Any, assert_never, get_args
 from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Packets
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.recording.surroundings import settings_of, settings_to_json
+from mav_tasks.recording.surroundings import settings_of
 from mav_tasks.store.codec import Encoder, format_of
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.task import Task
@@ -160,7 +161,7 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
         case inputs.Congestion(link=link, peer=peer, is_congested=is_congested):
             return ["congestion", now, link, _peer_to_json(peer), is_congested]
         case inputs.SettingsChanged(settings=settings):
-            return ["settings", now, settings_to_json(settings)]
+            return ["settings", now, asdict(settings)]
         case inputs.Committed(through=through):
             return ["committed", now, through]
         case inputs.StoreFailed(text=text):

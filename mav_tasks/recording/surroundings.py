@@ -4,7 +4,7 @@ Tasks have their own lines (``record_lines``): there may be a hundred thousand.
 """
 
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import astuple, fields, is_dataclass
 from typing import Any
 
 from mav_tasks.settings import Settings, VehicleProfile
@@ -15,20 +15,11 @@ from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Frame, Task
 
 
-def settings_to_json(settings: Any) -> Any:
-    """Return the JSON values of settings, or of a part of them, by name."""
-    if is_dataclass(settings):
-        return {
-            field.name: settings_to_json(getattr(settings, field.name))
-            for field in fields(settings)
-        }
-    if isinstance(settings, tuple):
-        return [settings_to_json(each) for each in settings]
-    return dict(settings) if isinstance(settings, Mapping) else settings
-
-
 def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
-    """Return settings from JSON values, defaults if missing; raise ValueError if unknown."""
+    """Return settings from the values of ``asdict``, also by way of JSON.
+
+    A missing value is the default; raise ValueError for an unknown name.
+    """
     # not the type hints: compiled, a class has less of them
     makers = {field.name: field.default_factory for field in fields(kind)}
     unknown = sorted(set(values) - set(makers))
@@ -40,9 +31,8 @@ def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
 def _setting_of(value: Any, maker: Any) -> Any:
     if is_dataclass(maker):
         return settings_of(value, maker)
-    if isinstance(value, list):  # of texts, or of profiles
-        each = [settings_of(v, VehicleProfile) if isinstance(v, dict) else v for v in value]
-        return tuple(each)
+    if isinstance(value, list | tuple):  # of texts, or of profiles
+        return tuple(settings_of(v, VehicleProfile) if isinstance(v, dict) else v for v in value)
     return value
 
 
@@ -54,16 +44,13 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
         "paused": [[vehicle, int(reason)] for vehicle, reason in restored.paused.items()],
         "uids": list(restored.uids.items()),
         "speeds": list(restored.speeds.items()),
-        "homes": [_home_to_json(home) for home in restored.homes.values()],
+        "homes": [astuple(home) for home in restored.homes.values()],
         "halt_epochs": list(restored.halt_epochs.items()),
         "halted": [[vehicle, int(why), at] for vehicle, (why, at) in restored.halted.items()],
         "disarmed": sorted(restored.disarmed),
         "plans": [[*key, *plan] for key, plan in restored.plans.items()],
         "parameters": list(restored.parameters.items()),
-        "signatures": [
-            [time.key, time.link_id, time.system_id, time.component_id, time.timestamp]
-            for time in restored.signatures
-        ],
+        "signatures": [astuple(time) for time in restored.signatures],
         "signed_until": restored.signed_until,
         "ended_well": restored.ended_well,
         "idle": restored.idle,
@@ -93,13 +80,6 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         idle=values["idle"],
         wall_offset=values["wall_offset"],
     )
-
-
-def _home_to_json(home: VehicleHomeSet) -> list[Any]:
-    frame = home.frame
-    place = [home.latitude_degE7, home.longitude_degE7]
-    of_frame = [frame.latitude_degE7, frame.longitude_degE7, frame.booted_at, frame.heard_at]
-    return [home.vehicle, *place, of_frame, home.actor, home.at]
 
 
 def _home_of(row: list[Any]) -> VehicleHomeSet:

@@ -62,7 +62,8 @@ class TlogFiles:
     def _keep(self, chunk: Sequence[bytes], *, utc: float) -> None:
         data = b"".join(chunk)
         is_full = self._written > 0 and self._written + len(data) > self._size
-        if self._fd is None or is_full or self._is_removed(self._fd):
+        # a user, or another server, may have removed the file
+        if self._fd is None or is_full or os.fstat(self._fd).st_nlink == 0:
             self._begin(utc)
         assert self._fd is not None
         try:
@@ -82,10 +83,6 @@ class TlogFiles:
         )
         self._written = 0
         self._forget_oldest()
-
-    def _is_removed(self, fd: int) -> bool:
-        """Whether the file was removed, by a user or by another server."""
-        return os.fstat(fd).st_nlink == 0
 
     def _cut_back(self, fd: int) -> None:
         """Remove a partly written packet: readers would lose synchronization."""

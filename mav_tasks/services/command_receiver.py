@@ -5,6 +5,7 @@ submissions are the same task is the task domain's to say (``tasks/deduplicator.
 """
 
 from collections import OrderedDict
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address, address_of
@@ -61,24 +62,17 @@ class Answer(NamedTuple):
     source: Address
 
     def ack(self, to: Address) -> CommandAck:
-        return CommandAck(
-            self.command,
-            self.result,
-            0,
-            self.result_param2,
-            to.system_id,
-            to.component_id,
-        )
+        system, component = to
+        return CommandAck(self.command, self.result, 0, self.result_param2, system, component)
 
 
 class Pending:
     """A command taken in; ``answer`` is None until it has been answered."""
 
-    __slots__ = ("answer", "at", "command", "packet")
+    __slots__ = ("answer", "at", "command")
 
-    def __init__(self, command: Command, packet: bytes, at: float) -> None:
+    def __init__(self, command: Command, at: float) -> None:
         self.command = command
-        self.packet = packet
         self.at = at
         self.answer: Answer | None = None
 
@@ -97,22 +91,17 @@ class CommandReceiver:
         return None
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
-        pending = Pending(command, packet, now)
         self._packets.pop(packet, None)
-        self._packets[packet] = pending
+        pending = self._packets[packet] = Pending(command, now)
         if len(self._packets) > REMEMBERED:
             self._packets.popitem(last=False)
         return pending
 
     def answer_to_copy(self, command: Command, *, now: float) -> Answer | None:
         """Return how an equal command was accepted, so lately that this may be a repeat of it."""
-        for pending in reversed(self._packets.values()):
-            answer = pending.answer
-            is_late = now - pending.at > REPEATED
-            if answer is None or answer.result != MavResult.ACCEPTED or is_late:
-                continue
-            if _equal(pending.command, command):
-                return answer
+        for pending in self._equals(command, within=REPEATED, now=now):
+            if pending.answer is not None and pending.answer.result == MavResult.ACCEPTED:
+                return pending.answer
         return None
 
     def answer_to_counted_copy(self, command: Command, *, now: float) -> Answer | None:
@@ -122,20 +111,16 @@ class CommandReceiver:
         """
         if command.confirmation == 0:
             return None
-        for pending in reversed(self._packets.values()):
-            is_late = now - pending.at > COPIED
-            if pending.answer is not None and not is_late and _equal(pending.command, command):
+        for pending in self._equals(command, within=COPIED, now=now):
+            if pending.answer is not None:
                 return pending.answer
         return None
 
     def is_refused_again(self, command: Command, *, within: float, now: float) -> bool:
         """Whether an equal command was refused in the last so many seconds."""
         return any(
-            now - pending.at <= within
-            and pending.answer is not None
-            and pending.answer.result != MavResult.ACCEPTED
-            and _equal(pending.command, command)
-            for pending in self._packets.values()
+            pending.answer is not None and pending.answer.result != MavResult.ACCEPTED
+            for pending in self._equals(command, within=within, now=now)
         )
 
     def older_copy(self, command: Command, *, before: float, now: float) -> bool:
@@ -143,11 +128,15 @@ class CommandReceiver:
         it whose ack was lost, or has yet to be sent."""
         return any(
             pending.at < before
-            and now - pending.at <= COPIED
             and (pending.answer is None or pending.answer.result == MavResult.ACCEPTED)
-            and _equal(pending.command, command)
-            for pending in self._packets.values()
+            for pending in self._equals(command, within=COPIED, now=now)
         )
+
+    def _equals(self, command: Command, *, within: float, now: float) -> Iterator[Pending]:
+        """Yield the equal commands of the last so many seconds, the latest first."""
+        for pending in reversed(self._packets.values()):
+            if now - pending.at <= within and _equal(pending.command, command):
+                yield pending
 
 
 def _equal(one: Command, other: Command) -> bool:

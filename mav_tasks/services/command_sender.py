@@ -202,9 +202,7 @@ class CommandSender:
     def is_pending(self, component: int, command: int) -> bool:
         """Whether a command of ours of this id is in flight or waits."""
         lane = self._lanes.get((component, command))
-        if lane is None:
-            return False
-        return any(request.origin is None for request in lane.requests)
+        return lane is not None and any(request.origin is None for request in lane.requests)
 
     def receive(self, ack: CommandAck, *, component: int, now: float) -> None:
         """Take an ack of a component of the vehicle; one that nobody waits for is dropped."""
@@ -226,15 +224,15 @@ class CommandSender:
         """Repeat what is due and give up what is too old."""
         for lane in self._lanes.values():
             flying = lane.in_flight
-            for request in [] if flying is None else flying.joined:
-                if request.retry.is_over(now):
-                    self._answer(request, None)
             if flying is not None:
+                for request in flying.joined:
+                    if request.retry.is_over(now):
+                        self._answer(request, None)
                 flying.joined = [r for r in flying.joined if not r.retry.is_over(now)]
-            if flying is not None and flying.retry.is_over(now):
-                lane.in_flight = None
-                lane.quiet_until = now + LATE
-                self._answer(flying, None)
+                if flying.retry.is_over(now):
+                    lane.in_flight = None
+                    lane.quiet_until = now + LATE
+                    self._answer(flying, None)
             for request in [r for r in lane.waiting if now >= r.wait_until]:
                 lane.waiting.remove(request)
                 self._answer(request, None)

@@ -40,15 +40,13 @@ class Item(NamedTuple):
 
 def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
     """Return the item that a message carries; None if its place is beyond all numbers."""
-    x: int | None = None
-    y: int | None = None
     if isinstance(message, m.MissionItem):
         scale = _scale(message.frame)
         x, y = _whole(message.x, scale), _whole(message.y, scale)
+        if x is None or y is None:
+            return None
     else:
         x, y = message.x, message.y
-    if x is None or y is None:
-        return None
     return Item(
         message.frame,
         message.command,

@@ -26,9 +26,8 @@ STEP_BACK = 3  # from so many requests for an item on each second one is for an 
 QUIET = 0.3  # s that a packet is on its way at the most
 LATE = 2 * QUIET  # s after an upload has ended, in which items may still come that it asked for
 REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
-ANOTHER_TRY = (
-    10.0  # s after an upload that came to nothing, in which the next one is meant the same
-)
+#: s after an upload that came to nothing, in which the next one is meant the same
+ANOTHER_TRY = 10.0
 #: requests for one item in the form that is known to be understood, or expected to be, before each
 #: second one is in the other form
 PATIENCE_PLAIN = 1
@@ -285,17 +284,15 @@ class MissionReceiver:
         if len(self._sends_int) > INT_SENDERS:
             del self._sends_int[next(iter(self._sends_int))]
 
-    def _note_end(self, session: _Session, *, now: float) -> None:
-        self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}
-        self._ended[session.sender, session.mission_type] = now
-
     def _note_in_vain(self, session: _Session, *, now: float) -> None:
         """An upload came to nothing: its client will try again, and mean what it meant."""
-        self._note_end(session, now=now)
+        upload = (session.sender, session.mission_type)
+        self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}
+        self._ended[upload] = now
         self._in_vain = {
             key: tries for key, tries in self._in_vain.items() if now - tries[1] <= ANOTHER_TRY
         }
-        self._in_vain[session.sender, session.mission_type] = session.begun_at, now
+        self._in_vain[upload] = session.begun_at, now
 
     def _quiet_until(self, sender: Sender, kind: int, *, now: float) -> float:
         """Return until when items may come that were sent before the count that came now."""
@@ -315,13 +312,11 @@ class MissionReceiver:
         assert session is not None, "an upload is under way"
         self._session = None
         self._note_in_vain(session, now=now)
-        if result == MavMissionResult.ACCEPTED:
-            del self._in_vain[session.sender, session.mission_type]
         sender, kind = session.sender, session.mission_type
+        if result == MavMissionResult.ACCEPTED:
+            del self._in_vain[sender, kind]
         ack = self._send_ack(sender, kind, result, opaque_id=opaque_id, why=why)
-        self._answered = _Answered(
-            session.sender, session.mission_type, last, len(session.items), ack, now
-        )
+        self._answered = _Answered(sender, kind, last, len(session.items), ack, now)
 
     def _repeat_answer(
         self, message: m.MissionItemInt | m.MissionItem, sender: Sender, *, now: float

@@ -508,9 +508,6 @@ class OffboardControl:
         """Return the setpoint that asks the vehicle to stand."""
         return self._orders.velocity(self._standing)
 
-    def hold_request(self) -> CommandLong:
-        return self._orders.hold()
-
     @property
     def holds_first(self) -> bool:
         """Whether commands leave before setpoints.
@@ -523,7 +520,7 @@ class OffboardControl:
 
     def zero_and_hold(self) -> tuple[Message, Message]:
         """Return both, to be sent once each; HOLD first if a zero would end a failsafe's HOLD."""
-        zero, hold = self.zero_setpoint(), self.hold_request()
+        zero, hold = self.zero_setpoint(), self._orders.hold()
         return (hold, zero) if self._persona.has_loss_failsafe else (zero, hold)
 
     def _note_requests(self, now: float) -> None:

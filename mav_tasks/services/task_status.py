@@ -30,13 +30,11 @@ class TaskStatusSender:
         """``wake`` is called with the time at which ``due`` has something to give."""
         self._wake = wake
         self._limit = TokenBucket(rate=rate, burst=BURST, now=now)
-        self._rate = rate
         self._changed: dict[int, None] = {}  # an ordered set
         self._streams: dict[int, _Stream] = {}  # by vehicle
         self._retry_at = 0.0
 
     def apply(self, *, rate: float) -> None:
-        self._rate = rate
         self._limit.apply(rate=rate)
 
     def changed(self, task_id: int) -> None:
@@ -71,7 +69,7 @@ class TaskStatusSender:
         due: dict[int, None] = {}
         while self._changed and now >= self._retry_at:
             if not self._limit.take(now=now):
-                self._retry_at = now + 1.0 / self._rate
+                self._retry_at = now + 1.0 / self._limit.rate
                 break
             task_id = next(iter(self._changed))
             del self._changed[task_id]

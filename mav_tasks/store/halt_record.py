@@ -158,7 +158,7 @@ class HaltRecord:
     def write(self, word: Word) -> None:
         """Make a word durable; raise OSError if that fails, or if the file was replaced."""
         self._put(word)
-        _sync(self._fd)
+        getattr(os, "fdatasync", os.fsync)(self._fd)  # macOS has no fdatasync
         found, ours = self._path.stat(), os.fstat(self._fd)
         if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
             raise OSError(ENOENT, "it was removed or replaced while it was in use")
@@ -193,16 +193,11 @@ def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:
     if len(content) != SIZE or not content.startswith(HEADER):
         raise ValueError("it is damaged: check that the rovers stand still, then remove it")
     for key in range(REGISTERS):
-        found: list[tuple[int, Word]] = []
-        is_cut_short = 0
-        for slot in range(SLOTS):
-            begin = _place(slot, key)
-            cell = content[begin : begin + CELL]
-            if cell != _EMPTY:
-                word = _word_in(cell, key)
-                found += [] if word is None else [(slot, word)]
-                is_cut_short += word is None
-        if is_cut_short == SLOTS:
+        places = [_place(slot, key) for slot in range(SLOTS)]
+        cells = [content[place : place + CELL] for place in places]
+        words = [(slot, _word_in(cell, key)) for slot, cell in enumerate(cells) if cell != _EMPTY]
+        found = [(slot, word) for slot, word in words if word is not None]
+        if len(words) == SLOTS and not found:  # a torn write leaves one of them
             raise ValueError("it is damaged: check that the rovers stand still, then remove it")
         if found:
             yield key, max(found, key=lambda each: each[1].number)
@@ -240,7 +235,3 @@ def _make(path: Path) -> None:
         os.fsync(folder)
     finally:
         os.close(folder)
-
-
-def _sync(fd: int) -> None:
-    getattr(os, "fdatasync", os.fsync)(fd)  # macOS has no fdatasync

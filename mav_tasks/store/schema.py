@@ -64,9 +64,9 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
 )
 
 
-def check(connection: sqlite3.Connection, *, known: int = len(MIGRATIONS)) -> None:
+def check(connection: sqlite3.Connection) -> None:
     """Raise StoreError if a database is another program's, or a newer version's."""
-    version = _number(connection, "user_version")
+    version, known = _number(connection, "user_version"), len(MIGRATIONS)
     if _number(connection, "application_id") != APPLICATION_ID and (
         version or connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     ):

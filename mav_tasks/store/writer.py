@@ -75,12 +75,11 @@ class Writer:
         """Queue events; never blocks the loop's thread, which calls it."""
         self._waiting.put(events)
 
-    def close(self, *, within: float) -> bool:
-        """Write the remaining events and end; return whether the thread ended in time."""
+    def close(self, *, within: float) -> None:
+        """Write the remaining events and end; wait at most ``within`` s and LAST_TRY."""
         self._give_up_at = time.monotonic() + within
         self._waiting.put(None)
         self._thread.join(within + LAST_TRY)
-        return not self._thread.is_alive()
 
     def utc(self) -> float:
         """Return the wall clock's time, s since 1970."""

@@ -21,6 +21,7 @@ ADDED = """\
 
 SCRIPT = """
 import sys
+from dataclasses import asdict
 from math import radians
 from parameter_table import table
 from mav_tasks import __file__ as where
@@ -30,7 +31,7 @@ from mav_tasks.config.reload import taken
 from mav_tasks.config.sample import sample
 from mav_tasks.config.words import flag_of_set
 from mav_tasks.errors import ConfigError
-from mav_tasks.recording.surroundings import settings_of, settings_to_json
+from mav_tasks.recording.surroundings import settings_of
 from mav_tasks.services.parameter_table import PARAMETERS, changed
 from mav_tasks.settings import KEYS, Driving, ServerSettings, Settings
 
@@ -61,7 +62,7 @@ assert list(PARAMETERS)[-1] == "TSK_CREEP"
 assert changed(Settings(), "TSK_CREEP", 7.0).driving == Driving(creep=radians(7))
 row = "TSK_CREEP | `driving.creep_deg` | 1..9 | deg/s | rate of a slow turn; at most TSK_TURN"
 assert f"| {{row}} |\\n" in table()
-record = settings_to_json(Settings(driving=Driving(creep=radians(8))))
+record = asdict(Settings(driving=Driving(creep=radians(8))))
 assert settings_of(record).driving.creep == radians(8)
 del record["driving"]["creep"]  # an older record
 assert settings_of(record) == Settings()

@@ -121,7 +121,7 @@ class MessageRequest(CommandRequest):
         target = Address(vehicle.system_id, AUTOPILOT)
         params = (*vehicle.persona.mode_params(mode), 0.0, 0.0, 0.0, 0.0)
         command = Command(target, MavCmd.DO_SET_MODE, params, 0, None, NO_MESSAGE)
-        return cls(client, vehicle, packet, Pending(command, packet.raw, 0.0))
+        return cls(client, vehicle, packet, Pending(command, 0.0))
 
     @property
     def marks(self) -> Marks:

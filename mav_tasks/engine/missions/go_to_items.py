@@ -72,9 +72,7 @@ class GoToItems:
         now: float,
     ) -> None:
         """Submit a "go to". An item that only changes the altitude is accepted without effect."""
-        asked = GuidedItemRequest(
-            client, vehicle, packet, Pending(_command_of(message), packet.raw, now)
-        )
+        asked = GuidedItemRequest(client, vehicle, packet, Pending(_command_of(message), now))
         try:
             if message.current == ONLY_HIGHER:
                 asked.answer(MavResult.ACCEPTED)

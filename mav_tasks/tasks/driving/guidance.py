@@ -9,7 +9,7 @@ from math import atan, atan2, copysign, cos, hypot, pi, radians, sin, sqrt, tan
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.path import Follow, nearest
+from mav_tasks.tasks.driving.path import Follow, forward_of, nearest
 from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
 from mav_tasks.tasks.task import Pose
 
@@ -106,10 +106,7 @@ def done_so_far(
     """
     match leg:
         case Move(distance=distance):
-            along = (pose.north - anchor.north) * cos(anchor.yaw) + (pose.east - anchor.east) * sin(
-                anchor.yaw
-            )
-            return copysign(1.0, distance) * along
+            return copysign(1.0, distance) * forward_of(anchor, pose)
         case Rotate(angle=angle):
             turned = copysign(1.0, angle) * (pose.yaw - anchor.yaw)
             return before + wrap(turned - before)

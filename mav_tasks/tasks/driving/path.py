@@ -141,19 +141,20 @@ def _direction(path: Path) -> float:
 def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Iterator[float]:
     """Yield the nearest place to a pose for each piece, and for both extensions."""
     start, begins, ahead = anchor, 0.0, _direction(path)
-    yield min(0.0, ahead * _forward_of(anchor, pose))
+    yield min(0.0, ahead * forward_of(anchor, pose))
     for bend in path:
         length = abs(bend.length)
         if abs(bend.curvature) < STRAIGHT:
-            along = ahead * _forward_of(start, pose)
+            along = ahead * forward_of(start, pose)
         else:
             along = _on_circle(start, bend.curvature, ahead, pose, around=around - begins)
         yield begins + min(max(along, 0.0), length)
         start, begins = moved(start, bend.curvature, bend.length), begins + length
-    yield begins + max(0.0, ahead * _forward_of(start, pose))
+    yield begins + max(0.0, ahead * forward_of(start, pose))
 
 
-def _forward_of(start: Pose, pose: Pose) -> float:
+def forward_of(start: Pose, pose: Pose) -> float:
+    """Return how many metres a pose is ahead of another, along the yaw of that."""
     north, east = pose.north - start.north, pose.east - start.east
     return north * cos(start.yaw) + east * sin(start.yaw)
 

@@ -10,7 +10,7 @@ from math import copysign, cos, inf, radians, sin
 from mav_tasks.tasks.driving.guidance import Motion, cross_track, done_so_far, wrap
 from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, distance, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
-from mav_tasks.tasks.driving.path import Follow, nearest, pose_on
+from mav_tasks.tasks.driving.path import Follow, forward_of, nearest, pose_on
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to, way_to_pose
 from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate, SingleGoal
@@ -58,8 +58,7 @@ def was_handled(task: Task, before: Pose, after: Pose) -> bool:
     leg = leg_of(goal_of(task), task.progress)
     if not isinstance(leg, Move):
         return False
-    north, east = after.north - before.north, after.east - before.east
-    ahead = copysign(1.0, leg.distance) * (north * cos(before.yaw) + east * sin(before.yaw))
+    ahead = copysign(1.0, leg.distance) * forward_of(before, after)
     return ahead < -PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
 
 

@@ -3,7 +3,7 @@
 import asyncio
 import json
 import logging
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +11,7 @@ import pytest
 from mav_tasks.config import profiles
 from mav_tasks.config.configuration import Sources
 from mav_tasks.errors import ConfigError
-from mav_tasks.recording.surroundings import settings_of, settings_to_json
+from mav_tasks.recording.surroundings import settings_of
 from mav_tasks.settings import Settings, VehicleProfile
 from tests.unit.config.test_reload import Server, Watched
 
@@ -179,7 +179,7 @@ def test_sighup_reads_them_again(tmp_path: Path, caplog: pytest.LogCaptureFixtur
 @pytest.mark.parametrize("given", [(), (FULL,), (FULL, LEAST)])
 def test_a_record_of_a_run_has_them(given: tuple[VehicleProfile, ...]) -> None:
     settings = Settings(profiles=given)
-    assert settings_of(json.loads(json.dumps(settings_to_json(settings)))) == settings
+    assert settings_of(json.loads(json.dumps(asdict(settings)))) == settings
 
 
 def test_a_service_whose_home_is_closed_has_no_profiles(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,8 +11,7 @@ import pytest
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.base import Link, Peer
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
-from mav_tasks.links.local_port import COUNT, FIRST, port_for
-from mav_tasks.links.udp import UdpLink, UdpUrl
+from mav_tasks.links.udp import COUNT, FIRST, UdpLink, UdpUrl, port_for
 from mav_tasks.links.url import parse_url
 
 HOST = "127.0.0.1"

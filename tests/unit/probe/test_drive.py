@@ -273,7 +273,8 @@ class TestInterrupt:
     ) -> None:
         world = ProbeWorld(drive=True, persona=persona)
         world.run(after)
-        was_driving = world.probe.is_driving
+        control = world.probe.talk.control
+        was_driving = control is not None and control.is_engaged
         asked_at = world.now
         world.probe.interrupt("ended by SIGINT", now=world.now)
         probe = world.finish()

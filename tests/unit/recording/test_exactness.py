@@ -1,6 +1,6 @@
 """Nothing is lost on the way into a record and back: bit for bit."""
 
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from json import loads
 from math import inf, nan
 
@@ -35,7 +35,6 @@ from mav_tasks.recording.surroundings import (
     restored_of,
     restored_to_json,
     settings_of,
-    settings_to_json,
 )
 from mav_tasks.settings import Clients, Retention, Settings
 from mav_tasks.store.codec import Decoder
@@ -123,7 +122,7 @@ def test_settings_come_back_as_they_were() -> None:
         retention=Retention(max_age=None),
         arming="operator",
     )
-    again = settings_of(loads(dumps(settings_to_json(settings))))
+    again = settings_of(loads(dumps(asdict(settings))))
     assert (again, repr(again)) == (settings, repr(settings))
     with pytest.raises(ValueError, match=r"Settings\.colour is unknown to this version"):
         settings_of({"colour": "red"})
