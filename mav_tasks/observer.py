@@ -19,17 +19,14 @@ class EngineObserver(Protocol):
 
     def on_input(self, item: Input | None, *, now: float) -> None:
         """Note an input that the engine is about to handle; None is a deadline."""
-        ...
 
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
         """Note the engine's output; the packets were sent, the events are not yet stored."""
-        ...
 
     def close(self) -> None:
         """End the record; this call may wait until everything is written."""
-        ...
 
 
 class EngineObservers:

@@ -26,19 +26,15 @@ class Link(Protocol):
 
     def fileno(self) -> int:
         """Return the descriptor to wait on for reading; it never changes while the link is open."""
-        ...
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
         """Return up to ``limit`` available datagrams, or pieces of a stream, with their senders."""
-        ...
 
     def send(self, peer: Peer, data: bytes) -> None:
         """Send one packet, or drop it; never block."""
-        ...
 
     def close(self) -> None:
         """Close all descriptors."""
-        ...
 
 
 @runtime_checkable
@@ -52,7 +48,6 @@ class StampedLink(Link, Protocol):
 
         ``longest``, s, is the upper limit, and the value for a datagram without a stamp.
         """
-        ...
 
 
 class PeerState(Enum):
@@ -79,7 +74,6 @@ class StreamLink(Link, Protocol):
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
         """Send, queue or drop one packet; ``first`` queues it before all waiting packets."""
-        ...
 
     def take_changes(self) -> list[PeerChange]:
         """Return the changes of peers since the last call, in order.
@@ -87,11 +81,9 @@ class StreamLink(Link, Protocol):
         A change to UP during ``receive`` belongs before the peer's first piece, a change to DOWN
         after its last.
         """
-        ...
 
     def poll(self) -> None:
         """Do what is due: dial, flush, check for congestion. Called about every TEND_PERIOD."""
-        ...
 
 
 @runtime_checkable

@@ -32,7 +32,6 @@ class Buffer(Protocol):
 
     def leaves_at(self, size: int, *, now: float) -> float | None:
         """Return when a datagram of ``size`` bytes leaves the buffer; None: it is dropped."""
-        ...
 
 
 class Radio:

@@ -67,7 +67,6 @@ class LinkUrl(Protocol):
 
         A link that dials is open before its peer exists, and tries until it connects.
         """
-        ...
 
 
 class KindModule(Protocol):
@@ -75,7 +74,6 @@ class KindModule(Protocol):
 
     def parse(self, kind: str, rest: str, options: UrlOptions, /, *, what: str) -> LinkUrl:
         """Return the URL; raise LinkUrlError, which names ``what``."""
-        ...
 
 
 def parse_url(text: str) -> LinkUrl:

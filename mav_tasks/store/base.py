@@ -61,7 +61,6 @@ class Store(Protocol):
 
         None: the store keeps no state over runs.
         """
-        ...
 
     def journal(self) -> Iterator[tuple[int, Event]]:
         """Yield every stored event, numbered over the life of the store."""
@@ -69,19 +68,15 @@ class Store(Protocol):
 
     def append(self, events: Sequence[Event]) -> None:
         """Queue events to be made durable, in order; return at once."""
-        ...
 
     def take_outcomes(self) -> list[Outcome]:
         """Return the outcomes since the last call, at once."""
-        ...
 
     def fileno(self) -> int | None:
         """Return a descriptor that is readable while there are outcomes, or None."""
-        ...
 
     def close(self) -> None:
         """Finish pending writes and close the store."""
-        ...
 
 
 class JournalReader(Protocol):
@@ -92,12 +87,9 @@ class JournalReader(Protocol):
 
         ``offset``, UTC minus monotonic seconds, is subtracted from times; 0 leaves them in UTC.
         """
-        ...
 
     def version(self) -> int:
         """Return a number that changes when the store was written to."""
-        ...
 
     def close(self) -> None:
         """Close the journal."""
-        ...

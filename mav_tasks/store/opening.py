@@ -29,15 +29,12 @@ class StoreKind(Protocol):
 
         ``wall_offset`` returns the current UTC minus ``boot_time``.
         """
-        ...
 
     def open_journal(self, place: str, which: Which, /) -> JournalReader:
         """Open the journal of an existing store, which a server may be writing."""
-        ...
 
     def read_parameters(self, place: str, /) -> dict[str, float]:
         """Return the parameters that clients have set, by name; {} if there is no store yet."""
-        ...
 
 
 def kind_of(place: str) -> StoreKind:
