@@ -88,8 +88,6 @@ class StreamLink(Link, Protocol):
 
 @runtime_checkable
 class PacedLink(Link, Protocol):
-    """A link of known capacity."""
-
     #: bytes per second in each direction
     capacity: float
 

@@ -31,8 +31,6 @@ class LinkSettings(Rules, Protocol):
 
 
 class ConfiguredLink(NamedTuple):
-    """One link of the configuration."""
-
     side: Side
     url: LinkUrl
     policy: LinkPolicy

@@ -113,7 +113,6 @@ class MemoryNet:
             heapq.heappush(self._under_way, (at, next(self._order), source, target, data))
 
     def next_arrival(self) -> float | None:
-        """Return when the next datagram arrives."""
         return self._under_way[0][0] if self._under_way else None
 
     def deliver(self) -> None:
@@ -151,11 +150,9 @@ class MemoryLink:
         return self._number
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        """Return up to ``limit`` datagrams that have arrived."""
         return [self.arrived.popleft() for _ in range(min(limit, len(self.arrived)))]
 
     def send(self, peer: Peer, data: bytes) -> None:
-        """Send a datagram to the link of that name."""
         self._net.send(self.name, str(peer), data)
 
     def close(self) -> None:

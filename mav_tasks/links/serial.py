@@ -57,13 +57,11 @@ class SerialUrl:
         return True
 
     def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
-        """Open the device; ``push`` must be empty."""
         assert not push, "only a link that can push gets addresses"
         return SerialLink(self, limits=limits)
 
 
 def parse(_kind: str, rest: str, options: UrlOptions, *, what: str) -> SerialUrl:
-    """Return the URL; raise LinkUrlError, which names ``what``."""
     device, _, baud = rest.rpartition(":")
     if not device or number_in(baud, BAUD_RATES) is None:
         rates = f"from {BAUD_RATES[0]} to {BAUD_RATES[-1]}"
@@ -111,7 +109,6 @@ class SerialLink:
         return self._lost + self._queue.dropped
 
     def fileno(self) -> int:
-        """Return the selector's descriptor, which stays the same when the device is reopened."""
         return self._selector.fileno()
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:

@@ -53,7 +53,6 @@ class TcpLink:
         return self._lost + sum(each.queue.dropped for each in self._by_peer.values())
 
     def fileno(self) -> int:
-        """Return the selector's descriptor, readable when any socket is ready."""
         return self._selector.fileno()
 
     def take_changes(self) -> list[PeerChange]:

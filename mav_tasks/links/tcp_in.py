@@ -19,13 +19,11 @@ class TcpInUrl(HostUrl):
     __slots__ = ()
 
     def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
-        """Open the link; ``push`` must be empty."""
         assert not push, "only a link that can push gets addresses"
         return TcpInLink(self, limits=limits)
 
 
 def parse(kind: str, rest: str, options: UrlOptions, *, what: str) -> TcpInUrl:
-    """Return the URL; raise LinkUrlError, which names ``what``."""
     return TcpInUrl(kind, *parse_endpoint(rest, what=what), options)
 
 

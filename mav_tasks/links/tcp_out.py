@@ -21,13 +21,11 @@ class TcpOutUrl(HostUrl):
     __slots__ = ()
 
     def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
-        """Open the link; ``push`` must be empty."""
         assert not push, "only a link that can push gets addresses"
         return TcpOutLink(self, limits=limits)
 
 
 def parse(kind: str, rest: str, options: UrlOptions, *, what: str) -> TcpOutUrl:
-    """Return the URL; raise LinkUrlError, which names ``what``."""
     return TcpOutUrl(kind, *parse_endpoint(rest, what=what), options)
 
 

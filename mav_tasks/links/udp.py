@@ -38,7 +38,6 @@ class UdpUrl(HostUrl):
 
 
 def parse(kind: str, rest: str, options: UrlOptions, *, what: str) -> UdpUrl:
-    """Return the URL; raise LinkUrlError, which names ``what``."""
     local = options.others.get("local")
     if local is not None and number_in(local, PORTS) is None:
         raise LinkUrlError(f"{what}: local: expected a port from 1 to 65535")

@@ -15,8 +15,6 @@ from mav_tasks.links.link_limits import LinkLimits
 
 
 class Kind(NamedTuple):
-    """A kind of link."""
-
     form: str  # of what follows the kind and a colon
     module: str  # has the function of ``KindModule``; it is imported when it is used
     options: tuple[str, ...] = ()  # of this kind only

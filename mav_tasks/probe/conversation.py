@@ -82,7 +82,6 @@ class Conversation:
 
     @property
     def armed(self) -> bool:
-        """Whether it was last seen armed."""
         return self.monitor is not None and self.monitor.armed
 
     @property
@@ -119,7 +118,6 @@ class Conversation:
         self._take_answers()
 
     def next_deadline(self) -> float:
-        """Return when ``handle_deadline`` has something to do."""
         due = [self._heartbeat.next_deadline(), self._text_receiver.next_deadline()]
         at = self.sender.next_deadline()
         return min(due if at is None else [*due, at])
@@ -152,7 +150,6 @@ class Conversation:
     # what the steps ask
 
     def send(self, message: m.Message) -> None:
-        """Send a message once."""
         self._outgoing.append(message)
 
     def ask(self, command: MavCmd, *params: float, component: int = AUTOPILOT) -> Steps[str]:
@@ -222,6 +219,5 @@ class Conversation:
 
 
 def result_name(result: int) -> str:
-    """Return a MAV_RESULT in words."""
     known = {each.value: each.name for each in MavResult}
     return known.get(result, f"result {result}")

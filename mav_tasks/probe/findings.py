@@ -41,8 +41,6 @@ class Drive:
 
 @dataclass(slots=True)
 class Findings:
-    """All of it."""
-
     system_id: int = 0
     autopilot: str = ""  # name of the persona
     vehicle_type: int = 0  # MAV_TYPE

@@ -31,7 +31,6 @@ class OtherTraffic:
         return f"OtherTraffic({self.in_words()})"
 
     def receive(self, packet: Packet, message: m.Message) -> None:
-        """Look at a message, whoever it is from."""
         source = packet.source
         if packet.message_id in SETPOINTS:
             _note(self.setpoints, source)
@@ -82,7 +81,6 @@ class OtherTraffic:
         return ""
 
     def in_words(self) -> list[str]:
-        """Return each that is there."""
         return [
             *(f"ground station {each}" for each in self.stations),
             *(f"on-board computer {each}" for each in self.own_computers),

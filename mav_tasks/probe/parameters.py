@@ -57,7 +57,6 @@ def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
 
 
 def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:
-    """Return the value that a PARAM_VALUE means."""
     form = FORMATS.get(message.param_type)
     if not is_bytewise or form is None:
         return float(message.param_value)

@@ -44,8 +44,6 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What a probe may do."""
-
     drive: bool = False
     set_failsafe: bool = False  # and nothing else
     speed: float = 0.3  # m/s
@@ -90,7 +88,6 @@ class Probe:
         self._walk.go_on(now=now)
 
     def next_deadline(self) -> float:
-        """Return when ``handle_deadline`` has something to do."""
         at = self._walk.next_deadline()
         return self.talk.next_deadline() if at is None else min(at, self.talk.next_deadline())
 

@@ -25,7 +25,6 @@ def never() -> bool:
 
 
 def pause(seconds: float) -> Wait:
-    """Let so much time pass."""
     return Wait(never, seconds)
 
 

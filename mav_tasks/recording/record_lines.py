@@ -61,7 +61,6 @@ class LineWriter:
         self._ways: dict[tuple[str, Hashable], bytes] = {}
 
     def task(self, task: Task) -> str:
-        """Return the line of a restored task."""
         return dumps(["task", self._encoder.row(task, offset=0.0)])
 
     def taken(self, item: Input | None, *, now: float) -> str:
@@ -205,7 +204,6 @@ def _peer_to_json(peer: Hashable) -> Hashable:
 
 
 def peer_of(value: Any) -> Hashable:
-    """Return a peer from its JSON value."""
     if isinstance(value, list):
         return tuple(map(_plain, value))
     return _plain(value)

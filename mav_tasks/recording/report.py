@@ -27,7 +27,6 @@ class Report:
             self._say(f"recorded by version {record.version}; this is {here}")
 
     def tell(self, happened: Happened) -> None:
-        """Print one event."""
         if self._quiet:
             return
         if self._as_json:
@@ -36,7 +35,6 @@ class Report:
             self._say(f"{_time(happened)} {happened.event}")
 
     def conclude(self, record: Record, run: Replay) -> None:
-        """Print the verdict."""
         if self._as_json:
             self._put(
                 {

@@ -247,7 +247,6 @@ class CommandSender:
                 del self._lanes[key]
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
         deadlines: list[float] = []
         for lane in self._lanes.values():
             if lane.in_flight is not None:

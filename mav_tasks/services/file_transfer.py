@@ -51,7 +51,6 @@ class Writers:
         return any(each != who and now - at < GIVEN_UP for each, at in self._writing.items())
 
     def note(self, request: m.FileTransferProtocol, who: Hashable, *, now: float) -> None:
-        """Take note of a request that goes to a vehicle."""
         if not reads(request):
             self._writing = {each: at for each, at in self._writing.items() if now - at < GIVEN_UP}
             self._writing[who] = now

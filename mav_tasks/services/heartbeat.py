@@ -50,7 +50,6 @@ class HeartbeatSender:
         self._next_at = now
 
     def next_deadline(self) -> float:
-        """Return when the next one is due."""
         return self._next_at
 
     def is_due(self, *, now: float) -> bool:

@@ -83,7 +83,6 @@ class MissionDownloader:
             self._ask(download, now=now)
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
         download = self._download
         return None if download is None else min(download.ask_at, download.give_up_at)
 

@@ -225,7 +225,6 @@ class MissionReceiver:
         self._end(result, last, opaque_id=opaque_id, now=now)
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
         session = self._session
         if session is None or session.is_whole:
             return None

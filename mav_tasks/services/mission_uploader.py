@@ -102,7 +102,6 @@ class MissionUploader:
         return (upload.is_sent or not upload.items) and self._fits(ack.opaque_id)
 
     def next_deadline(self) -> float | None:
-        """Return when ``handle_deadline`` has something to do."""
         if not self._waiting:
             return None
         upload = self._waiting[0]

@@ -188,7 +188,6 @@ class OffboardControl:
         return outgoing
 
     def heard(self, *, armed: bool, mode: int, now: float) -> None:
-        """Take in what a HEARTBEAT of the vehicle says."""
         if self._news.armed and not armed:
             self.we_armed = False
         self._news.heard(armed=armed, mode=mode, now=now)

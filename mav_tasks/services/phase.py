@@ -4,8 +4,6 @@ from enum import Enum, auto
 
 
 class Phase(Enum):
-    """How far control of the vehicle has come."""
-
     #: it is not ours; nothing is sent
     IDLE = auto()
     #: a heartbeat is awaited that shows whose it is now

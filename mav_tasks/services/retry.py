@@ -38,5 +38,4 @@ class Retry:
         self.give_up_at += now - self.sent_at
 
     def next_deadline(self) -> float:
-        """Return the next moment at which something changes."""
         return min(self.next_at, self.give_up_at)

@@ -101,7 +101,6 @@ def word_of(event: Event, number: int, *, offset: float) -> Word | None:
 
 
 def event_of(word: Word, *, offset: float) -> Event:
-    """Return the event from which a word was made."""
     at = word.utc - offset
     if word.register is Register.HALTS:
         return VehicleHalted(word.vehicle, word.value, word.reason, word.actor, at)
