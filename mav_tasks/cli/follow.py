@@ -16,7 +16,9 @@ from mav_tasks.cli import output, words
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import is_alone
 from mav_tasks.client.aio import Client
+from mav_tasks.client.descriptions import state_of, why_of
 from mav_tasks.client.handle import Task
+from mav_tasks.client.json_form import task_json
 from mav_tasks.client.values import TaskStatus
 
 LOOK = 0.5  # s between two checks for silence
@@ -111,7 +113,7 @@ class Objects:
         told = (status.state, status.reason, status.progress, status.item)
         if told != self._told:
             self._told = told
-            output.say_json(words.task_json(status))
+            output.say_json(task_json(status))
 
     def silence(self, *, is_silent: bool) -> None:
         """Print nothing: a program detects silence itself."""
@@ -144,8 +146,8 @@ class Bar:
             grid.add_row("")
             return grid
         status = self.status
-        state = words.state_of(status)
-        why = "rover silent" if self._is_silent else words.why_of(status)
+        state = state_of(status)
+        why = "rover silent" if self._is_silent else why_of(status)
         cells: list[str | ProgressBar] = [words.name_of(status), state]
         if width >= BAR_FROM:
             done = status.progress or 0.0

@@ -5,10 +5,11 @@ from typing import Annotated
 
 import typer
 
-from mav_tasks.cli import output, words
+from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import opened
+from mav_tasks.client.json_form import history_json
 from mav_tasks.client.values import TaskStatus
 
 
@@ -35,7 +36,7 @@ async def history(
 def _show(rover: int, tasks: tuple[TaskStatus, ...], *, now: "datetime", as_json: bool) -> None:
     if as_json:
         for each in tasks:
-            output.say_json(words.history_json(each, now=now))
+            output.say_json(history_json(each, now=now))
         return
     from mav_tasks.cli.tables import history_table  # noqa: PLC0415
 

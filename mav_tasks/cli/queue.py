@@ -4,11 +4,12 @@ from typing import Annotated
 
 import typer
 
-from mav_tasks.cli import output, words
+from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import is_alone, opened
 from mav_tasks.client.aio import Client
+from mav_tasks.client.json_form import queue_json
 from mav_tasks.client.values import QueueStatus
 
 
@@ -48,7 +49,7 @@ async def fetch(client: Client, common: Common, *, limit: int) -> list[QueueStat
 def show(queues: list[QueueStatus], common: Common, *, is_alone: bool) -> None:
     if common.json:
         for each in queues:
-            output.say_json(words.queue_json(each))
+            output.say_json(queue_json(each))
         return
     from mav_tasks.cli.tables import queue_table  # noqa: PLC0415
 

@@ -9,6 +9,7 @@ from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import all_show, opened
+from mav_tasks.client.json_form import vehicle_json
 from mav_tasks.client.values import VehicleStatus
 from mav_tasks.errors import Refused
 
@@ -37,7 +38,7 @@ async def ready(
         rovers = [each for each in client.vehicles() if common.vehicle in (None, each.id)]
     silent = [_silence(each) for each in rovers if not each.is_heard]
     if common.json:
-        shown = [words.vehicle_json(each) for each in rovers]
+        shown = [vehicle_json(each) for each in rovers]
         output.say_json({"ready": not silent, "rovers": shown})
     if silent:
         raise Refused(

@@ -8,7 +8,9 @@ from mav_tasks.cli.options import Common, TaskId, Wait
 from mav_tasks.cli.session import find_task, is_alone, opened
 from mav_tasks.cli.times import moment_ago, spoken_duration
 from mav_tasks.client.aio import Client
+from mav_tasks.client.descriptions import end_of, state_of, what_of
 from mav_tasks.client.handle import Task
+from mav_tasks.client.json_form import task_json, timing_json
 from mav_tasks.client.values import TaskStatus, TaskTiming
 from mav_tasks.errors import Refused
 
@@ -25,7 +27,7 @@ async def status(task_id: TaskId, common: Common, wait: Wait = False) -> None:
             return
         answer, timing = await task.refresh(), await _timing_of(task)
         if common.json:
-            output.say_json(words.task_json(answer) | {"setpoints": words.timing_json(timing)})
+            output.say_json(task_json(answer) | {"setpoints": timing_json(timing)})
             return
         ages = {each.id: each.heartbeat_age for each in client.vehicles()}
         silence = words.silence_of(ages.get(answer.vehicle))
@@ -59,9 +61,9 @@ def _fields(
         ("task", str(status.id)),
         ("rover", f"{status.vehicle} ({silence})" if silence else str(status.vehicle)),
         ("label", status.label),
-        ("goal", words.what_of(status)),
-        ("state", words.state_of(status)),
-        ("reason", words.end_of(status)),
+        ("goal", what_of(status)),
+        ("state", state_of(status)),
+        ("reason", end_of(status)),
         ("what to do", to_do),
         ("priority", str(status.priority)),
         ("after task", str(status.after or "")),

@@ -14,9 +14,9 @@ from mav_tasks.cli.places import parse_place
 from mav_tasks.cli.session import is_alone, opened, read, values_checked
 from mav_tasks.cli.times import parse_duration
 from mav_tasks.cli.typed_words import in_typed_words
-from mav_tasks.cli.words import task_json
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
+from mav_tasks.client.json_form import task_json
 from mav_tasks.client.wire import Goal
 from mav_tasks.errors import ClientError
 from mav_tasks.tasks.goal import Drive, Face, GoTo, Move, Rotate, Wait

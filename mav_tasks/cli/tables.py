@@ -12,6 +12,7 @@ from rich.text import Text
 
 from mav_tasks.cli import words
 from mav_tasks.cli.times import format_duration, moment_ago
+from mav_tasks.client.descriptions import end_of, state_of, waits_of, what_of, why_of
 from mav_tasks.client.values import QueueStatus, TaskStatus, VehicleStatus
 from mav_tasks.tasks.lifecycle import TaskState
 
@@ -53,9 +54,9 @@ class Row(NamedTuple):
 TASK_COLUMNS: tuple[Column[Row], ...] = (
     Column("id", lambda row: str(row.status.id), is_right=True),
     Column("prio", lambda row: str(row.status.priority), worth=2, is_right=True),
-    Column("state", lambda row: words.state_of(row.status)),
+    Column("state", lambda row: state_of(row.status)),
     Column("label", lambda row: row.status.label, worth=1, is_words=True),
-    Column("goal", lambda row: words.what_of(row.status), is_words=True),
+    Column("goal", lambda row: what_of(row.status), is_words=True),
     Column("reason", lambda row: row.why, worth=1, is_words=True),
     Column("starts in", lambda row: words.starts_of(row.status), worth=3, is_right=True),
     Column("ends in", lambda row: words.ends_of(row.status), worth=4, is_right=True),
@@ -83,8 +84,8 @@ def queue_table(
     # a redrawn window cuts its lines; elsewhere they wrap, which keeps the command at the end
     parts: list[Text | Table] = [Text(text) if rows is None else _line(text) for text in above]
     if tasks:
-        waits = words.waits_of(queue)
-        shown = [Row(each, waits.get(each.id, words.why_of(each))) for each in tasks]
+        waits = waits_of(queue)
+        shown = [Row(each, waits.get(each.id, why_of(each))) for each in tasks]
         styles = {"state": lambda row: STYLES.get(row.status.state, "")}
         parts.append(_table(TASK_COLUMNS, shown, width, styles=styles))
         if count > len(tasks):
@@ -103,10 +104,10 @@ def history_table(tasks: Sequence[TaskStatus], *, now: datetime, width: int) -> 
 
     columns: tuple[Column[TaskStatus], ...] = (
         Column("id", lambda status: str(status.id), is_right=True),
-        Column("state", words.state_of),
+        Column("state", state_of),
         Column("label", lambda status: status.label, worth=1, is_words=True),
-        Column("goal", words.what_of, is_words=True),
-        Column("reason", words.end_of, worth=1, is_words=True),
+        Column("goal", what_of, is_words=True),
+        Column("reason", end_of, worth=1, is_words=True),
         Column(f"ended ({now:%Z})", ended, worth=2, is_right=True),
         Column("run time", words.took_of, worth=3, is_right=True),
         Column("done", words.percent_of, worth=4, is_right=True),

@@ -1,9 +1,10 @@
 """``mav-tasks vehicles``: show the rovers of the server."""
 
-from mav_tasks.cli import output, words
+from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import all_show, opened
+from mav_tasks.client.json_form import vehicle_json
 
 
 @command
@@ -16,6 +17,6 @@ async def vehicles(common: Common) -> None:
         found = [each for each in client.vehicles() if common.vehicle in (None, each.id)]
     if common.json:
         for each in found:
-            output.say_json(words.vehicle_json(each))
+            output.say_json(vehicle_json(each))
         return
     output.show(vehicle_table(found, width=output.console().width))

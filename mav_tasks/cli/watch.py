@@ -8,12 +8,13 @@ from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
-from mav_tasks.cli import output, words
+from mav_tasks.cli import output
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.queue import fetch, show
 from mav_tasks.cli.session import is_alone
 from mav_tasks.cli.tables import queue_table
 from mav_tasks.client.aio import Client
+from mav_tasks.client.descriptions import state_of
 from mav_tasks.client.values import QueueStatus
 from mav_tasks.errors import NoAnswer
 
@@ -108,6 +109,6 @@ def _line(text: str) -> Text:
 
 def _essence(queue: QueueStatus) -> object:
     """Return what counts as a change: no times and no progress."""
-    current = queue.current and (queue.current.id, words.state_of(queue.current))
+    current = queue.current and (queue.current.id, state_of(queue.current))
     tasks = [(t.id, t.state, t.reason, t.priority, t.after) for t in queue.waiting]
     return current, queue.running, queue.paused, dict(queue.counts), tasks

@@ -1,15 +1,13 @@
-"""Tasks, queues and rovers as text and as JSON. Pure. Angles are in degrees here."""
+"""Tasks, queues and rovers as the command line shows them, with the commands that help. Pure."""
 
-from datetime import datetime, timedelta
-from math import degrees, inf
-from typing import Any
+from math import inf
 
 from mav_tasks.cli.times import format_duration, spoken_duration
+from mav_tasks.client.descriptions import end_of, is_of_last_save, left, state_of, what_of, why_of
 from mav_tasks.client.fleet_view import SILENT_AFTER
-from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Unit, VehicleStatus
+from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 
-UNITS = {Unit.METRES: "m", Unit.RADIANS: "deg", Unit.SECONDS: "s", Unit.ITEMS: "items"}
 #: reasons of tasks that wait until the queue is resumed
 UNTIL_RESUMED = (
     TaskReason.QUEUE_PAUSED,
@@ -38,42 +36,6 @@ COMES_BY_ITSELF = (
     TaskReason.BEHIND_OTHERS,
     TaskReason.WAITING_FOR_START,
 )
-
-
-def state_of(status: TaskStatus) -> str:
-    return status.state.name.lower()
-
-
-def what_of(status: TaskStatus) -> str:
-    """Return what a task does: "move 2 m"."""
-    what, colon, _ = status.words.partition(" '" if status.label else ": ")
-    return what if colon else f"command {status.command}"
-
-
-def why_of(status: TaskStatus) -> str:
-    """Return why a task is in its state, with the rover's text; "" if there is no reason."""
-    if not status.reason:
-        return ""
-    why = words_of(status.reason)
-    _, colon, says = status.words.partition(f"({why}: ")  # it may be cut short
-    return f"{why}: {says.removesuffix(')')}" if colon else why
-
-
-def waits_of(queue: QueueStatus) -> dict[int, str]:
-    """Return why each task of a queue waits, by its id: "behind task 4"."""
-    waits: dict[int, str] = {}
-    before = None if queue.current is None else queue.current.id
-    for status in queue.waiting:
-        is_known = before is not None and status.reason is TaskReason.BEHIND_OTHERS
-        why = f"behind task {before}" if is_known else why_of(status)
-        if status.after and status.reason is TaskReason.DEPENDENCY:
-            why = f"after task {status.after}"
-        elif status.after and status.reason is TaskReason.START_TIME:
-            why = f"{why}, after task {status.after}"
-        waits[status.id] = why
-        if status.state is TaskState.QUEUED:
-            before = status.id
-    return waits
 
 
 def time_of(seconds: float | None) -> str:
@@ -132,12 +94,6 @@ def name_of(status: TaskStatus) -> str:
     return f"rover {status.vehicle}: task {status.id}"
 
 
-def end_of(status: TaskStatus) -> str:
-    """Return why a task is in its state; "" if it repeats the state ("cancelled: cancelled")."""
-    why = why_of(status)
-    return "" if why == state_of(status) else why
-
-
 def starts_by_itself(status: TaskStatus) -> bool:
     """Return whether a task has started, or starts without a person's action."""
     return not status.is_waiting or status.reason in COMES_BY_ITSELF
@@ -180,19 +136,6 @@ def left_of(status: TaskStatus) -> str:
     digits = {"m": 2, "items": 0}.get(unit, 1)
     words = f"{amount:.{digits}f} {unit}"
     return f"at most {words}" if is_of_last_save(status) else words
-
-
-def is_of_last_save(status: TaskStatus) -> bool:
-    """Return whether the progress is a last save: the server died while it drove the task."""
-    return status.state is TaskState.HELD and status.reason is TaskReason.OUTCOME_UNKNOWN
-
-
-def left(status: TaskStatus) -> tuple[float | None, str | None]:
-    """Return the remainder of a task as a number and its unit."""
-    if status.remaining is None or status.unit is Unit.NONE:
-        return None, None
-    is_angle = status.unit is Unit.RADIANS
-    return degrees(status.remaining) if is_angle else status.remaining, UNITS[status.unit]
 
 
 def silence_of(heartbeat_age: float | None) -> str:
@@ -246,45 +189,6 @@ def counts_of(queue: QueueStatus) -> str:
     return ", ".join(f"{count} {state.name.lower()}" for state, count in queue.counts.items())
 
 
-def history_json(status: TaskStatus, *, now: datetime) -> dict[str, Any]:
-    """Return a finished task as JSON, with the time of its end."""
-    ago = status.ended_ago
-    ended_at = None if ago is None else now - timedelta(seconds=ago)
-    return task_json(status) | {
-        "why": end_of(status) or None,
-        "ended_ago": _rounded(ago),
-        "ended_at": None if ended_at is None else ended_at.isoformat(timespec="seconds"),
-    }
-
-
-def task_json(status: TaskStatus) -> dict[str, Any]:
-    """Return a task as JSON; unknown values are null."""
-    amount, unit = left(status)
-    return {
-        "id": status.id,
-        "vehicle": status.vehicle,
-        "what": what_of(status),
-        "label": status.label or None,
-        "command": status.command,
-        "state": state_of(status),
-        "reason": status.reason.name.lower() if status.reason else None,
-        "priority": status.priority,
-        "after": status.after or None,
-        "position": status.position,
-        "progress": status.progress,
-        "left": _rounded(amount),
-        "left_unit": unit,
-        "item": status.item,
-        "items": status.items,
-        "time_to_start": _rounded(status.time_to_start),
-        "time_to_finish": _rounded(status.time_to_finish),
-        "execution_time": _rounded(status.execution_time),
-        "nonce": status.nonce or None,
-        "submitter": status.submitter,
-        "version": status.version,
-    }
-
-
 def timing_of(timing: TaskTiming | None) -> str:
     """Return how evenly a task's setpoints left; "" if there were none."""
     if timing is None or timing.p50 is None or timing.p99 is None or timing.max is None:
@@ -293,55 +197,3 @@ def timing_of(timing: TaskTiming | None) -> str:
         f"{timing.count} at {timing.rate:g} Hz: p50 {timing.p50 * 1e3:.1f},"
         f" p99 {timing.p99 * 1e3:.1f}, max {timing.max * 1e3:.1f} ms, {timing.late} late"
     )
-
-
-def timing_json(timing: TaskTiming | None) -> dict[str, Any] | None:
-    """Return the timing as JSON, in seconds; null if it is unknown."""
-    if timing is None:
-        return None
-    names = ("rate", "count", "p50", "p99", "max", "late")
-    return {name: _rounded(getattr(timing, name)) for name in names}
-
-
-def queue_json(queue: QueueStatus) -> dict[str, Any]:
-    waits = waits_of(queue)
-    return {
-        "vehicle": queue.vehicle,
-        "running": queue.running,
-        "next": queue.next,
-        "paused": None if queue.paused is None else queue.paused.name.lower(),
-        "halt_epoch": queue.halt_epoch,
-        "heartbeat_age": _age(queue.heartbeat_age),
-        "waiting_count": queue.waiting_count,
-        "capacity": queue.capacity,
-        "counts": {state.name.lower(): count for state, count in queue.counts.items()},
-        "current": None if queue.current is None else task_json(queue.current),
-        "waiting": [task_json(each) | {"why": waits[each.id] or None} for each in queue.waiting],
-    }
-
-
-def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
-    heading = None if vehicle.yaw is None else round(degrees(vehicle.yaw), 4) % 360.0
-    return {
-        "vehicle": vehicle.id,
-        "kind": vehicle.kind,
-        "mode": vehicle.mode,
-        "armed": vehicle.armed,
-        "heard": vehicle.is_heard,
-        "heartbeat_age": _age(vehicle.heartbeat_age),
-        "north": _rounded(vehicle.north),
-        "east": _rounded(vehicle.east),
-        "heading": _rounded(heading),
-        "speed": _rounded(vehicle.speed),
-        "server_component": vehicle.server_component,
-    }
-
-
-def _age(heartbeat_age: float | None) -> float | None:
-    """Return an age for JSON: null also if there was no heartbeat."""
-    return None if heartbeat_age in (None, inf) else _rounded(heartbeat_age)
-
-
-def _rounded(value: float | None) -> float | None:
-    """Return a number rounded to 4 decimals, without the noise of a float32."""
-    return None if value is None else round(value, 4)

@@ -11,6 +11,8 @@ from rich.console import Console
 
 from mav_tasks.cli import words
 from mav_tasks.cli.tables import history_table, queue_table, vehicle_table
+from mav_tasks.client.descriptions import waits_of, why_of
+from mav_tasks.client.json_form import history_json, queue_json, task_json, vehicle_json
 from mav_tasks.client.values import QueueStatus, TaskStatus, Unit, VehicleStatus
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
@@ -127,8 +129,8 @@ def test_each_waiting_task_says_why_it_waits() -> None:
         for number, (state, reason, after, _) in WAITS.items()
     ]
     queue = replace(QUEUE, waiting=tuple(tasks))
-    assert words.waits_of(queue) == {number: each[3] for number, each in WAITS.items()}
-    shown = words.queue_json(queue)["waiting"]
+    assert waits_of(queue) == {number: each[3] for number, each in WAITS.items()}
+    shown = queue_json(queue)["waiting"]
     assert [each["why"] for each in shown] == [each[3] for each in WAITS.values()]
 
 
@@ -181,10 +183,10 @@ def test_finished_tasks_say_how_and_when_they_ended() -> None:
 
 
 def test_a_finished_task_as_json_has_the_moment_of_its_end() -> None:
-    done = words.history_json(DONE, now=NOW)
+    done = history_json(DONE, now=NOW)
     assert (done["ended_ago"], done["ended_at"]) == (72.0, "2026-11-24T14:02:00+01:00")
     assert (done["state"], done["why"]) == ("completed", None)
-    assert words.history_json(STUCK, now=NOW)["ended_at"] is None
+    assert history_json(STUCK, now=NOW)["ended_at"] is None
 
 
 @pytest.mark.parametrize("width", [20, 27, 40, 57, 80, 133])
@@ -237,9 +239,9 @@ def test_why_it_waits_has_the_rovers_own_words() -> None:
     said = replace(starting, words="move 2 m: starting (not ready: PreArm: no fix)")
     cut = replace(starting, words="move 2 m: starting (not ready: PreArm: GPS 1: Bad")
     silent = replace(starting, words="move 2 m: starting (not ready)")
-    assert words.why_of(said) == "not ready: PreArm: no fix"
-    assert words.why_of(cut) == "not ready: PreArm: GPS 1: Bad"
-    assert words.why_of(silent) == "not ready"
+    assert why_of(said) == "not ready: PreArm: no fix"
+    assert why_of(cut) == "not ready: PreArm: GPS 1: Bad"
+    assert why_of(silent) == "not ready"
 
 
 def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
@@ -295,15 +297,15 @@ def test_no_number_is_minus_nothing() -> None:
 
 
 def test_json_has_degrees_names_and_nulls() -> None:
-    task = words.task_json(RUNNING)
+    task = task_json(RUNNING)
     assert (task["state"], task["reason"], task["what"]) == ("executing", None, "rotate 90 deg")
     assert (task["left"], task["left_unit"], task["progress"]) == (45.0, "deg", 0.45)
     assert (task["after"], task["position"]) == (None, None)
-    waiting = words.task_json(WAITING)
+    waiting = task_json(WAITING)
     assert (waiting["reason"], waiting["left"], waiting["after"]) == ("behind_others", 1.2, 12)
-    assert words.queue_json(QUEUE)["current"] == task
-    assert words.queue_json(QUEUE)["waiting"] == [waiting | {"why": "behind task 12"}]
-    assert words.queue_json(replace(QUEUE, paused=TaskReason.TAKEOVER))["paused"] == "takeover"
+    assert queue_json(QUEUE)["current"] == task
+    assert queue_json(QUEUE)["waiting"] == [waiting | {"why": "behind task 12"}]
+    assert queue_json(replace(QUEUE, paused=TaskReason.TAKEOVER))["paused"] == "takeover"
 
 
 def test_what_is_not_known_of_a_rover_is_a_dash() -> None:
@@ -315,7 +317,7 @@ def test_what_is_not_known_of_a_rover_is_a_dash() -> None:
     assert [cell.strip() for cell in cells if cell] == [
         *("3", "px4", "OFFBOARD", "armed", "yes", "1.50 m", "-2.25 m", "270.0 deg", "-"),
     ]
-    assert words.vehicle_json(rover)["heading"] == 270.0
+    assert vehicle_json(rover)["heading"] == 270.0
 
 
 @pytest.mark.parametrize(
@@ -333,8 +335,8 @@ def test_a_queue_says_how_old_its_news_is(age: float | None, said: str) -> None:
 
 
 def test_json_has_no_infinity() -> None:
-    assert words.queue_json(replace(QUEUE, heartbeat_age=inf))["heartbeat_age"] is None
-    assert words.queue_json(replace(QUEUE, heartbeat_age=1.25))["heartbeat_age"] == 1.25
+    assert queue_json(replace(QUEUE, heartbeat_age=inf))["heartbeat_age"] is None
+    assert queue_json(replace(QUEUE, heartbeat_age=1.25))["heartbeat_age"] == 1.25
 
 
 PAUSED = replace(QUEUE, paused=TaskReason.OPERATOR, current=None, running=None)
@@ -457,4 +459,4 @@ def test_no_heading_is_360(yaw: float, shown: str) -> None:
     with console.capture() as captured:
         console.print(vehicle_table([rover], width=120))
     assert f" {shown}" in captured.get()
-    assert words.vehicle_json(replace(rover, yaw=-1e-9))["heading"] == 0.0
+    assert vehicle_json(replace(rover, yaw=-1e-9))["heading"] == 0.0

@@ -1,0 +1,63 @@
+"""Tasks and queues in words: what a task does, its state, why it waits. Pure."""
+
+from math import degrees
+
+from mav_tasks.client.values import QueueStatus, TaskStatus, Unit
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+
+UNITS = {Unit.METRES: "m", Unit.RADIANS: "deg", Unit.SECONDS: "s", Unit.ITEMS: "items"}
+
+
+def state_of(status: TaskStatus) -> str:
+    return status.state.name.lower()
+
+
+def what_of(status: TaskStatus) -> str:
+    """Return what a task does: "move 2 m"."""
+    what, colon, _ = status.words.partition(" '" if status.label else ": ")
+    return what if colon else f"command {status.command}"
+
+
+def why_of(status: TaskStatus) -> str:
+    """Return why a task is in its state, with the rover's text; "" if there is no reason."""
+    if not status.reason:
+        return ""
+    why = words_of(status.reason)
+    _, colon, says = status.words.partition(f"({why}: ")  # it may be cut short
+    return f"{why}: {says.removesuffix(')')}" if colon else why
+
+
+def end_of(status: TaskStatus) -> str:
+    """Return why a task is in its state; "" if it repeats the state ("cancelled: cancelled")."""
+    why = why_of(status)
+    return "" if why == state_of(status) else why
+
+
+def waits_of(queue: QueueStatus) -> dict[int, str]:
+    """Return why each task of a queue waits, by its id: "behind task 4"."""
+    waits: dict[int, str] = {}
+    before = None if queue.current is None else queue.current.id
+    for status in queue.waiting:
+        is_known = before is not None and status.reason is TaskReason.BEHIND_OTHERS
+        why = f"behind task {before}" if is_known else why_of(status)
+        if status.after and status.reason is TaskReason.DEPENDENCY:
+            why = f"after task {status.after}"
+        elif status.after and status.reason is TaskReason.START_TIME:
+            why = f"{why}, after task {status.after}"
+        waits[status.id] = why
+        if status.state is TaskState.QUEUED:
+            before = status.id
+    return waits
+
+
+def left(status: TaskStatus) -> tuple[float | None, str | None]:
+    """Return the remainder of a task as a number and its unit."""
+    if status.remaining is None or status.unit is Unit.NONE:
+        return None, None
+    is_angle = status.unit is Unit.RADIANS
+    return degrees(status.remaining) if is_angle else status.remaining, UNITS[status.unit]
+
+
+def is_of_last_save(status: TaskStatus) -> bool:
+    """Return whether the progress is a last save: the server died while it drove the task."""
+    return status.state is TaskState.HELD and status.reason is TaskReason.OUTCOME_UNKNOWN
