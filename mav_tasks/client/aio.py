@@ -15,10 +15,11 @@ from mav_tasks.client.asker import Asker
 from mav_tasks.client.connection import Connection
 from mav_tasks.client.handle import Release, Task
 from mav_tasks.client.plan_sources import Plan, file_of, items_of
-from mav_tasks.client.session import Session
+from mav_tasks.client.session import TELEMETRY_RATE, Session
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.client.submissions import Submissions, utc_of
 from mav_tasks.client.values import (
+    News,
     QueueStatus,
     TaskStatus,
     TaskTiming,
@@ -76,7 +77,8 @@ class Client:
 
     With a ``key`` of 32 bytes the client signs all packets (MAVLink 2) and drops packets that the
     server has not signed with this key. ``link_id``, 0 to 255, goes into the signatures; None: a
-    random one. Raise ValueError if the key is invalid.
+    random one. Raise ValueError if the key is invalid. ``telemetry_rate``: Hz of the rovers'
+    telemetry that the client asks for.
 
     Every method may raise NoAnswer, Refused and NoSuchVehicle.
 
@@ -93,8 +95,10 @@ class Client:
         component_id: int = SCRIPT.component_id,
         key: Key | bytes | None = None,
         link_id: int | None = None,
+        telemetry_rate: int = TELEMETRY_RATE,
     ) -> None:
         self._link = link
+        self._telemetry_rate = telemetry_rate
         self._signatures = None if key is None else ClientSignatures(key, link_id=link_id)
         self._vehicle = vehicle
         self._timeout = timeout
@@ -129,7 +133,7 @@ class Client:
             raise MavTasksError(f"{self!r}: it is open already")
         connection = Connection(
             self._link,
-            lambda now: Session(self._address, now=now),
+            lambda now: Session(self._address, now=now, telemetry_rate=self._telemetry_rate),
             signatures=self._signatures,
         )
         session = connection.session
@@ -399,6 +403,15 @@ class Client:
                     raise ClientError("the client was closed")
                 yield text
 
+    @contextmanager
+    def listening(self, listener: Callable[[News], None]) -> Iterator[None]:
+        """Call ``listener`` with each piece of news of any rover while this is open.
+
+        The client calls it from the event loop: it must return at once, and not raise.
+        """
+        with self._ask.listening(listener):
+            yield
+
     # plans
 
     async def submit_mission(
@@ -471,6 +484,10 @@ class Client:
         items = wire.items_of_file(fence_items(file_of(plan)))
         await self._ask.upload(self._autopilot(vehicle), items, MavMissionType.FENCE)
         return len(items)
+
+    async def rally_points(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
+        """Return the items of the rally points."""
+        return await self._ask.download(self._autopilot(vehicle), MavMissionType.RALLY)
 
     async def set_rally_points(
         self, plan: PlanFile | Path | str, *, vehicle: int | None = None

@@ -9,7 +9,14 @@ from typing import Any, TypeVar
 from mav_tasks.client.calls import AGAIN, Call, Command
 from mav_tasks.client.connection import Connection
 from mav_tasks.client.session import WORDS_WITHIN, Answer, Reply, request_message
-from mav_tasks.client.values import TaskStatus, TaskTiming, Text
+from mav_tasks.client.values import (
+    News,
+    TaskStatus,
+    TaskTiming,
+    Text,
+    VehicleChanged,
+    queue_status_of,
+)
 from mav_tasks.errors import ClientError, NoAnswer, Refused
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -37,8 +44,10 @@ class Asker:
         self._pending: dict[asyncio.Future[Any], Command | None] = {}
         self._takers: set[Callable[[Answer, int], None]] = set()
         self._listening: set[asyncio.Queue[Text | None]] = set()
+        self._listeners: set[Callable[[News], None]] = set()
         connection.session.on_answer = self._on_answer
         connection.session.on_text = self._on_text
+        connection.session.on_vehicle = self._on_vehicle
 
     def __repr__(self) -> str:
         return f"Asker({self._connection!r}, {len(self._pending)} pending)"
@@ -248,6 +257,12 @@ class Asker:
         with _added(self._listening, heard):
             yield heard
 
+    @contextmanager
+    def listening(self, listener: Callable[[News], None]) -> Iterator[None]:
+        """Call ``listener`` with each piece of news while this is open."""
+        with _added(self._listeners, listener):
+            yield
+
     # internal
 
     @contextmanager
@@ -307,11 +322,24 @@ class Asker:
     def _on_answer(self, answer: Answer, vehicle: int) -> None:
         for take in list(self._takers):
             take(answer, vehicle)
+        if isinstance(answer, TaskStatus):
+            self._tell(answer)
+        elif isinstance(answer, m.TaskQueueStatus):
+            self._tell(queue_status_of(answer, vehicle, (), None))
 
     def _on_text(self, text: Text) -> None:
         for queue in self._listening:
             if not queue.full():  # a slow reader misses later texts
                 queue.put_nowait(text)
+        self._tell(text)
+
+    def _on_vehicle(self, vehicle: int) -> None:
+        if self._listeners:
+            self._tell(VehicleChanged(vehicle))
+
+    def _tell(self, news: News) -> None:
+        for listener in list(self._listeners):
+            listener(news)
 
 
 @contextmanager

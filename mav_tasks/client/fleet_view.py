@@ -13,13 +13,19 @@ from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.persona import Persona, persona_of
+from mav_tasks.services.prearm_check import passes_checks
 
 SILENT_AFTER = 3.5  # s without a heartbeat; same as in the server
 GAP = 1.7  # s without a heartbeat, after which the server may be another process
 ASK_AGAIN = 0.6  # s between requests to a vehicle's task server until it answers
 
+DEGREE = 1e7  # of MAVLink's integers
+UNKNOWN_VOLTAGE = 65535
+UNKNOWN_BATTERY = -1
+
+POSITIONS = frozenset({m.LocalPositionNed.id, m.GlobalPositionInt.id})
 #: telemetry messages whose latest packet is kept
-KEPT = frozenset({m.LocalPositionNed.id, m.Attitude.id})
+KEPT = POSITIONS | {m.Attitude.id, m.SysStatus.id}
 
 
 class VehicleView:
@@ -34,6 +40,7 @@ class VehicleView:
         self.server_component: int | None = None
         self.ask_at = now
         self.latest: dict[int, Packet] = {}
+        self._placed_at: float | None = None  # when the last position arrived
 
     def __repr__(self) -> str:
         return f"VehicleView({self.system_id}, server {self.server_component})"
@@ -60,9 +67,17 @@ class VehicleView:
         heard += [] if self.server_heard_at is None else [self.server_heard_at]
         return now - max(heard) if heard else None
 
+    def telemetry(self, packet: Packet, *, now: float) -> None:
+        """Keep a telemetry packet; ``status`` decodes it."""
+        self.latest[packet.message_id] = packet
+        if packet.message_id in POSITIONS:
+            self._placed_at = now
+
     def status(self, decoder: Decoder, *, now: float) -> VehicleStatus:
         """Return the rover's last known state."""
         place = self._latest(decoder, m.LocalPositionNed)
+        on_earth = self._latest(decoder, m.GlobalPositionInt)
+        system = self._latest(decoder, m.SysStatus)
         attitude = self._latest(decoder, m.Attitude)
         monitor = self._monitor
         return VehicleStatus(
@@ -77,6 +92,12 @@ class VehicleView:
             east=None if place is None else place.y,
             yaw=None if attitude is None else attitude.yaw,
             speed=None if place is None else hypot(place.vx, place.vy),
+            latitude=None if on_earth is None else on_earth.lat / DEGREE,
+            longitude=None if on_earth is None else on_earth.lon / DEGREE,
+            position_age=None if self._placed_at is None else now - self._placed_at,
+            battery=None if system is None else _battery_of(system),
+            voltage=None if system is None else _voltage_of(system),
+            is_ready=None if system is None else passes_checks(system),
         )
 
     @property
@@ -173,11 +194,13 @@ class FleetView:
         view.server_component = source.component_id
         view.server_heard_at = None if age is None else now - age
 
-    def telemetry(self, packet: Packet) -> None:
-        """Keep a vehicle's telemetry packet; ``status`` decodes it."""
+    def telemetry(self, packet: Packet, *, now: float) -> bool:
+        """Keep a vehicle's telemetry packet. Return whether it is one of a known vehicle."""
         view = self._views.get(packet.system_id)
-        if view is not None and packet.component_id == AUTOPILOT:
-            view.latest[packet.message_id] = packet
+        if view is None or packet.component_id != AUTOPILOT:
+            return False
+        view.telemetry(packet, now=now)
+        return True
 
     def _view(self, system_id: int, *, now: float) -> VehicleView:
         view = self._views.get(system_id)
@@ -196,6 +219,17 @@ class FleetView:
         for view in due:
             view.ask_at = now + ASK_AGAIN
         return [view.system_id for view in due]
+
+
+def _battery_of(message: m.SysStatus) -> float | None:
+    """Return the charge that is left, 0 to 1; None: unknown."""
+    percent = message.battery_remaining
+    return None if percent == UNKNOWN_BATTERY else min(max(percent / 100, 0.0), 1.0)
+
+
+def _voltage_of(message: m.SysStatus) -> float | None:
+    voltage = message.voltage_battery
+    return None if voltage in (0, UNKNOWN_VOLTAGE) else voltage / 1000
 
 
 def _there_are(ids: Sequence[int]) -> str:

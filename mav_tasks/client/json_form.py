@@ -80,6 +80,12 @@ def vehicle_json(vehicle: VehicleStatus) -> dict[str, Any]:
         "east": _rounded(vehicle.east),
         "heading": _rounded(heading),
         "speed": _rounded(vehicle.speed),
+        "latitude": vehicle.latitude,
+        "longitude": vehicle.longitude,
+        "position_age": _rounded(vehicle.position_age),
+        "battery": vehicle.battery,
+        "voltage": vehicle.voltage,
+        "ready": vehicle.is_ready,
         "server_component": vehicle.server_component,
     }
 

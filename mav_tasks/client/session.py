@@ -88,8 +88,11 @@ class Session:
     The asyncio layer sets the ``on_`` callbacks to receive news.
     """
 
-    def __init__(self, address: Address, *, now: float) -> None:
+    def __init__(
+        self, address: Address, *, now: float, telemetry_rate: int = TELEMETRY_RATE
+    ) -> None:
         self.address = address
+        self._telemetry_rate = telemetry_rate  # Hz
         self.fleet = FleetView()
         self.watch = Watch()
         self._encoder = Encoder(address)
@@ -105,6 +108,7 @@ class Session:
         self.on_news: Callable[[Followed], None] = lambda _followed: None
         self.on_answer: Callable[[Answer, int], None] = lambda _answer, _vehicle: None
         self.on_text: Callable[[Text], None] = lambda _text: None
+        self.on_vehicle: Callable[[int], None] = lambda _vehicle: None
 
     def __repr__(self) -> str:
         return f"Session({self.address}, {self.fleet!r}, {self.calls!r})"
@@ -113,8 +117,8 @@ class Session:
 
     def receive(self, packet: Packet, *, now: float) -> None:
         """Process one packet."""
-        if packet.message_id in KEPT:
-            self.fleet.telemetry(packet)
+        if packet.message_id in KEPT and self.fleet.telemetry(packet, now=now):
+            self.on_vehicle(packet.system_id)
         if packet.message_id not in DECODED:
             return
         message = self._decoder.decode(packet)
@@ -130,6 +134,7 @@ class Session:
             case m.TaskQueueStatus():
                 self.fleet.served_by(packet.source, heartbeat_age_of(message), now=now)
                 self.on_served()
+                self.on_vehicle(packet.system_id)
                 self.on_answer(message, packet.system_id)
             case m.TaskTiming():
                 self.on_answer(task_timing_of(message, packet.system_id), packet.system_id)
@@ -283,10 +288,12 @@ class Session:
     # received messages
 
     def _heard(self, packet: Packet, message: m.Heartbeat, *, now: float) -> None:
-        if not self.fleet.heartbeat(packet, message, now=now):
-            return
         vehicle = packet.system_id
-        self.send(m.RequestDataStream(vehicle, AUTOPILOT, 0, TELEMETRY_RATE, 1))
+        is_new = self.fleet.heartbeat(packet, message, now=now)
+        self.on_vehicle(vehicle)
+        if not is_new:
+            return
+        self.send(m.RequestDataStream(vehicle, AUTOPILOT, 0, self._telemetry_rate, 1))
         self.watch.hurry(vehicle, now=now)
         interval = self.watch.stream_of(vehicle)
         if interval is not None:

@@ -11,6 +11,7 @@ from mav_tasks.client.aio import DEFAULT_LINK, FIND_WITHIN, SCRIPT, STOP_WITHIN,
 from mav_tasks.client.blocking import BlockingClient, BlockingTask, Portal, called, id_of
 from mav_tasks.client.handle import Release
 from mav_tasks.client.plan_sources import Plan
+from mav_tasks.client.session import TELEMETRY_RATE
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming, Text, VehicleStatus
 from mav_tasks.client.wire import Goal
 from mav_tasks.links.base import Link
@@ -105,7 +106,8 @@ class SyncClient(BlockingClient):
 
     With a ``key`` of 32 bytes the client signs all packets (MAVLink 2) and drops packets that the
     server has not signed with this key. ``link_id``, 0 to 255, goes into the signatures; None: a
-    random one. Raise ValueError if the key is invalid.
+    random one. Raise ValueError if the key is invalid. ``telemetry_rate``: Hz of the rovers'
+    telemetry that the client asks for.
 
     Every method may raise NoAnswer, Refused and NoSuchVehicle.
 
@@ -122,6 +124,7 @@ class SyncClient(BlockingClient):
         component_id: int = SCRIPT.component_id,
         key: Key | bytes | None = None,
         link_id: int | None = None,
+        telemetry_rate: int = TELEMETRY_RATE,
         portal: Portal | None = None,
     ) -> None:
         super().__init__(
@@ -133,6 +136,7 @@ class SyncClient(BlockingClient):
                 component_id=component_id,
                 key=key,
                 link_id=link_id,
+                telemetry_rate=telemetry_rate,
             ),
             portal,
         )
@@ -372,6 +376,10 @@ class SyncClient(BlockingClient):
     def set_fence(self, plan: PlanFile | Path | str, *, vehicle: int | None = None) -> int:
         """Upload the fence of a .plan file, which may be empty. Return the number of items."""
         return self._call(self._aio.set_fence(plan, vehicle=vehicle))
+
+    def rally_points(self, *, vehicle: int | None = None) -> tuple[Item, ...]:
+        """Return the items of the rally points."""
+        return self._call(self._aio.rally_points(vehicle=vehicle))
 
     def set_rally_points(self, plan: PlanFile | Path | str, *, vehicle: int | None = None) -> int:
         """Upload the rally points of a .plan file. Return their number."""

@@ -128,8 +128,10 @@ class TaskTiming:
 @dataclass(frozen=True, slots=True)
 class VehicleStatus:
     """A rover as its telemetry shows it. ``north`` and ``east`` in m, ``yaw`` in rad, ``speed`` in
-    m/s; None, or "unknown" for ``kind`` and ``mode``: not received. ``is_heard``: its heartbeats
-    arrive. ``server_component`` is the task server's component id in the rover's system.
+    m/s, ``latitude`` and ``longitude`` in deg, ``battery`` 0 to 1, ``voltage`` in V; None, or
+    "unknown" for ``kind`` and ``mode``: not received. ``position_age``: seconds since its position
+    arrived. ``is_ready``: its checks before arming pass; None: it does not say. ``is_heard``: its
+    heartbeats arrive. ``server_component`` is the task server's component id in the rover's system.
     ``heartbeat_age``: seconds since its last heartbeat; inf: none since the server started; None:
     none arrived here, and the server does not say.
     """
@@ -145,6 +147,12 @@ class VehicleStatus:
     yaw: float | None = None
     speed: float | None = None
     heartbeat_age: float | None = None
+    latitude: float | None = None
+    longitude: float | None = None
+    position_age: float | None = None
+    battery: float | None = None
+    voltage: float | None = None
+    is_ready: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +163,17 @@ class Text:
     component: int
     severity: int
     words: str
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleChanged:
+    """Packets of a rover arrived: ``Client.vehicles`` returns its new state."""
+
+    vehicle: int
+
+
+#: what ``Client.listen`` reports; a QueueStatus without its tasks
+News = TaskStatus | QueueStatus | Text | VehicleChanged
 
 
 def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:

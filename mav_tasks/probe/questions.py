@@ -11,11 +11,11 @@ from mav_tasks.probe.steps import Steps, Wait, pause
 from mav_tasks.services.identity import identity_of
 from mav_tasks.services.interval_requester import WANTED
 from mav_tasks.services.persona import persona_of
+from mav_tasks.services.prearm_check import passes_checks
 
 LISTEN = 3.0  # s, in which what comes by itself is counted
 ASK_AGAIN = 0.5  # s
 ASKS = 3
-PREARM = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
 PREARM_TIME = 1.5  # s in which the texts of the checks come
 DEFAULT_RATE = 0  # of SET_MESSAGE_INTERVAL
 RATES: Mapping[str, int] = {
@@ -94,11 +94,8 @@ def ask_prearm(talk: Conversation, findings: Findings) -> Steps[None]:
         yield pause(PREARM_TIME)
     findings.prearm_texts = list(dict.fromkeys(talk.texts[mark:]))
     status = talk.latest.get(m.SysStatus.id)
-    if isinstance(status, m.SysStatus) and (
-        status.onboard_control_sensors_present & PREARM
-        or status.onboard_control_sensors_health & PREARM  # PX4 1.17 sets it in health only
-    ):
-        is_healthy = bool(status.onboard_control_sensors_health & PREARM)
+    is_healthy = passes_checks(status) if isinstance(status, m.SysStatus) else None
+    if is_healthy is not None:
         findings.prearm = "ok" if is_healthy else "not ok"
 
 
