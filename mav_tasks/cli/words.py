@@ -3,19 +3,18 @@
 from math import inf
 
 from mav_tasks.cli.times import format_duration, spoken_duration
-from mav_tasks.client.descriptions import end_of, is_of_last_save, left, state_of, what_of, why_of
+from mav_tasks.client.descriptions import (
+    UNTIL_RESUMED,
+    end_of,
+    is_of_last_save,
+    left,
+    state_of,
+    what_of,
+    why_of,
+)
 from mav_tasks.client.fleet_view import SILENT_AFTER
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-
-#: reasons of tasks that wait until the queue is resumed
-UNTIL_RESUMED = (
-    TaskReason.QUEUE_PAUSED,
-    TaskReason.OPERATOR,
-    TaskReason.TAKEOVER,
-    TaskReason.FAILSAFE,
-    TaskReason.RESTARTED,
-)
 
 #: reasons that block one task, and what a person can do; "{rover}": the option that names the rover
 REMEDIES = {

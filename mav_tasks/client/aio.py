@@ -1,7 +1,7 @@
 """The asyncio client. Messages of the server wake the coroutines that await them: no polling."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from math import nan
@@ -390,9 +390,9 @@ class Client:
         """
         return self._which(None)
 
-    def vehicles(self) -> tuple[VehicleStatus, ...]:
-        """Return the last known state of the server's rovers."""
-        return self._open.session.vehicles(now=self._now)
+    def vehicles(self, *, only: Container[int] | None = None) -> tuple[VehicleStatus, ...]:
+        """Return the last known state of the server's rovers; ``only``: of these."""
+        return self._open.session.vehicles(only=only, now=self._now)
 
     async def texts(self) -> AsyncIterator[Text]:
         """Yield each STATUSTEXT of rovers and task servers from now on."""

@@ -7,6 +7,15 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 
 UNITS = {Unit.METRES: "m", Unit.RADIANS: "deg", Unit.SECONDS: "s", Unit.ITEMS: "items"}
 
+#: reasons of tasks that wait until the queue is resumed
+UNTIL_RESUMED = (
+    TaskReason.QUEUE_PAUSED,
+    TaskReason.OPERATOR,
+    TaskReason.TAKEOVER,
+    TaskReason.FAILSAFE,
+    TaskReason.RESTARTED,
+)
+
 
 def state_of(status: TaskStatus) -> str:
     return status.state.name.lower()

@@ -5,7 +5,7 @@ repeats each request until it is answered or times out. ``aio`` builds the API f
 """
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 from math import inf
 
@@ -242,9 +242,12 @@ class Session:
         """Return the uploads and downloads of a component."""
         return self._transfers.setdefault(target, Transfers(target))
 
-    def vehicles(self, *, now: float) -> tuple[VehicleStatus, ...]:
-        """Return the rovers whose task server has answered, by id."""
-        views = (self.fleet.get(system_id) for system_id in self.fleet.served())
+    def vehicles(
+        self, *, only: Container[int] | None = None, now: float
+    ) -> tuple[VehicleStatus, ...]:
+        """Return the rovers whose task server has answered, by id; ``only``: these of them."""
+        served = (each for each in self.fleet.served() if only is None or each in only)
+        views = (self.fleet.get(system_id) for system_id in served)
         return tuple(v.status(self._decoder, now=now) for v in views if v is not None)
 
     def follow(self, task_id: int, vehicle: int, *, nonce: int | None, now: float) -> Followed:

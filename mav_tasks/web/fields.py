@@ -1,0 +1,127 @@
+"""The parts of a request's JSON body: declared once, for reading it and for the OpenAPI document.
+
+Pure.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from mav_tasks.web.problems import invalid
+
+EXPECTED = {
+    "number": "a number",
+    "integer": "a whole number",
+    "string": "a text",
+    "boolean": "true or false",
+    "array": "a list",
+    "object": "an object",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One part. ``least`` and ``most``: of a number, or of a text's or list's length.
+
+    ``items`` is the JSON schema of a list's items.
+    """
+
+    name: str
+    type: str
+    meaning: str
+    is_required: bool = False
+    least: float | None = None
+    most: float | None = None
+    choices: Sequence[str] = ()
+    items: Mapping[str, Any] | None = None
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The JSON schema of the part."""
+        kinds = {"number": "imum", "integer": "imum", "string": "Length", "array": "Items"}
+        schema: dict[str, Any] = {"type": [self.type] if self.is_required else [self.type, "null"]}
+        if len(schema["type"]) == 1:
+            schema["type"] = self.type
+        schema["description"] = self.meaning
+        for prefix, bound in (("min", self.least), ("max", self.most)):
+            if bound is not None:
+                schema[prefix + kinds[self.type]] = bound
+        if self.choices:
+            schema["enum"] = list(self.choices)
+        if self.type == "array":
+            schema["items"] = dict(self.items or {})
+        return schema
+
+    def read(self, body: Mapping[str, Any]) -> Any:
+        """Return the part of a body, None if it is not given; raise Problem if it is wrong."""
+        value = body.get(self.name)
+        if value is None:
+            if self.is_required:
+                raise invalid(f"{self.name}: missing; expected {self.meaning}")
+            return None
+        if not self._is_of_type(value):
+            raise invalid(f"{self.name} {_shown(value)}: expected {EXPECTED[self.type]}")
+        if self.choices and value not in self.choices:
+            words = ", ".join(self.choices)
+            raise invalid(f"{self.name} {_shown(value)}: expected one of {words}")
+        size = (
+            value if self.type in ("number", "integer") else len(value) if _has_size(value) else 0
+        )
+        if self.least is not None and size < self.least:
+            raise invalid(
+                f"{self.name} {_shown(value)}: expected at least {self.least:g}{self._of}"
+            )
+        if self.most is not None and size > self.most:
+            raise invalid(f"{self.name} {_shown(value)}: expected at most {self.most:g}{self._of}")
+        return value
+
+    @property
+    def _of(self) -> str:
+        return {"string": " characters", "array": " parts"}.get(self.type, "")
+
+    def _is_of_type(self, value: object) -> bool:
+        match self.type:
+            case "number":
+                return _is_number(value)
+            case "integer":
+                return isinstance(value, int) and not isinstance(value, bool)
+            case "string":
+                return isinstance(value, str)
+            case "boolean":
+                return isinstance(value, bool)
+            case "array":
+                return isinstance(value, list)
+            case _:
+                return isinstance(value, dict)
+
+
+def body_schema(fields: Sequence[Field]) -> dict[str, Any]:
+    """Return the JSON schema of a body."""
+    return {
+        "type": "object",
+        "properties": {field.name: field.schema for field in fields},
+        "required": [field.name for field in fields if field.is_required],
+        "additionalProperties": False,
+    }
+
+
+def read_body(fields: Sequence[Field], body: object) -> dict[str, Any]:
+    """Return all parts of a body, None for those not given; raise Problem if it is wrong."""
+    if not isinstance(body, dict):
+        raise invalid("the request's body: expected a JSON object")
+    known = {field.name for field in fields}
+    for name in body:
+        if name not in known:
+            words = ", ".join(sorted(known)) or "nothing"
+            raise invalid(f"{_shown(name)}: no such part; expected {words}")
+    return {field.name: field.read(body) for field in fields}
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,138 @@
+"""Rovers, queues and tasks as the API and the page show them: JSON with words for people. Pure."""
+
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from mav_tasks.client.descriptions import UNTIL_RESUMED, end_of, waits_of, why_of
+from mav_tasks.client.json_form import queue_json, task_json, vehicle_json
+from mav_tasks.client.values import QueueStatus, TaskStatus, Text, VehicleStatus
+from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
+
+#: reasons that keep one task from starting, and what a person can do at the rover
+AT_THE_ROVER = {
+    TaskReason.DISARMED: "Arm the rover in HOLD, or resume if the server may arm it.",
+    TaskReason.WRONG_MODE: "Set the rover to HOLD, then resume.",
+    TaskReason.NOT_READY: "Wait, or mend what the rover reports.",
+    TaskReason.NO_POSITION: "Wait until the rover knows its position.",
+    TaskReason.VEHICLE_SILENT: "Check the rover's radio and power.",
+    TaskReason.LOSS_FAILSAFE: (
+        "Let the rover stop when setpoints end: run 'mav-tasks probe --set-failsafe'."
+    ),
+    TaskReason.OUTSIDE_OWN_FENCE: "Drive it back manually, or switch that fence off.",
+    TaskReason.OTHER_CONTROLLER: "Wait until the other program has stopped driving.",
+}
+
+WHY_PAUSED = {
+    TaskReason.OPERATOR: "somebody paused it",
+    TaskReason.QUEUE_PAUSED: "somebody paused it",
+    TaskReason.STOPPED: "STOP is in force",
+    TaskReason.TAKEOVER: "somebody else has taken over the rover",
+    TaskReason.FAILSAFE: "the rover's own failsafe took over",
+    TaskReason.RESTARTED: "the server or the rover was restarted",
+}
+
+
+def task_form(
+    status: TaskStatus, *, why: str | None = None, goals: Mapping[int, Any] | None = None
+) -> dict[str, Any]:
+    """Return a task; ``why`` it waits, if its queue tells more than its own status."""
+    words = why if why is not None else end_of(status)
+    ago = status.ended_ago
+    ended = None if ago is None else datetime.now(UTC) - timedelta(seconds=ago)
+    return task_json(status) | {
+        "why": words or None,
+        "remedy": remedy_of(status),
+        "halt_epoch": status.halt_epoch,
+        "ended_ago": None if ago is None else round(ago, 3),
+        "ended_at": None if ended is None else ended.isoformat(timespec="milliseconds"),
+        "goals": (goals or {}).get(status.id),
+    }
+
+
+def remedy_of(status: TaskStatus) -> dict[str, str] | None:
+    """Return what a person can do about a task that waits; None: nothing needs to be done."""
+    if status.is_over:
+        return None
+    is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released already, waits to start
+    if status.state is TaskState.HELD and not is_decided:
+        words = "Release it: again from here, only the rest of it, or skip it."
+        return {"action": "release", "words": words}
+    if status.reason in UNTIL_RESUMED or status.reason is TaskReason.STOPPED:
+        return {"action": "resume", "words": "Resume lets it run."}
+    words = AT_THE_ROVER.get(status.reason, "")
+    return {"action": "none", "words": words} if words else None
+
+
+def queue_form(queue: QueueStatus, *, goals: Mapping[int, Any] | None = None) -> dict[str, Any]:
+    """Return a rover's queue, with the tasks in the order in which they run."""
+    waits = waits_of(queue)
+    current = queue.current
+    return queue_json(queue) | {
+        "paused_words": paused_words(queue.paused),
+        "more": max(queue.waiting_count - len(queue.waiting), 0),
+        "current": None if current is None else task_form(current, goals=goals),
+        "waiting": [task_form(e, why=waits[e.id], goals=goals) for e in queue.waiting],
+    }
+
+
+def paused_words(reason: TaskReason | None) -> str | None:
+    """Return why a queue is paused, as a clause; None: it is not paused."""
+    if reason is None:
+        return None
+    return WHY_PAUSED.get(reason, words_of(reason))
+
+
+def vehicle_form(
+    vehicle: VehicleStatus,
+    queue: QueueStatus | None,
+    *,
+    prearm: Iterable[str] = (),
+    goal: Mapping[str, float] | None = None,
+    origin: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
+    """Return a rover, who controls it, and what keeps it from driving, in words."""
+    form = vehicle_json(vehicle)
+    battery, voltage = form.pop("battery"), form.pop("voltage")
+    control, words = _control_of(vehicle, queue)
+    return form | {
+        "data_age": form.pop("position_age"),
+        "battery": None
+        if battery is None and voltage is None
+        else {"percent": None if battery is None else round(100 * battery), "voltage": voltage},
+        "prearm": list(prearm),
+        "control": control,
+        "control_words": words,
+        "goal": goal,
+        "origin": origin,
+    }
+
+
+def text_form(text: Text, *, number: int, at: float) -> dict[str, Any]:
+    """Return a text of a rover or the server."""
+    return {
+        "number": number,
+        "at": round(at, 3),
+        "vehicle": text.vehicle,
+        "component": text.component,
+        "severity": text.severity,
+        "words": text.words,
+    }
+
+
+def _control_of(vehicle: VehicleStatus, queue: QueueStatus | None) -> tuple[str, str]:
+    name = f"Rover {vehicle.id}"
+    if not vehicle.is_heard:
+        return "silent", f"{name} is silent. Check its radio and power."
+    if queue is None or queue.paused is None:
+        current = None if queue is None else queue.current
+        if current is not None and current.state is TaskState.HELD:
+            held = f"Task {current.id} of rover {vehicle.id} is held ({why_of(current)})."
+            return "tasks", f"{held} Release it, so that the queue goes on."
+        return "tasks", f"{name} runs its tasks."
+    why = paused_words(queue.paused)
+    if queue.paused is TaskReason.STOPPED:
+        return "stopped", f"{name} was stopped: STOP is in force. Resume ends it."
+    if queue.paused in TAKEN:
+        return "taken over", f"{name}: {why}. Set HOLD there, then resume."
+    return "paused", f"{name} is paused: {why}. Resume lets its tasks run."

@@ -1,0 +1,225 @@
+"""Decides which requests reach the API: the outermost layer of the web process. ASGI.
+
+A page of another site can make a browser send requests to 127.0.0.1. They are refused by their
+Host header (DNS rebinding), by Origin and Sec-Fetch-Site (cross-site requests), and because a body
+must be JSON, for which a browser would ask first. Every answer has the headers that keep a browser
+from running or framing anything else.
+"""
+
+import asyncio
+from collections.abc import Iterable
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from mav_tasks.web.identity import Identity
+from mav_tasks.web.problems import Problem
+from mav_tasks.web.rates import Rates
+from mav_tasks.web.sessions import COOKIE, Sessions
+from mav_tasks.web.tokens import Tokens
+
+SAFE = frozenset({"GET", "HEAD"})
+METHODS = SAFE | {"POST", "PUT", "PATCH", "DELETE"}
+API = "/api/"
+SESSION = "/api/v1/session"
+STOP = "/api/v1/stop"
+
+SMALL_BODY = 64 * 1024  # bytes
+PLAN_BODY = 24 * 1024 * 1024  # bytes: a plan file of 10 MB, escaped
+WITH_PLANS = ("/plans", "/missions", "/fence", "/rally")
+BODY_WITHIN = 15.0  # s for the whole body
+
+HEADERS = {
+    "content-security-policy": (
+        "default-src 'self'; img-src 'self' data: blob:; connect-src 'self'; object-src 'none'; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    ),
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=(), payment=(), usb=()",
+}
+RAW_HEADERS = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+
+
+class Guard:
+    """The layer around an application.
+
+    ``hosts`` are the values of Host that are accepted, in lower case. ``open_identity`` is that of
+    requests without a token; None: a token is required. ``tile_origins`` are the sites of map tiles.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        hosts: Iterable[str],
+        tokens: Tokens,
+        sessions: Sessions,
+        open_identity: Identity | None,
+        tile_origins: tuple[str, ...] = (),
+    ) -> None:
+        self._app = app
+        self._hosts = frozenset(hosts)
+        self._tokens = tokens
+        self._sessions = sessions
+        self._open_identity = open_identity
+        self._tile_origins = tile_origins
+        self._rates = Rates()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or pass it on."""
+        if scope["type"] != "http":
+            if scope["type"] == "lifespan":
+                await self._app(scope, receive, send)
+            return
+
+        async def guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message.get("headers", ()), *self._headers()]
+            await send(message)
+
+        try:
+            self._check(scope)
+            body = _limited(receive, most=_most_bytes(scope["path"]))
+        except Problem as problem:
+            await problem.response()(scope, receive, guarded)
+            return
+        try:
+            await self._app(scope, body, guarded)
+        except _TooLarge as error:
+            await error.problem.response()(scope, receive, guarded)
+
+    def _headers(self) -> list[tuple[bytes, bytes]]:
+        if not self._tile_origins:
+            return RAW_HEADERS
+        policy = HEADERS["content-security-policy"].replace(
+            "img-src 'self'", f"img-src 'self' {' '.join(self._tile_origins)}"
+        )
+        return [(b"content-security-policy", policy.encode()), *RAW_HEADERS[1:]]
+
+    def _check(self, scope: Scope) -> None:
+        """Raise Problem if a request must not pass; else note whose it is in its state."""
+        headers = _headers_of(scope)
+        host = headers.get("host", "").lower()
+        if host not in self._hosts:
+            words = f"this server is not called {host[:80]!r}; name it with --name"
+            raise Problem(421, "Wrong host", words)
+        if scope["method"] not in METHODS:
+            raise Problem(405, "Method not allowed", f"{scope['method'][:20]}: not used here")
+        if scope["method"] not in SAFE:
+            _check_origin(headers, host, scheme=scope.get("scheme", "http"))
+        _check_length(headers, most=_most_bytes(scope["path"]))
+        identity, session = self._identity(headers)
+        scope.setdefault("state", {})
+        scope["state"]["identity"], scope["state"]["session"] = identity, session
+        if not scope["path"].startswith(API):
+            return
+        is_login = scope["path"] == SESSION and scope["method"] == "POST"
+        if identity is None and not is_login:
+            words = "a token is required: log in, or send 'Authorization: Bearer TOKEN'"
+            raise Problem(401, "Who are you?", words, headers={"www-authenticate": "Bearer"})
+        if scope["path"] != STOP:  # STOP is never rate-limited
+            who = scope["client"][0] if identity is None else identity.name
+            wait = self._rates.wait_of(who)
+            if wait:
+                words = f"too many requests: try again in {wait} s"
+                raise Problem(429, "Too many requests", words, headers={"retry-after": str(wait)})
+
+    def _identity(self, headers: dict[str, str]) -> tuple[Identity | None, str | None]:
+        """Return whose request it is, and the session that says so."""
+        kind, _, text = headers.get("authorization", "").partition(" ")
+        if kind.lower() == "bearer" and text:
+            token = self._tokens.of_text(text.strip())
+            if token is None:
+                words = "there is no such token, or it was revoked"
+                raise Problem(401, "Unknown token", words, headers={"www-authenticate": "Bearer"})
+            return Identity(token.name, token.role), None
+        session = _cookie_of(headers.get("cookie", ""))
+        if session is not None:
+            token = self._sessions.token_of(session)
+            if token is not None:
+                return Identity(token.name, token.role), session
+        return self._open_identity, None
+
+
+class _TooLarge(Exception):
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem.detail)
+        self.problem = problem
+
+
+def _headers_of(scope: Scope) -> dict[str, str]:
+    """Return the headers of a request; raise Problem if one that decides comes twice."""
+    headers: dict[str, str] = {}
+    for name, value in scope["headers"]:
+        key = name.decode("latin-1").lower()
+        if key in headers and key in ("host", "origin", "authorization", "content-length"):
+            raise Problem(400, "Invalid request", f"two headers {key!r}")
+        headers[key] = value.decode("latin-1")
+    return headers
+
+
+def _check_origin(headers: dict[str, str], host: str, *, scheme: str) -> None:
+    """Raise Problem if a page of another site sent a request that changes something."""
+    origin = headers.get("origin")
+    site = headers.get("sec-fetch-site", "same-origin")
+    if site not in ("same-origin", "none") or origin not in (None, f"{scheme}://{host}"):
+        words = f"a page of {(origin or 'another site')[:80]} may not do this"
+        raise Problem(403, "Cross-site request", words)
+    kind = headers.get("content-type", "").partition(";")[0].strip().lower()
+    has_body = headers.get("content-length", "0") != "0" or "transfer-encoding" in headers
+    if has_body and kind != "application/json":
+        raise Problem(415, "Wrong media type", "expected Content-Type: application/json")
+
+
+def _check_length(headers: dict[str, str], *, most: int) -> None:
+    text = headers.get("content-length", "0")
+    if not text.isdigit() or int(text[:20]) > most:
+        raise _too_large(most)
+
+
+def _limited(receive: Receive, *, most: int) -> Receive:
+    """Return ``receive`` for a body that is neither too large nor too slow."""
+    taken = 0
+    is_whole = False
+    loop = asyncio.get_running_loop()
+    until = loop.time() + BODY_WITHIN
+
+    async def limited() -> Message:
+        nonlocal taken, is_whole
+        if is_whole:
+            return await receive()
+        try:
+            async with asyncio.timeout_at(until):
+                message: dict[str, Any] = dict(await receive())
+        except TimeoutError:
+            problem = Problem(408, "Too slow", f"the body took more than {BODY_WITHIN:g} s")
+            raise _TooLarge(problem) from None
+        if message["type"] == "http.request":
+            taken += len(message.get("body", b""))
+            is_whole = not message.get("more_body", False)
+            if taken > most:
+                raise _TooLarge(_too_large(most))
+        return message
+
+    return limited
+
+
+def _most_bytes(path: str) -> int:
+    return PLAN_BODY if path.startswith(API) and path.endswith(WITH_PLANS) else SMALL_BODY
+
+
+def _too_large(most: int) -> Problem:
+    return Problem(413, "Too large", f"expected a body of at most {most} bytes")
+
+
+def _cookie_of(text: str) -> str | None:
+    try:
+        found = SimpleCookie(text).get(COOKIE)
+    except CookieError:
+        return None
+    return None if found is None else found.value

@@ -1,0 +1,173 @@
+"""Server-sent events for any number of readers. Each event is encoded once. WHATWG HTML, 9.2.
+
+An event has a number, by which a reader that reconnects gets what it missed. States of rovers come
+many times a second and have none: a reader that is too slow skips them, and later gets the latest.
+A reader that is slower still gets a new snapshot. No reader can hold up another one.
+"""
+
+import asyncio
+import json
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+KEPT = 2000  # events for readers that reconnect
+UNREAD = 500  # events that one reader may leave unread before it gets a snapshot instead
+SILENCE = 10.0  # s without an event, after which a comment shows that the stream is alive
+COMMENT = b": alive\n\n"
+SNAPSHOT, VEHICLES = "snapshot", "vehicles"
+
+_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode
+
+
+class Hub:
+    """The events of one view of the server.
+
+    ``instance`` tells the numbers of this process from those of an earlier one. ``snapshot`` and
+    ``vehicles`` return the data of those events at this moment.
+    """
+
+    def __init__(
+        self, instance: str, *, snapshot: Callable[[], Any], vehicles: Callable[[], Any]
+    ) -> None:
+        self._instance = instance
+        self._snapshot = snapshot
+        self._vehicles = vehicles
+        self._number = 0
+        self._kept: deque[tuple[int, bytes]] = deque(maxlen=KEPT)
+        self._readers: set[Reader] = set()
+
+    def __repr__(self) -> str:
+        return f"Hub({self._number} events, {len(self._readers)} readers)"
+
+    @property
+    def readers(self) -> int:
+        """The number of open streams."""
+        return len(self._readers)
+
+    def publish(self, kind: str, value: Any) -> None:
+        """Send an event to all readers."""
+        self._number += 1
+        frame = self._frame(kind, value, number=self._number)
+        self._kept.append((self._number, frame))
+        for reader in self._readers:
+            reader.put(frame)
+
+    def publish_vehicles(self, value: Any) -> None:
+        """Send states of rovers to all readers that keep up."""
+        if not self._readers:
+            return
+        frame = self._frame(VEHICLES, value)
+        for reader in self._readers:
+            reader.put_vehicles(frame)
+
+    def open(self, last: str | None) -> "Reader":
+        """Return a new reader. ``last`` is the id of the last event that it got, None: none."""
+        reader = Reader(self)
+        missed = None if last is None else self._since(last)
+        if missed is None:
+            reader.is_behind = True
+        else:
+            for frame in missed:
+                reader.put(frame)
+            reader.are_vehicles_behind = True
+        self._readers.add(reader)
+        return reader
+
+    def close(self, reader: "Reader") -> None:
+        """Forget a reader."""
+        self._readers.discard(reader)
+
+    def snapshot_frame(self) -> bytes:
+        """Return the event that shows everything."""
+        return self._frame(SNAPSHOT, self._snapshot(), number=self._number)
+
+    def vehicles_frame(self) -> bytes:
+        """Return the event that shows all rovers."""
+        return self._frame(VEHICLES, self._vehicles())
+
+    def _since(self, last: str) -> list[bytes] | None:
+        """Return the events after one; None if they are not kept."""
+        instance, dash, text = last.rpartition("-")
+        if not dash or instance != self._instance or not text.isascii() or not text.isdigit():
+            return None
+        number = int(text[:20])
+        oldest = self._kept[0][0] if self._kept else self._number + 1
+        if not oldest - 1 <= number <= self._number:
+            return None
+        return [frame for each, frame in self._kept if each > number]
+
+    def _frame(self, kind: str, value: Any, *, number: int | None = None) -> bytes:
+        mark = "" if number is None else f"id: {self._instance}-{number}\n"
+        return f"{mark}event: {kind}\ndata: {_encode(value)}\n\n".encode()
+
+
+class Reader:
+    """One event stream."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._unread: deque[bytes] = deque()
+        self._vehicles: bytes | None = None
+        self._wake = asyncio.Event()
+        self.is_behind = False
+        self.are_vehicles_behind = False
+        self._is_closed = False
+
+    def put(self, frame: bytes) -> None:
+        """Add an event; too many unread ones are replaced by a snapshot."""
+        if len(self._unread) >= UNREAD:
+            self._unread.clear()
+            self.is_behind = True
+        if not self.is_behind:
+            self._unread.append(frame)
+        self._wake.set()
+
+    def put_vehicles(self, frame: bytes) -> None:
+        """Add states of rovers; an unread one is replaced by the latest of all rovers."""
+        if self._vehicles is None:
+            self._vehicles = frame
+        else:
+            self.are_vehicles_behind = True
+        self._wake.set()
+
+    def close(self) -> None:
+        """End the stream."""
+        self._is_closed = True
+        self._wake.set()
+
+    async def frames(self) -> AsyncIterator[bytes]:
+        """Yield bytes for the stream until it is closed."""
+        try:
+            while not self._is_closed:
+                data = self._take()
+                if not data:
+                    data = await self._next()
+                yield data
+        finally:
+            self._hub.close(self)
+
+    async def _next(self) -> bytes:
+        self._wake.clear()
+        try:
+            async with asyncio.timeout(SILENCE):
+                await self._wake.wait()
+        except TimeoutError:
+            return COMMENT
+        return self._take() or COMMENT
+
+    def _take(self) -> bytes:
+        """Return all that is unread; b"" if there is nothing."""
+        if self.is_behind:
+            self.is_behind = self.are_vehicles_behind = False
+            self._unread.clear()
+            self._vehicles = None
+            return self._hub.snapshot_frame()
+        data = b"".join(self._unread)
+        self._unread.clear()
+        if self.are_vehicles_behind:
+            data += self._hub.vehicles_frame()
+        elif self._vehicles is not None:
+            data += self._vehicles
+        self._vehicles, self.are_vehicles_behind = None, False
+        return data

@@ -1,0 +1,130 @@
+"""STOPs that the page sent, and what came of each: acknowledged, then standing."""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from mav_tasks.client.aio import Client
+from mav_tasks.client.values import TaskStatus
+from mav_tasks.errors import NoAnswer, Refused
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+
+KEPT = 50
+STANDS = 0.03  # m/s; below this a rover counts as standing
+STANDS_WITHIN = 30.0  # s
+FRESH = 1.5  # s; an older position says nothing about now
+
+
+class Stop:
+    """One STOP: of one rover, or of all (``vehicle`` None)."""
+
+    def __init__(self, number: int, vehicle: int | None, by: str) -> None:
+        self.number, self.vehicle, self.by = number, vehicle, by
+        self.at = time.time()
+        self.begun = time.monotonic()
+        self.phase = "sent"
+        self.acknowledged_after: float | None = None
+        self.standing_after: float | None = None
+        self.detail: str | None = None
+        self.tasks: list[int] = []
+
+    def form(self) -> dict[str, Any]:
+        """Return the STOP as JSON."""
+        return {
+            "number": self.number,
+            "at": round(self.at, 3),
+            "vehicle": self.vehicle,
+            "by": self.by,
+            "phase": self.phase,
+            "acknowledged_after": _rounded(self.acknowledged_after),
+            "standing_after": _rounded(self.standing_after),
+            "detail": self.detail,
+            "tasks": self.tasks,
+        }
+
+
+class Stops:
+    """Sends STOPs and follows them. ``publish`` gets a STOP at each change."""
+
+    def __init__(self, client: Client, publish: Callable[[Stop], None]) -> None:
+        self._client = client
+        self._publish = publish
+        self._kept: deque[Stop] = deque(maxlen=KEPT)
+        self._open: set[Stop] = set()
+        self._following: set[asyncio.Task[None]] = set()
+        self._count = 0
+
+    def forms(self) -> list[dict[str, Any]]:
+        """Return the latest STOPs, the oldest first."""
+        return [stop.form() for stop in self._kept]
+
+    async def stop(self, vehicle: int | None, *, clear: bool, by: str) -> Stop:
+        """Send a STOP. Return it once it is acknowledged; raise NoAnswer or Refused."""
+        self._count += 1
+        stop = Stop(self._count, vehicle, by)
+        self._kept.append(stop)
+        self._open.add(stop)
+        # the packet leaves in this step of the loop, the event in the next one
+        asyncio.get_running_loop().call_soon(self._publish, stop)
+        try:
+            await self._client.stop(clear=clear, vehicle=vehicle)
+        except (NoAnswer, Refused) as error:
+            stop.phase = "refused" if isinstance(error, Refused) else "unanswered"
+            stop.detail = str(error)
+            self._open.discard(stop)
+            self._publish(stop)
+            raise
+        stop.acknowledged_after = time.monotonic() - stop.begun
+        stop.phase = "acknowledged"
+        self._publish(stop)
+        following = asyncio.create_task(self._follow(stop))
+        self._following.add(following)
+        following.add_done_callback(self._following.discard)
+        return stop
+
+    def on_task(self, status: TaskStatus) -> None:
+        """Note a task that a STOP has ended."""
+        if status.state is not TaskState.KILLED or status.reason is not TaskReason.STOP:
+            return
+        for stop in self._open:
+            if stop.vehicle in (None, status.vehicle) and status.id not in stop.tasks:
+                stop.tasks.append(status.id)
+                self._publish(stop)
+
+    def on_vehicles(self) -> None:
+        """Look whether the rovers of open STOPs stand now."""
+        for stop in [each for each in self._open if each.phase == "acknowledged"]:
+            if self._stand(stop.vehicle, since=stop.begun):
+                stop.standing_after = time.monotonic() - stop.begun
+                stop.phase = "standing"
+                self._open.discard(stop)
+                self._publish(stop)
+
+    async def _follow(self, stop: Stop) -> None:
+        await asyncio.sleep(STANDS_WITHIN)
+        if stop in self._open:
+            self._open.discard(stop)
+            stop.detail = f"no rover data showed it standing within {STANDS_WITHIN:g} s"
+            self._publish(stop)
+
+    def _stand(self, vehicle: int | None, *, since: float) -> bool:
+        """Return whether every rover that is heard has shown itself standing since then."""
+        rovers = [
+            each
+            for each in self._client.vehicles()
+            if vehicle in (None, each.id) and each.is_heard and each.speed is not None
+        ]
+        past = time.monotonic() - since
+        return bool(rovers) and all(
+            each.speed is not None
+            and each.speed < STANDS
+            and each.position_age is not None
+            and each.position_age < min(past, FRESH)
+            for each in rovers
+        )
+
+
+def _rounded(seconds: float | None) -> float | None:
+    return None if seconds is None else round(seconds, 4)
