@@ -425,18 +425,22 @@ class Client:
         at: datetime | None = None,
         vehicle: int | None = None,
         nonce: int = 0,
+        check: int = 0,
         label: str = "",
     ) -> Task:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
-        Raise PlanFileError if a file is invalid. Other arguments as in ``submit``.
+        Raise PlanFileError if a file is invalid. ``check``, up to 2,147,483,646: if you derive the
+        nonce from a longer key, more bits of that; the server refuses a mission that repeats a
+        nonce with another ``check``. Other arguments as in ``submit``.
         """
         check_label(label)
+        wire.check_check(check)
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = self._submissions.delay(delay, at, mark)
         terms = TaskOptions(priority, _id_of(after), wait, deadline)
-        items = (*items_of(plan), wire.options_of(terms, nonce=mark))
+        items = (*items_of(plan), wire.options_of(terms, nonce=mark, check=check))
         task = await self._submit_plan(items, system_id, mark)
         await self._complete(task, deadline=0.0, at=at, label=label, nonce=mark)
         return task

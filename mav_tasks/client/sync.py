@@ -322,11 +322,14 @@ class SyncClient(BlockingClient):
         at: datetime | None = None,
         vehicle: int | None = None,
         nonce: int = 0,
+        check: int = 0,
         label: str = "",
     ) -> SyncTask:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
-        Raise PlanFileError if a file is invalid. Other arguments as in ``submit``.
+        Raise PlanFileError if a file is invalid. ``check``, up to 2,147,483,646: if you derive the
+        nonce from a longer key, more bits of that; the server refuses a mission that repeats a
+        nonce with another ``check``. Other arguments as in ``submit``.
         """
         return self._handle(
             SyncTask,
@@ -339,6 +342,7 @@ class SyncClient(BlockingClient):
                 at=at,
                 vehicle=vehicle,
                 nonce=nonce,
+                check=check,
                 label=label,
             ),
         )

@@ -62,6 +62,11 @@ def check_nonce(nonce: int) -> None:
     _whole("nonce", nonce, 0, MAX_NONCE)
 
 
+def check_check(check: int) -> None:
+    """Raise ValueError unless this is a number that can accompany a nonce."""
+    _whole("check", check, 0, LARGEST)
+
+
 def command_of(
     goal: Move | Rotate | Drive, terms: TaskOptions, *, target: tuple[int, int], nonce: int
 ) -> m.CommandLong:
@@ -112,15 +117,16 @@ def with_home(items: Sequence[Item]) -> tuple[Item, ...]:
     return (home, *moved)
 
 
-def options_of(terms: TaskOptions, *, nonce: int) -> Item:
+def options_of(terms: TaskOptions, *, nonce: int, check: int = 0) -> Item:
     """Return the TASK_OPTIONS item of a plan.
 
     It goes last, so that the targets of jumps stay right. The nonce tells this plan from an equal
-    one, and lets the server recognize a late copy.
+    one, and lets the server recognize a late copy. A plan with this nonce and another ``check``
+    is another plan, which the server refuses.
     """
     after, priority = to_param(terms.after), float(terms.priority)
     options = _item(MavCmd.TASK_OPTIONS, priority, terms.delay, terms.deadline, after)
-    return options._replace(x=nonce)
+    return options._replace(x=nonce, y=check)
 
 
 def _own(goal: Move | Rotate | Drive) -> tuple[int, float, float, float]:

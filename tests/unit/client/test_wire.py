@@ -147,6 +147,15 @@ def test_the_options_of_a_plan_are_its_terms_and_make_it_unlike_any_other() -> N
     assert wanted[0].plan.source != wanted[1].plan.source
 
 
+def test_more_bits_of_a_nonce_make_another_plan() -> None:
+    one, other = (wire.options_of(TaskOptions(), nonce=7, check=check) for check in (0, 8))
+    assert (one.x, one.y, other.x, other.y) == (7, 0, 7, 8)
+    for wrong in (-1, 2**31 - 1, True):
+        with pytest.raises(ValueError, match="check"):
+            wire.check_check(wrong)
+
+
+
 def test_a_jump_goes_one_further_behind_a_home() -> None:
     jump = PlanItem(MavCmd.DO_JUMP, 2, (0.0, 3.0, 0.0, 0.0), 0, 0, 0.0, True)
     items = (*wire.items_of_goals([Move(1.0)]), *wire.items_of_file([jump]))
