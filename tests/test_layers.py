@@ -162,6 +162,20 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.qgc_actions": frozenset(
         {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
     ),
+    "mav_tasks.web": frozenset(
+        {
+            "mav_tasks.client",
+            "mav_tasks.logs",
+            "mav_tasks.store",
+            "mav_tasks.plan_files",
+            "mav_tasks.services",
+            "mav_tasks.tasks",
+            "mav_tasks.mavlink",
+            "mav_tasks.folders",
+            "mav_tasks.whole_file",
+            "mav_tasks.errors",
+        }
+    ),
     "mav_tasks.probe": frozenset(
         {
             "mav_tasks.engine",
@@ -193,6 +207,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.qgc_actions",
             "mav_tasks.probe",
             "mav_tasks.probing",
+            "mav_tasks.web",
             "mav_tasks.client",
             "mav_tasks.plan_files",
             "mav_tasks.mavlink",

@@ -16,7 +16,7 @@ SYNC = "mav_tasks/client/sync.py"
 #: (module, class) -> its calls that stay with the asyncio client, or are in blocking.py
 LEFT_OUT: Mapping[tuple[str, str], frozenset[str]] = {
     ("handle", "Task"): frozenset({"done", "wake", "close"}),
-    ("aio", "Client"): frozenset({"vehicle", "rearm", "streaming", "listening"}),
+    ("aio", "Client"): frozenset({"vehicle", "rearm", "streaming", "listening", "some_vehicles"}),
 }
 OPENING = {"open": "_begin", "close": "_end"}
 HEADER = '''"""The blocking client: the calls of the asyncio client, each waiting for its answer.

@@ -28,6 +28,7 @@ COMMANDS = (
     Lazy("mission", "plans:mission", "Upload, start and download missions."),
     Lazy("fence", "plans:fence", "Upload and download the fence."),
     Lazy("rally", "plans:rally", "Upload rally points."),
+    Lazy("web", "web:app", "Show and steer the rovers in a browser."),
     Lazy("log", "log:log", "Print the journal, one event per line; times are UTC."),
     Lazy("replay", "replay:replay", "Replay a record and compare the results."),
     Lazy("config", "config:app", "Show, check and create the configuration of the server."),

@@ -390,9 +390,13 @@ class Client:
         """
         return self._which(None)
 
-    def vehicles(self, *, only: Container[int] | None = None) -> tuple[VehicleStatus, ...]:
-        """Return the last known state of the server's rovers; ``only``: of these."""
-        return self._open.session.vehicles(only=only, now=self._now)
+    def vehicles(self) -> tuple[VehicleStatus, ...]:
+        """Return the last known state of the server's rovers."""
+        return self._open.session.vehicles(now=self._now)
+
+    def some_vehicles(self, ids: Container[int]) -> tuple[VehicleStatus, ...]:
+        """Return the last known state of the rovers with these ids."""
+        return self._open.session.vehicles(only=ids, now=self._now)
 
     async def texts(self) -> AsyncIterator[Text]:
         """Yield each STATUSTEXT of rovers and task servers from now on."""

@@ -65,9 +65,7 @@ class Field:
         if self.choices and value not in self.choices:
             words = ", ".join(self.choices)
             raise invalid(f"{self.name} {_shown(value)}: expected one of {words}")
-        size = (
-            value if self.type in ("number", "integer") else len(value) if _has_size(value) else 0
-        )
+        size = len(value) if isinstance(value, str | list) else value
         if self.least is not None and size < self.least:
             raise invalid(
                 f"{self.name} {_shown(value)}: expected at least {self.least:g}{self._of}"

@@ -49,7 +49,7 @@ class Guard:
     """The layer around an application.
 
     ``hosts`` are the values of Host that are accepted, in lower case. ``open_identity`` is that of
-    requests without a token; None: a token is required. ``tile_origins`` are the sites of map tiles.
+    requests without a token; None: a token is required. ``tile_origins`` are the sites of tiles.
     """
 
     def __init__(
@@ -88,10 +88,7 @@ class Guard:
         except Problem as problem:
             await problem.response()(scope, receive, guarded)
             return
-        try:
-            await self._app(scope, body, guarded)
-        except _TooLarge as error:
-            await error.problem.response()(scope, receive, guarded)
+        await self._app(scope, body, guarded)
 
     def _headers(self) -> list[tuple[bytes, bytes]]:
         if not self._tile_origins:
@@ -146,12 +143,6 @@ class Guard:
         return self._open_identity, None
 
 
-class _TooLarge(Exception):
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem.detail)
-        self.problem = problem
-
-
 def _headers_of(scope: Scope) -> dict[str, str]:
     """Return the headers of a request; raise Problem if one that decides comes twice."""
     headers: dict[str, str] = {}
@@ -183,7 +174,7 @@ def _check_length(headers: dict[str, str], *, most: int) -> None:
 
 
 def _limited(receive: Receive, *, most: int) -> Receive:
-    """Return ``receive`` for a body that is neither too large nor too slow."""
+    """Return ``receive`` for a body; it raises Problem if that is too large or too slow."""
     taken = 0
     is_whole = False
     loop = asyncio.get_running_loop()
@@ -197,13 +188,13 @@ def _limited(receive: Receive, *, most: int) -> Receive:
             async with asyncio.timeout_at(until):
                 message: dict[str, Any] = dict(await receive())
         except TimeoutError:
-            problem = Problem(408, "Too slow", f"the body took more than {BODY_WITHIN:g} s")
-            raise _TooLarge(problem) from None
+            words = f"the body took more than {BODY_WITHIN:g} s"
+            raise Problem(408, "Too slow", words) from None
         if message["type"] == "http.request":
             taken += len(message.get("body", b""))
             is_whole = not message.get("more_body", False)
             if taken > most:
-                raise _TooLarge(_too_large(most))
+                raise _too_large(most)
         return message
 
     return limited

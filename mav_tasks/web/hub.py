@@ -78,6 +78,11 @@ class Hub:
         """Forget a reader."""
         self._readers.discard(reader)
 
+    def end(self) -> None:
+        """End all streams."""
+        for reader in self._readers:
+            reader.close()
+
     def snapshot_frame(self) -> bytes:
         """Return the event that shows everything."""
         return self._frame(SNAPSHOT, self._snapshot(), number=self._number)

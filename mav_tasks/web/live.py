@@ -87,7 +87,9 @@ class Live:
                 goal=self._goal_of(each.id),
                 origin=self._origins.of(each),
             )
-            for each in self.client.vehicles(only=only)
+            for each in (
+                self.client.vehicles() if only is None else self.client.some_vehicles(only)
+            )
         ]
 
     def queue_form(self, queue: QueueStatus) -> dict[str, Any]:
@@ -210,7 +212,7 @@ class Live:
             self._flush = None
         changed, self._changed = self._changed, set()
         now = time.time()
-        for each in self.client.vehicles(only=changed):
+        for each in self.client.some_vehicles(changed):
             running = self._running.get(each.id)
             self.tracks.add(each, task=None if running is None else running.id, at=now)
         self.stops.on_vehicles()

@@ -1,4 +1,4 @@
-"""Logins of browsers: a random id in a cookie stands for a token. In memory: a restart ends them."""
+"""Logins of browsers: a random id in a cookie stands for a token. A restart ends them."""
 
 import secrets
 import time

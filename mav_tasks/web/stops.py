@@ -12,7 +12,7 @@ from mav_tasks.errors import NoAnswer, Refused
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
 KEPT = 50
-STANDS = 0.03  # m/s; below this a rover counts as standing
+STANDS = 0.1  # m/s; below this a rover counts as standing: measured speeds are noisy
 STANDS_WITHIN = 30.0  # s
 FRESH = 1.5  # s; an older position says nothing about now
 

@@ -155,7 +155,6 @@ def test_more_bits_of_a_nonce_make_another_plan() -> None:
             wire.check_check(wrong)
 
 
-
 def test_a_jump_goes_one_further_behind_a_home() -> None:
     jump = PlanItem(MavCmd.DO_JUMP, 2, (0.0, 3.0, 0.0, 0.0), 0, 0, 0.0, True)
     items = (*wire.items_of_goals([Move(1.0)]), *wire.items_of_file([jump]))

@@ -1,0 +1,54 @@
+"""Operations on what has happened: texts and the journal."""
+
+from typing import Any
+
+from mav_tasks.tasks.task import MAX_TASK_ID
+from mav_tasks.web.fields import Field
+from mav_tasks.web.operation import Call, Operation
+from mav_tasks.web.problems import not_found
+from mav_tasks.web.services import Services
+
+LIMIT = Field("limit", "integer", "at most so many, the latest", False, 1, 2000)
+
+
+def operations(services: Services) -> list[Operation]:
+    """Return the operations."""
+
+    async def texts(call: Call) -> Any:
+        limit = call.query["limit"] or 200
+        return {"texts": services.live.texts(before=call.query["before"], limit=limit)}
+
+    async def journal(call: Call) -> Any:
+        if services.journal is None:
+            raise not_found("the web process has no store: start it with --store")
+        entries = await services.entries(
+            task=call.query["task"],
+            vehicle=call.query["vehicle"],
+            after=call.query["after"] or 0,
+            limit=call.query["limit"] or 200,
+        )
+        return {"entries": entries, "next": entries[-1]["number"] if entries else None}
+
+    return [
+        Operation(
+            "GET",
+            "/texts",
+            "Texts of rovers and the server, while this process ran",
+            texts,
+            query=[Field("before", "integer", "number of a text; older ones", False, 1), LIMIT],
+            answer="Texts",
+        ),
+        Operation(
+            "GET",
+            "/journal",
+            "Events of the store, of the last day unless a task is named",
+            journal,
+            query=[
+                Field("task", "integer", "only of this task", False, 1, MAX_TASK_ID),
+                Field("vehicle", "integer", "only of this rover", False, 1, 255),
+                Field("after", "integer", "number of an event; later ones", False, 0),
+                LIMIT,
+            ],
+            answer="Entries",
+        ),
+    ]

@@ -1,0 +1,185 @@
+"""Operations on rovers: their state, STOP, pause, resume, queue, fence and rally points."""
+
+from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
+from mav_tasks.errors import NoSuchVehicle
+from mav_tasks.plan_files import PlanFile, parse_plan
+from mav_tasks.web.fields import Field
+from mav_tasks.web.goal_places import places_of_items
+from mav_tasks.web.operation import Call, Operation
+from mav_tasks.web.problems import invalid
+from mav_tasks.web.services import Services
+
+EPOCH = Field(
+    "epoch",
+    "integer",
+    "halt_epoch of the queue that you have seen: if anything has halted the rover since then, the"
+    " request is refused (stale)",
+    True,
+    0,
+)
+LIMIT = Field("limit", "integer", "at most so many tasks", False, 0, 10_000)
+PLACE = {
+    "type": "object",
+    "properties": {
+        "latitude": {"type": "number", "minimum": -90, "maximum": 90},
+        "longitude": {"type": "number", "minimum": -180, "maximum": 180},
+    },
+    "required": ["latitude", "longitude"],
+}
+FENCE = [
+    Field("name", "string", "name of the file", False, 0, 255),
+    Field("text", "string", "contents of a .plan file with a fence", False, 1),
+    Field("circle", "object", "stay inside: latitude and longitude (deg) and radius (m)"),
+    Field("polygon", "array", "stay inside: three or more places", False, 3, 500, items=PLACE),
+]
+RALLY = [
+    Field("name", "string", "name of the file", False, 0, 255),
+    Field("text", "string", "contents of a .plan file with rally points", True, 1),
+]
+
+
+def operations(services: Services) -> list[Operation]:
+    """Return the operations."""
+    client, live = services.client, services.live
+
+    def known(call: Call) -> int:
+        """Return the rover; raise NoSuchVehicle if the server does not have it."""
+        if not client.some_vehicles({call.vehicle}):
+            ids = ", ".join(str(each.id) for each in client.vehicles()) or "none"
+            raise NoSuchVehicle(f"no rover {call.vehicle}; the server has: {ids}")
+        return call.vehicle
+
+    async def vehicles(_call: Call) -> object:
+        return {"vehicles": live.vehicle_forms()}
+
+    async def vehicle(call: Call) -> object:
+        return live.vehicle_forms({known(call)})[0]
+
+    async def stop(call: Call) -> object:
+        rover = call.body["vehicle"]
+        clear = bool(call.body["clear"])
+        found = await live.stops.stop(rover, clear=clear, by=call.identity.name)
+        return found.form()
+
+    async def pause(call: Call) -> None:
+        await client.pause(vehicle=known(call))
+        live.hurry(call.vehicle)
+
+    async def resume(call: Call) -> None:
+        await client.resume(epoch=call.body["epoch"], vehicle=known(call))
+        live.hurry(call.vehicle)
+
+    async def clear(call: Call) -> None:
+        running_too = bool(call.body["running_too"])
+        await client.clear(running_too=running_too, vehicle=known(call))
+        live.hurry(call.vehicle)
+
+    async def queue(call: Call) -> object:
+        limit = call.query["limit"]
+        found = await client.queue(vehicle=known(call), limit=100 if limit is None else limit)
+        return live.queue_form(found)
+
+    async def history(call: Call) -> object:
+        limit = call.query["limit"]
+        tasks = await client.history(vehicle=known(call), limit=50 if limit is None else limit)
+        return {"tasks": [live.task_form(each) for each in tasks]}
+
+    async def track(call: Call) -> object:
+        return {"points": live.tracks.of_vehicle(known(call), since=call.query["since"] or 0.0)}
+
+    async def mission(call: Call) -> object:
+        items = await client.mission(vehicle=known(call))
+        return {"path": places_of_items(items)}
+
+    async def fence(call: Call) -> object:
+        return {"shapes": shapes_of(await client.fence_file(vehicle=known(call)))}
+
+    async def set_fence(call: Call) -> object:
+        plan = _fence_of(call)
+        return {"items": await client.set_fence(plan, vehicle=known(call))}
+
+    async def clear_fence(call: Call) -> None:
+        await client.set_fence(PlanFile((), None, (), ()), vehicle=known(call))
+
+    async def rally(call: Call) -> object:
+        items = await client.rally_points(vehicle=known(call))
+        places = [{"latitude": item.x / 1e7, "longitude": item.y / 1e7} for item in items]
+        return {"places": places}
+
+    async def set_rally(call: Call) -> object:
+        plan = parse_plan(call.body["text"])
+        return {"items": await client.set_rally_points(plan, vehicle=known(call))}
+
+    one = "/vehicles/{vehicle}"
+    return [
+        Operation("GET", "/vehicles", "All rovers", vehicles, answer="Vehicles"),
+        Operation("GET", one, "One rover", vehicle, answer="Vehicle"),
+        Operation(
+            "POST",
+            "/stop",
+            "Stop one rover or all at once; no task runs until you resume",
+            stop,
+            may="stop",
+            body=[
+                Field("vehicle", "integer", "the rover; all if not given", False, 1, 255),
+                Field("clear", "boolean", "also cancel the waiting tasks"),
+            ],
+            answer="Stop",
+        ),
+        Operation("POST", f"{one}/pause", "Pause a rover and its queue", pause, "pause", body=[]),
+        Operation(
+            "POST",
+            f"{one}/resume",
+            "Resume after a pause, a STOP or a takeover",
+            resume,
+            may="resume",
+            body=[EPOCH],
+        ),
+        Operation(
+            "POST",
+            f"{one}/clear",
+            "Cancel the waiting tasks",
+            clear,
+            may="clear",
+            body=[Field("running_too", "boolean", "also cancel the running task")],
+        ),
+        Operation("GET", f"{one}/queue", "The queue", queue, query=[LIMIT], answer="Queue"),
+        Operation(
+            "GET", f"{one}/history", "Finished tasks", history, query=[LIMIT], answer="Tasks"
+        ),
+        Operation(
+            "GET",
+            f"{one}/track",
+            "Where the rover has been while this process ran",
+            track,
+            query=[Field("since", "number", "seconds since 1970")],
+            answer="Track",
+        ),
+        Operation("GET", f"{one}/mission", "The staged mission", mission, answer="Path"),
+        Operation("GET", f"{one}/fence", "The fence", fence, answer="Fence"),
+        Operation(
+            "PUT", f"{one}/fence", "Set the fence", set_fence, "fence", body=FENCE, answer="Count"
+        ),
+        Operation("DELETE", f"{one}/fence", "Remove the fence", clear_fence, "fence"),
+        Operation("GET", f"{one}/rally", "The rally points", rally, answer="Places"),
+        Operation(
+            "PUT",
+            f"{one}/rally",
+            "Set the rally points",
+            set_rally,
+            may="fence",
+            body=RALLY,
+            answer="Count",
+        ),
+    ]
+
+
+def _fence_of(call: Call) -> PlanFile:
+    """Return the fence of a request. Raise Problem unless it has exactly one form of it."""
+    given = [name for name in ("text", "circle", "polygon") if call.body[name] is not None]
+    if len(given) != 1:
+        raise invalid("expected one of text, circle, polygon")
+    if given == ["text"]:
+        return parse_plan(call.body["text"])
+    value = call.body[given[0]]
+    return circle_of(value) if given == ["circle"] else polygon_of(value)

@@ -1,0 +1,100 @@
+"""Operations of the session: who am I, log in, log out; and the event stream."""
+
+from importlib.metadata import version
+
+from starlette.responses import Response, StreamingResponse
+
+from mav_tasks.client.goal_form import KINDS
+from mav_tasks.mavlink.label import MAX_LABEL
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
+from mav_tasks.web.fields import Field
+from mav_tasks.web.operation import Call, Operation
+from mav_tasks.web.problems import Problem
+from mav_tasks.web.services import Services
+from mav_tasks.web.sessions import COOKIE, LASTS
+
+MOST_STREAMS = 200
+TOKEN = Field(
+    "token", "string", "the token, as 'mav-tasks web tokens add' printed it", True, 1, 200
+)
+
+
+def operations(services: Services) -> list[Operation]:
+    """Return the operations."""
+
+    async def session(call: Call) -> object:
+        return {
+            "name": call.identity.name,
+            "role": call.identity.role,
+            "may": sorted(call.identity.may),
+            "version": version("mav-tasks"),
+            "server": services.server,
+            "instance": services.instance,
+            "tiles": None if services.tiles is None else services.tiles.form,
+            "journal": services.journal is not None and services.journal.is_readable(),
+            "records": False,
+            "goals": [
+                {
+                    "kind": kind.name,
+                    "meaning": kind.meaning,
+                    "numbers": [
+                        {
+                            "name": number.name,
+                            "unit": number.unit,
+                            "meaning": number.meaning,
+                            "required": number.is_required,
+                            "least": number.least,
+                            "most": number.most,
+                        }
+                        for number in kind.numbers
+                    ],
+                }
+                for kind in KINDS
+            ],
+            "priority": {"least": 0, "most": MAX_PRIORITY, "default": DEFAULT_PRIORITY},
+            "label_bytes": MAX_LABEL,
+        }
+
+    async def log_in(call: Call) -> Response:
+        token = services.tokens.of_text(call.body["token"])
+        if token is None:
+            raise Problem(401, "Unknown token", "there is no such token, or it was revoked")
+        response = Response(status_code=204)
+        number = services.sessions.begin(token)
+        response.set_cookie(
+            COOKIE, number, max_age=int(LASTS), httponly=True, samesite="strict", path="/"
+        )
+        return response
+
+    async def log_out(call: Call) -> Response:
+        if call.session is not None:
+            services.sessions.end(call.session)
+        response = Response(status_code=204)
+        response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
+        return response
+
+    async def events(call: Call) -> Response:
+        hub = services.live.hub
+        if hub.readers >= MOST_STREAMS:
+            words = f"{MOST_STREAMS} event streams are open already: close a page"
+            raise Problem(503, "Too many streams", words, headers={"retry-after": "5"})
+        reader = hub.open(call.headers.get("last-event-id"))
+        return StreamingResponse(
+            reader.frames(),
+            media_type="text/event-stream",
+            headers={"cache-control": "no-store", "x-accel-buffering": "no"},
+        )
+
+    return [
+        Operation("GET", "/session", "Who you are, and what you may do", session, answer="Session"),
+        Operation("POST", "/session", "Log in with a token", log_in, body=[TOKEN]),
+        Operation("DELETE", "/session", "Log out", log_out),
+        Operation(
+            "GET",
+            "/events",
+            "Changes of rovers, queues, tasks and texts, as server-sent events",
+            events,
+            answer="Events",
+            headers=[Field("Last-Event-ID", "string", "id of the last event that you got")],
+        ),
+    ]

@@ -1,0 +1,193 @@
+"""Operations on tasks: submit, show, change, cancel, release."""
+
+from typing import Any
+
+from mav_tasks.client.json_form import timing_json
+from mav_tasks.client.plan_sources import Plan
+from mav_tasks.client.values import TaskStatus
+from mav_tasks.errors import NoSuchVehicle
+from mav_tasks.plan_files import parse_plan
+from mav_tasks.tasks.task import DEFAULT_PRIORITY
+from mav_tasks.web.fields import Field
+from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
+from mav_tasks.web.operation import Call, Operation
+from mav_tasks.web.plan_preview import preview_of
+from mav_tasks.web.problems import not_found
+from mav_tasks.web.services import Services
+from mav_tasks.web.submissions import (
+    AFTER,
+    AT,
+    DEADLINE,
+    DELAY,
+    GOALS,
+    KEY,
+    LABEL,
+    PRIORITY,
+    TERMS,
+    goals_of,
+    moment_of,
+    submit,
+)
+
+assert DEFAULT_PRIORITY == 5, "the API's document says so"
+
+FILE = (
+    Field("name", "string", "name of the file", False, 0, 255),
+    Field("text", "string", "contents of a .plan or QGC WPL 110 file", True, 1),
+)
+KEYED = (Field(KEY, "string", "a text of yours: the same key makes no second task", False, 1, 200),)
+CHANGES = (
+    PRIORITY,
+    AFTER,
+    DELAY,
+    AT,
+    DEADLINE,
+    LABEL,
+    Field("preemptible", "boolean", "other tasks may interrupt it"),
+    Field("preemptive", "boolean", "it may interrupt other tasks"),
+)
+RELEASE = (
+    Field(
+        "how",
+        "string",
+        "again restarts the task here, remainder finishes it, skip drops it",
+        True,
+        choices=("again", "remainder", "skip"),
+    ),
+    Field("epoch", "integer", "halt_epoch that you have seen", True, 0),
+)
+
+
+def operations(services: Services) -> list[Operation]:
+    """Return the operations."""
+    client, live = services.client, services.live
+
+    async def add(call: Call, plan: Plan, places: list[Place]) -> Any:
+        task = await submit(
+            client,
+            plan,
+            vehicle=call.vehicle,
+            terms=call.body,
+            headers=call.headers,
+            by=call.identity.name,
+        )
+        services.own(task.id, call.identity)
+        if places:
+            live.remember_places(task.id, places)
+        live.hurry(call.vehicle)
+        return live.task_form(await task.refresh())
+
+    async def submit_task(call: Call) -> Any:
+        goals = goals_of(call.body["goals"])
+        return await add(call, goals, places_of_goals(goals))
+
+    async def submit_mission(call: Call) -> Any:
+        plan = parse_plan(call.body["text"])
+        return await add(call, plan, places_of_items(plan.items))
+
+    async def preview(call: Call) -> Any:
+        return preview_of(parse_plan(call.body["text"]))
+
+    async def status_of(call: Call) -> TaskStatus:
+        """Return a task's status: any rover's server knows the tasks of all."""
+        rovers = client.vehicles()
+        if not rovers:
+            raise NoSuchVehicle("the server has no rover")
+        return await client.status(call.task, vehicle=rovers[0].id)
+
+    async def task(call: Call) -> Any:
+        return live.task_form(await status_of(call))
+
+    async def timing(call: Call) -> Any:
+        status = await status_of(call)
+        return timing_json(await client.timing(status.id, vehicle=status.vehicle))
+
+    async def track(call: Call) -> Any:
+        return {"points": live.tracks.of_task(call.task)}
+
+    async def modify(call: Call) -> Any:
+        services.check_may("modify", call.task, call.identity)
+        status = await status_of(call)
+        changes = dict(call.body) | {"at": moment_of(call.body["at"])}
+        await client.modify(status.id, vehicle=status.vehicle, **changes)
+        live.hurry(status.vehicle)
+        return live.task_form(await client.status(status.id, vehicle=status.vehicle))
+
+    async def cancel(call: Call) -> None:
+        services.check_may("cancel", call.task, call.identity)
+        status = await status_of(call)
+        ended = client.kill if call.body["kill"] else client.cancel
+        await ended(status.id, vehicle=status.vehicle)
+        live.hurry(status.vehicle)
+
+    async def release(call: Call) -> None:
+        services.check_may("release", call.task, call.identity)
+        status = await status_of(call)
+        epoch, how = call.body["epoch"], call.body["how"]
+        await client.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
+        live.hurry(status.vehicle)
+
+    async def journal(call: Call) -> Any:
+        if services.journal is None:
+            raise not_found("the web process has no store: start it with --store")
+        return {"entries": await services.entries(task=call.task, limit=1000)}
+
+    one, rover = "/tasks/{task}", "/vehicles/{vehicle}"
+    return [
+        Operation(
+            "POST",
+            f"{rover}/tasks",
+            "Submit goals as one task; answered once the task is durable",
+            submit_task,
+            may="submit",
+            body=[GOALS, *TERMS],
+            answer="Task",
+            status=201,
+            headers=KEYED,
+        ),
+        Operation(
+            "POST",
+            f"{rover}/missions",
+            "Submit a mission file as one task",
+            submit_mission,
+            may="mission",
+            body=[*FILE, *TERMS],
+            answer="Task",
+            status=201,
+            headers=KEYED,
+        ),
+        Operation(
+            "POST",
+            "/plans",
+            "Read a mission file and show its path; nothing is sent to a rover",
+            preview,
+            body=FILE,
+            answer="Plan",
+        ),
+        Operation("GET", one, "One task", task, answer="Task"),
+        Operation(
+            "GET",
+            f"{one}/timing",
+            "How evenly the setpoints of a task left",
+            timing,
+            answer="Timing",
+        ),
+        Operation(
+            "GET",
+            f"{one}/track",
+            "Where the rover drove the task, while this process ran",
+            track,
+            answer="Track",
+        ),
+        Operation("GET", f"{one}/journal", "What happened to a task", journal, answer="Entries"),
+        Operation("PATCH", one, "Change a task", modify, "own", body=CHANGES, answer="Task"),
+        Operation(
+            "POST",
+            f"{one}/cancel",
+            "Cancel a task",
+            cancel,
+            may="own",
+            body=[Field("kill", "boolean", "put the rover into HOLD at once")],
+        ),
+        Operation("POST", f"{one}/release", "Release a held task", release, "own", body=RELEASE),
+    ]

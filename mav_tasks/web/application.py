@@ -1,0 +1,71 @@
+"""The web application: the API's operations and the page, inside the guard."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from mav_tasks.web import api_past, api_rovers, api_session, api_tasks, pages
+from mav_tasks.web.guard import Guard
+from mav_tasks.web.identity import Identity
+from mav_tasks.web.openapi import document_of
+from mav_tasks.web.operation import ROOT, Operation
+from mav_tasks.web.problems import Problem
+from mav_tasks.web.services import Services
+
+
+def operations_of(services: Services) -> list[Operation]:
+    """Return all operations of the API."""
+    parts = (api_session, api_rovers, api_tasks, api_past)
+    return [operation for part in parts for operation in part.operations(services)]
+
+
+def application(
+    services: Services, *, hosts: Iterable[str], open_identity: Identity | None
+) -> ASGIApp:
+    """Return the application. ``hosts`` and ``open_identity`` as in Guard."""
+    operations = operations_of(services)
+    document = document_of(operations)
+
+    async def openapi(_request: Request) -> Response:
+        return JSONResponse(document)
+
+    app = Starlette(
+        routes=[
+            *(_route(operation) for operation in operations),
+            Route(f"{ROOT}/openapi.json", openapi),
+            *pages.routes(services.tiles),
+        ],
+        exception_handlers={HTTPException: _failed, Problem: _failed, 500: _broken},
+    )
+    return Guard(
+        app,
+        hosts=hosts,
+        tokens=services.tokens,
+        sessions=services.sessions,
+        open_identity=open_identity,
+        tile_origins=() if services.tiles is None else services.tiles.origins,
+    )
+
+
+def _route(operation: Operation) -> Route:
+    path = operation.path.replace("{vehicle}", "{vehicle:int}").replace("{task}", "{task:int}")
+    return Route(f"{ROOT}{path}", operation.run, methods=[operation.method])
+
+
+async def _failed(_request: Request, error: Any) -> Response:
+    if isinstance(error, Problem):
+        return error.response()
+    words = {404: "there is nothing at this address", 405: "this address does not take that method"}
+    detail = words.get(error.status_code, str(error.detail))
+    headers = dict(error.headers or {})
+    return Problem(error.status_code, str(error.detail), detail, headers=headers).response()
+
+
+async def _broken(_request: Request, _error: Exception) -> Response:
+    return Problem(500, "Internal error", "a fault of the web process: see its log").response()

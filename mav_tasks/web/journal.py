@@ -1,0 +1,57 @@
+"""The journal of a store on this machine, for the page: what happened to a task, and its places."""
+
+import time
+from collections import deque
+from contextlib import closing
+from typing import Any
+
+from mav_tasks.errors import StoreError
+from mav_tasks.logs.rendering import event_values
+from mav_tasks.store.base import Which
+from mav_tasks.store.opening import kind_of
+from mav_tasks.tasks.events import TaskSubmitted
+from mav_tasks.tasks.goal import Goal
+
+DAY = 24 * 3600.0
+
+
+class Journal:
+    """Reads a store's journal. Methods block: call them in a thread. They raise StoreError."""
+
+    def __init__(self, place: str) -> None:
+        self._place = place
+
+    def __repr__(self) -> str:
+        return f"Journal({self._place})"
+
+    def is_readable(self) -> bool:
+        """Return whether there is a store that can be read."""
+        try:
+            with closing(kind_of(self._place).open_journal(self._place, Which(task=0))):
+                return True
+        except StoreError:
+            return False
+
+    def entries(
+        self, *, task: int | None, vehicle: int | None, after: int, limit: int
+    ) -> list[dict[str, Any]]:
+        """Return the latest events after a number, the oldest first; without a task: of a day."""
+        since = None if task is not None else time.time() - DAY
+        which = Which(task=task, vehicle=vehicle, since=since)
+        with closing(kind_of(self._place).open_journal(self._place, which)) as reader:
+            found = deque(
+                ((number, event) for number, event in reader.take(offset=0.0) if number > after),
+                maxlen=limit,
+            )
+        return [
+            {"number": number, "at": round(event.at, 3)} | event_values(event, offset=0.0)
+            for number, event in found
+        ]
+
+    def goal_of(self, task: int) -> Goal | None:
+        """Return the goal of a task; None if the journal does not have it."""
+        with closing(kind_of(self._place).open_journal(self._place, Which(task=task))) as reader:
+            for _, event in reader.take(offset=0.0):
+                if isinstance(event, TaskSubmitted):
+                    return event.task.goal
+        return None

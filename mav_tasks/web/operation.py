@@ -1,0 +1,115 @@
+"""An operation of the API: declared once, for its route, its checks and the OpenAPI document."""
+
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from mav_tasks.errors import MavTasksError
+from mav_tasks.web.fields import Field, read_body
+from mav_tasks.web.identity import Identity
+from mav_tasks.web.problems import Problem, invalid, problem_of
+
+ROOT = "/api/v1"
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A request that has passed all checks. ``body`` has all declared parts."""
+
+    identity: Identity
+    session: str | None
+    path: Mapping[str, int | str]
+    query: Mapping[str, Any]
+    body: Mapping[str, Any]
+    headers: Mapping[str, str]
+
+    @property
+    def vehicle(self) -> int:
+        """The rover that the path names."""
+        return int(self.path["vehicle"])
+
+    @property
+    def task(self) -> int:
+        """The task that the path names."""
+        return int(self.path["task"])
+
+
+#: returns a JSON value, a Response, or None for an answer without contents
+Handler = Callable[[Call], Awaitable[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """``path`` is below ROOT; "{vehicle}" and "{task}" in it are numbers.
+
+    ``may``: what the role must permit; "": anybody; "own": the handler checks. ``body``: None: the
+    request has none. ``answer``: the name of the answer's schema; "": no contents.
+    """
+
+    method: str
+    path: str
+    summary: str
+    handler: Handler
+    may: str = ""
+    query: Sequence[Field] = ()
+    body: Sequence[Field] | None = None
+    answer: str = ""
+    status: int = 200
+    headers: Sequence[Field] = ()
+
+    async def run(self, request: Request) -> Response:
+        """Answer a request."""
+        try:
+            result = await self.handler(await self._call(request))
+        except (MavTasksError, ValueError) as error:
+            return problem_of(error).response()
+        if isinstance(result, Response):
+            return result
+        if result is None:
+            return Response(status_code=204)
+        return JSONResponse(result, status_code=self.status, headers={"cache-control": "no-store"})
+
+    async def _call(self, request: Request) -> Call:
+        identity = request.state.identity
+        if identity is None:  # only to log in
+            identity = Identity("nobody", "observer")
+        if self.may and self.may != "own" and self.may not in identity.may:
+            words = f"{identity.name} has the role {identity.role}, which may not {self.may}"
+            raise Problem(403, "Not allowed", words, reason="not_allowed")
+        body: Mapping[str, Any] = {}
+        if self.body is not None:
+            body = read_body(self.body, await _json_of(request))
+        return Call(
+            identity,
+            request.state.session,
+            request.path_params,
+            {field.name: _queried(field, request.query_params) for field in self.query},
+            body,
+            request.headers,
+        )
+
+
+async def _json_of(request: Request) -> object:
+    data = await request.body()
+    if not data:
+        return {}
+    try:
+        return await request.json()
+    except (ValueError, RecursionError) as error:
+        raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
+
+
+def _queried(field: Field, query: Mapping[str, str]) -> Any:
+    text = query.get(field.name)
+    if text is None:
+        return None
+    if field.type == "string":
+        return field.read({field.name: text})
+    try:
+        value: float = int(text) if field.type == "integer" else float(text)
+    except ValueError:
+        raise invalid(f"{field.name} {text[:40]!r}: expected a number") from None
+    return field.read({field.name: value})

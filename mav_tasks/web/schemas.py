@@ -1,0 +1,288 @@
+"""The JSON schemas of the API's answers, as ``forms`` and the handlers make them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+
+Schema = dict[str, Any]
+
+NUMBER: Schema = {"type": "number"}
+INTEGER: Schema = {"type": "integer"}
+TEXT: Schema = {"type": "string"}
+FLAG: Schema = {"type": "boolean"}
+REASON: Schema = {"type": "string", "enum": [reason.name.lower() for reason in TaskReason]}
+
+
+def ref(name: str) -> Schema:
+    """Return a reference to a schema of this document."""
+    return {"$ref": f"#/components/schemas/{name}"}
+
+
+def or_null(schema: Schema, meaning: str = "") -> Schema:
+    """Return the schema of a value that may be unknown."""
+    if "$ref" in schema:
+        return {"anyOf": [schema, {"type": "null"}]} | ({"description": meaning} if meaning else {})
+    found = dict(schema) | {"type": [schema["type"], "null"]}
+    if "enum" in schema:
+        found["enum"] = [*schema["enum"], None]
+    return said(found, meaning)
+
+
+def said(schema: Schema, meaning: str) -> Schema:
+    """Return a schema with its meaning."""
+    return schema | ({"description": meaning} if meaning else {})
+
+
+def listed(schema: Schema) -> Schema:
+    """Return the schema of a list."""
+    return {"type": "array", "items": schema}
+
+
+def whole(parts: Mapping[str, Schema], *, optional: tuple[str, ...] = ()) -> Schema:
+    """Return the schema of an object with exactly these parts."""
+    required = [name for name in parts if name not in optional]
+    return {
+        "type": "object",
+        "properties": dict(parts),
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+MAYBE = or_null(NUMBER)
+PLACE = whole(
+    {
+        "north": said(NUMBER, "m north of the rover's local origin"),
+        "east": said(NUMBER, "m east of it"),
+        "latitude": said(NUMBER, "deg"),
+        "longitude": said(NUMBER, "deg"),
+    },
+    optional=("north", "east", "latitude", "longitude"),
+)
+
+VEHICLE = whole(
+    {
+        "vehicle": said(INTEGER, "system id of the rover"),
+        "kind": said(TEXT, "ardupilot, px4, other or unknown"),
+        "mode": TEXT,
+        "armed": or_null(FLAG),
+        "heard": said(FLAG, "its heartbeats arrive"),
+        "heartbeat_age": or_null(NUMBER, "s"),
+        "data_age": or_null(NUMBER, "s since its position arrived"),
+        "north": MAYBE,
+        "east": MAYBE,
+        "heading": or_null(NUMBER, "deg clockwise from north"),
+        "speed": or_null(NUMBER, "m/s"),
+        "latitude": MAYBE,
+        "longitude": MAYBE,
+        "battery": or_null(ref("Battery")),
+        "ready": or_null(FLAG, "its checks before arming pass"),
+        "prearm": said(listed(TEXT), "what those checks reported lately"),
+        "control": said(
+            {"type": "string", "enum": ["tasks", "paused", "taken over", "stopped", "silent"]},
+            "who or what controls it",
+        ),
+        "control_words": TEXT,
+        "goal": or_null(ref("Place")),
+        "origin": or_null(ref("Place"), "origin of its local frame"),
+        "server_component": INTEGER,
+    }
+)
+TASK = whole(
+    {
+        "id": INTEGER,
+        "vehicle": INTEGER,
+        "what": TEXT,
+        "label": or_null(TEXT),
+        "command": INTEGER,
+        "state": {"type": "string", "enum": [state.name.lower() for state in TaskState]},
+        "reason": or_null(REASON),
+        "why": or_null(TEXT, "why it is in its state, in words"),
+        "remedy": or_null(ref("Remedy"), "what a person can do about it"),
+        "priority": INTEGER,
+        "after": or_null(INTEGER),
+        "position": or_null(INTEGER, "number of tasks that run before it"),
+        "progress": or_null(NUMBER, "0 to 1"),
+        "left": MAYBE,
+        "left_unit": or_null(TEXT),
+        "item": INTEGER,
+        "items": INTEGER,
+        "time_to_start": or_null(NUMBER, "s"),
+        "time_to_finish": or_null(NUMBER, "s"),
+        "execution_time": or_null(NUMBER, "s"),
+        "nonce": or_null(INTEGER),
+        "submitter": said(TEXT, "system and component id of who submitted it"),
+        "version": INTEGER,
+        "halt_epoch": INTEGER,
+        "ended_ago": or_null(NUMBER, "s"),
+        "ended_at": or_null(TEXT, "ISO 8601"),
+        "goals": {
+            "anyOf": [listed(ref("Place")), {"type": "null"}],
+            "description": "places that it drives to; null: not known",
+        },
+    }
+)
+QUEUE = whole(
+    {
+        "vehicle": INTEGER,
+        "running": or_null(INTEGER),
+        "next": or_null(INTEGER),
+        "paused": or_null(REASON),
+        "paused_words": or_null(TEXT),
+        "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
+        "heartbeat_age": MAYBE,
+        "waiting_count": INTEGER,
+        "capacity": INTEGER,
+        "counts": {"type": "object", "additionalProperties": INTEGER},
+        "current": or_null(ref("Task")),
+        "waiting": said(listed(ref("Task")), "in the order in which they run"),
+        "more": said(INTEGER, "waiting tasks that are not listed"),
+    }
+)
+SHAPE = whole(
+    {
+        "kind": {"type": "string", "enum": ["polygon", "circle"]},
+        "inclusion": FLAG,
+        "points": listed(ref("Place")),
+        "centre": ref("Place"),
+        "radius": said(NUMBER, "m"),
+    },
+    optional=("points", "centre", "radius"),
+)
+STOP = whole(
+    {
+        "number": INTEGER,
+        "at": said(NUMBER, "seconds since 1970"),
+        "vehicle": or_null(INTEGER, "null: all rovers"),
+        "by": TEXT,
+        "phase": {
+            "type": "string",
+            "enum": ["sent", "acknowledged", "standing", "refused", "unanswered"],
+        },
+        "acknowledged_after": or_null(NUMBER, "s"),
+        "standing_after": or_null(NUMBER, "s"),
+        "detail": or_null(TEXT),
+        "tasks": said(listed(INTEGER), "ids of the tasks that it ended"),
+    }
+)
+TEXT_FORM = whole(
+    {
+        "number": INTEGER,
+        "at": said(NUMBER, "seconds since 1970"),
+        "vehicle": INTEGER,
+        "component": INTEGER,
+        "severity": said(INTEGER, "0 (emergency) to 7 (debug)"),
+        "words": TEXT,
+    }
+)
+POINT: Schema = {
+    "type": "array",
+    "description": "seconds since 1970, north and east (m), heading (deg), task id",
+    "items": or_null(NUMBER),
+    "minItems": 5,
+    "maxItems": 5,
+}
+KIND = whole(
+    {
+        "kind": TEXT,
+        "meaning": TEXT,
+        "numbers": listed(
+            whole(
+                {
+                    "name": TEXT,
+                    "unit": TEXT,
+                    "meaning": TEXT,
+                    "required": FLAG,
+                    "least": MAYBE,
+                    "most": MAYBE,
+                }
+            )
+        ),
+    }
+)
+
+SCHEMAS: dict[str, Schema] = {
+    "Place": PLACE,
+    "Battery": whole({"percent": or_null(INTEGER), "voltage": or_null(NUMBER, "V")}),
+    "Remedy": whole(
+        {
+            "action": {"type": "string", "enum": ["resume", "release", "none"]},
+            "words": TEXT,
+        }
+    ),
+    "Vehicle": VEHICLE,
+    "Vehicles": whole({"vehicles": listed(ref("Vehicle"))}),
+    "Task": TASK,
+    "Tasks": whole({"tasks": listed(ref("Task"))}),
+    "Queue": QUEUE,
+    "Stop": STOP,
+    "Text": TEXT_FORM,
+    "Texts": whole({"texts": listed(ref("Text"))}),
+    "Track": whole({"points": listed(POINT)}),
+    "Path": whole({"path": listed(ref("Place"))}),
+    "Places": whole({"places": listed(ref("Place"))}),
+    "Shape": SHAPE,
+    "Fence": whole({"shapes": listed(ref("Shape"))}),
+    "Count": whole({"items": INTEGER}),
+    "Plan": whole(
+        {
+            "items": INTEGER,
+            "path": listed(ref("Place")),
+            "length": or_null(NUMBER, "m"),
+            "fence": listed(ref("Shape")),
+            "rally": listed(ref("Place")),
+        }
+    ),
+    "Timing": whole(
+        {
+            "rate": said(NUMBER, "Hz"),
+            "count": INTEGER,
+            "p50": or_null(NUMBER, "s"),
+            "p99": or_null(NUMBER, "s"),
+            "max": or_null(NUMBER, "s"),
+            "late": INTEGER,
+        }
+    ),
+    "Entries": {
+        "type": "object",
+        "properties": {
+            "entries": listed(
+                {
+                    "type": "object",
+                    "properties": {"number": INTEGER, "at": NUMBER, "message": TEXT},
+                    "required": ["number", "at", "message"],
+                }
+            ),
+            "next": or_null(INTEGER),
+        },
+        "required": ["entries"],
+    },
+    "Session": whole(
+        {
+            "name": TEXT,
+            "role": TEXT,
+            "may": listed(TEXT),
+            "version": TEXT,
+            "server": TEXT,
+            "instance": said(TEXT, "new with each start of the web process"),
+            "tiles": or_null(ref("Tiles")),
+            "journal": FLAG,
+            "records": FLAG,
+            "goals": listed(ref("Kind")),
+            "priority": whole({"least": INTEGER, "most": INTEGER, "default": INTEGER}),
+            "label_bytes": INTEGER,
+        }
+    ),
+    "Tiles": whole({"url": TEXT, "attribution": TEXT, "min_zoom": INTEGER, "max_zoom": INTEGER}),
+    "Kind": KIND,
+    "Problem": whole(
+        {
+            "type": TEXT,
+            "title": TEXT,
+            "status": INTEGER,
+            "detail": TEXT,
+            "reason": or_null(TEXT),
+        }
+    ),
+}

@@ -1,0 +1,164 @@
+"""Runs the web process: the client, its live view and the HTTP server on one event loop."""
+
+import asyncio
+import logging
+import resource
+import secrets
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from ipaddress import ip_address
+
+import uvicorn
+
+from mav_tasks.client.aio import Client
+from mav_tasks.errors import UsageError
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.web.application import application
+from mav_tasks.web.connections import PatientProtocol
+from mav_tasks.web.identity import Identity
+from mav_tasks.web.journal import Journal
+from mav_tasks.web.live import Live
+from mav_tasks.web.services import Services
+from mav_tasks.web.sessions import Sessions
+from mav_tasks.web.tiles import Tiles
+from mav_tasks.web.tokens import Tokens
+
+#: not the address of a script, nor of a ground station
+PAGE = Address(243, 190)
+TELEMETRY = 10  # Hz
+GRACE = 1  # s for open requests at the end
+FILES = 4096  # descriptors
+
+
+@dataclass(frozen=True, slots=True)
+class WebOptions:
+    """How to run. ``role`` is that of requests without a token, "" if they need one."""
+
+    server: str
+    host: str
+    port: int
+    names: tuple[str, ...]
+    role: str
+    tokens: Tokens
+    key: Key | None
+    journal: Journal | None
+    tiles: Tiles | None
+
+
+def listening(options: WebOptions) -> socket.socket:
+    """Return the bound socket. Raise UsageError if the address cannot be used."""
+    family = socket.AF_INET6 if ":" in options.host else socket.AF_INET
+    bound = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind((options.host, options.port))
+    except OSError as error:
+        bound.close()
+        where = f"{options.host}:{options.port}"
+        raise UsageError(f"--listen {where}: {error.strerror or error}") from error
+    return bound
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine reaches an address. Raise UsageError if it is none."""
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        raise UsageError(f"--listen {host}: expected an IP address and a port") from None
+
+
+def run(options: WebOptions, bound: socket.socket, *, started: Callable[[str], None]) -> None:
+    """Serve until SIGINT or SIGTERM. ``started`` gets the page's address."""
+    asyncio.run(_run(options, bound, started))
+
+
+async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str], None]) -> None:
+    _allow_files()
+    port = bound.getsockname()[1]
+    instance = secrets.token_hex(4)
+    client = Client(
+        options.server,
+        system_id=PAGE.system_id,
+        component_id=PAGE.component_id,
+        key=options.key,
+        telemetry_rate=TELEMETRY,
+    )
+    client.open()
+    try:
+        live = Live(client, instance, server=options.server)
+        services = Services(
+            client,
+            live,
+            options.tokens,
+            Sessions(options.tokens),
+            instance,
+            options.server,
+            options.journal,
+            options.tiles,
+        )
+        identity = Identity("local", options.role) if options.role else None
+        app = application(services, hosts=_hosts(options, port), open_identity=identity)
+        server = _Server(app, live)
+        async with asyncio.TaskGroup() as group:
+            viewing = group.create_task(live.run())
+            group.create_task(server.until_ended([bound], viewing))
+            started(f"http://{_shown(options.host)}:{port}/")
+    finally:
+        await client.close()
+
+
+class _Server(uvicorn.Server):
+    def __init__(self, app: object, live: Live) -> None:
+        super().__init__(
+            uvicorn.Config(
+                app,  # type: ignore[arg-type]
+                http=PatientProtocol,
+                ws="none",
+                lifespan="off",
+                log_config=None,
+                log_level=logging.WARNING,
+                access_log=False,
+                server_header=False,
+                proxy_headers=False,
+                timeout_keep_alive=30,
+                timeout_graceful_shutdown=GRACE,
+                h11_max_incomplete_event_size=64 * 1024,
+            )
+        )
+        self._live = live
+
+    async def until_ended(self, sockets: list[socket.socket], viewing: asyncio.Task[None]) -> None:
+        """Serve; then end the view."""
+        try:
+            await self.serve(sockets=sockets)
+        finally:
+            viewing.cancel()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End the event streams, which would never end by themselves, and then the rest."""
+        self._live.hub.end()
+        await super().shutdown(sockets)
+
+
+def _hosts(options: WebOptions, port: int) -> set[str]:
+    """Return the values of Host by which the page can be asked for."""
+    names = {options.host.lower(), *(name.lower() for name in options.names)}
+    if is_loopback(options.host) or options.host in ("0.0.0.0", "::"):
+        names |= {"localhost", "127.0.0.1", "::1"}
+    shown = {_shown(name) for name in names}
+    return {f"{name}:{port}" for name in shown} | (shown if port == 80 else set())
+
+
+def _shown(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+def _allow_files() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, min(hard, FILES)), hard))

@@ -1,0 +1,98 @@
+"""Submits tasks for the API: each idempotency key once, however often the request is repeated.
+
+A task is sent as a plan, also a single goal: the server compares all of a plan with an earlier one
+of the same key.
+"""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+from mav_tasks.client.aio import Client
+from mav_tasks.client.goal_form import goal_of, goal_schema
+from mav_tasks.client.handle import Task
+from mav_tasks.client.idempotency import LONGEST, numbers_of
+from mav_tasks.client.plan_sources import Plan
+from mav_tasks.client.wire import Goal
+from mav_tasks.errors import Refused
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID
+from mav_tasks.web.fields import Field
+from mav_tasks.web.problems import Problem, invalid
+
+KEY = "idempotency-key"
+LONGEST_WAIT = 366 * 24 * 3600.0  # s
+
+PRIORITY = Field("priority", "integer", "0 to 10, 10 runs first; 5 if not given", False, 0, 10)
+AFTER = Field("after", "integer", "id of a task that must complete first", False, 1, MAX_TASK_ID)
+DELAY = Field("delay", "number", "start no earlier than in so many seconds", False, 0, LONGEST_WAIT)
+AT = Field("at", "string", "start time, ISO 8601 with a time zone", False, 1, 40)
+DEADLINE = Field(
+    "deadline",
+    "number",
+    "the task expires if it has not started in so many s",
+    False,
+    0,
+    LONGEST_WAIT,
+)
+LABEL = Field("label", "string", "name of the task, at most 24 bytes of UTF-8", False, 0, 24)
+TERMS = (PRIORITY, AFTER, DELAY, AT, DEADLINE, LABEL)
+GOALS = Field(
+    "goals", "array", "what to do, in this order, as one task", True, 1, 200, items=goal_schema()
+)
+assert PRIORITY.most == MAX_PRIORITY
+
+
+def goals_of(values: Sequence[Any]) -> list[Goal]:
+    """Return the goals of a request. Raise ValueError, with the part's name, if one is invalid."""
+    return [goal_of(value, f"goals[{at}]") for at, value in enumerate(values)]
+
+
+def moment_of(text: str | None) -> datetime | None:
+    """Return a time with its zone. Raise Problem if it is invalid."""
+    if text is None:
+        return None
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        raise invalid(f"at {text!r}: expected a time such as 2026-11-20T14:30:00Z") from None
+    if moment.tzinfo is None:
+        raise invalid(f"at {text!r}: expected a time zone, such as Z or +01:00")
+    return moment
+
+
+async def submit(
+    client: Client,
+    plan: Plan,
+    *,
+    vehicle: int,
+    terms: Mapping[str, Any],
+    headers: Mapping[str, str],
+    by: str,
+) -> Task:
+    """Submit a task. Return it once it is durable. Raise Problem for a key of another task."""
+    key = headers.get(KEY)
+    label = terms["label"] or ""
+    numbers: dict[str, int] = {}
+    if key is not None:
+        if not 0 < len(key) <= LONGEST:
+            raise invalid(f"Idempotency-Key: expected 1 to {LONGEST} characters")
+        numbers = numbers_of(f"{by} {key}", label=label)._asdict()
+    try:
+        return await client.submit_mission(
+            plan,
+            vehicle=vehicle,
+            priority=DEFAULT_PRIORITY if terms["priority"] is None else terms["priority"],
+            after=terms["after"] or 0,
+            delay=terms["delay"] or 0.0,
+            at=moment_of(terms["at"]),
+            deadline=terms["deadline"] or 0.0,
+            label=label,
+            **numbers,
+        )
+    except Refused as error:
+        is_reused = bool(numbers) and error.reason in (0, TaskReason.NONCE_REUSED)
+        if not is_reused or f"nonce {numbers['nonce']} " not in str(error):
+            raise
+        words = "this Idempotency-Key was used for another task: repeat that, or use a new key"
+        raise Problem(409, "Key was used", words, reason="nonce_reused") from error
