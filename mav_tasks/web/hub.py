@@ -8,7 +8,7 @@ A reader that is slower still gets a new snapshot. No reader can hold up another
 import asyncio
 import json
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from typing import Any
 
 KEPT = 2000  # events for readers that reconnect
@@ -68,9 +68,7 @@ class Hub:
         if missed is None:
             reader.is_behind = True
         else:
-            for frame in missed:
-                reader.put(frame)
-            reader.are_vehicles_behind = True
+            reader.catch_up(missed)
         self._readers.add(reader)
         return reader
 
@@ -118,6 +116,11 @@ class Reader:
         self.is_behind = False
         self.are_vehicles_behind = False
         self._is_closed = False
+
+    def catch_up(self, missed: Iterable[bytes]) -> None:
+        """Begin with the events that a reader missed, and the latest of all rovers."""
+        self._unread.extend(missed)
+        self.are_vehicles_behind = True
 
     def put(self, frame: bytes) -> None:
         """Add an event; too many unread ones are replaced by a snapshot."""

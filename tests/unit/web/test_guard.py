@@ -1,0 +1,225 @@
+"""Which requests reach the API: attacks by web pages, tokens, limits. No sockets."""
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from mav_tasks.web import tokens
+from mav_tasks.web.guard import PLAN_BODY, SMALL_BODY, Guard
+from mav_tasks.web.identity import Identity
+from mav_tasks.web.problems import Problem
+from mav_tasks.web.sessions import COOKIE, Sessions
+from mav_tasks.web.tokens import Tokens
+from tests.kit.awaited import awaited
+
+HOST = "127.0.0.1:8560"
+JSON = {"content-type": "application/json"}
+LOCAL = Identity("local", "operator")
+
+
+class Rig:
+    """A guard around an application that says who asked and how long the body was."""
+
+    def __init__(self, folder: Path, *, open_identity: Identity | None = LOCAL) -> None:
+        self.path = folder / "tokens.json"
+        self.tokens = Tokens(self.path)
+        self.sessions = Sessions(self.tokens)
+        app = Starlette(
+            routes=[
+                Route("/api/v1/{rest:path}", _said, methods=["GET", "POST", "PUT", "PATCH"]),
+                Route("/", _said),
+            ],
+            exception_handlers={Problem: _problem},
+        )
+        guard = Guard(
+            app,
+            hosts={HOST},
+            tokens=self.tokens,
+            sessions=self.sessions,
+            open_identity=open_identity,
+        )
+        transport = httpx.ASGITransport(app=guard, client=("127.0.0.1", 5))
+        self.client = httpx.AsyncClient(transport=transport, base_url=f"http://{HOST}")
+
+
+async def _said(request: Request) -> Response:
+    identity = request.state.identity
+    body = await request.body()
+    name = None if identity is None else f"{identity.name} {identity.role}"
+    return JSONResponse({"who": name, "bytes": len(body)})
+
+
+async def _problem(_request: Request, error: Exception) -> Response:
+    assert isinstance(error, Problem)
+    return error.response()
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8560", "127.0.0.1", "127.0.0.1:80", "", f"{HOST}."]
+)
+@awaited
+async def test_another_host_is_refused_dns_rebinding(tmp_path: Path, host: str) -> None:
+    answer = await Rig(tmp_path).client.get("/api/v1/vehicles", headers={"host": host})
+    assert answer.status_code == 421
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"origin": "https://evil.example"},
+        {"origin": "null"},
+        {"origin": "http://127.0.0.1:9999"},
+        {"origin": f"https://{HOST}"},
+        {"sec-fetch-site": "cross-site"},
+        {"sec-fetch-site": "same-site"},
+        {"sec-fetch-site": "cross-site", "origin": f"http://{HOST}"},
+    ],
+)
+@awaited
+async def test_a_page_of_another_site_changes_nothing(
+    tmp_path: Path, headers: dict[str, str]
+) -> None:
+    answer = await Rig(tmp_path).client.post("/api/v1/stop", headers=JSON | headers, content="{}")
+    assert answer.status_code == 403
+
+
+@pytest.mark.parametrize(
+    "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data; x=y", ""]
+)
+@awaited
+async def test_a_body_that_a_form_could_send_is_refused(tmp_path: Path, kind: str) -> None:
+    headers = {"content-type": kind} if kind else {}
+    answer = await Rig(tmp_path).client.post("/api/v1/stop", headers=headers, content="{}")
+    assert answer.status_code == 415
+
+
+@awaited
+async def test_our_own_page_and_programs_pass(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    ours = {"origin": f"http://{HOST}", "sec-fetch-site": "same-origin"}
+    for headers in (JSON, JSON | ours, {"content-type": "application/json; charset=utf-8"}):
+        answer = await rig.client.post("/api/v1/stop", headers=headers, content="{}")
+        assert answer.json() == {"who": "local operator", "bytes": 2}
+
+
+@awaited
+async def test_every_answer_forbids_what_the_page_does_not_need(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    answers = [
+        await rig.client.get("/"),
+        await rig.client.get("/nothing"),
+        await rig.client.get("/", headers={"host": "evil.example"}),
+    ]
+    for answer in answers:
+        policy = answer.headers["content-security-policy"]
+        assert "default-src 'self'" in policy
+        assert "frame-ancestors 'none'" in policy
+        assert "unsafe" not in policy
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert "access-control-allow-origin" not in answer.headers
+
+
+@awaited
+async def test_without_a_token_nothing_but_the_page_and_the_login(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, open_identity=None)
+    assert (await rig.client.get("/api/v1/vehicles")).status_code == 401
+    stop = await rig.client.post("/api/v1/stop", headers=JSON, content="{}")
+    assert stop.status_code == 401
+    assert stop.headers["www-authenticate"] == "Bearer"
+    assert (await rig.client.get("/")).status_code == 200
+    login = await rig.client.post("/api/v1/session", headers=JSON, content="{}")
+    assert login.json()["who"] is None
+
+
+@awaited
+async def test_a_token_names_its_holder_until_it_is_revoked(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, open_identity=None)
+    text = tokens.add(rig.path, "anna", "submitter")
+    bearer = {"authorization": f"Bearer {text}"}
+    answer = await rig.client.get("/api/v1/vehicles", headers=bearer)
+    assert answer.json()["who"] == "anna submitter"
+    for wrong in (f"Bearer {text}x", "Bearer x", f"Bearer {text[:-1]}"):
+        refused = await rig.client.get("/api/v1/vehicles", headers={"authorization": wrong})
+        assert refused.status_code == 401
+    tokens.revoke(rig.path, "anna")
+    assert (await rig.client.get("/api/v1/vehicles", headers=bearer)).status_code == 401
+
+
+@awaited
+async def test_a_session_ends_with_its_token_and_when_it_is_ended(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, open_identity=None)
+    found = rig.tokens.of_text(tokens.add(rig.path, "anna", "operator"))
+    assert found is not None
+    numbers = [rig.sessions.begin(found) for _ in range(2)]
+
+    async def who(number: str) -> int:
+        headers = {"cookie": f"{COOKIE}={number}"}
+        return (await rig.client.get("/api/v1/vehicles", headers=headers)).status_code
+
+    assert [await who(number) for number in numbers] == [200, 200]
+    rig.sessions.end(numbers[0])
+    assert [await who(number) for number in numbers] == [401, 200]
+    assert await who(numbers[1][:-1]) == 401
+    tokens.revoke(rig.path, "anna")
+    assert await who(numbers[1]) == 401
+
+
+@awaited
+async def test_a_stolen_cookie_does_not_help_a_page_of_another_site(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, open_identity=None)
+    found = rig.tokens.of_text(tokens.add(rig.path, "anna", "operator"))
+    assert found is not None
+    cookie = {"cookie": f"{COOKIE}={rig.sessions.begin(found)}"}
+    evil = JSON | cookie | {"origin": "https://evil.example"}
+    answer = await rig.client.post("/api/v1/stop", headers=evil, content="{}")
+    assert answer.status_code == 403
+
+
+@awaited
+async def test_a_large_body_is_refused_before_and_while_it_is_read(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    announced = await rig.client.post("/api/v1/stop", headers=JSON, content=b"x" * (SMALL_BODY + 1))
+    assert announced.status_code == 413
+
+    async def pieces() -> AsyncIterator[bytes]:
+        for _ in range(SMALL_BODY // 1024 + 1):
+            yield b"x" * 1024
+
+    chunked = await rig.client.post("/api/v1/stop", headers=JSON, content=pieces())
+    assert chunked.status_code == 413
+    plan = await rig.client.post("/api/v1/plans", headers=JSON, content=b"x" * (SMALL_BODY + 1))
+    assert plan.json()["bytes"] == SMALL_BODY + 1
+    headers = JSON | {"content-length": str(PLAN_BODY + 1)}
+    assert (await rig.client.post("/api/v1/plans", headers=headers)).status_code == 413
+    headers = JSON | {"content-length": "-1"}
+    assert (await rig.client.post("/api/v1/plans", headers=headers)).status_code == 413
+
+
+@awaited
+async def test_too_many_requests_are_refused_but_a_stop_never_is(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    codes = [(await rig.client.get("/api/v1/vehicles")).status_code for _ in range(400)]
+    assert codes[0] == 200
+    assert codes.count(429) > 50
+    refused = await rig.client.get("/api/v1/vehicles")
+    if refused.status_code == 429:
+        assert refused.headers["retry-after"] == "1"
+    for _ in range(20):
+        stop = await rig.client.post("/api/v1/stop", headers=JSON, content="{}")
+        assert stop.status_code == 200
+
+
+@awaited
+async def test_headers_that_come_twice_and_strange_methods_are_refused(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    twice = [("host", HOST), ("host", "evil.example")]
+    assert (await rig.client.get("/", headers=twice)).status_code == 400
+    assert (await rig.client.request("TRACE", "/")).status_code == 405
+    assert (await rig.client.request("CONNECT", "/")).status_code == 405
