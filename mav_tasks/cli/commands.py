@@ -30,6 +30,11 @@ COMMANDS = (
     Lazy("rally", "plans:rally", "Upload rally points."),
     Lazy("log", "log:log", "Print the journal, one event per line; times are UTC."),
     Lazy("replay", "replay:replay", "Replay a record and compare the results."),
+    Lazy(
+        "export",
+        "export:export",
+        "Convert recordings to MCAP, for Foxglove and Lichtblick, or back.",
+    ),
     Lazy("config", "config:app", "Show, check and create the configuration of the server."),
     Lazy("keys", "keys:app", "Add, list and revoke signing keys."),
     Lazy(
