@@ -88,12 +88,13 @@ class _Writing:
 
 def _records(path: Path) -> Iterator[Any]:
     """Yield the records of a file after the one that says that it follows our convention."""
+    is_ours = is_mcap = False
     try:
         with path.open("rb") as file:
-            is_ours = False
             whole: Any = _Bounded(file, path.stat().st_size)  # no BytesIO, as the package asks for
             reader = StreamReader(whole, validate_crcs=True, record_size_limit=MOST_OF_A_RECORD)
             for record in reader.records:
+                is_mcap = True
                 if isinstance(record, Metadata) and record.name == CONVENTION:
                     _check_version(path, record.metadata.get("convention", ""))
                     is_ours = True
@@ -106,10 +107,9 @@ def _records(path: Path) -> Iterator[Any]:
         raise RecordError(f"{path}: {error.strerror}") from error
     except UnsupportedCompressionError as error:
         raise RecordError(f"{path}: {error}; install the package that it names") from error
-    except InvalidMagic as error:
-        raise RecordError(f"{path}: not an MCAP file, or damaged at its end") from error
-    except EndOfFile as error:
-        raise RecordError(f"{path}: not an MCAP file, or its end is missing") from error
+    except (InvalidMagic, EndOfFile) as error:
+        what = "its end is missing" if is_mcap else "not an MCAP file"
+        raise RecordError(f"{path}: {what}") from error
     except (McapError, ValueError, struct.error, MemoryError) as error:
         raise RecordError(f"{path}: damaged: {error}") from error
 
