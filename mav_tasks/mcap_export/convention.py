@@ -16,6 +16,8 @@ DIGEST = 16  # bytes of the BLAKE2b of a telemetry log
 
 RAW = "/mavlink/raw"
 RAW_ENCODING = "tlog"
+#: an empty schema: some programs that copy MCAP files stop at a channel without one
+RAW_SCHEMA = "mav_tasks.TlogPiece"
 TEXTS = "/texts"
 TASK_CHANGES = "/tasks/changes"
 TASK_LOG = "/tasks/log"

@@ -106,7 +106,8 @@ def _records(path: Path) -> Iterator[Any]:
     except OSError as error:
         raise RecordError(f"{path}: {error.strerror}") from error
     except UnsupportedCompressionError as error:
-        raise RecordError(f"{path}: {error}; install the package that it names") from error
+        package = str(error).rpartition(" ")[2]
+        raise RecordError(f"{path}: compressed with {package}: pip install {package}") from error
     except (InvalidMagic, EndOfFile) as error:
         what = "its end is missing" if is_mcap else "not an MCAP file"
         raise RecordError(f"{path}: {what}") from error

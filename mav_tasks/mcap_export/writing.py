@@ -16,6 +16,7 @@ from mav_tasks.mcap_export.convention import (
     CONVENTION,
     RAW,
     RAW_ENCODING,
+    RAW_SCHEMA,
     TLOG,
     VERSION,
     message_topic,
@@ -54,7 +55,9 @@ class McapWriter:
         channel = self._channels.get(key)
         if channel is None:
             metadata = {"file": heard.way.file}
-            channel = self._writer.register_channel(RAW, RAW_ENCODING, 0, metadata)
+            channel = self._writer.register_channel(
+                RAW, RAW_ENCODING, self._schema(RAW_SCHEMA, "", b""), metadata
+            )
             self._channels[key] = channel
         count = self._counts.get(heard.way.file, 0)
         self._counts[heard.way.file] = count + 1
@@ -79,7 +82,7 @@ class McapWriter:
         """Add a value."""
         channel = self._channels.get(seen.topic)
         if channel is None:
-            schema = self._schema(seen.schema)
+            schema = self._json_schema(seen.schema)
             channel = self._writer.register_channel(seen.topic, "json", schema)
             self._channels[seen.topic] = channel
         data = _encode(seen.values).encode()
@@ -101,16 +104,18 @@ class McapWriter:
             self._kinds[message_id] = MessageJson(kind)
         assert heard.packet is not None
         topic = message_topic(heard.packet.source, kind.msgname)
-        schema = self._schema(message_schema(kind))
+        schema = self._json_schema(message_schema(kind))
         known = _known(heard.way)
         number: int = self._writer.register_channel(topic, "json", schema, known)
         return number
 
-    def _schema(self, schema: Schema) -> int:
-        number = self._schemas.get(schema.name)
+    def _json_schema(self, schema: Schema) -> int:
+        return self._schema(schema.name, "jsonschema", schema.data)
+
+    def _schema(self, name: str, encoding: str, data: bytes) -> int:
+        number = self._schemas.get(name)
         if number is None:
-            number = self._writer.register_schema(schema.name, "jsonschema", schema.data)
-            self._schemas[schema.name] = number
+            number = self._schemas[name] = self._writer.register_schema(name, encoding, data)
         return number
 
 

@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("mcap", reason="the extra mcap is not installed")
 
+from mcap import stream_reader
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, Writer
 
@@ -232,7 +233,7 @@ def rewritten(path: Path, change: Callable[[list[Any]], list[Any]], **options: A
     """Copy a file as another program would, with changes to its messages."""
     out = path.with_name("changed.mcap")
     with path.open("rb") as source, out.open("wb") as target:
-        writer: Any = Writer(target, compression=CompressionType.NONE, **options)
+        writer: Any = Writer(target, **{"compression": CompressionType.NONE, **options})
         writer.start()
         reader = make_reader(source)
         metadata = list(reader.iter_metadata())
@@ -264,6 +265,24 @@ def test_a_copy_by_another_program_serves_as_well(tmp_path: Path, options: dict[
     path, _ = exported(tmp_path, log=log)
     copy = rewritten(path, without("/mavlink/1/1/ATTITUDE"), **options)
     assert Restored(copy).contents == {"log.tlog": log}
+
+
+@pytest.mark.parametrize(
+    ("kind", "package"), [(CompressionType.ZSTD, "zstandard"), (CompressionType.LZ4, "lz4.frame")]
+)
+def test_a_copy_may_be_compressed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: CompressionType, package: str
+) -> None:
+    pytest.importorskip(package, reason="the package that compresses is not installed")
+    log = b"".join(attitudes(500))
+    path, _ = exported(tmp_path, log=log)
+    copy = rewritten(path, list, compression=kind)
+    assert copy.stat().st_size < path.stat().st_size / 3
+    assert Restored(copy).contents == {"log.tlog": log}
+    monkeypatch.setattr(stream_reader, package.partition(".")[0], None)
+    words = r"changed\.mcap: compressed with (zstandard|lz4): pip install \1$"
+    with pytest.raises(RecordError, match=words):
+        Restored(copy)
 
 
 @pytest.mark.parametrize(
