@@ -1,8 +1,8 @@
 """``mav-tasks export``: recordings as an MCAP file, and telemetry logs back from one."""
 
 import os
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated, BinaryIO
 
@@ -11,6 +11,7 @@ import typer
 from mav_tasks.cli import output
 from mav_tasks.cli.options import Json
 from mav_tasks.errors import RecordError, UsageError
+from mav_tasks.mcap_export.convention import RAW
 from mav_tasks.whole_file import replacing
 
 PRIVATE = 0o600  # as the recordings are
@@ -54,11 +55,11 @@ def _to_mcap(files: Sequence[Path], out: Path, *, as_json: bool, force: bool) ->
         from mav_tasks.mcap_export.exporting import export as export_recordings  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise _without(error) from error
-    with _Outputs(files, force=force) as outputs:
-        counts = export_recordings(files, outputs.opened(out))
+    with _new_file(out, files, force=force) as file:
+        counts = export_recordings(files, file)
     words = f"{out}: {counts.packets} packets and {counts.events} events"
     if counts.raw_only:
-        words += f"; {counts.raw_only} packets that the dialect does not know are only raw"
+        words += f"; {counts.raw_only} packets could not be decoded and are in {RAW} only"
     if counts.other_bytes:
         words += f"; {counts.other_bytes} bytes belong to no packet"
     output.say_done(
@@ -81,7 +82,7 @@ def _to_tlog(files: Sequence[Path], out: Path, *, as_json: bool, force: bool) ->
     if len(files) != 1:
         raise UsageError(f"--tlog takes one MCAP file, not {len(files)}")
     paths: dict[str, Path] = {}
-    with _Outputs(files, force=force) as outputs:
+    with ExitStack() as stack:
 
         def opened(name: str) -> BinaryIO:
             if out.is_dir():
@@ -91,7 +92,7 @@ def _to_tlog(files: Sequence[Path], out: Path, *, as_json: bool, force: bool) ->
                 raise UsageError(f"{words}; name a folder for them: --tlog FOLDER")
             else:
                 paths[name] = out
-            return outputs.opened(paths[name])
+            return stack.enter_context(_new_file(paths[name], files, force=force))
 
         logs = restore(files[0], opened)
     for log in logs:
@@ -99,47 +100,24 @@ def _to_tlog(files: Sequence[Path], out: Path, *, as_json: bool, force: bool) ->
         output.say_done(as_json, "export", f"{path}: {log.size} bytes", file=path, bytes=log.size)
 
 
-class _Outputs:
-    """New files, which take their places at the end, or are removed after an exception."""
+@contextmanager
+def _new_file(path: Path, inputs: Sequence[Path], *, force: bool) -> Iterator[BinaryIO]:
+    """Open a new file, which takes its place when the block ends, or is removed after an exception.
 
-    def __init__(self, inputs: Sequence[Path], *, force: bool) -> None:
-        self._inputs = inputs
-        self._force = force
-        self._stack = ExitStack()
-        self._last = Path()
-
-    def __enter__(self) -> "_Outputs":
-        self._stack.__enter__()
-        return self
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        try:
-            if error is None:
-                self._stack.close()
-            else:
-                self._stack.__exit__(type(error), error, error.__traceback__)
-        except OSError as failure:
-            raise self._unwritable(failure) from failure
-        if isinstance(error, OSError):
-            raise self._unwritable(error) from error
-
-    def opened(self, path: Path) -> BinaryIO:
-        """Open a new file for ``path``; raise UsageError if it may not take its place."""
-        self._last = path
+    Raise UsageError if it may not take that place, or cannot be written.
+    """
+    try:
         if path.exists():
             if not path.is_file():
                 raise UsageError(f"{path}: not a file")
-            if any(each.exists() and each.samefile(path) for each in self._inputs):
+            if any(each.exists() and each.samefile(path) for each in inputs):
                 raise UsageError(f"{path} is also read: name another file")
-            if not self._force:
+            if not force:
                 raise UsageError(f"{path} exists; use --force to overwrite it")
-        try:
-            return self._stack.enter_context(replacing(Path(os.path.realpath(path)), mode=PRIVATE))
-        except OSError as error:
-            raise self._unwritable(error) from error
-
-    def _unwritable(self, error: OSError) -> UsageError:
-        return UsageError(f"{self._last}: {error.strerror}")
+        with replacing(Path(os.path.realpath(path)), mode=PRIVATE) as file:
+            yield file
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from error
 
 
 def _checked(name: str, source: Path) -> str:

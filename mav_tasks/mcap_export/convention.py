@@ -12,7 +12,6 @@ VERSION = "1"
 CONVENTION = "mav-tasks"
 #: name of the metadata records at the end, one for each telemetry log
 TLOG = "mav-tasks tlog"
-DIGEST = 16  # bytes of the BLAKE2b of a telemetry log
 
 RAW = "/mavlink/raw"
 RAW_ENCODING = "tlog"

@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from hashlib import blake2b
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mav_tasks.mavlink.codec import Decoder
-from mav_tasks.mcap_export.convention import DIGEST
+from mav_tasks.mcap_export.log_facts import LogFacts
 from mav_tasks.mcap_export.sources import Happened, Heard, Restored, items_of
 from mav_tasks.mcap_export.task_views import TaskViews
 from mav_tasks.mcap_export.views import Views
@@ -21,7 +20,7 @@ class Counts:
 
     packets: int = 0
     events: int = 0
-    raw_only: int = 0  # packets that the dialect does not know, or with a wrong CRC
+    raw_only: int = 0  # packets of unknown ids or with a wrong CRC, or beyond MOST_CHANNELS
     other_bytes: int = 0  # between the packets
 
 
@@ -32,7 +31,7 @@ class _Export:
         self._decoder = Decoder()
         self._views = Views()
         self._tasks = TaskViews()
-        self._logs: dict[str, _Log] = {}
+        self._logs: dict[str, LogFacts] = {}
         self._time = 0
 
     def add(self, item: Heard | Happened | Restored) -> None:
@@ -51,8 +50,8 @@ class _Export:
     def finish(self) -> Counts:
         for seen in self._views.rest(time=self._time):
             self._writer.add(seen)
-        for name, log in self._logs.items():
-            self._writer.add_log(name, log.facts())
+        for log in self._logs.values():
+            self._writer.add_log(log)
         self._writer.finish()
         return self.counts
 
@@ -60,40 +59,20 @@ class _Export:
         name = heard.way.file
         log = self._logs.get(name)
         if log is None:
-            log = self._logs[name] = _Log()
+            log = self._logs[name] = LogFacts(name)
         log.add(heard.data)
         self._writer.add_raw(heard)
-        if heard.packet is None:
+        packet = heard.packet
+        if packet is None:
             self.counts.other_bytes += len(heard.data)
             return
         self.counts.packets += 1
-        message = self._decoder.decode(heard.packet)
-        if message is None or not self._writer.add_message(message, heard):
+        message = self._decoder.decode(packet)
+        if message is None or not self._writer.add_message(message, packet, heard):
             self.counts.raw_only += 1
             return
-        for seen in self._views.of(message, heard.packet.source, time=heard.time):
+        for seen in self._views.of(message, packet.source, time=heard.time):
             self._writer.add(seen)
-
-
-class _Log:
-    """What a telemetry log made of the file must be equal to."""
-
-    def __init__(self) -> None:
-        self._pieces = 0
-        self._bytes = 0
-        self._digest: Any = blake2b(digest_size=DIGEST)
-
-    def add(self, data: bytes) -> None:
-        self._pieces += 1
-        self._bytes += len(data)
-        self._digest.update(data)
-
-    def facts(self) -> dict[str, str]:
-        return {
-            "pieces": str(self._pieces),
-            "bytes": str(self._bytes),
-            "blake2b": self._digest.hexdigest(),
-        }
 
 
 def export(records: Sequence[Path], file: BinaryIO) -> Counts:

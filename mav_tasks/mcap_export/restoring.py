@@ -6,7 +6,6 @@ is complete and in its order: each log's length and digest are checked.
 
 import struct
 from collections.abc import Callable, Iterator
-from hashlib import blake2b
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -17,12 +16,12 @@ from mcap.stream_reader import StreamReader
 from mav_tasks.errors import RecordError
 from mav_tasks.mcap_export.convention import (
     CONVENTION,
-    DIGEST,
     RAW,
     RAW_ENCODING,
     TLOG,
     VERSION,
 )
+from mav_tasks.mcap_export.log_facts import LogFacts
 
 MOST_OF_A_RECORD = 1 << 30  # bytes
 
@@ -39,13 +38,14 @@ def restore(path: Path, opened: Callable[[str], BinaryIO]) -> list[Log]:
 
     Raise RecordError if the file is not ours, is damaged, or was changed.
     """
-    logs: dict[str, _Writing] = {}
+    files: dict[str, BinaryIO] = {}
+    logs: dict[str, LogFacts] = {}
     names: dict[int, str] = {}
-    facts: dict[str, dict[str, str]] = {}
+    recorded: dict[str, dict[str, str]] = {}
     for record in _records(path):
         match record:
             case Metadata(name=name, metadata=values) if name == TLOG:
-                facts[values.get("file", "")] = values
+                recorded[values.get("file", "")] = values
             case Channel(topic=topic, message_encoding=encoding) if topic == RAW:
                 if encoding != RAW_ENCODING:
                     raise RecordError(f"{path}: {RAW} has the encoding {encoding!r}")
@@ -53,37 +53,15 @@ def restore(path: Path, opened: Callable[[str], BinaryIO]) -> list[Log]:
             case Message() if record.channel_id in names:
                 name = names[record.channel_id]
                 if name not in logs:
-                    logs[name] = _Writing(opened(name))
-                logs[name].add(record)
+                    files[name], logs[name] = opened(name), LogFacts(name)
+                files[name].write(record.data)
+                logs[name].add(record.data)
     if not logs:
         raise RecordError(f"{path}: has no telemetry log")
     for name, log in logs.items():
-        if log.facts() != {
-            key: value for key, value in facts.get(name, {}).items() if key != "file"
-        }:
+        if log.metadata() != recorded.get(name):
             raise RecordError(f"{path}: {name!r} is incomplete, or not in its order")
     return [Log(name, log.size) for name, log in logs.items()]
-
-
-class _Writing:
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._pieces = 0
-        self._digest: Any = blake2b(digest_size=DIGEST)
-        self.size = 0
-
-    def add(self, message: Any) -> None:
-        self._file.write(message.data)
-        self._pieces += 1
-        self.size += len(message.data)
-        self._digest.update(message.data)
-
-    def facts(self) -> dict[str, str]:
-        return {
-            "pieces": str(self._pieces),
-            "bytes": str(self.size),
-            "blake2b": self._digest.hexdigest(),
-        }
 
 
 def _records(path: Path) -> Iterator[Any]:

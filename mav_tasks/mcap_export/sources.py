@@ -99,24 +99,22 @@ def _of_record(record: Record, *, with_packets: bool) -> Iterator[Item]:
             case inputs.LinkChanged():
                 sides[item.link] = item.side
         if with_packets and item is not None:
-            for packets, stamped in _stamped(content, item, entry.now):
-                side = sides[packets.link].name.lower() if packets.link in sides else ""
-                way = Way(name, packets.link, side)
+            for link, stamped in _stamped(content, item, entry.now):
+                side = sides[link].name.lower() if link in sides else ""
+                way = Way(name, link, side)
                 (packet,) = split_datagram(stamped[STAMP:])
                 yield Heard(int.from_bytes(stamped[:STAMP]) * 1000, stamped, packet, way)
 
 
-def _stamped(content: TlogContent, item: Input, now: float) -> Iterator[tuple[Packets, bytes]]:
-    """Yield the packets of an input, as in a telemetry log."""
+def _stamped(content: TlogContent, item: Input, now: float) -> Iterator[tuple[str, bytes]]:
+    """Yield the link and the log's form of each packet of an input; other inputs have none."""
     if isinstance(item, inputs.AtOnce | inputs.Backlog):
         for each in item.packets:
             yield from _stamped(content, each, now)
-    elif isinstance(item, Packets):
-        for stamped in content.of_input(item, now=now):
-            yield item, stamped
     else:
-        for _ in content.of_input(item, now=now):
-            raise AssertionError("only packets have packets")
+        link = item.link if isinstance(item, Packets) else ""
+        for stamped in content.of_input(item, now=now):
+            yield link, stamped
 
 
 def _first_offset(record: Record) -> float:

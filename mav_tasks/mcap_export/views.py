@@ -34,6 +34,8 @@ _LEVELS = {
     MavSeverity.DEBUG: 1,
 }
 
+_FRAMES = {frame.value: frame.name for frame in MavFrame}
+
 _T = PositionTargetTypemask
 _IGNORED = {
     "x": _T.X_IGNORE,
@@ -133,7 +135,7 @@ def _setpoint_of(message: m.SetPositionTargetLocalNed, source: Address, time: in
     frame = message.coordinate_frame
     values: dict[str, Any] = {
         "timestamp": timestamp(time),
-        "frame": MavFrame(frame).name if frame in set(MavFrame) else str(frame),
+        "frame": _FRAMES.get(frame, str(frame)),
     }
     for name, ignored in _IGNORED.items():
         value = getattr(message, name)

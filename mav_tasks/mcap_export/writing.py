@@ -5,13 +5,13 @@ that the file is read anywhere, and is the same for the same recordings, none is
 """
 
 import json
-from collections.abc import Mapping
 from typing import Any, BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.messages import Message
+from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mcap_export.convention import (
     CONVENTION,
     RAW,
@@ -21,6 +21,7 @@ from mav_tasks.mcap_export.convention import (
     VERSION,
     message_topic,
 )
+from mav_tasks.mcap_export.log_facts import LogFacts
 from mav_tasks.mcap_export.message_json import MessageJson
 from mav_tasks.mcap_export.schemas import Schema, message_schema
 from mav_tasks.mcap_export.sources import Heard, Way
@@ -64,14 +65,12 @@ class McapWriter:
         sequence = count & 0xFFFF_FFFF
         self._writer.add_message(channel, heard.time, heard.data, heard.time, sequence)
 
-    def add_message(self, message: Message, heard: Heard) -> bool:
-        """Add a decoded message; return False if there are too many channels for it."""
-        packet = heard.packet
-        assert packet is not None
+    def add_message(self, message: Message, packet: Packet, heard: Heard) -> bool:
+        """Add the message of a packet; return False if there are too many channels for it."""
         key = (packet.source, packet.message_id, heard.way.link)
         channel = self._channels.get(key)
         if channel is None:
-            channel = self._channels[key] = self._channel_of(packet.message_id, heard)
+            channel = self._channels[key] = self._channel_of(packet, heard.way)
             if channel is None:
                 return False
         data = self._kinds[packet.message_id].encode(message)
@@ -88,24 +87,22 @@ class McapWriter:
         data = _encode(seen.values).encode()
         self._writer.add_message(channel, seen.time, data, seen.time)
 
-    def add_log(self, name: str, facts: Mapping[str, str]) -> None:
+    def add_log(self, log: LogFacts) -> None:
         """Add what is needed to check a telemetry log that is made of this file."""
-        self._writer.add_metadata(TLOG, {"file": name, **facts})
+        self._writer.add_metadata(TLOG, log.metadata())
 
     def finish(self) -> None:
         """Write the index."""
         self._writer.finish()
 
-    def _channel_of(self, message_id: int, heard: Heard) -> int | None:
+    def _channel_of(self, packet: Packet, way: Way) -> int | None:
         if len(self._channels) >= MOST_CHANNELS:
             return None
-        kind = m.ALL[message_id]
-        if message_id not in self._kinds:
-            self._kinds[message_id] = MessageJson(kind)
-        assert heard.packet is not None
-        topic = message_topic(heard.packet.source, kind.msgname)
+        kind = m.ALL[packet.message_id]
+        self._kinds.setdefault(packet.message_id, MessageJson(kind))
+        topic = message_topic(packet.source, kind.msgname)
         schema = self._json_schema(message_schema(kind))
-        known = _known(heard.way)
+        known = {"link": way.link, "side": way.side} if way.link else {}
         number: int = self._writer.register_channel(topic, "json", schema, known)
         return number
 
@@ -117,7 +114,3 @@ class McapWriter:
         if number is None:
             number = self._schemas[name] = self._writer.register_schema(name, encoding, data)
         return number
-
-
-def _known(way: Way) -> dict[str, str]:
-    return {"link": way.link, "side": way.side} if way.link else {}
