@@ -2,9 +2,11 @@
 
 import os
 import stat
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
+from typing import BinaryIO
 
 FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_NOFOLLOW
 
@@ -28,11 +30,22 @@ def replace_whole(path: Path, text: str, *, mode: int, kept: int | None = None) 
 
     It has the mode ``kept``; None: ``mode``, without what the umask forbids.
     """
+    with replacing(path, mode=mode, kept=kept) as file:
+        file.write(text.encode())
+
+
+@contextmanager
+def replacing(path: Path, *, mode: int, kept: int | None = None) -> Iterator[BinaryIO]:
+    """Open a new file beside ``path``, which takes its place when the block ends.
+
+    After an exception the new file is removed, and the old contents are in place. Modes are as in
+    ``replace_whole``.
+    """
     beside = path.with_name(f".{path.name[:100]}.{token_hex(8)}")
     fd = os.open(beside, FLAGS, mode)
     try:
-        with os.fdopen(fd, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(fd, "wb") as file:
+            yield file
             file.flush()
             if kept is not None:
                 os.fchmod(fd, kept)

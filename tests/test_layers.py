@@ -70,6 +70,17 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
+    "mav_tasks.mcap_export": frozenset(
+        {
+            "mav_tasks.recording",
+            "mav_tasks.logs",
+            "mav_tasks.engine",
+            "mav_tasks.services",
+            "mav_tasks.tasks",
+            "mav_tasks.mavlink",
+            "mav_tasks.errors",
+        }
+    ),
     "mav_tasks.pump": frozenset(
         {
             "mav_tasks.logs",
@@ -204,12 +215,14 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.tasks",
             "mav_tasks.serve",
             "mav_tasks.recording",
+            "mav_tasks.mcap_export",
             "mav_tasks.qgc_actions",
             "mav_tasks.probe",
             "mav_tasks.probing",
             "mav_tasks.web",
             "mav_tasks.client",
             "mav_tasks.plan_files",
+            "mav_tasks.whole_file",
             "mav_tasks.mavlink",
             "mav_tasks.setting_keys",
             "mav_tasks.settings",

@@ -31,6 +31,11 @@ COMMANDS = (
     Lazy("web", "web:app", "Show and steer the rovers in a browser."),
     Lazy("log", "log:log", "Print the journal, one event per line; times are UTC."),
     Lazy("replay", "replay:replay", "Replay a record and compare the results."),
+    Lazy(
+        "export",
+        "export:export",
+        "Convert recordings to MCAP, for Foxglove and Lichtblick, or back.",
+    ),
     Lazy("config", "config:app", "Show, check and create the configuration of the server."),
     Lazy("keys", "keys:app", "Add, list and revoke signing keys."),
     Lazy(

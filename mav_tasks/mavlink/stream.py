@@ -42,7 +42,7 @@ class StreamSplitter:
         packets: list[Packet] = []
         start, end = 0, len(data)
         while start < end:
-            stop = _stop_of(data, start)
+            stop = end_of(data, start)
             if stop is not None and stop > end and not (is_late and start == 0):
                 break
             packet = None if stop is None or stop > end else _packet(data[start:stop])
@@ -58,8 +58,11 @@ class StreamSplitter:
         return packets
 
 
-def _stop_of(data: bytes, start: int) -> int | None:
-    """Return where the packet that may begin here ends, as far as can be told; None: none does."""
+def end_of(data: bytes, start: int) -> int | None:
+    """Return where the packet that may begin here ends, as far as can be told; None: none does.
+
+    The end may lie beyond the data.
+    """
     magic, there = data[start], len(data) - start
     if magic == MAGIC_V1:
         return start + HEADER_V1 + CRC + (data[start + 1] if there > 1 else 0)

@@ -16,18 +16,22 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from mav_tasks.engine.inputs import Input
 from mav_tasks.errors import RecordError
 from mav_tasks.recording.record_file import GZIP
-from mav_tasks.recording.record_lines import FORMAT, MAGIC, ROWS
+from mav_tasks.recording.record_lines import EVENTS, FORMAT, MAGIC, ROWS, input_of
 from mav_tasks.recording.surroundings import restored_of, settings_of
 from mav_tasks.settings import Settings
 from mav_tasks.store.codec import Decoder, Unreadable
+from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Task
 
 PIECE = 1 << 16  # bytes read at once
+GZIP_MAGIC = b"\x1f\x8b"
 TASKS_AT_ONCE = 5_000
 MOST_OF_A_LINE = 1 << 25  # bytes; our lines are shorter
+_EVENTS = Decoder(ROWS, is_exact=True)
 NOT_OURS = (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError)
 
 
@@ -69,6 +73,38 @@ class Record:
         begin = 1 + (0 if self.restored is None else len(self.restored.tasks))
         for number, raw in islice(_numbered(self.path), begin, self.lines):
             yield Entry(number, raw, _entry_values(self.path, number, raw))
+
+    def input_of(self, entry: Entry) -> Input | None:
+        """Return the input of an entry, None for a deadline; raise RecordError if it is none."""
+        try:
+            return input_of(entry.values)
+        except NOT_OURS as error:
+            raise self._unreadable(entry, error) from error
+
+    def events_of(self, entry: Entry) -> list[Event]:
+        """Return the events of an output; raise RecordError if it has none."""
+        try:
+            _, _, _, _, rows = entry.values
+            return [_event_of(*row) for row in rows]
+        except (*NOT_OURS, Unreadable) as error:
+            raise self._unreadable(entry, error) from error
+
+    def _unreadable(self, entry: Entry, error: Exception) -> RecordError:
+        return RecordError(f"{self.path}: line {entry.number} is unreadable: {_words(error)}")
+
+
+def is_record(path: Path) -> bool:
+    """Return whether a file begins as a record does, and not as a telemetry log.
+
+    Raise RecordError if it cannot be read.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise RecordError(f"{path}: not a file")
+        with path.open("rb") as file:
+            return file.read(len(GZIP_MAGIC)) == GZIP_MAGIC
+    except OSError as error:
+        raise RecordError(f"{path}: {error.strerror}") from error
 
 
 def read(path: Path) -> Record:
@@ -201,6 +237,11 @@ def _inflated(path: Path) -> Iterator[bytes]:
         raise RecordError(f"{path}: {error.strerror}") from error
     except zlib.error as error:
         raise RecordError(f"{path}: not a record of decisions, or damaged: {error}") from error
+
+
+def _event_of(name: str, *row: Any) -> Event:
+    (event,) = _EVENTS.values(EVENTS[name], [list(row)], offset=0.0)
+    return event  # type: ignore[no-any-return]
 
 
 def _check_words(value: Any) -> None:

@@ -13,7 +13,7 @@ from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.recording.decisions import CLOSED
 from mav_tasks.recording.reading import NOT_OURS, Entry, Record
-from mav_tasks.recording.record_lines import MISSING, LineWriter, described, dumps, input_of
+from mav_tasks.recording.record_lines import MISSING, LineWriter, described, dumps
 from mav_tasks.tasks.events import Event
 
 MOST_NAMES = 12  # of packets, in a text
@@ -81,11 +81,7 @@ class Replay:
             self._look_for_more(engine)
 
     def _feed(self, engine: Engine, entry: Entry) -> None:
-        try:
-            item = input_of(entry.values)
-        except NOT_OURS as error:
-            words = f"{self._record.path}: line {entry.number} is unreadable: {error}"
-            raise RecordError(words) from error
+        item = self._record.input_of(entry)
         self._last = entry
         self.inputs += 1
         if isinstance(item, WallClock):
