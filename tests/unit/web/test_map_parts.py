@@ -138,7 +138,7 @@ def test_tiles_of_a_site_name_the_site(tmp_path: Path) -> None:
 
 def test_a_plan_is_shown_before_it_is_sent() -> None:
     wpl = "QGC WPL 110\n" + "\n".join(
-        f"{n}\t0\t3\t16\t0\t0\t0\t0\t{47.0 + n * 0.001}\t8.0\t0\t1" for n in range(3)
+        f"{n}\t0\t{3 * (n > 0)}\t16\t0\t0\t0\t0\t{47.0 + n * 0.001}\t8.0\t0\t1" for n in range(3)
     )
     shown = preview_of(parse_plan(wpl))
     assert [place["latitude"] for place in shown["path"]] == [47.001, 47.002]

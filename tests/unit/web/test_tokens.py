@@ -59,7 +59,7 @@ def test_a_damaged_file_is_named_and_lets_nobody_in(tmp_path: Path, text: str) -
     path = tmp_path / "tokens.json"
     path.touch(mode=0o600)
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(TokenError, match="tokens.json"):
+    with pytest.raises(TokenError, match=r"tokens\.json"):
         tokens.load(path)
     assert Tokens(path).of_text("x") is None
     with pytest.raises(TokenError):
