@@ -8,7 +8,7 @@ next upload. What an item is worth says ``check``; a plan counts only when it is
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from math import inf
+from math import isnan
 from typing import NamedTuple
 
 from mav_tasks.mavlink import messages as m
@@ -26,7 +26,7 @@ STEP_BACK = 3  # from so many requests for an item on each second one is for an 
 QUIET = 0.3  # s that a packet is on its way at the most
 LATE = 2 * QUIET  # s after an upload has ended, in which items may still come that it asked for
 REPEATED = 2.0  # s in which a last item that comes again is acknowledged again
-#: s after an upload that came to nothing, in which the next one is meant the same
+#: s after an upload that came to nothing, in which the next one with its items is meant the same
 ANOTHER_TRY = 10.0
 #: requests for one item in the form that is known to be understood, or expected to be, before each
 #: second one is in the other form
@@ -73,12 +73,21 @@ class ToClient(NamedTuple):
     why: str = ""
 
 
+class _InVain(NamedTuple):
+    """Tries that came to nothing: their items, when the first began, and when the last ended."""
+
+    items: tuple[Item, ...]
+    begun_at: float
+    ended_at: float
+
+
 @dataclass(slots=True)
 class _Session:
     sender: Sender
     mission_type: int
     count: int
-    begun_at: float
+    counted_at: float
+    before: _InVain | None
     ask_at: float
     give_up_at: float
     over_at: float
@@ -89,6 +98,14 @@ class _Session:
     last_form: RequestForm = m.MissionRequestInt  # of the last request
     asked: int = 0  # times, for the next item
     is_whole: bool = False
+
+    @property
+    def begun_at(self) -> float:
+        """When the first try of this upload began; with other items it is another upload."""
+        before = self.before
+        if before is None or not _begin_alike(self.items, before.items):
+            return self.counted_at
+        return before.begun_at
 
 
 class _Answered(NamedTuple):
@@ -114,8 +131,7 @@ class MissionReceiver:
         self._session: _Session | None = None
         self._answered: _Answered | None = None
         self._ended: dict[tuple[Sender, int], float] = {}  # by mission type: when the last one did
-        #: by mission type, of tries that came to nothing: when the first began, the last ended
-        self._in_vain: dict[tuple[Sender, int], tuple[float, float]] = {}
+        self._in_vain: dict[tuple[Sender, int], _InVain] = {}  # by mission type
         self._outgoing: list[ToClient] = []
         self._uploads: list[Upload] = []
 
@@ -158,14 +174,16 @@ class MissionReceiver:
         # items of one upload with those of another.
         if session is not None:
             self._note_in_vain(session, now=now)
-        began, ended = self._in_vain.get((sender, kind), (now, -inf))
-        begun_at = began if now - ended <= ANOTHER_TRY else now
+        before = self._in_vain.get((sender, kind))
+        if before is not None and now - before.ended_at > ANOTHER_TRY:
+            before = None
         quiet_until = self._quiet_until(sender, kind, now=now)
         self._session = _Session(
             sender,
             kind,
             message.count,
-            begun_at,
+            now,
+            before,
             ask_at=quiet_until,
             give_up_at=now + GIVE_UP,
             over_at=now + LONGEST if session is None else session.over_at,
@@ -289,9 +307,15 @@ class MissionReceiver:
         self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}
         self._ended[upload] = now
         self._in_vain = {
-            key: tries for key, tries in self._in_vain.items() if now - tries[1] <= ANOTHER_TRY
+            key: tries
+            for key, tries in self._in_vain.items()
+            if now - tries.ended_at <= ANOTHER_TRY
         }
-        self._in_vain[upload] = session.begun_at, now
+        items = tuple(session.items)
+        before = session.before
+        if before is not None and _begin_alike(items, before.items):
+            items = max(items, before.items, key=len)
+        self._in_vain[upload] = _InVain(items, session.begun_at, now)
 
     def _quiet_until(self, sender: Sender, kind: int, *, now: float) -> float:
         """Return until when items may come that were sent before the count that came now."""
@@ -341,3 +365,15 @@ class MissionReceiver:
         ack = m.MissionAck(*sender.address, result, mission_type, opaque_id)
         self._outgoing.append(ToClient(sender, ack, why))
         return ack
+
+
+def _begin_alike(some: Sequence[Item], others: Sequence[Item]) -> bool:
+    """Return whether two uploads have the same items, as far as both have come."""
+    return all(_is_same(item, other) for item, other in zip(some, others, strict=False))
+
+
+def _is_same(one: Item, other: Item) -> bool:
+    """Return whether two items are equal; a parameter that is not given, NaN, is equal to NaN."""
+    return one == other or all(
+        a == b or (isnan(a) and isnan(b)) for a, b in zip(one, other, strict=True)
+    )

@@ -288,6 +288,38 @@ def test_a_try_soon_after_one_in_vain_counts_from_the_first(
     assert rig.uploads[0].begun_at == (0.0 if is_same else rig.now)
 
 
+@pytest.mark.parametrize(
+    ("again", "is_same"), [([1, 2], True), ([1, 3], False), ([2, 2], False), ([1], True)]
+)
+def test_a_try_with_other_items_is_another_upload(again: list[int], is_same: bool) -> None:
+    rig = Rig().count(2)
+    for seq, north in enumerate([1, 2]):
+        rig.item(seq, north=north)
+    rig.said()
+    rig.receiver.finish(Result.DENIED, opaque_id=0, now=rig.now)
+    rig.run(1.0)
+    rig.count(len(again))
+    rig.run(1.0 + QUIET)
+    for seq, north in enumerate(again):
+        rig.item(seq, north=north)
+    rig.said()
+    assert rig.uploads[-1].begun_at == (0.0 if is_same else 1.0)
+
+
+def test_items_without_a_value_are_the_same_again() -> None:
+    rig = Rig()
+    for begun in (0.0, 1.0):
+        rig.run(begun)
+        rig.count(1)
+        rig.run(begun + QUIET)
+        message = item(0)
+        message.param4 = float("nan")
+        rig.receiver.item(message, ALICE, now=rig.now)
+        rig.said()
+        rig.receiver.finish(Result.DENIED, opaque_id=0, now=rig.now)
+    assert [upload.begun_at for upload in rig.uploads] == [0.0, 0.0]
+
+
 def test_a_count_that_comes_again_counts_from_the_first() -> None:
     rig = Rig().count(2)
     rig.run(1.0)

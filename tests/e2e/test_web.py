@@ -1,0 +1,438 @@
+"""The HTTP API of a real web process, beside a real server and rover."""
+
+import signal
+import socket
+import stat
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import jsonschema
+import pytest
+
+from mav_tasks.web.schemas import SCHEMAS
+from tests.kit.processes import Stand, process, stand, wait_until
+from tests.kit.web import Web, has_rover, web
+
+pytestmark = pytest.mark.slow
+
+STREAMS = 200  # that one web process has at most
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stand, Web]]:
+    """One server, rover and web process for all of them; each leaves the queue empty."""
+    folder = tmp_path_factory.mktemp("web")
+    store = str(folder / "tasks.sqlite3")
+    with (
+        stand(folder, serve_store=store) as it,
+        web(folder, it, "--store", store) as page,
+    ):
+        has_rover(page)
+        yield it, page
+
+
+@pytest.fixture
+def page(both: tuple[Stand, Web]) -> Iterator[Web]:
+    """The web process; afterwards nothing waits and nothing is paused."""
+    it = both[1]
+    yield it
+    it.post("/stop", {"clear": True})
+    wait_until(lambda: not _active(it), within=15, what="an empty queue")
+    resume(it)
+
+
+def _active(it: Web) -> Any:
+    queue = it.get("/vehicles/1/queue")
+    return queue["running"] or queue["waiting_count"]
+
+
+def resume(it: Web) -> None:
+    epoch = it.get("/vehicles/1/queue")["halt_epoch"]
+    it.post("/vehicles/1/resume", {"epoch": epoch})
+
+
+def move(it: Web, metres: float, **more: Any) -> Any:
+    return it.post("/vehicles/1/tasks", {"goals": [{"kind": "move", "distance": metres}]} | more)
+
+
+def check(name: str, value: Any) -> None:
+    """Fail unless a value is as the OpenAPI document says."""
+    schema = SCHEMAS[name] | {"components": {"schemas": SCHEMAS}}
+    jsonschema.validate(value, schema)
+
+
+def test_a_task_is_submitted_followed_and_driven(page: Web) -> None:
+    task = move(page, 0.4, label="to the gate", priority=7)
+    check("Task", task)
+    assert (task["what"], task["label"], task["priority"]) == ("move 0.4 m", "to the gate", 7)
+    done = page.wait_for(task["id"], "completed")
+    check("Task", done)
+    track = page.get(f"/tasks/{task['id']}/track")
+    check("Track", track)
+    assert len(track["points"]) > 2
+    timing = page.get(f"/tasks/{task['id']}/timing")
+    check("Timing", timing)
+    assert timing["count"] > 5
+    entries = page.get(f"/tasks/{task['id']}/journal")
+    check("Entries", entries)
+    assert any("completed" in entry["message"] for entry in entries["entries"])
+    history = page.get("/vehicles/1/history")
+    check("Tasks", history)
+    assert history["tasks"][0]["id"] == task["id"]
+    assert history["tasks"][0]["ended_at"] is not None
+
+
+def test_answers_are_as_the_document_says(page: Web) -> None:
+    document = page.get("/openapi.json")
+    assert document["openapi"] == "3.1.0"
+    later = move(page, 1.0, delay=1000)
+    for name, path in (
+        ("Session", "/session"),
+        ("Vehicles", "/vehicles"),
+        ("Vehicle", "/vehicles/1"),
+        ("Queue", "/vehicles/1/queue"),
+        ("Tasks", "/vehicles/1/history"),
+        ("Track", "/vehicles/1/track"),
+        ("Path", "/vehicles/1/mission"),
+        ("Fence", "/vehicles/1/fence"),
+        ("Places", "/vehicles/1/rally"),
+        ("Task", f"/tasks/{later['id']}"),
+        ("Texts", "/texts"),
+        ("Entries", "/journal?limit=20"),
+    ):
+        check(name, page.get(path))
+
+
+def test_one_key_makes_one_task(page: Web) -> None:
+    body = {"goals": [{"kind": "wait", "duration": 900}], "label": "once"}
+    first = page.post("/vehicles/1/tasks", body, idempotency_key="a key")
+    again = page.post("/vehicles/1/tasks", body, idempotency_key="a key")
+    assert first["id"] == again["id"]
+    for other in (body | {"label": "twice"}, body | {"priority": 6}):
+        refused = page.send("POST", "/vehicles/1/tasks", other, idempotency_key="a key")
+        assert refused.status_code == 409
+        assert refused.json()["reason"] == "nonce_reused"
+    second = page.post("/vehicles/1/tasks", body, idempotency_key="another key")
+    assert second["id"] != first["id"]
+
+
+def test_why_a_task_waits_and_what_helps(page: Web) -> None:
+    page.post("/vehicles/1/pause", {})
+    task = move(page, 0.3)
+    queue = page.get("/vehicles/1/queue")
+    check("Queue", queue)
+    assert queue["paused"] == "operator"
+    assert queue["paused_words"] == "somebody paused it"
+    assert queue["waiting"][0]["id"] == task["id"]
+    assert queue["waiting"][0]["why"] == "queue paused"
+    assert queue["waiting"][0]["remedy"] == {"action": "resume", "words": "Resume lets it run."}
+    rover = page.get("/vehicles/1")
+    assert rover["control"] == "paused"
+    resume(page)
+    page.wait_for(task["id"], "completed")
+
+
+def test_a_stale_page_cannot_release_a_newer_stop(page: Web) -> None:
+    page.post("/vehicles/1/pause", {})
+    seen = page.get("/vehicles/1/queue")["halt_epoch"]
+    page.post("/stop", {"vehicle": 1})
+    refused = page.send("POST", "/vehicles/1/resume", {"epoch": seen})
+    assert refused.status_code == 409
+    assert refused.json()["reason"] == "stale"
+    assert page.get("/vehicles/1/queue")["paused"] == "stopped"
+
+
+def test_a_stop_says_what_came_of_it(page: Web) -> None:
+    task = move(page, 9.0)
+    page.wait_for(task["id"], "executing")
+    stream = page.events()
+    assert next(stream)[0] == "snapshot"
+    stop = page.post("/stop", {})
+    check("Stop", stop)
+    assert stop["phase"] == "acknowledged"
+    seen = []
+    for kind, _, data in stream:
+        if kind == "stop" and data["number"] == stop["number"]:
+            check("Stop", data)
+            seen.append(data)
+            if data["phase"] == "standing" and data["tasks"]:
+                break
+    assert [each["phase"] for each in seen][:2] == ["sent", "acknowledged"]
+    assert seen[-1]["tasks"] == [task["id"]]
+    assert 0 < seen[-1]["standing_after"] < 30
+    assert page.task(task["id"])["state"] == "killed"
+
+
+def test_a_held_task_is_released_with_the_epoch_that_was_seen(page: Web) -> None:
+    task = move(page, 3.0)
+    page.wait_for(task["id"], "executing")
+    refused = page.send("POST", f"/tasks/{task['id']}/release", {"how": "again", "epoch": 0})
+    assert refused.status_code == 409
+    wrong = page.send("POST", f"/tasks/{task['id']}/release", {"how": "maybe", "epoch": 0})
+    assert wrong.status_code == 422
+    assert "expected one of again, remainder, skip" in wrong.json()["detail"]
+
+
+def test_tasks_are_changed_and_cancelled(page: Web) -> None:
+    first = move(page, 1.0, delay=500)
+    second = move(page, 1.0, after=first["id"])
+    changed = page.send("PATCH", f"/tasks/{first['id']}", {"priority": 9, "label": "neu: ä"})
+    assert changed.json()["priority"] == 9
+    assert page.task(first["id"])["label"] == "neu: ä"
+    page.post(f"/tasks/{first['id']}/cancel", {})
+    assert page.wait_for(first["id"], "cancelled")["reason"] is not None
+    assert page.wait_for(second["id"], "failed")["reason"] == "dependency_failed"
+    over = page.send("POST", f"/tasks/{first['id']}/cancel", {})
+    assert over.status_code == 409
+    page.post("/vehicles/1/clear", {})
+
+
+ITEM = "{}\t{}\t{}\t16\t0\t0\t0\t0\t{}\t{}\t0\t1\n"
+
+
+def test_a_plan_is_shown_and_then_queued(page: Web) -> None:
+    rover = page.get("/vehicles/1")
+    latitude, longitude = rover["latitude"], rover["longitude"]
+    text = "QGC WPL 110\n" + ITEM.format(0, 1, 0, latitude, longitude)
+    text += ITEM.format(1, 0, 3, latitude + 1e-5, longitude)
+    shown = page.post("/plans", {"name": "yard.txt", "text": text})
+    check("Plan", shown)
+    assert shown["path"] == [{"latitude": pytest.approx(latitude + 1e-5), "longitude": longitude}]
+    task = page.post("/vehicles/1/missions", {"text": text, "label": "yard"})
+    assert task["goals"] == shown["path"]
+    page.wait_for(task["id"], "completed")
+    wrong = page.send("POST", "/plans", {"text": "no plan"})
+    assert wrong.status_code == 422
+
+
+def test_the_fence_is_set_shown_and_removed(page: Web) -> None:
+    rover = page.get("/vehicles/1")
+    circle = {"latitude": rover["latitude"], "longitude": rover["longitude"], "radius": 40}
+    assert page.send("PUT", "/vehicles/1/fence", {"circle": circle}).json() == {"items": 1}
+    (shape,) = page.get("/vehicles/1/fence")["shapes"]
+    assert (shape["kind"], shape["radius"]) == ("circle", 40)
+    far = {"kind": "goto", "north": 400, "east": 0}
+    refused = page.send("POST", "/vehicles/1/tasks", {"goals": [far]})
+    assert refused.status_code == 409
+    assert refused.json()["reason"] in ("outside_fence", None)
+    assert page.send("DELETE", "/vehicles/1/fence", None).status_code == 204
+    assert page.get("/vehicles/1/fence")["shapes"] == []
+    both = page.send("PUT", "/vehicles/1/fence", {"circle": circle, "polygon": []})
+    assert both.status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status", "words"),
+    [
+        ("POST", "/vehicles/1/tasks", {"goals": []}, 422, "goals []: expected at least 1"),
+        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "fly"}]}, 422, "goals[0].kind 'fly'"),
+        ("POST", "/vehicles/1/tasks", {}, 422, "goals: missing"),
+        ("POST", "/vehicles/9/pause", {}, 404, "no rover 9; the server has: 1"),
+        ("POST", "/vehicles/1/resume", {}, 422, "epoch: missing"),
+        ("GET", "/tasks/99999", None, 404, "no task 99999"),
+        ("GET", "/nothing", None, 404, "there is nothing at this address"),
+        ("DELETE", "/stop", None, 405, "does not take that method"),
+        ("GET", "/vehicles/1/queue?limit=x", None, 422, "limit 'x': expected a number"),
+        ("POST", "/stop", [], 422, "expected a JSON object"),
+        ("POST", "/stop", {"vehicle": 0}, 422, "vehicle 0: expected at least 1"),
+    ],
+)
+def test_a_wrong_request_is_a_problem_that_names_what_was_wrong(
+    page: Web, method: str, path: str, body: Any, status: int, words: str
+) -> None:
+    answer = page.send(method, path, body)
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    check("Problem", answer.json())
+    assert words in answer.json()["detail"]
+
+
+def test_a_body_that_is_no_json_is_named(page: Web) -> None:
+    for content in (b"{", b"\xff", b"[" * 60_000):
+        headers = {"content-type": "application/json"}
+        answer = page.client.post("/api/v1/stop", content=content, headers=headers)
+        assert answer.status_code == 400, answer.text
+
+
+def test_a_stream_goes_on_where_it_ended(page: Web) -> None:
+    stream = page.events()
+    kind, last, snapshot = next(stream)
+    assert kind == "snapshot"
+    check("Vehicle", snapshot["vehicles"][0])
+    check("Queue", snapshot["queues"][0])
+    stream.close()  # type: ignore[attr-defined]
+    task = move(page, 1.0, delay=900)
+    ids = []
+    for kind, number, data in page.events(last=last):
+        assert kind != "snapshot"
+        if number:
+            ids.append(int(number.rpartition("-")[2]))
+        if kind == "task" and data["id"] == task["id"]:
+            break
+    assert ids == sorted(ids)
+
+
+def test_role_and_token(tmp_path: Path, both: tuple[Stand, Web]) -> None:
+    with web(tmp_path, both[0], "--role", "observer", name="observer") as it:
+        has_rover(it)
+        refused = it.send("POST", "/vehicles/1/tasks", {"goals": [{"kind": "home"}]})
+        assert refused.status_code == 403
+        assert "observer, which may not submit" in refused.json()["detail"]
+        command = ("-m", "mav_tasks.cli", "web", "tokens", "add", "anna", "--role", "submitter")
+        with process(
+            *command, "--tokens", str(tmp_path / "web-tokens.json"), folder=tmp_path, name="add"
+        ) as adding:
+            assert adding.popen.wait(20) == 0
+            token = adding.text.strip()
+        mode = (tmp_path / "web-tokens.json").stat().st_mode
+        assert stat.S_IMODE(mode) == 0o600
+        own = it.send(
+            "POST",
+            "/vehicles/1/tasks",
+            {"goals": [{"kind": "wait", "duration": 500}], "delay": 500},
+            authorization=f"Bearer {token}",
+        ).json()
+        stranger = it.send("POST", f"/tasks/{own['id']}/cancel", {})
+        assert stranger.status_code == 403
+        login = it.send("POST", "/session", {"token": token})
+        assert login.status_code == 204
+        cookie = login.headers["set-cookie"]
+        assert "HttpOnly" in cookie
+        assert "SameSite=strict" in cookie
+        assert it.get("/session")["name"] == "anna"
+        assert it.send("POST", f"/tasks/{own['id']}/cancel", {}).status_code == 204
+        assert it.send("DELETE", "/session", None).status_code == 204
+        assert it.get("/session")["name"] == "local"
+
+
+def test_beyond_loopback_without_a_token_it_does_not_start(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    command = ("-m", "mav_tasks.cli", "web", "--listen", "0.0.0.0:0", "--store", "")
+    tokens = ("--tokens", str(tmp_path / "none.json"))
+    with process(*command, *tokens, folder=tmp_path, name="open") as it:
+        assert it.popen.wait(20) == 2
+        assert "add a token first: mav-tasks web tokens add" in it.text
+
+
+def test_a_port_in_use_is_one_line(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        where = f"127.0.0.1:{taken.getsockname()[1]}"
+        command = ("-m", "mav_tasks.cli", "web", "--listen", where, "--store", "")
+        with process(*command, folder=tmp_path, name="taken") as it:
+            assert it.popen.wait(20) == 2
+            assert f"--listen {where}: Address already in use" in it.text
+            assert "Traceback" not in it.text
+
+
+def test_a_server_that_is_killed_is_missed_and_found_again(tmp_path: Path) -> None:
+    store = str(tmp_path / "tasks.sqlite3")
+    with stand(tmp_path, serve_store=store) as it, web(tmp_path, it) as page:
+        has_rover(page)
+        stream = page.events()
+        next(stream)
+        it.server.end(signal.SIGKILL)
+        for kind, _, data in stream:
+            if kind == "server" and not data["reachable"]:
+                assert "is it running?" in data["detail"]
+                break
+        stop = page.send("POST", "/stop", {})
+        assert stop.status_code == 504
+        with process(
+            *("-m", "mav_tasks.cli", "serve", "--no-push", "--store", store),
+            *("--client", f"udpin:127.0.0.1:{it.client_port}"),
+            *("--vehicle", f"udpout:127.0.0.1:{it.rover_port}"),
+            folder=tmp_path,
+            name="again",
+        ):
+            for kind, _, data in stream:
+                if kind == "server":
+                    assert data["reachable"] is True
+                    break
+            wait_until(
+                lambda: page.send("POST", "/vehicles/1/pause", {}).status_code == 204,
+                within=20,
+                what="a pause",
+            )
+
+
+def test_idle_streams_and_slow_readers_keep_nobody_from_a_stop(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    with web(tmp_path, both[0], name="flooded") as it:
+        has_rover(it)
+        port = int(it.url.rpartition(":")[2])
+        host = f"Host: 127.0.0.1:{port}\r\n"
+        held = []
+        try:
+            status = b""
+            while status != b"503":  # as many streams as there may be; nobody reads on
+                each = socket.create_connection(("127.0.0.1", port), 5)
+                each.settimeout(10)
+                each.sendall(f"GET /api/v1/events HTTP/1.1\r\n{host}\r\n".encode())
+                status = each.recv(12)[-3:]
+                assert status in (b"200", b"429", b"503")  # 429: a few requests later
+                if status == b"200":
+                    held.append(each)
+                else:
+                    each.close()
+            assert len(held) == STREAMS
+            for _ in range(200):  # the request never ends
+                each = socket.create_connection(("127.0.0.1", port), 5)
+                each.sendall(f"POST /api/v1/stop HTTP/1.1\r\n{host}".encode())
+                held.append(each)
+            stops = [it.post("/stop", {}) for _ in range(5)]
+            assert {stop["phase"] for stop in stops} == {"acknowledged"}
+            resume(it)
+            unended = held[-1]
+            unended.settimeout(25)
+            assert unended.recv(100) == b""  # closed after 10 s without a request
+        finally:
+            for each in held:
+                each.close()
+        wait_until(lambda: _can_stream(it), within=20, what="a free event stream")
+
+
+def _can_stream(it: Web) -> bool:
+    with it.client.stream("GET", "/api/v1/events") as stream:
+        assert stream.status_code in (200, 503)
+        return stream.status_code == 200
+
+
+def test_fifty_browsers_each_get_every_event(page: Web) -> None:
+    counts: list[int] = []
+
+    def look(client: httpx.Client, task: int) -> None:
+        with client.stream("GET", "/api/v1/events", timeout=30) as stream:
+            for line in stream.iter_lines():
+                if f'"id":{task},' in line and '"state":"completed"' in line:
+                    counts.append(1)
+                    return
+
+    clients = [httpx.Client(base_url=page.url) for _ in range(50)]
+    task = move(page, 0.5, delay=2.0)
+    threads = [threading.Thread(target=look, args=(each, task["id"])) for each in clients]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(40)
+    for each in clients:
+        each.close()
+    assert len(counts) == 50
+
+
+def test_it_ends_at_once_with_streams_open(tmp_path: Path, both: tuple[Stand, Web]) -> None:
+    with web(tmp_path, both[0], name="ended") as it:
+        stream = it.events()
+        next(stream)
+        began = time.monotonic()
+        it.process.popen.send_signal(signal.SIGTERM)
+        assert it.process.popen.wait(10) in (0, -signal.SIGTERM, 143)
+        assert time.monotonic() - began < 8
+        assert "Traceback" not in it.process.text

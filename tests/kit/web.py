@@ -1,0 +1,92 @@
+"""A running web process beside a server and a rover, and a client of its API."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from tests.kit.processes import Process, Stand, process, wait_until
+
+
+@dataclass
+class Web:
+    """A web process: its address, and the client of a program without a token."""
+
+    process: Process
+    url: str
+    client: httpx.Client
+
+    def get(self, path: str, **named: Any) -> Any:
+        """Return the JSON at an address of the API; fail if it is a problem."""
+        answer = self.client.get(f"/api/v1{path}", **named)
+        assert answer.is_success, answer.text
+        return answer.json()
+
+    def send(self, method: str, path: str, body: Any, **headers: str) -> httpx.Response:
+        """Send JSON; return the answer, whatever it is."""
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        return self.client.request(method, f"/api/v1{path}", json=body, headers=named)
+
+    def post(self, path: str, body: Any, **headers: str) -> Any:
+        """Send JSON by POST; return the answer's JSON, None if it has none."""
+        answer = self.send("POST", path, body, **headers)
+        assert answer.is_success, answer.text
+        return answer.json() if answer.content else None
+
+    def task(self, task_id: int) -> Any:
+        """Return a task."""
+        return self.get(f"/tasks/{task_id}")
+
+    def wait_for(self, task_id: int, *states: str, within: float = 30.0) -> Any:
+        """Wait until a task is in one of the states; return it."""
+
+        def found() -> Any:
+            task = self.task(task_id)
+            return task if task["state"] in states else None
+
+        return wait_until(found, within=within, what=lambda: f"{states} of {self.task(task_id)}")
+
+    def events(self, *, last: str = "") -> Iterator[tuple[str, str, Any]]:
+        """Yield events of the stream: kind, id ("" for none) and data."""
+        headers = {"last-event-id": last} if last else {}
+        with self.client.stream("GET", "/api/v1/events", headers=headers, timeout=30) as stream:
+            assert stream.status_code == 200
+            kind = number = ""
+            for line in stream.iter_lines():
+                name, _, value = line.partition(": ")
+                if name == "event":
+                    kind = value
+                elif name == "id":
+                    number = value
+                elif name == "data":
+                    yield kind, number, json.loads(value)
+                    kind = number = ""
+
+
+@contextmanager
+def web(
+    folder: Path, it: Stand, *options: str, server: str = "", name: str = "web"
+) -> Iterator[Web]:
+    """Run a web process for a ``with`` block, on a free port of the loopback."""
+    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", ""]
+    command += ["--server", server or f"udpout:127.0.0.1:{it.client_port}"]
+    command += ["--tokens", str(folder / "web-tokens.json"), *options]
+    with process(*command, folder=folder, name=name) as running:
+        url = running.wait_for(r"web page: (http://\S+)/\n")[1]
+        with httpx.Client(base_url=url, timeout=15) as client:
+            yield Web(running, url, client)
+
+
+def has_rover(it: Web) -> Any:
+    """Wait until the page shows a rover with a position and a queue; return it."""
+
+    def found() -> Any:
+        _, _, shown = next(it.events())
+        rovers = shown["vehicles"] if shown["queues"] else []
+        return rovers[0] if rovers and rovers[0]["north"] is not None else None
+
+    return wait_until(found, within=20, what="a rover with a position and a queue")
