@@ -1,0 +1,66 @@
+// Dialogues: below the bar with STOP, which stays in reach. Escape closes; the focus comes back.
+
+import { failureWords } from "./api.js";
+import { h, say, show } from "./dom.js";
+
+const place = () => document.getElementById("dialogs");
+
+/**
+ * Open a dialogue. "act" does what it is for, and may throw a Problem; then it stays open and says why.
+ * @param {{title: string, words?: (string|Node)[], word: string, act: (form: any) => Promise<any>, fields?: Node, other?: Node[]}} what
+ */
+export function ask({ title, words = [], word, act, fields, other = [] }) {
+  close();
+  const before = document.activeElement;
+  const failure = h("p", { class: "failure", role: "alert", hidden: true });
+  const go = h("button", { class: "small main-word", type: "submit" }, word);
+  const form = h("form", { class: "box", role: "dialog", "aria-labelledby": "dialog-title", tabIndex: -1, noValidate: true },
+    h("h2", { id: "dialog-title" }, title),
+    ...words.map((each) => (each instanceof Node ? each : h("p", {}, each))),
+    fields,
+    failure,
+    h("div", { class: "row" }, ...other, h("button", { class: "small", type: "button", onclick: () => close() }, "Back"), go));
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    if (go.disabled) return;
+    go.disabled = true;
+    show(failure, false);
+    try {
+      await act(form);
+      close();
+    } catch (error) {
+      say(failure, failureWords(error));
+      show(failure, true);
+      go.disabled = false;
+    }
+  });
+  const cover = h("div", { class: "cover" }, form);
+  cover.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") close();
+    if (event.key === "Tab") keepFocus(event, form);
+  });
+  cover.addEventListener("pointerdown", (event) => event.target === cover && close());
+  cover._before = before;
+  place().append(cover);
+  (form.querySelector("input, select, textarea") ?? go).focus();
+  return form;
+}
+
+/** Close the open dialogue. */
+export function close() {
+  const cover = place().firstElementChild;
+  if (!cover) return;
+  const before = cover._before;
+  cover.remove();
+  if (before && before.isConnected) before.focus();
+}
+
+// STOP is part of the round, though it is not in the dialogue
+function keepFocus(event, form) {
+  const stops = [...document.querySelectorAll(".stop:not([hidden])")];
+  const all = [...form.querySelectorAll("button, input, select, textarea, a[href]"), ...stops].filter((each) => !each.disabled);
+  const at = all.indexOf(document.activeElement);
+  const next = all[(at + (event.shiftKey ? all.length - 1 : 1)) % all.length];
+  event.preventDefault();
+  next.focus();
+}

@@ -1,0 +1,65 @@
+// Small helpers for the DOM. Data become text nodes only: nothing that others sent is read as HTML.
+
+/**
+ * Make an element. A property "on…" is a listener, "class" the class, "data-…"/"aria-…" an attribute.
+ * @param {string} tag
+ * @param {Record<string, any>} [properties]
+ * @param {...(Node|string|number|null|undefined|false)} children
+ * @returns {any}
+ */
+export function h(tag, properties = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (name in element && !name.includes("-") && name !== "list") element[name] = value;
+    else element.setAttribute(name === "class" ? "class" : name, value === true ? "" : String(value));
+  }
+  if (properties.class) element.className = properties.class;
+  element.append(...children.filter((child) => child !== null && child !== undefined && child !== false).map((c) => (c instanceof Node ? c : String(c))));
+  return element;
+}
+
+/** Set a text only if it has changed, so that a screen reader does not read it again. */
+export function say(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Show or hide. */
+export function show(element, isShown) {
+  if (element.hidden === isShown) element.hidden = !isShown;
+}
+
+/**
+ * Make a list show items: elements of unchanged items stay as they are, with their focus.
+ * @param {HTMLElement} list
+ * @param {any[]} items
+ * @param {(item: any) => string|number} keyOf
+ * @param {(item: any) => {element: HTMLElement, update: (item: any) => void}} make
+ */
+export function reconcile(list, items, keyOf, make) {
+  const known = list._rows ?? (list._rows = new Map());
+  const wanted = new Set();
+  let before = null;
+  for (const item of items) {
+    const key = keyOf(item);
+    wanted.add(key);
+    let row = known.get(key);
+    if (!row) {
+      row = make(item);
+      known.set(key, row);
+    }
+    if (row.item !== item) {
+      row.update(item);
+      row.item = item;
+    }
+    const place = before ? before.nextSibling : list.firstChild;
+    if (place !== row.element) list.insertBefore(row.element, place);
+    before = row.element;
+  }
+  for (const [key, row] of known) {
+    if (wanted.has(key)) continue;
+    row.element.remove();
+    known.delete(key);
+  }
+}

@@ -1,0 +1,381 @@
+// The map: a metre grid, or tiles; rovers, tracks, goals, mission, fence, rally points.
+
+import { get, request } from "./api.js";
+import { confirmGoal, may } from "./acts.js";
+import { ask } from "./dialogs.js";
+import { h, say } from "./dom.js";
+import { change, choose, dataAge, onChange, state } from "./store.js";
+import { taskColour } from "./words.js";
+
+/* global L: Leaflet, loaded before this module */
+
+const hint = document.getElementById("map-hint");
+const METRES = 111318.845; // of a degree of latitude, as the server converts
+const OLD = 3; // s
+const FENCE_RADIUS = 20; // m
+const REFRESH = 30000; // ms
+
+let map = null;
+let hasTiles = false;
+let reference = null; // the place on earth at the grid's origin
+let trackLayer = null;
+let groundLayer = null;
+let goalLayer = null;
+let previewLayer = null;
+let taskTrackLayer = null;
+let isFitted = false;
+const marks = new Map();
+const drawnTracks = new Map();
+
+export function begin() {
+  const tiles = state.session.tiles;
+  hasTiles = Boolean(tiles);
+  map = L.map("map", {
+    crs: hasTiles ? L.CRS.EPSG3857 : L.CRS.Simple, preferCanvas: true, attributionControl: hasTiles, zoomSnap: 0.25,
+    minZoom: hasTiles ? tiles.min_zoom : -4, maxZoom: hasTiles ? Math.max(tiles.max_zoom, 22) : 7,
+    fadeAnimation: false, zoomAnimation: !matchMedia("(prefers-reduced-motion: reduce)").matches,
+  });
+  if (hasTiles) {
+    map.attributionControl.setPrefix(false);
+    const attribution = document.createElement("span");
+    attribution.textContent = tiles.attribution; // a file may hold anything
+    L.tileLayer(tiles.url, { minNativeZoom: tiles.min_zoom, maxNativeZoom: tiles.max_zoom, maxZoom: 22, attribution: attribution.innerHTML }).addTo(map);
+  } else {
+    grid().addTo(map);
+  }
+  map.setView([0, 0], hasTiles ? 3 : 3);
+  [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer] = Array.from({ length: 5 }, () => L.layerGroup().addTo(map));
+  map.on("click", (event) => clicked(event.latlng));
+  new ResizeObserver(() => map.invalidateSize()).observe(document.getElementById("map"));
+  onChange((names) => {
+    if (names.has("whole")) reset();
+    if (names.has("vehicles") || names.has("clock")) drawRovers();
+    if (names.has("chosen")) centre();
+    if (["vehicles", "chosen", "queues"].some((name) => names.has(name))) drawTracks();
+    if (["queues", "chosen", "tasks"].some((name) => names.has(name))) drawGoals();
+    if (names.has("chosen") || names.has("ground")) drawGround();
+  });
+  setInterval(loadGround, REFRESH);
+}
+
+/** Look at the ground of the chosen rover again: fence, rally points, mission. */
+export async function loadGround() {
+  const vehicle = state.chosen;
+  if (vehicle === null) return;
+  const parts = await Promise.allSettled(["fence", "rally", "mission"].map((part) => get(`/vehicles/${vehicle}/${part}`)));
+  const [fence, rally, mission] = parts.map((part) => (part.status === "fulfilled" ? part.value : null));
+  state.grounds.set(vehicle, { shapes: fence ? fence.shapes : [], places: rally ? rally.places : [], path: mission ? mission.path : [] });
+  change("ground");
+}
+
+function reset() {
+  for (const mark of marks.values()) mark.remove();
+  marks.clear();
+}
+
+/** The point of the map for a place, of a rover's frame or on earth; null: not known. */
+function point(place, vehicle) {
+  const origin = vehicle ? vehicle.origin : null;
+  let { latitude, longitude } = place;
+  if (latitude === undefined && origin) {
+    latitude = origin.latitude + place.north / METRES;
+    longitude = origin.longitude + place.east / (METRES * Math.cos((origin.latitude * Math.PI) / 180));
+  }
+  if (hasTiles) return latitude === undefined || latitude === null ? null : [latitude, longitude];
+  if (latitude === undefined || latitude === null) return place.north === undefined ? null : [place.north, place.east];
+  if (!reference) return place.north === undefined ? null : [place.north, place.east];
+  return [(latitude - reference.latitude) * METRES, (longitude - reference.longitude) * METRES * Math.cos((reference.latitude * Math.PI) / 180)];
+}
+
+/** The place of a point of the map, for a goal: on earth, or in the rover's frame. */
+function placeAt(latlng, vehicle) {
+  if (hasTiles) return { latitude: latlng.lat, longitude: latlng.lng };
+  if (reference) {
+    return {
+      latitude: reference.latitude + latlng.lat / METRES,
+      longitude: reference.longitude + latlng.lng / (METRES * Math.cos((reference.latitude * Math.PI) / 180)),
+    };
+  }
+  return vehicle ? { north: latlng.lat, east: latlng.lng } : null;
+}
+
+function here(vehicle) {
+  if (vehicle.north === null) return null;
+  if (!reference && vehicle.origin) reference = vehicle.origin;
+  // the position in the local frame is the smoother one
+  if (vehicle.origin) return point({ north: vehicle.north, east: vehicle.east }, vehicle);
+  return point({ north: vehicle.north, east: vehicle.east, latitude: vehicle.latitude ?? undefined, longitude: vehicle.longitude ?? undefined }, vehicle);
+}
+
+function drawRovers() {
+  for (const vehicle of state.vehicles.values()) {
+    const at = here(vehicle);
+    if (!at) continue;
+    let mark = marks.get(vehicle.vehicle);
+    if (!mark) {
+      mark = makeMark(vehicle.vehicle, at);
+      marks.set(vehicle.vehicle, mark);
+    }
+    if (mark._at !== `${at}`) {
+      mark.setLatLng(at);
+      mark._at = `${at}`;
+    }
+    const turn = `rotate(${vehicle.heading ?? 0}deg)`;
+    if (mark._turn !== turn) {
+      mark._svg.style.transform = turn;
+      mark._turn = turn;
+    }
+    const age = dataAge(vehicle);
+    const isOld = !vehicle.heard || age === null || age > OLD || !state.stream.isOpen;
+    const kind = `rover-mark leaflet-marker-icon leaflet-zoom-animated leaflet-interactive${isOld ? " old" : vehicle.control === "stopped" ? " stopped" : ""}`;
+    const element = mark.getElement();
+    if (element && mark._kind !== kind) {
+      element.className = kind;
+      mark._kind = kind;
+    }
+  }
+  if (!isFitted && marks.size) fit();
+}
+
+function makeMark(id, at) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 28 28");
+  const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  shape.setAttribute("class", "shape");
+  shape.setAttribute("d", "M14 2 L23 25 L14 20 L5 25 Z");
+  svg.append(shape);
+  const icon = h("div", {}, svg, h("span", { class: "number" }, String(id)));
+  const mark = L.marker(at, { icon: L.divIcon({ html: icon, className: "rover-mark", iconSize: [28, 28], iconAnchor: [14, 14] }), keyboard: true, alt: `Rover ${id}`, title: `Rover ${id}` });
+  mark.on("click", () => {
+    choose(id);
+    centre();
+  });
+  mark.addTo(map);
+  mark._svg = svg;
+  return mark;
+}
+
+function fit() {
+  const places = [...marks.values()].map((mark) => mark.getLatLng());
+  isFitted = true;
+  if (places.length === 1) map.setView(places[0], hasTiles ? 19 : 4);
+  else map.fitBounds(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 19 : 4 });
+}
+
+function centre() {
+  const mark = marks.get(state.chosen);
+  if (mark && isFitted) map.panTo(mark.getLatLng());
+  const words = state.chosen === null ? "" : `Click the map to send rover ${state.chosen} there, or to turn it. ${hasTiles ? "" : "Grid in metres, north is up."}`;
+  say(hint, words);
+  loadGround();
+}
+
+function drawTracks() {
+  const shown = new Set();
+  for (const [id, track] of state.tracks) {
+    if (state.vehicles.size > 5 && id !== state.chosen) continue;
+    shown.add(id);
+    const vehicle = state.vehicles.get(id);
+    if (!vehicle) continue;
+    let drawn = drawnTracks.get(id);
+    if (!drawn) drawnTracks.set(id, (drawn = { version: -1, layer: L.layerGroup().addTo(trackLayer) }));
+    if (id === state.chosen && !track.isWhole) loadTrack(id, track);
+    if (drawn.version === track.version) continue;
+    drawn.version = track.version;
+    drawn.layer.clearLayers();
+    for (const part of pieces(track.points)) {
+      const places = part.points.map(([, north, east]) => point({ north, east }, vehicle)).filter(Boolean);
+      if (places.length > 1) L.polyline(places, { color: taskColour(part.task), weight: part.task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }).addTo(drawn.layer);
+    }
+  }
+  for (const [id, drawn] of drawnTracks) {
+    if (shown.has(id)) continue;
+    drawn.layer.remove();
+    drawnTracks.delete(id);
+  }
+}
+
+async function loadTrack(id, track) {
+  track.isWhole = true;
+  try {
+    const { points } = await get(`/vehicles/${id}/track`);
+    const first = track.points.length ? track.points[0][0] : Infinity;
+    track.points.unshift(...points.filter((each) => each[0] < first));
+    track.version += 1;
+    change("vehicles");
+  } catch {
+    track.isWhole = false;
+  }
+}
+
+function* pieces(points) {
+  let part = null;
+  for (const each of points) {
+    if (!part || part.task !== each[4]) {
+      if (part) part.points.push(each);
+      if (part) yield part;
+      part = { task: each[4], points: [] };
+    }
+    part.points.push(each);
+  }
+  if (part) yield part;
+}
+
+function drawGoals() {
+  goalLayer.clearLayers();
+  for (const queue of state.queues.values()) {
+    if (state.vehicles.size > 5 && queue.vehicle !== state.chosen) continue;
+    const vehicle = state.vehicles.get(queue.vehicle);
+    if (!vehicle) continue;
+    let from = here(vehicle);
+    for (const task of [queue.current, ...queue.waiting.slice(0, 50)]) {
+      if (!task || !task.goals) continue;
+      const isNow = task === queue.current;
+      const places = task.goals.map((place) => point(place, vehicle)).filter(Boolean);
+      const colour = taskColour(task.id);
+      if (isNow && from && places.length) L.polyline([from, ...places.slice(Math.max(0, task.item - 1))], { color: colour, weight: 2, dashArray: "6 6", interactive: false }).addTo(goalLayer);
+      for (const [at, place] of places.entries()) {
+        const isNext = isNow && at === Math.min(Math.max(task.item, 1), places.length) - 1;
+        L.circleMarker(place, { radius: isNext ? 7 : 5, color: colour, weight: 2, opacity: isNow ? 1 : 0.45, fillOpacity: isNext ? 0.6 : 0.1, interactive: false }).addTo(goalLayer);
+      }
+      from = places.length ? places[places.length - 1] : from;
+    }
+  }
+}
+
+function drawGround() {
+  groundLayer.clearLayers();
+  const ground = state.grounds.get(state.chosen);
+  const vehicle = state.vehicles.get(state.chosen);
+  if (!ground || !vehicle) return;
+  drawShapes(ground.shapes, vehicle, groundLayer);
+  for (const place of ground.places) {
+    const at = point(place, vehicle);
+    if (at) L.circleMarker(at, { radius: 6, color: "#6a4fb3", weight: 2, fill: false }).bindTooltip("rally point").addTo(groundLayer);
+  }
+  const path = ground.path.map((place) => point(place, vehicle)).filter(Boolean);
+  if (path.length > 1) L.polyline(path, { color: "#3b6fd4", weight: 2, opacity: 0.5, dashArray: "2 6", interactive: false }).addTo(groundLayer);
+}
+
+function drawShapes(shapes, vehicle, layer) {
+  for (const shape of shapes) {
+    const style = { color: shape.inclusion ? "#2f8f4e" : "#c4161c", weight: 2, fillOpacity: shape.inclusion ? 0.03 : 0.12, interactive: false };
+    if (shape.kind === "polygon") {
+      const points = shape.points.map((place) => point(place, vehicle)).filter(Boolean);
+      if (points.length > 2) L.polygon(points, style).addTo(layer);
+    } else {
+      const at = point(shape.centre, vehicle);
+      // in the grid, a unit is a metre
+      if (at) L.circle(at, { ...style, radius: shape.radius }).addTo(layer);
+    }
+  }
+}
+
+/** Show what a plan file would do; null: nothing. */
+export function preview(plan) {
+  if (!previewLayer) return;
+  previewLayer.clearLayers();
+  if (!plan) return;
+  const vehicle = state.vehicles.get(state.chosen);
+  const path = plan.path.map((place) => point(place, vehicle)).filter(Boolean);
+  if (path.length) {
+    L.polyline(path, { color: "#d1602d", weight: 4, interactive: false }).addTo(previewLayer);
+    for (const at of path) L.circleMarker(at, { radius: 4, color: "#d1602d", fillOpacity: 1, interactive: false }).addTo(previewLayer);
+    map.fitBounds(L.latLngBounds(path).pad(0.3), { maxZoom: hasTiles ? 20 : 4 });
+  }
+  drawShapes(plan.fence, vehicle, previewLayer);
+}
+
+/** Show the track of one task; null: none. */
+export function showTrack(track) {
+  if (!taskTrackLayer) return;
+  taskTrackLayer.clearLayers();
+  if (!track) return;
+  const vehicle = state.vehicles.get(track.vehicle);
+  const places = track.points.map(([, north, east]) => point({ north, east }, vehicle)).filter(Boolean);
+  if (places.length < 2) return;
+  L.polyline(places, { color: taskColour(track.id), weight: 7, opacity: 0.5, interactive: false }).addTo(taskTrackLayer);
+  map.fitBounds(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 20 : 4 });
+}
+
+function clicked(latlng) {
+  const vehicle = state.vehicles.get(state.chosen);
+  if (!vehicle) return;
+  const place = placeAt(latlng, vehicle);
+  const from = here(vehicle);
+  if (!place || !from) return;
+  const target = "latitude" in place
+    ? { kind: "goto_global", latitude: round(place.latitude, 7), longitude: round(place.longitude, 7) }
+    : { kind: "goto", north: round(place.north, 2), east: round(place.east, 2) };
+  const [north, east] = offset(from, [latlng.lat, latlng.lng]);
+  const heading = round(((Math.atan2(east, north) * 180) / Math.PI + 360) % 360, 1);
+  const away = Math.hypot(north, east);
+  const id = vehicle.vehicle;
+  const buttons = [];
+  const button = (words, act) => buttons.push(h("button", { class: "small", type: "button", onclick: () => { map.closePopup(); act(); } }, words));
+  if (may("submit")) {
+    button(`Go here (${away.toFixed(1)} m)…`, () => confirmGoal(id, target, `Send rover ${id} here, ${away.toFixed(1)} m away?`));
+    button(`Face here (${Math.round(heading)}°)…`, () => confirmGoal(id, { kind: "face", heading }, `Turn rover ${id} to ${Math.round(heading)}°?`));
+  }
+  if (may("fence") && "latitude" in place) button("Fence here…", () => fenceHere(id, place));
+  if (!buttons.length) return;
+  const box = h("div", {}, h("p", {}, `Rover ${id}`), h("div", { class: "row" }, ...buttons));
+  L.popup({ closeButton: true, autoPan: true }).setLatLng(latlng).setContent(box).openOn(map);
+}
+
+function fenceHere(id, place) {
+  ask({
+    title: `Fence around this place for rover ${id}?`,
+    words: ["The rover must stay inside the circle. This replaces its present fence. A task that would leave it is refused, and a driving rover stops at it."],
+    fields: h("div", { class: "fields" }, h("label", {}, "Radius (m)", h("input", { name: "radius", type: "number", min: 1, max: 10000, step: "any", value: FENCE_RADIUS }))),
+    word: "Set the fence",
+    act: async (form) => {
+      const radius = Number(new FormData(form).get("radius"));
+      await request("PUT", `/vehicles/${id}/fence`, { circle: { ...place, radius } });
+      await loadGround();
+    },
+  });
+}
+
+function offset(from, to) {
+  if (!hasTiles) return [to[0] - from[0], to[1] - from[1]];
+  return [(to[0] - from[0]) * METRES, (to[1] - from[1]) * METRES * Math.cos((from[0] * Math.PI) / 180)];
+}
+
+const round = (value, digits) => Number(value.toFixed(digits));
+
+// lines of a metre grid, drawn on canvas tiles
+function grid() {
+  const layer = L.gridLayer({ tileSize: 256, updateWhenIdle: false });
+  layer.createTile = (coords) => {
+    const tile = document.createElement("canvas");
+    tile.width = tile.height = 256;
+    const pen = tile.getContext("2d");
+    const size = 256 / 2 ** coords.z; // m
+    const step = [0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((each) => each * 2 ** coords.z >= 48) ?? 5000;
+    const style = getComputedStyle(document.documentElement);
+    pen.strokeStyle = style.getPropertyValue("--line");
+    pen.fillStyle = style.getPropertyValue("--soft");
+    pen.font = "10px system-ui";
+    const west = coords.x * size;
+    const north = -coords.y * size;
+    for (let east = Math.ceil(west / step) * step; east < west + size; east += step) {
+      const x = Math.round((east - west) * 2 ** coords.z) + 0.5;
+      pen.beginPath();
+      pen.moveTo(x, 0);
+      pen.lineTo(x, 256);
+      pen.stroke();
+      if (Math.round(north / step) % 2 === 0) pen.fillText(`${+east.toFixed(1)} E`, x + 2, 10);
+    }
+    for (let at = Math.floor(north / step) * step; at > north - size; at -= step) {
+      const y = Math.round((north - at) * 2 ** coords.z) + 0.5;
+      pen.beginPath();
+      pen.moveTo(0, y);
+      pen.lineTo(256, y);
+      pen.stroke();
+      if (Math.round(west / step) % 2 === 0) pen.fillText(`${+at.toFixed(1)} N`, 2, y - 2);
+    }
+    return tile;
+  };
+  return layer;
+}

@@ -1,0 +1,129 @@
+// Finished tasks of the chosen rover; and one task with its journal, track and set-point timing.
+
+import { failureWords, get } from "./api.js";
+import * as acts from "./acts.js";
+import { h, reconcile, say, show } from "./dom.js";
+import { showTrack } from "./map.js";
+import { onChange, state } from "./store.js";
+import { goTo, showTask } from "./routes.js";
+import { clock, duration, progressWords, quick, stateWords, taskName } from "./words.js";
+
+const panel = document.getElementById("panel-past");
+const list = h("ol", { "aria-label": "Finished tasks, the newest first" });
+const none = h("p", { class: "empty" });
+const detail = h("section", { hidden: true, "aria-label": "One task" });
+const past = h("div", {}, list, none);
+
+export let tasks = [];
+let loadedFor = "";
+
+export function begin() {
+  panel.append(detail, past);
+  onChange((names) => {
+    if (names.has("route")) open();
+    if (names.has("tasks") && state.task !== null && state.tasks.has(state.task)) drawFacts(state.tasks.get(state.task));
+    if (["chosen", "tasks", "queues", "whole"].some((name) => names.has(name))) refresh();
+  });
+}
+
+// the list is fetched again when a task of the rover has ended
+async function refresh() {
+  const queue = state.queues.get(state.chosen);
+  if (!queue) return;
+  const over = ["completed", "failed", "cancelled", "killed", "expired"].map((name) => queue.counts[name] ?? 0);
+  const mark = `${queue.vehicle} ${over.join(" ")}`;
+  if (mark === loadedFor) return;
+  loadedFor = mark;
+  try {
+    tasks = (await get(`/vehicles/${queue.vehicle}/history?limit=100`)).tasks;
+    say(none, tasks.length ? "" : "No task has ended yet.");
+  } catch (error) {
+    loadedFor = "";
+    say(none, failureWords(error));
+  }
+  for (const task of tasks) task.endedAt = task.ended_ago === null ? null : Date.now() / 1000 - task.ended_ago;
+  reconcile(list, tasks, (task) => task.id, make);
+  document.dispatchEvent(new CustomEvent("past"));
+}
+
+function make(task) {
+  const link = h("a", { href: `/tasks/${task.id}`, onclick: (event) => goTo(event, task.id) });
+  const mark = h("span", { class: "state" });
+  const info = h("p", { class: "why" });
+  const element = h("li", { class: "task" }, h("div", { class: "line" }, h("span", { class: "title" }, link), mark), info);
+  return {
+    element,
+    update: (shown) => {
+      say(link, taskName(shown));
+      say(mark, stateWords(shown));
+      const parts = [];
+      if (shown.endedAt) parts.push(`ended ${clock(shown.endedAt)}`);
+      if (shown.execution_time) parts.push(`driven ${duration(shown.execution_time)}`);
+      if (shown.why && shown.why !== shown.state) parts.push(shown.why);
+      say(info, parts.join(" · "));
+    },
+  };
+}
+
+const facts = h("dl", { class: "facts-table" });
+const title = h("h2", {});
+const buttons = h("div", { class: "row" });
+const failure = h("p", { class: "failure", role: "alert", hidden: true });
+const log = h("ol", { class: "log", "aria-label": "Journal of the task" });
+detail.append(h("button", { class: "small", type: "button", onclick: () => showTask(null) }, "← Back to the list"), title, facts, failure, buttons, h("h3", {}, "What happened"), log);
+
+async function open() {
+  const id = state.task;
+  show(detail, id !== null);
+  show(past, id === null);
+  if (id === null) return showTrack(null);
+  document.getElementById("tab-past").click();
+  say(title, `Task ${id}`);
+  facts.replaceChildren();
+  log.replaceChildren();
+  buttons.replaceChildren();
+  show(failure, false);
+  try {
+    const task = await get(`/tasks/${id}`);
+    if (state.task !== id) return;
+    state.tasks.set(id, task);
+    drawFacts(task);
+  } catch (error) {
+    say(failure, failureWords(error));
+    return show(failure, true);
+  }
+  const [track, timing, journal] = await Promise.allSettled([get(`/tasks/${id}/track`), get(`/tasks/${id}/timing`), state.session && state.session.journal ? get(`/tasks/${id}/journal`) : null]);
+  if (state.task !== id) return;
+  if (track.status === "fulfilled") showTrack({ id, points: track.value.points, vehicle: state.tasks.get(id).vehicle });
+  if (timing.status === "fulfilled" && timing.value && timing.value.count) {
+    const { count, rate, p50, p99, max, late } = timing.value;
+    addFact("Set-points", `${count} intervals at ${rate} Hz: median ${quick(p50)}, p99 ${quick(p99)}, longest ${quick(max)}, ${late} late`);
+  }
+  const entries = journal.status === "fulfilled" && journal.value ? journal.value.entries : [];
+  log.replaceChildren(...entries.map((entry) => h("li", { class: entry.level === "warning" ? "warn" : "" }, h("time", {}, clock(entry.at)), entry.message)));
+  if (!entries.length) log.append(h("li", {}, "The web process reads no journal of this server: start it on the same machine, with --store."));
+}
+
+function drawFacts(task) {
+  say(title, taskName(task));
+  const rows = [["State", stateWords(task)]];
+  if (task.why) rows.push(["Why", task.why]);
+  if (task.remedy) rows.push(["What helps", task.remedy.words]);
+  rows.push(["Rover", String(task.vehicle)], ["Priority", String(task.priority)]);
+  if (progressWords(task)) rows.push(["Progress", progressWords(task)]);
+  if (task.after) rows.push(["After", `task ${task.after}`]);
+  if (task.execution_time) rows.push(["Driven", duration(task.execution_time)]);
+  if (task.ended_at) rows.push(["Ended", new Date(task.ended_at).toLocaleString()]);
+  rows.push(["Submitted by", task.submitter]);
+  const kept = [...facts.children].filter((each) => each.dataset.kept);
+  facts.replaceChildren(...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]), ...kept);
+  const isOver = ["completed", "failed", "cancelled", "killed", "expired"].includes(task.state);
+  const made = [];
+  if (task.state === "held" && acts.may("release")) made.push(h("button", { class: "small main-word", type: "button", onclick: () => acts.release(task, task.halt_epoch) }, "Release…"));
+  if (!isOver && (acts.may("cancel") || acts.may("submit"))) made.push(h("button", { class: "small", type: "button", onclick: () => acts.cancel(task) }, "Cancel…"));
+  buttons.replaceChildren(...made);
+}
+
+function addFact(name, value) {
+  facts.append(h("dt", { "data-kept": "yes" }, name), h("dd", { "data-kept": "yes" }, value));
+}

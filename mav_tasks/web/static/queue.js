@@ -1,0 +1,162 @@
+// The queue of the chosen rover: what runs, what waits and why, in order; and what a person can do about it.
+
+import { failureWords } from "./api.js";
+import * as acts from "./acts.js";
+import { h, reconcile, say, show } from "./dom.js";
+import { openTaskForm } from "./task_form.js";
+import { planDrop } from "./plans.js";
+import { chosenQueue, onChange, state } from "./store.js";
+import { goTo } from "./routes.js";
+import { duration, progressWords, stateWords, taskName } from "./words.js";
+
+const panel = document.getElementById("panel-queue");
+const MOST = 200; // rows
+
+const what = h("p", { class: "what" });
+const add = h("button", { class: "small main-word", type: "button", onclick: () => openTaskForm(state.chosen) }, "Add a task…");
+const clear = h("button", { class: "small", type: "button", onclick: () => acts.clear(chosenQueue()) }, "Cancel all…");
+const why = h("strong");
+const remedy = h("span");
+const go = h("button", { class: "small main-word", type: "button", onclick: () => acts.resume(chosenQueue()) }, "Resume…");
+const notice = h("div", { class: "notice", role: "status", hidden: true }, why, remedy, h("div", { class: "row" }, go));
+const failure = h("p", { class: "failure", role: "alert", hidden: true });
+const said = h("p", { class: "quiet", "aria-live": "polite" });
+const current = h("ol", { "aria-label": "The task that runs" });
+const list = h("ol", { "aria-label": "Waiting tasks, in the order in which they run" });
+const more = h("p", { class: "empty" });
+
+let dragged = null;
+
+export function begin() {
+  panel.append(h("div", { class: "panel-head" }, what, add, clear), notice, failure, said, current, list, more, planDrop());
+  onChange((names) => {
+    if (["queues", "chosen", "tasks", "clock", "whole"].some((name) => names.has(name))) draw();
+  });
+}
+
+function draw() {
+  const queue = chosenQueue();
+  show(add, Boolean(queue) && acts.may("submit"));
+  show(clear, Boolean(queue && queue.waiting_count) && acts.may("clear"));
+  if (!queue) {
+    say(what, state.vehicles.size ? "Loading the queue…" : "No rover yet.");
+    for (const each of [current, list]) reconcile(each, [], () => 0, () => null);
+    show(notice, false);
+    say(more, "");
+    return;
+  }
+  const count = queue.waiting_count;
+  say(what, `Rover ${queue.vehicle}: ${queue.current ? "one task runs" : "no task runs"}, ${count} wait${count === 1 ? "s" : ""}`);
+  show(notice, Boolean(queue.paused));
+  if (queue.paused) {
+    say(why, `No task runs: ${queue.paused_words}.`);
+    say(remedy, queue.paused === "takeover" || queue.paused === "failsafe" ? "Set the rover to HOLD, then resume." : "Resume lets the tasks run.");
+    show(go, acts.may("resume"));
+  }
+  reconcile(current, queue.current ? [queue.current] : [], (task) => task.id, (task) => make(task, true));
+  reconcile(list, queue.waiting.slice(0, MOST), (task) => task.id, (task) => make(task, false));
+  const hidden = queue.more + Math.max(0, queue.waiting.length - MOST);
+  say(more, hidden ? `and ${hidden} more` : count || queue.current ? "" : "Nothing waits. Add a task, drop a plan file here, or click on the map.");
+}
+
+function make(task, isCurrent) {
+  const id = task.id;
+  const link = h("a", { href: `/tasks/${id}`, onclick: (event) => goTo(event, id) });
+  const mark = h("span", { class: "state" });
+  const bar = h("progress", { max: 1, "aria-label": `Progress of task ${id}` });
+  const info = h("p", { class: "why" });
+  const reason = h("p", { class: "why" });
+  const button = (words, act, label) => h("button", { class: "small", type: "button", "aria-label": label, onclick: act }, words);
+  const now = () => find(id);
+  const higher = button("▲", () => change(now(), +1), `Raise the priority of task ${id}`);
+  const lower = button("▼", () => change(now(), -1), `Lower the priority of task ${id}`);
+  const release = h("button", { class: "small main-word", type: "button", onclick: () => acts.release(now(), chosenQueue().halt_epoch) }, "Release…");
+  const cancel = button("Cancel…", () => acts.cancel(now()), `Cancel task ${id}`);
+  const pause = button("Pause", async () => guarded(() => acts.pause(now().vehicle)), `Pause task ${id}`);
+  const element = h("li", { class: isCurrent ? "task now" : "task", "data-task": String(id) },
+    h("div", { class: "line" }, h("span", { class: "title" }, link), mark), bar, info, reason,
+    h("div", { class: "row" }, release, pause, higher, lower, cancel));
+  if (!isCurrent) makeDraggable(element, id);
+  const update = (shown) => {
+    say(link, taskName(shown));
+    say(mark, stateWords(shown));
+    show(bar, isCurrent && shown.progress !== null);
+    if (shown.progress !== null) bar.value = shown.progress;
+    say(info, isCurrent ? progressWords(shown) : waitWords(shown));
+    say(reason, shown.why ? `${isCurrent ? "" : "Waits: "}${shown.why}${shown.remedy ? `. ${shown.remedy.words}` : ""}` : "");
+    const mood = shown.remedy ? "why warn" : "why";
+    if (reason.className !== mood) reason.className = mood;
+    show(release, shown.state === "held" && Boolean(shown.remedy) && acts.may("release"));
+    show(pause, isCurrent && ["starting", "executing"].includes(shown.state));
+    show(higher, !isCurrent && shown.priority < 10 && acts.may("modify"));
+    show(lower, !isCurrent && shown.priority > 0 && acts.may("modify"));
+    show(cancel, shown.state !== "cancelling" && (acts.may("cancel") || acts.may("submit")));
+    element.draggable = !isCurrent && acts.may("modify");
+  };
+  return { element, update };
+}
+
+function find(id) {
+  const queue = chosenQueue();
+  return [queue.current, ...queue.waiting].find((task) => task && task.id === id) ?? state.tasks.get(id);
+}
+
+function waitWords(task) {
+  const parts = [`priority ${task.priority}`];
+  if (task.time_to_start !== null) parts.push(`starts in ${duration(task.time_to_start)}`);
+  if (task.time_to_finish !== null) parts.push(`ends in ${duration(task.time_to_finish)}`);
+  return parts.join(" · ");
+}
+
+async function guarded(act) {
+  show(failure, false);
+  try {
+    await act();
+  } catch (error) {
+    say(failure, failureWords(error));
+    show(failure, true);
+  }
+}
+
+async function change(task, by) {
+  await rank(task, Math.min(10, Math.max(0, task.priority + by)));
+}
+
+async function rank(task, priority) {
+  await guarded(async () => {
+    await acts.setPriority(task, priority);
+    say(said, `Task ${task.id} has priority ${priority} now.`);
+  });
+}
+
+/** The priority that puts a task before another one: equal ones run in the order of their ids. */
+export function priorityBefore(task, other) {
+  const isEarlier = task.id < other.id;
+  return Math.min(10, isEarlier ? other.priority : other.priority + 1);
+}
+
+function makeDraggable(element, id) {
+  element.addEventListener("dragstart", (event) => {
+    dragged = id;
+    event.dataTransfer.effectAllowed = "move";
+    event.dataTransfer.setData("text/plain", `task ${id}`);
+    element.classList.add("dragged");
+  });
+  element.addEventListener("dragend", () => {
+    dragged = null;
+    element.classList.remove("dragged");
+    say(said, "");
+    for (const each of list.querySelectorAll(".over-above")) each.classList.remove("over-above");
+  });
+  element.addEventListener("dragover", (event) => {
+    if (dragged === null || dragged === id) return;
+    event.preventDefault();
+    element.classList.add("over-above");
+    say(said, `Task ${dragged} gets priority ${priorityBefore(find(dragged), find(id))}: it then runs before task ${id}.`);
+  });
+  element.addEventListener("dragleave", () => element.classList.remove("over-above"));
+  element.addEventListener("drop", (event) => {
+    event.preventDefault();
+    if (dragged !== null && dragged !== id) rank(find(dragged), priorityBefore(find(dragged), find(id)));
+  });
+}

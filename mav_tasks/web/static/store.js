@@ -1,0 +1,127 @@
+// What the page knows, and who is told of changes: once for each frame of the display.
+
+export const state = {
+  session: null,
+  /** @type {Map<number, any>} */ vehicles: new Map(),
+  /** @type {Map<number, any>} */ queues: new Map(),
+  /** @type {Map<number, any>} */ tasks: new Map(),
+  /** @type {Map<number, any>} */ tracks: new Map(),
+  /** @type {Map<number, any>} */ grounds: new Map(), // fence, rally points and mission by rover
+  texts: [],
+  stops: [],
+  chosen: null,
+  task: null, // the task of a permalink
+  stream: { isOpen: false, heardAt: 0 },
+  server: { reachable: true, detail: null },
+};
+
+const MOST_TEXTS = 2000;
+const listeners = [];
+let changed = new Set();
+let isAsked = false;
+
+/** Call a view with the names of what has changed, before the next frame is drawn. */
+export function onChange(view) {
+  listeners.push(view);
+}
+
+/** Note that parts of the state have changed. */
+export function change(...names) {
+  for (const name of names) changed.add(name);
+  if (isAsked) return;
+  isAsked = true;
+  // a page in the background gets no frames, and must be right when it is looked at again
+  if (document.hidden) setTimeout(tell, 200);
+  else requestAnimationFrame(tell);
+}
+
+function tell() {
+  isAsked = false;
+  const names = changed;
+  changed = new Set();
+  for (const view of listeners) view(names);
+}
+
+/** Seconds of this page's clock. */
+export const now = () => performance.now() / 1000;
+
+/** Take the states of rovers. */
+export function takeVehicles(vehicles) {
+  const at = now();
+  for (const vehicle of vehicles) {
+    vehicle.takenAt = at;
+    state.vehicles.set(vehicle.vehicle, vehicle);
+    addToTrack(vehicle);
+  }
+  if (state.chosen === null && state.vehicles.size) state.chosen = Math.min(...state.vehicles.keys());
+  change("vehicles");
+}
+
+/** Take a queue; it has its tasks in it. */
+export function takeQueue(queue) {
+  queue.takenAt = now();
+  state.queues.set(queue.vehicle, queue);
+  for (const task of [queue.current, ...queue.waiting]) if (task) state.tasks.set(task.id, task);
+  change("queues");
+}
+
+/** Take a task; in the queue it replaces the line that it had. */
+export function takeTask(task) {
+  const before = state.tasks.get(task.id);
+  if (before && before.version > task.version) return;
+  state.tasks.set(task.id, task);
+  const queue = state.queues.get(task.vehicle);
+  if (queue && queue.current && queue.current.id === task.id) {
+    state.queues.set(task.vehicle, { ...queue, current: task });
+  }
+  change("queues", "tasks");
+}
+
+export function takeTexts(texts) {
+  state.texts.push(...texts);
+  if (state.texts.length > MOST_TEXTS) state.texts.splice(0, state.texts.length - MOST_TEXTS);
+  change("texts");
+}
+
+export function takeStop(stop) {
+  const place = state.stops.findIndex((each) => each.number === stop.number);
+  if (place >= 0) state.stops[place] = stop;
+  else state.stops.push(stop);
+  if (state.stops.length > 50) state.stops.shift();
+  change("stops");
+}
+
+/** Choose a rover; null: none. */
+export function choose(vehicle) {
+  state.chosen = vehicle;
+  change("chosen", "queues", "vehicles");
+}
+
+/** The queue of the chosen rover. */
+export const chosenQueue = () => (state.chosen === null ? null : state.queues.get(state.chosen) ?? null);
+
+/** How old the position of a rover is now, s; null: it has none. */
+export function dataAge(vehicle) {
+  return vehicle.data_age === null ? null : vehicle.data_age + (now() - vehicle.takenAt);
+}
+
+/** How long ago its heartbeat was, s; null: not known. */
+export function linkAge(vehicle) {
+  return vehicle.heartbeat_age === null ? null : vehicle.heartbeat_age + (now() - vehicle.takenAt);
+}
+
+const APART = 0.1; // m between two points of a track
+const MOST_POINTS = 20000;
+
+function addToTrack(vehicle) {
+  if (vehicle.north === null) return;
+  let track = state.tracks.get(vehicle.vehicle);
+  if (!track) state.tracks.set(vehicle.vehicle, (track = { points: [], isWhole: false, version: 0 }));
+  const queue = state.queues.get(vehicle.vehicle);
+  const task = queue && queue.current && queue.current.state === "executing" ? queue.current.id : null;
+  const last = track.points[track.points.length - 1];
+  if (last && Math.hypot(last[1] - vehicle.north, last[2] - vehicle.east) < APART && last[4] === task) return;
+  track.points.push([Date.now() / 1000, vehicle.north, vehicle.east, vehicle.heading, task]);
+  track.version += 1;
+  if (track.points.length > MOST_POINTS) track.points.splice(0, track.points.length - MOST_POINTS);
+}

@@ -1,0 +1,67 @@
+// A form for a new task, made from what the API says of goals and their limits.
+
+import { newKey, post } from "./api.js";
+import { consequenceOf } from "./acts.js";
+import { ask } from "./dialogs.js";
+import { h } from "./dom.js";
+import { state } from "./store.js";
+
+const NAMES = {
+  move: "Move straight", rotate: "Turn by an angle", drive: "Drive at a velocity", goto: "Go to (metres)",
+  goto_global: "Go to (latitude, longitude)", face: "Face a heading", wait: "Wait", home: "Return home",
+};
+
+/** Open the form for a rover, with the parts of a goal filled in. */
+export function openTaskForm(vehicle, goal = {}) {
+  const kinds = state.session.goals;
+  const select = h("select", { name: "kind" }, ...kinds.map((kind) => h("option", { value: kind.kind, selected: kind.kind === goal.kind }, NAMES[kind.kind] ?? kind.kind)));
+  const meaning = h("small");
+  const numbers = h("div", { class: "fields" });
+  const draw = () => {
+    const kind = kinds.find((each) => each.kind === select.value);
+    meaning.textContent = kind.meaning;
+    numbers.replaceChildren(...kind.numbers.map((number) => field(number, goal[number.name])));
+  };
+  select.addEventListener("change", draw);
+  draw();
+  const { least, most, default: usual } = state.session.priority;
+  const terms = h("div", { class: "fields" },
+    labelled("Name of the task", h("input", { name: "label", maxLength: state.session.label_bytes, autocomplete: "off" }), `at most ${state.session.label_bytes} bytes`),
+    labelled("Priority", h("input", { name: "priority", type: "number", min: least, max: most, step: 1, value: usual }), `${most} runs first`),
+    labelled("Start in (s)", h("input", { name: "delay", type: "number", min: 0, step: "any" }), "empty: when it is its turn"),
+    labelled("After task", h("input", { name: "after", type: "number", min: 1, step: 1 }), "empty: none"));
+  const key = newKey();
+  ask({
+    title: `Add a task for rover ${vehicle}`,
+    words: [h("label", { class: "fields" }, "What ", select), meaning],
+    fields: h("div", {}, numbers, terms, h("p", { class: "empty" }, consequenceOf(vehicle))),
+    word: "Add the task",
+    act: (form) => post(`/vehicles/${vehicle}/tasks`, bodyOf(form, kinds.find((each) => each.kind === select.value)), { key: `${key}` }),
+  });
+}
+
+function bodyOf(form, kind) {
+  const data = new FormData(form);
+  const number = (name) => {
+    const text = String(data.get(name) ?? "").trim();
+    return text === "" ? null : Number(text);
+  };
+  const goal = { kind: kind.kind };
+  for (const each of kind.numbers) if (number(each.name) !== null) goal[each.name] = number(each.name);
+  return { goals: [goal], label: String(data.get("label") ?? ""), priority: number("priority"), delay: number("delay"), after: number("after") };
+}
+
+function field(number, value) {
+  const hint = [number.meaning];
+  if (number.least !== null) hint.push(`at least ${number.least}`);
+  if (number.most !== null) hint.push(`at most ${number.most}`);
+  const input = h("input", {
+    name: number.name, type: "number", step: "any", required: number.required, value: value ?? "",
+    min: number.least ?? undefined, max: number.most ?? undefined,
+  });
+  return labelled(`${number.name.replace("_", " ")}${number.unit ? ` (${number.unit})` : ""}${number.required ? "" : ", optional"}`, input, hint.join("; "));
+}
+
+function labelled(name, input, hint) {
+  return h("label", {}, name, input, hint ? h("small", {}, hint) : null);
+}

@@ -1,0 +1,57 @@
+// Times, distances and states in words.
+
+/** "3 s", "2 min", "1 h 5 min" */
+export function duration(seconds) {
+  if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "unknown";
+  const whole = Math.max(0, Math.round(seconds));
+  if (whole < 60) return `${whole} s`;
+  if (whole < 3600) return `${Math.floor(whole / 60)} min${whole % 60 && whole < 600 ? ` ${whole % 60} s` : ""}`;
+  if (whole < 86400) return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
+  return `${Math.floor(whole / 86400)} d ${Math.floor((whole % 86400) / 3600)} h`;
+}
+
+/** Milliseconds below a second, else seconds with a decimal. */
+export function quick(seconds) {
+  if (seconds === null || seconds === undefined) return "";
+  return seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`;
+}
+
+/** The local time of seconds since 1970. */
+export function clock(seconds) {
+  return new Date(seconds * 1000).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+}
+
+/** A mark beside the word of a state, so that colour is not needed to tell them apart. */
+export const MARKS = {
+  scheduled: "◷", blocked: "◇", queued: "○", starting: "◔", executing: "▶", paused: "❚❚", cancelling: "◌", held: "⚠",
+  completed: "✓", failed: "✗", cancelled: "–", killed: "■", expired: "⌛", unknown: "?",
+};
+
+/** "▶ executing" */
+export function stateWords(task) {
+  return `${MARKS[task.state] ?? ""} ${task.state}`;
+}
+
+/** How far a task is: "1.2 m left, 40 %, ends in 3 s". */
+export function progressWords(task) {
+  const parts = [];
+  if (task.left !== null && task.left_unit) parts.push(`${task.left.toFixed(task.left_unit === "items" ? 0 : 1)} ${task.left_unit} left`);
+  if (task.progress !== null) parts.push(`${Math.round(task.progress * 100)} %`);
+  if (task.items > 1) parts.push(`item ${task.item} of ${task.items}`);
+  if (task.time_to_finish !== null) parts.push(`ends in ${duration(task.time_to_finish)}`);
+  return parts.join(" · ");
+}
+
+/** The name of a task: "Task 12 “to the gate”: move 2 m". */
+export function taskName(task) {
+  return `Task ${task.id}${task.label ? ` “${task.label}”` : ""}: ${task.what}`;
+}
+
+export const ACTIVE = new Set(["starting", "executing", "paused", "cancelling", "held"]);
+export const OVER = new Set(["completed", "failed", "cancelled", "killed", "expired"]);
+
+/** One of a fixed set of colours for each task. */
+export function taskColour(task) {
+  const colours = ["#0b84a5", "#d1602d", "#6a4fb3", "#2f8f4e", "#b3468a", "#8a6d00", "#3b6fd4", "#a23b3b"];
+  return task === null ? "#8a9693" : colours[task % colours.length];
+}
