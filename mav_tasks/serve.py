@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import signal
+import socket
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -16,6 +17,7 @@ from typing import Any
 from mav_tasks.clock import boot_time
 from mav_tasks.config.reload import Reload
 from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import LinkSide
 from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
 from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.link_keys import check_keys, in_words
@@ -28,8 +30,11 @@ from mav_tasks.logs.field_notes import FieldNotes
 from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.logs.vehicle_texts import VehicleTexts
+from mav_tasks.metrics import endpoint
+from mav_tasks.metrics.collector import Collector
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
+from mav_tasks.recording.decisions import project_version
 from mav_tasks.runner import Runner
 from mav_tasks.settings import Links, ServerSettings
 from mav_tasks.store import Store
@@ -55,6 +60,9 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
     say = partial(_say, as_json=settings.log.format == "json")
     with ExitStack() as opened:
         opened.enter_context(log_to_stderr(settings.log))
+        scraped = endpoint.opened(settings.metrics)
+        if scraped is not None:
+            opened.callback(scraped.close)
         keys = _watched_ring(links)
         client_links = [
             _open(opened, link.url, TO_CLIENTS, push=pushed if link.url == pushing else ())
@@ -83,12 +91,16 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
                 say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
             say("links.push not used: no link for clients is UDP")
+        if scraped is not None:
+            say(f"metrics on http://{settings.metrics.listen}/metrics")
         say(f"store {store.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
             values = sorted(restored.parameters.items())
             told = ", ".join(f"{name} {value:g}" for name, value in values)
             say(f"parameters of an earlier run: {told}")
-        running = _run(settings, store, restored, client_links, vehicle_links, reload, keys, say)
+        running = _run(
+            settings, store, restored, client_links, vehicle_links, reload, keys, say, scraped
+        )
         return asyncio.run(running)
 
 
@@ -138,6 +150,7 @@ async def _run(
     reload: Reload | None,
     keys: RingWatch,
     say: Callable[[str], None],
+    scraped: socket.socket | None,
 ) -> int:
     now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)
@@ -150,17 +163,29 @@ async def _run(
     listeners: list[EngineObserver] = [VehicleTexts(), *recorders]
     if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
         listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
-    runner = Runner(
-        engine,
-        store,
-        clients=clients,
-        vehicles=vehicles,
-        reload=reload,
-        observers=listeners,
-        policies={str(link.url): link.policy for link in links_of(settings.links)},
-        keys=keys,
-    )
-    return await runner.run()
+    with ExitStack() as shown:
+        if scraped is not None:
+            collector = Collector(
+                engine,
+                links={LinkSide.CLIENTS: clients, LinkSide.VEHICLES: vehicles},
+                recorders=recorders,
+                restored=restored,
+                version=project_version(),
+                woke_at=lambda: runner.woke_at,
+            )
+            listeners.append(collector)
+            shown.enter_context(endpoint.served(scraped, collector))
+        runner = Runner(
+            engine,
+            store,
+            clients=clients,
+            vehicles=vehicles,
+            reload=reload,
+            observers=listeners,
+            policies={str(link.url): link.policy for link in links_of(settings.links)},
+            keys=keys,
+        )
+        return await runner.run()
 
 
 def _say(words: str, *, as_json: bool) -> None:
