@@ -6,18 +6,16 @@ import json
 import logging
 import os
 import signal
-import socket
 import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mav_tasks.clock import boot_time
 from mav_tasks.config.reload import Reload
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import LinkSide
 from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
 from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.link_keys import check_keys, in_words
@@ -30,17 +28,18 @@ from mav_tasks.logs.field_notes import FieldNotes
 from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.logs.vehicle_texts import VehicleTexts
-from mav_tasks.metrics import endpoint
-from mav_tasks.metrics.collector import Collector
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
 from mav_tasks.recording.decisions import project_version
 from mav_tasks.runner import Runner
-from mav_tasks.settings import Links, ServerSettings
+from mav_tasks.settings import Links, Metrics, ServerSettings
 from mav_tasks.store import Store
 from mav_tasks.store.latest import note_latest
 from mav_tasks.store.opening import open_store
 from mav_tasks.tasks.restored import Restored
+
+if TYPE_CHECKING:
+    from mav_tasks.metrics.endpoint import Endpoint
 
 
 def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
@@ -60,9 +59,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
     say = partial(_say, as_json=settings.log.format == "json")
     with ExitStack() as opened:
         opened.enter_context(log_to_stderr(settings.log))
-        scraped = endpoint.opened(settings.metrics)
-        if scraped is not None:
-            opened.callback(scraped.close)
+        metrics = _metrics(opened, settings.metrics)
         keys = _watched_ring(links)
         client_links = [
             _open(opened, link.url, TO_CLIENTS, push=pushed if link.url == pushing else ())
@@ -91,7 +88,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
                 say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
             say("links.push not used: no link for clients is UDP")
-        if scraped is not None:
+        if metrics is not None:
             say(f"metrics on http://{settings.metrics.listen}/metrics")
         say(f"store {store.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
@@ -99,7 +96,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             told = ", ".join(f"{name} {value:g}" for name, value in values)
             say(f"parameters of an earlier run: {told}")
         running = _run(
-            settings, store, restored, client_links, vehicle_links, reload, keys, say, scraped
+            settings, store, restored, client_links, vehicle_links, reload, keys, say, metrics
         )
         return asyncio.run(running)
 
@@ -141,6 +138,16 @@ def _open(
     return link
 
 
+def _metrics(opened: ExitStack, metrics: Metrics) -> "Endpoint | None":
+    if not metrics.listen:
+        return None
+    from mav_tasks.metrics.endpoint import Endpoint  # noqa: PLC0415  # off by default
+
+    endpoint = Endpoint(metrics.listen)
+    opened.callback(endpoint.close)
+    return endpoint
+
+
 async def _run(
     settings: ServerSettings,
     store: Store,
@@ -150,7 +157,7 @@ async def _run(
     reload: Reload | None,
     keys: RingWatch,
     say: Callable[[str], None],
-    scraped: socket.socket | None,
+    metrics: "Endpoint | None",
 ) -> int:
     now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)
@@ -163,29 +170,28 @@ async def _run(
     listeners: list[EngineObserver] = [VehicleTexts(), *recorders]
     if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
         listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
-    with ExitStack() as shown:
-        if scraped is not None:
-            collector = Collector(
-                engine,
-                links={LinkSide.CLIENTS: clients, LinkSide.VEHICLES: vehicles},
-                recorders=recorders,
-                restored=restored,
-                version=project_version(),
-                woke_at=lambda: runner.woke_at,
-            )
-            listeners.append(collector)
-            shown.enter_context(endpoint.served(scraped, collector))
-        runner = Runner(
+    if metrics is not None:
+        collector = metrics.show(
             engine,
-            store,
             clients=clients,
             vehicles=vehicles,
-            reload=reload,
-            observers=listeners,
-            policies={str(link.url): link.policy for link in links_of(settings.links)},
-            keys=keys,
+            recorders=recorders,
+            restored=restored,
+            version=project_version(),
+            woke_at=lambda: runner.woke_at,
         )
-        return await runner.run()
+        listeners.append(collector)
+    runner = Runner(
+        engine,
+        store,
+        clients=clients,
+        vehicles=vehicles,
+        reload=reload,
+        observers=listeners,
+        policies={str(link.url): link.policy for link in links_of(settings.links)},
+        keys=keys,
+    )
+    return await runner.run()
 
 
 def _say(words: str, *, as_json: bool) -> None:

@@ -44,7 +44,7 @@ class ServeCommand(TyperCommand):
         """Return the arguments with a value for each option that may be given without one."""
         bare = {option.name: option.bare for _, option, _ in self._options if option.bare}
         filled = []
-        for argument, following in zip(args, [*args[1:], "-"], strict=True):
+        for argument, following in zip(args, [*args[1:], "-"], strict=False):
             filled.append(argument)
             if argument in bare and following.startswith("-"):
                 filled.append(bare[argument])

@@ -56,7 +56,7 @@ class BadRequest(Exception):
         self.status = status
 
 
-def listen(address: str, *, what: str) -> socket.socket:
+def listening(address: str, *, what: str) -> socket.socket:
     """Return a socket that listens at ``host:port``; raise UsageError, which names ``what``."""
     host, port = parse_endpoint(address, what=what)
     try:
@@ -71,7 +71,8 @@ def listen(address: str, *, what: str) -> socket.socket:
         listener.listen(BACKLOG)
     except OSError as error:
         listener.close()
-        raise UsageError(f"{what}: {address} cannot be opened: {error.strerror}") from error
+        why = f"{what}: {address} cannot be opened: {error.strerror}"
+        raise UsageError(f"{why}; choose another address") from error
     return listener
 
 
@@ -84,6 +85,7 @@ class HttpServer:
         self._is_local = is_loopback(str(listener.getsockname()[0]))
         self._loop: asyncio.AbstractEventLoop | None = None
         self._serving: asyncio.Task[None] | None = None
+        self._is_closing = False
         #: answers by status
         self.answers: Counter[int] = Counter()
         self._thread = Thread(target=self._run, name="metrics", daemon=True)
@@ -97,6 +99,7 @@ class HttpServer:
 
     def close(self) -> None:
         """End the thread; wait at most END_WITHIN."""
+        self._is_closing = True  # before the look at the loop, which may be about to begin
         loop, serving = self._loop, self._serving
         if loop is not None and serving is not None:
             with suppress(RuntimeError):  # it has ended by itself
@@ -116,7 +119,7 @@ class HttpServer:
         free = asyncio.Semaphore(CONNECTIONS)
         connections: set[asyncio.Task[None]] = set()
         with suppress(asyncio.CancelledError):
-            while True:
+            while not self._is_closing:
                 await free.acquire()
                 connection = await self._accept(self._loop)
                 task = self._loop.create_task(self._converse(connection))

@@ -33,7 +33,7 @@ def test_the_engine_has_five_methods_and_two_views() -> None:
 @pytest.mark.patches_core
 def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
     engine = Engine(settings.Settings(), now=0.0)
-    assert public(engine) == ["emergency_stop_packets", "not_in_force", "signatures"]
+    assert public(engine) == ["emergency_stop_packets", "figures", "not_in_force", "signatures"]
     assert (engine.emergency_stop_packets, engine.not_in_force) == ((), ())
 
 
