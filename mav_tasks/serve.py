@@ -172,7 +172,7 @@ async def _run(
         listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
     if metrics is not None:
         collector = metrics.show(
-            engine,
+            engine.figures,
             clients=clients,
             vehicles=vehicles,
             recorders=recorders,

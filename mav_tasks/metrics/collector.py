@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from mav_tasks.clock import boot_time
-from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import (
     AtOnce,
     Backlog,
@@ -90,7 +90,7 @@ class Collector:
 
     def __init__(
         self,
-        engine: Engine,
+        figures: Figures,
         *,
         links: Mapping[LinkSide, Sequence[Link]],
         recorders: Sequence[object],
@@ -100,14 +100,14 @@ class Collector:
         clock: Callable[[], float] = boot_time,
     ) -> None:
         """``woke_at`` returns when the loop began to read what it handles now, s of ``clock``."""
-        self._engine = engine
+        self._figures = figures
         self._links = {
             link.name: LinkCounts(link, side) for side, some in links.items() for link in some
         }
         self._recorders = [each for each in recorders if isinstance(each, Recorder)]
         self._version = version
         self._clock = clock
-        self._stops = Stops(engine.figures, clock=clock, woke_at=woke_at)
+        self._stops = Stops(figures, clock=clock, woke_at=woke_at)
         self._inputs = 0
         self._counters: dict[Family, dict[tuple[object, ...], int]] = defaultdict(
             lambda: defaultdict(int)
@@ -194,7 +194,7 @@ class Collector:
 
     def totals(self) -> tuple[Part, tuple[int, ...]]:
         """Return the figures that belong to no vehicle's state, and the vehicles to ask about."""
-        figures = self._engine.figures.all()
+        figures = self._figures.all()
         part: dict[Family, Sequence[Raw]] = {
             f.BUILD: [((self._version, platform.python_version()), 1)],
             f.INPUTS: [((), self._inputs)],
@@ -222,7 +222,7 @@ class Collector:
         for vehicle in self._staged.values():
             staged[vehicle] += 1
         for vehicle in system_ids:
-            found = self._engine.figures.of(vehicle, now=now)
+            found = self._figures.of(vehicle, now=now)
             for state, reason, count in found.tasks:
                 if (state, reason) == (TaskState.BLOCKED, TaskReason.DEPENDENCY):
                     first = min(count, staged[vehicle])

@@ -3,7 +3,8 @@
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from mav_tasks.engine.engine import Engine
+
+from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import LinkSide
 from mav_tasks.links.base import Link
 from mav_tasks.links.endpoint import is_loopback
@@ -37,7 +38,7 @@ class Endpoint:
 
     def show(
         self,
-        engine: Engine,
+        figures: Figures,
         *,
         clients: Sequence[Link],
         vehicles: Sequence[Link],
@@ -51,7 +52,7 @@ class Endpoint:
         Call it in the running event loop; ``Collector`` explains the arguments.
         """
         collector = Collector(
-            engine,
+            figures,
             links={LinkSide.CLIENTS: clients, LinkSide.VEHICLES: vehicles},
             recorders=recorders,
             restored=restored,
