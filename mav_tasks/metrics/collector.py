@@ -121,6 +121,8 @@ class Collector:
         self._uncommitted: deque[tuple[int, float]] = deque()  # last event of a turn, and its time
         self._store_fault = ""
         self._is_ending = False
+        #: a bug of ours has ended the counting: see ``EngineObservers``
+        self.is_broken = False
         self._on_input: dict[type, Callable[[Any, float], None]] = {
             Packets: self._receive,
             AtOnce: self._receive_several,
@@ -151,24 +153,36 @@ class Collector:
 
     def on_input(self, item: Input | None, *, now: float) -> None:
         """Count an input."""
-        self._inputs += 1
-        if self._stops.look_at <= now:
-            self._stops.look(now=now)
-        note = self._on_input.get(type(item))
-        if note is not None:
-            note(item, now)
+        try:
+            self._inputs += 1
+            if self._stops.look_at <= now:
+                self._stops.look(now=now)
+            note = self._on_input.get(type(item))
+            if note is not None:
+                note(item, now)
+        except Exception:
+            self.is_broken = True
+            raise
 
     def on_output(
         self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
     ) -> None:
         """Count packets and events."""
-        links = self._links
-        for outgoing in packets:
-            counts = links[outgoing.link]
-            counts.sent += 1
-            counts.sent_bytes += len(outgoing.data)
-        if not events:
-            return
+        try:
+            links = self._links
+            for outgoing in packets:
+                counts = links[outgoing.link]
+                counts.sent += 1
+                counts.sent_bytes += len(outgoing.data)
+            if events:
+                self._note_events(packets, events, now)
+        except Exception:
+            self.is_broken = True
+            raise
+
+    def _note_events(
+        self, packets: Sequence[Outgoing], events: Sequence[Event], now: float
+    ) -> None:
         self._events += len(events)
         self._uncommitted.append((self._events, now))
         self._stops.note(packets, events, now=now)
@@ -313,7 +327,6 @@ class Collector:
     def _withdraw(self, event: TaskWithdrawn) -> None:
         self._submitted.pop(event.task_id, None)
         self._staged.pop(event.task_id, None)
-        self._counters[f.REFUSED][TaskReason.STORE_UNAVAILABLE,] += 1
 
     def _refuse(self, event: SubmissionRefused) -> None:
         self._counters[f.REFUSED][event.reason,] += 1

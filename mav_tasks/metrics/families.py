@@ -14,7 +14,12 @@ INPUTS = _family(
 )
 
 TASKS = _family("gauge", "tasks", "Tasks that have not ended.", "vehicle", "state", "reason")
-SUBMITTED = _family("counter", "tasks_submitted_total", "Tasks accepted.", "vehicle")
+SUBMITTED = _family(
+    "counter",
+    "tasks_submitted_total",
+    "Tasks that got an id; also those withdrawn as not stored in time.",
+    "vehicle",
+)
 ENDED = _family("counter", "tasks_total", "Tasks that ended.", "vehicle", "outcome", "reason")
 INTERRUPTED = _family(
     "counter",

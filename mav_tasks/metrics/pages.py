@@ -61,6 +61,8 @@ class Pages:
         }
 
     async def _metrics(self) -> Answer:
+        if self._collector.is_broken:
+            return Answer(HTTPStatus.INTERNAL_SERVER_ERROR, b"nothing is counted: see the log\n")
         making = self._making
         if making is None or (making.done() and time.monotonic() - self._made_at > FRESH):
             making = self._making = asyncio.create_task(self._text())

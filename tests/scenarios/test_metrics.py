@@ -2,6 +2,8 @@
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from math import inf
 from typing import Any
 
 import pytest
@@ -13,7 +15,9 @@ from mav_tasks.metrics import families as f
 from mav_tasks.metrics.collector import Collector
 from mav_tasks.metrics.exposition import Family
 from mav_tasks.observer import EngineObservers
+from mav_tasks.tasks.events import TaskModified, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.task import TaskId, Terms
 from tests.kit.store import LateStore
 from tests.kit.world import World
 
@@ -150,3 +154,39 @@ def test_each_write_of_the_store_is_timed_until_it_is_durable(make_world: MakeWo
     commits = samples(collector, f.COMMIT)[()]
     assert commits.count >= 4
     assert commits.total == pytest.approx(0.15 * commits.count, rel=0.2)
+
+
+def test_what_is_not_stored_in_time_is_refused_once_and_no_longer_waits(
+    make_world: MakeWorld,
+) -> None:
+    store = LateStore()
+    world = make_world(store=store)
+    collector = watched(world)
+    world.ready()
+    store.delay = inf
+    world.client.move(0.3)
+    world.until(lambda: samples(collector, f.REFUSED) != {}, within=5)
+    world.run(1.0)
+    assert samples(collector, f.REFUSED) == {(R.STORE_UNAVAILABLE,): 1}
+    assert samples(collector, f.QUEUE_LENGTH) == {(1,): 0}
+    assert (collector._submitted, samples(collector, f.ENDED)) == ({}, {})
+    assert samples(collector, f.PENDING)[()] > 0
+
+
+def test_a_staged_task_needs_a_start_command_and_another_its_dependency(world: World) -> None:
+    collector = watched(world)
+    world.ready()
+    first = world.client.move(5.0)
+    world.until(lambda: first.ack is not None, within=5)
+    waits = world.client.command(54000, 1.0, 0, 0, 0, first.task_id)
+    world.until(lambda: waits.ack is not None, within=5)
+    blocked = (1, S.BLOCKED, R.DEPENDENCY)
+    assert tasks(collector)[blocked] == 1
+    task = world.task(waits.task_id)
+    staged = replace(task, id=TaskId(99), terms=Terms(is_staged=True))
+    collector.on_output([], [TaskSubmitted(staged, world.now)], now=world.now)
+    assert tasks(collector)[1, S.BLOCKED, R.WAITING_FOR_START] == 1
+    assert blocked not in tasks(collector), "one is blocked, of which one is staged"
+    started = TaskModified(TaskId(99), 1, 2, Terms(), "a client", world.now, staged.terms)
+    collector.on_output([], [started], now=world.now)
+    assert tasks(collector)[blocked] == 1

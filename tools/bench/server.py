@@ -1,11 +1,11 @@
 """A real server on loopback with room for every task of a measurement, and no rate limits.
 
 ``python -m tools.bench.server CLIENT_PORT VEHICLE_PORT [--store FILE] [--profile FILE] [--drive]
-[--tlog FOLDER] [--record FOLDER] [--default-limits]``. Without ``--default-limits``, clients may
-send any amount. ``--profile`` writes cProfile's figures of the whole run to a file. With
-``--drive`` the server arms and drives; otherwise no task starts. At its end it prints as JSON the
-deviation from 1/20 s, in seconds, of each interval between two moving setpoints to one vehicle. The
-zero that ends a drive leaves at once and is not counted.
+[--tlog FOLDER] [--record FOLDER] [--metrics HOST:PORT] [--default-limits]``. Without
+``--default-limits``, clients may send any amount. ``--profile`` writes cProfile's figures of the
+whole run to a file. With ``--drive`` the server arms and drives; otherwise no task starts. At its
+end it prints as JSON the deviation from 1/20 s, in seconds, of each interval between two moving
+setpoints to one vehicle. The zero that ends a drive leaves at once and is not counted.
 """
 
 import argparse
@@ -78,10 +78,23 @@ async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
     recorders = observers(recording, settings, None, now=now)
     tame_collector()
     clients = [UdpLink(UdpUrl("udpin", HOST, options.client_port))]
+    if options.metrics:
+        from mav_tasks.metrics.endpoint import Endpoint  # noqa: PLC0415  # an earlier one lacks it
+
+        recorders.append(
+            Endpoint(options.metrics).show(
+                engine.figures,
+                clients=clients,
+                vehicles=[vehicle_link],
+                recorders=recorders,
+                restored=None,
+                version="",
+                woke_at=lambda: runner.woke_at,
+            )
+        )
     print(READY, flush=True)
-    return await Runner(
-        engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders
-    ).run()
+    runner = Runner(engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders)
+    return await runner.run()
 
 
 def main() -> int:
@@ -92,6 +105,7 @@ def main() -> int:
     parser.add_argument("--store")
     parser.add_argument("--tlog", default="")
     parser.add_argument("--record", default="")
+    parser.add_argument("--metrics", default="")
     parser.add_argument("--profile")
     parser.add_argument("--drive", action="store_true")
     parser.add_argument("--default-limits", action="store_true")

@@ -47,12 +47,13 @@ def _errors(rovers: int) -> list[float]:
         child("server", *options, quiet=True) as said,
     ):
         client.connect(loopback(port))
-        _drive(client.send, rovers)
+        drive(client.send, rovers)
     errors: list[float] = json.loads(said[-1])
     return errors
 
 
-def _drive(send: Callable[[bytes], object], rovers: int) -> None:
+def drive(send: Callable[[bytes], object], rovers: int) -> None:
+    """Submit a long move to each rover, and wait while they drive."""
     encoder = Encoder(CLIENT)
     sleep(GATHER)
     send(encoder.encode(m.Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)))

@@ -11,6 +11,7 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
     Committed,
     LinkSide,
+    Outgoing,
     PeerChanged,
     Shutdown,
     StoreFailed,
@@ -23,6 +24,7 @@ from mav_tasks.metrics import pages
 from mav_tasks.metrics.collector import Collector
 from mav_tasks.metrics.http_server import Answer, Page
 from mav_tasks.metrics.pages import Pages
+from mav_tasks.observer import EngineObservers
 from mav_tasks.settings import Settings
 from tests.kit.processes import free_tcp_ports
 from tests.kit.scraped import figure, figures_of
@@ -128,6 +130,16 @@ def test_a_bug_where_the_figures_are_read_is_an_internal_error(
         its = Pages(collector, loop=loop, answers=dict).by_path
         with pytest.raises(ZeroDivisionError):
             run(its["/metrics"])
+
+
+def test_figures_that_are_no_longer_counted_are_not_shown() -> None:
+    collector = collector_of()
+    observers = EngineObservers([collector])
+    observers.on_output([Outgoing("no such link", 1, b"")], [], now=NOW)
+    assert repr(observers) == "EngineObservers([])"
+    with turning() as loop:
+        its = Pages(collector, loop=loop, answers=dict).by_path
+        assert run(its["/metrics"]) == (500, "nothing is counted: see the log\n")
 
 
 def test_it_is_ready_while_the_store_works_and_a_rover_can_be_reached() -> None:
