@@ -18,8 +18,9 @@ from mav_tasks.observer import EngineObservers
 from mav_tasks.tasks.events import TaskModified, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import TaskId, Terms
+from rover_sim.personas import PX4, Persona
 from tests.kit.store import LateStore
-from tests.kit.world import World
+from tests.kit.world import PROMPT, World
 
 R, S = TaskReason, TaskState
 MakeWorld = Callable[..., World]
@@ -82,7 +83,11 @@ def test_a_task_is_counted_from_its_submission_to_its_end(world: World) -> None:
     assert intervals.total == pytest.approx(0.05 * intervals.count, rel=0.01)
 
 
-def test_a_stop_is_timed_until_the_setpoint_and_until_it_stands(world: World) -> None:
+@pytest.mark.parametrize("persona", [PROMPT, PX4], ids=lambda persona: persona.name)
+def test_a_stop_is_timed_until_the_setpoint_and_until_it_stands(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
     collector = watched(world)
     world.ready()
     world.client.move(20.0)
