@@ -152,6 +152,11 @@ class Runner:
         self._wall_offset: float | None = None
         self._is_ending = False
 
+    @property
+    def woke_at(self) -> float:
+        """When the present callback began, and with it the reading of what it handles."""
+        return self._ran_at
+
     async def run(self) -> int:
         """Serve until SIGINT or SIGTERM; return the exit code."""
         self._loop = asyncio.get_running_loop()

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mav_tasks.clock import boot_time
 from mav_tasks.config.reload import Reload
@@ -30,12 +30,16 @@ from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.logs.vehicle_texts import VehicleTexts
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
+from mav_tasks.recording.decisions import project_version
 from mav_tasks.runner import Runner
-from mav_tasks.settings import Links, ServerSettings
+from mav_tasks.settings import Links, Metrics, ServerSettings
 from mav_tasks.store import Store
 from mav_tasks.store.latest import note_latest
 from mav_tasks.store.opening import open_store
 from mav_tasks.tasks.restored import Restored
+
+if TYPE_CHECKING:
+    from mav_tasks.metrics.endpoint import Endpoint
 
 
 def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
@@ -55,6 +59,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
     say = partial(_say, as_json=settings.log.format == "json")
     with ExitStack() as opened:
         opened.enter_context(log_to_stderr(settings.log))
+        metrics = _metrics(opened, settings.metrics)
         keys = _watched_ring(links)
         client_links = [
             _open(opened, link.url, TO_CLIENTS, push=pushed if link.url == pushing else ())
@@ -83,12 +88,16 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
                 say(f"{opened_link.name}: {opened_link.note}")
         if pushed and pushing is None:
             say("links.push not used: no link for clients is UDP")
+        if metrics is not None:
+            say(f"metrics on http://{settings.metrics.listen}/metrics")
         say(f"store {store.name}, {len(restored.tasks) if restored else 0} tasks")
         if restored is not None and restored.parameters:
             values = sorted(restored.parameters.items())
             told = ", ".join(f"{name} {value:g}" for name, value in values)
             say(f"parameters of an earlier run: {told}")
-        running = _run(settings, store, restored, client_links, vehicle_links, reload, keys, say)
+        running = _run(
+            settings, store, restored, client_links, vehicle_links, reload, keys, say, metrics
+        )
         return asyncio.run(running)
 
 
@@ -129,6 +138,16 @@ def _open(
     return link
 
 
+def _metrics(opened: ExitStack, metrics: Metrics) -> "Endpoint | None":
+    if not metrics.listen:
+        return None
+    from mav_tasks.metrics.endpoint import Endpoint  # noqa: PLC0415  # off by default
+
+    endpoint = Endpoint(metrics.listen)
+    opened.callback(endpoint.close)
+    return endpoint
+
+
 async def _run(
     settings: ServerSettings,
     store: Store,
@@ -138,6 +157,7 @@ async def _run(
     reload: Reload | None,
     keys: RingWatch,
     say: Callable[[str], None],
+    metrics: "Endpoint | None",
 ) -> int:
     now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)
@@ -150,6 +170,17 @@ async def _run(
     listeners: list[EngineObserver] = [VehicleTexts(), *recorders]
     if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
         listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
+    if metrics is not None:
+        collector = metrics.show(
+            engine.figures,
+            clients=clients,
+            vehicles=vehicles,
+            recorders=recorders,
+            restored=restored,
+            version=project_version(),
+            woke_at=lambda: runner.woke_at,
+        )
+        listeners.append(collector)
     runner = Runner(
         engine,
         store,

@@ -38,6 +38,9 @@ DEFAULT_TURNING_RADIUS = 1.5
 #: the command that makes a rover stand when its setpoints stop, as refusals name it
 SET_FAILSAFE = "mav-tasks probe --set-failsafe"
 
+#: where metrics are served if nobody names another address
+METRICS_ADDRESS = "127.0.0.1:8561"
+
 DEGREE = pi / 180  # rad
 DAY = 86_400.0  # s
 FOREVER = "forever"
@@ -646,6 +649,28 @@ class Recording:
 
 
 @dataclass(frozen=True, slots=True)
+class Metrics:
+    """Figures of the running server for Prometheus, over HTTP."""
+
+    listen: str = setting(
+        "",
+        Text('host:port, "" for none'),
+        "address at which the server offers its metrics over HTTP; other machines can read "
+        "them unless it is a loopback address",
+        is_live=False,
+        options=(
+            Option(
+                "--metrics",
+                "[HOST:PORT]",
+                bare=METRICS_ADDRESS,
+                help="Offer metrics for Prometheus over HTTP, at "
+                f"{METRICS_ADDRESS} unless you name another address.",
+            ),
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class Log:
     """The server's log on standard error."""
 
@@ -666,7 +691,7 @@ class Log:
 
 @dataclass(frozen=True, slots=True)
 class ServerSettings:
-    """All settings of one server process: links, store, engine, recordings and log."""
+    """All settings of one server process: links, store, engine, recordings, metrics and log."""
 
     links: Links = field(default_factory=Links)
     store: str = setting(
@@ -686,6 +711,7 @@ class ServerSettings:
         key="vehicles.profiles",
     )
     recording: Recording = field(default_factory=Recording)
+    metrics: Metrics = field(default_factory=Metrics)
     log: Log = field(default_factory=Log)
 
 
@@ -703,6 +729,7 @@ TABLES = (
     "watch",
     "identity",
     "recording",
+    "metrics",
     "log",
 )
 #: all keys by name: by table, then as the fields come

@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.errors": frozenset(),
     "mav_tasks.clock": frozenset(),
+    "mav_tasks.histogram": frozenset(),
     "mav_tasks.link_reader": frozenset({"mav_tasks.engine", "mav_tasks.links"}),
     "mav_tasks.setting_keys": frozenset({"mav_tasks.errors"}),
     "mav_tasks.settings": frozenset({"mav_tasks.setting_keys", "mav_tasks.errors"}),
@@ -23,12 +24,13 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.services": frozenset(
         {"mav_tasks.mavlink", "mav_tasks.setting_keys", "mav_tasks.settings", "mav_tasks.errors"}
     ),
-    "mav_tasks.tasks": frozenset({"mav_tasks.errors", "mav_tasks.settings"}),
+    "mav_tasks.tasks": frozenset({"mav_tasks.histogram", "mav_tasks.errors", "mav_tasks.settings"}),
     "mav_tasks.engine": frozenset(
         {
             "mav_tasks.tasks",
             "mav_tasks.services",
             "mav_tasks.mavlink",
+            "mav_tasks.histogram",
             "mav_tasks.settings",
             "mav_tasks.errors",
         }
@@ -55,6 +57,19 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.mavlink",
             "mav_tasks.settings",
             "mav_tasks.folders",
+            "mav_tasks.errors",
+        }
+    ),
+    "mav_tasks.metrics": frozenset(
+        {
+            "mav_tasks.clock",
+            "mav_tasks.observer",
+            "mav_tasks.engine",
+            "mav_tasks.links",
+            "mav_tasks.tasks",
+            "mav_tasks.mavlink",
+            "mav_tasks.histogram",
+            "mav_tasks.settings",
             "mav_tasks.errors",
         }
     ),
@@ -156,6 +171,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.settings",
             "mav_tasks.tasks",
             "mav_tasks.recording",
+            "mav_tasks.metrics",
             "mav_tasks.runner",
             "mav_tasks.errors",
         }
@@ -267,6 +283,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
 #: pure: no I/O, no clock, no chance
 PURE = (
     "mav_tasks.errors",
+    "mav_tasks.histogram",
     "mav_tasks.settings",
     "mav_tasks.setting_keys",
     "mav_tasks.mavlink",

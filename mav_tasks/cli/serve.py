@@ -29,7 +29,7 @@ class ServeCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments. Of two options for one key the one declared last counts."""
-        rest = super().parse_args(ctx, args)
+        rest = super().parse_args(ctx, self._with_values(args))
         given = {}
         for key, option, made in self._options:
             value = ctx.params.pop(made.name, None)
@@ -39,6 +39,16 @@ class ServeCommand(TyperCommand):
                 given[key.name] = Flag(option.name, key.name, plain)
         ctx.obj = list(given.values())
         return rest
+
+    def _with_values(self, args: list[str]) -> list[str]:
+        """Return the arguments with a value for each option that may be given without one."""
+        bare = {option.name: option.bare for _, option, _ in self._options if option.bare}
+        filled = []
+        for argument, following in zip(args, [*args[1:], "-"], strict=False):
+            filled.append(argument)
+            if argument in bare and following.startswith("-"):
+                filled.append(bare[argument])
+        return filled
 
 
 def _typer_option(key: Key, option: Option) -> TyperOption:

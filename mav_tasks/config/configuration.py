@@ -7,9 +7,10 @@ from pathlib import Path
 from platformdirs import user_config_path
 
 from mav_tasks.config import profiles, toml_file, words
-from mav_tasks.config.given import Given, Layer
-from mav_tasks.errors import ConfigError, SettingError
+from mav_tasks.config.given import Given, Layer, shown
+from mav_tasks.errors import ConfigError, LinkUrlError, SettingError
 from mav_tasks.links.config_check import faults_of
+from mav_tasks.links.endpoint import parse_endpoint
 from mav_tasks.setting_keys.key import check_bounds
 from mav_tasks.settings import BOUNDED, ServerSettings
 
@@ -103,6 +104,12 @@ def _faults_together(
     if not any(name.startswith("links.") for name in faulty):
         for field, fault in faults_of(settings.links):
             yield f"{_names(f'links.{field}', '', given)}: {fault}"
+    listen = settings.metrics.listen
+    if listen:
+        try:
+            parse_endpoint(listen, what=shown(listen))
+        except LinkUrlError as error:
+            yield f"{_names('metrics.listen', '', given)}: {error}"
 
 
 def _names(name: str, other: str, given: Mapping[str, Given]) -> str:

@@ -27,6 +27,7 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
+from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionServers
@@ -133,6 +134,8 @@ class Engine:
             publisher=self._publisher,
             reports=self._reports,
         )
+        #: figures for metrics
+        self.figures = Figures(vehicles, gcs, self._gates, self._fleet, registry)
         self._stop_by: float | None = None
         self._stopped = False
         #: zero and HOLD for every driven vehicle, as of the last ``take_packets``; the runner sends

@@ -92,4 +92,18 @@ class PacedLink(Link, Protocol):
     capacity: float
 
 
+@runtime_checkable
+class CountingLink(Link, Protocol):
+    @property
+    def lost(self) -> int:
+        """Number of packets that could not be sent."""
+
+
+@runtime_checkable
+class ListeningLink(Link, Protocol):
+    @property
+    def refused(self) -> int:
+        """Number of connections that were refused."""
+
+
 TEND_PERIOD = 0.05  # s

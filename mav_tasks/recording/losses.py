@@ -17,6 +17,11 @@ class Losses:
     def __repr__(self) -> str:
         return f"Losses({self._name}, {self._count})"
 
+    @property
+    def count(self) -> int:
+        """Number of packets lost since the start."""
+        return self._count
+
     def lose(self, count: int, why: str) -> None:
         """Note that so many packets are lost."""
         self._count += count

@@ -52,6 +52,11 @@ class Tlog:
     def __str__(self) -> str:
         return self._name
 
+    @property
+    def lost(self) -> int:
+        """Number of packets that were not written, since the start."""
+        return self._too_many.count + self._unwritten.count
+
     def on_input(self, item: Input | None, *, now: float) -> None:
         """Queue received packets, and changes of links, peers and the wall clock."""
         if isinstance(item, Packets):

@@ -18,13 +18,14 @@ _DECLARED = "setting"  # in the metadata of a field
 class Option:
     """An option of ``mav-tasks serve`` for a key: it takes a value, or is a switch that sets one.
 
-    ``sets`` is the plain value of a switch, and ``help`` what the switch does, unless the meaning
-    of the key says it. The help of other options follows from the key.
+    ``sets`` is the plain value of a switch, ``bare`` that of an option without its value; None: the
+    option needs one. ``help`` says what the option does; without it the help follows from the key.
     """
 
     name: str
     metavar: str = ""
     sets: Any = None
+    bare: str | None = None
     help: str = ""
     short: str = ""
 

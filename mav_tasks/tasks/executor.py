@@ -6,6 +6,7 @@ velocity waits until EXECUTING is durable; zeros never wait.
 
 from dataclasses import replace
 
+from mav_tasks.histogram import Histogram
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.drive import Becomes, Drive
@@ -17,7 +18,7 @@ from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TERMINAL, TaskReason, TaskS
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
-from mav_tasks.tasks.timing import Timing, TimingMeter
+from mav_tasks.tasks.timing import INTERVALS, Timing, TimingMeter
 from mav_tasks.tasks.view import Demand, ModeKind, VehicleView
 
 S, R = TaskState, TaskReason
@@ -51,6 +52,8 @@ class Executor:
         self._was_silent = False  # heartbeats were lost, too
         self._untaken_in: ModeKind | None = None  # mode at the loss, if we had sent nothing
         self._meter: TimingMeter | None = None  # while EXECUTING
+        #: intervals between setpoints of all tasks of this run, s
+        self.intervals = Histogram(INTERVALS)
         self._taking_since = 0.0  # while STARTING, or EXECUTING without control
         self._ask_again_at: float | None = None  # next attempt to arm, if not ready
         #: what a STARTING task waits for, and the vehicle's own words for that
@@ -383,7 +386,7 @@ class Executor:
         )
         if new is S.EXECUTING:
             period = self._settings.watch.setpoint_period
-            self._meter = TimingMeter(period=period, before=old.timing)
+            self._meter = TimingMeter(period=period, before=old.timing, every=self.intervals)
 
     def _finish(self, state: TaskState, reason: TaskReason, *, actor: str, now: float) -> None:
         self._change(state, reason, actor=actor, now=now)

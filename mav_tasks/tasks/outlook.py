@@ -1,5 +1,7 @@
 """The outlook of a task for people: why it waits, its position, its times. It decides nothing."""
 
+from collections import Counter
+from collections.abc import Sequence
 from math import nan
 
 from mav_tasks.tasks.driving.estimate import time_left
@@ -55,6 +57,27 @@ def wait_reason(tasks: VehicleTasks, task: Task) -> TaskReason:
             return tasks.turns.blocker_of(task.id) or task.reason
         case _:
             return task.reason
+
+
+def tally(tasks: VehicleTasks, counts: Sequence[int]) -> Counter[tuple[TaskState, TaskReason]]:
+    """Return how many unfinished tasks of a vehicle have each state and reason.
+
+    ``counts`` are its tasks by TaskState. The cost does not depend on how many wait: of the queued
+    ones, all but the first wait for the same reason, and a blocked one counts as waiting for
+    another task, although it may be staged.
+    """
+    found = Counter(
+        {
+            (S.SCHEDULED, R.START_TIME): counts[S.SCHEDULED],
+            (S.BLOCKED, R.DEPENDENCY): counts[S.BLOCKED],
+        }
+    )
+    for task_id, count in zip(tasks.queue.page(0, 2), (1, counts[S.QUEUED] - 1), strict=False):
+        found[S.QUEUED, _why_queued(tasks, tasks.registry[task_id])] += count
+    active = [] if tasks.active is None else [tasks.active]
+    for task in (*active, *tasks.suspended):
+        found[task.state, wait_reason(tasks, task)] += 1
+    return +found
 
 
 def _why_queued(tasks: VehicleTasks, task: Task) -> TaskReason:

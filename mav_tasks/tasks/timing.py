@@ -9,12 +9,20 @@ counts: no interval spans a pause.
 from dataclasses import dataclass, replace
 from math import ceil
 
+from mav_tasks.histogram import Histogram
+
 FINE = 1e-4  # s, resolution of the percentiles up to FINE_END
 FINE_END = 0.2  # s
 COARSE = 1e-2  # s, resolution from there up to COARSE_END
 COARSE_END = 10.0  # s; longer intervals are counted together, and the longest is exact anyway
 _FINE_BUCKETS = round(FINE_END / FINE)
 _PER_FINE, _PER_COARSE = 1 / FINE, 1 / COARSE
+
+#: s, bounds of the histogram over all tasks of a vehicle; setpoints come every 0.02 to 0.2 s
+INTERVALS = (
+    *(0.01, 0.02, 0.03, 0.04, 0.045, 0.049, 0.051, 0.055, 0.06, 0.075),
+    *(0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.5, 1.0),
+)
 
 LATE = 1.5  # periods; a longer interval means a setpoint half a period late, or left out
 
@@ -51,9 +59,15 @@ class Timing:
 class TimingMeter:
     """Meter of one task's intervals. Its memory is bounded, however long the task drives."""
 
-    def __init__(self, *, period: float, before: Timing | None = None) -> None:
-        """``before`` is the timing of the task so far, with its spread."""
+    def __init__(
+        self, *, period: float, before: Timing | None = None, every: Histogram | None = None
+    ) -> None:
+        """``before`` is the timing of the task so far, with its spread.
+
+        ``every`` counts the intervals of all tasks of the vehicle.
+        """
         self._period = period
+        self._every = every
         self._late_after = LATE * period
         self._counts: dict[int, int] = {}  # by bucket
         self._late = 0
@@ -76,6 +90,8 @@ class TimingMeter:
             int(interval * _PER_FINE + 0.5) if interval < FINE_END else _coarse_bucket(interval)
         )
         self._counts[bucket] = self._counts.get(bucket, 0) + 1
+        if self._every is not None:
+            self._every.note(interval)
         if interval > self._longest:
             self._longest = interval
         if interval > self._late_after:

@@ -146,6 +146,7 @@ def without_extras(python: str, folder: Path) -> None:
     assert "](" not in readme, "links of a repository that a reader of the wheel has not"
     for document in ("README.md", "GUIDE.md", "CHANGELOG.md"):
         assert (Path(path).parents[1] / document).is_file()
+    assert (Path(path).parents[1] / "metrics" / "grafana.json").is_file()
 
     refused = run(python, "-m", "mav_tasks.cli", "sim", "--body", "bullet", folder=folder)
     assert refused.returncode == 2, refused.stdout

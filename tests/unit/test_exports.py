@@ -33,7 +33,7 @@ def test_the_engine_has_five_methods_and_two_views() -> None:
 @pytest.mark.patches_core
 def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
     engine = Engine(settings.Settings(), now=0.0)
-    assert public(engine) == ["emergency_stop_packets", "not_in_force", "signatures"]
+    assert public(engine) == ["emergency_stop_packets", "figures", "not_in_force", "signatures"]
     assert (engine.emergency_stop_packets, engine.not_in_force) == ((), ())
 
 
@@ -96,6 +96,7 @@ def test_every_setting_is_known_by_name() -> None:
         "Limits": ["tasks", "max_priority", "max_speed", "quota", "rate"],
         "Links": ["clients", "push", "vehicles", "insecure", "keys", "unsigned"],
         "Log": ["format", "level"],
+        "Metrics": ["listen"],
         "Queueing": ["capacity", "quota", "aging", "preemption_gap", "preemption_rest"],
         "Recording": ["tlog", "tlog_size", "tlog_files", "decisions", "decisions_size"],
         "Retention": ["max_age", "max_count"],
@@ -107,7 +108,15 @@ def test_every_setting_is_known_by_name() -> None:
             "operator",
             "safety",
         ],
-        "ServerSettings": ["links", "store", "engine", "profiles", "recording", "log"],
+        "ServerSettings": [
+            "links",
+            "store",
+            "engine",
+            "profiles",
+            "recording",
+            "metrics",
+            "log",
+        ],
         "Settings": [
             "identity",
             "signing",

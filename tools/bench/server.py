@@ -1,11 +1,12 @@
 """A real server on loopback with room for every task of a measurement, and no rate limits.
 
 ``python -m tools.bench.server CLIENT_PORT VEHICLE_PORT [--store FILE] [--profile FILE] [--drive]
-[--tlog FOLDER] [--record FOLDER] [--default-limits]``. Without ``--default-limits``, clients may
-send any amount. ``--profile`` writes cProfile's figures of the whole run to a file. With
-``--drive`` the server arms and drives; otherwise no task starts. At its end it prints as JSON the
-deviation from 1/20 s, in seconds, of each interval between two moving setpoints to one vehicle. The
-zero that ends a drive leaves at once and is not counted.
+[--tlog FOLDER] [--record FOLDER] [--metrics HOST:PORT] [--times] [--default-limits]``. Without
+``--default-limits``, clients may send any amount. ``--profile`` writes cProfile's figures of the
+whole run to a file. With ``--drive`` the server arms and drives; otherwise no task starts. At its
+end it prints as JSON the deviation from 1/20 s, in seconds, of each interval between two moving
+setpoints to one vehicle; with ``--times`` pairs of that and the monotonic time when the interval
+ended. The zero that ends a drive leaves at once and is not counted.
 """
 
 import argparse
@@ -43,6 +44,7 @@ class TimedLink(UdpLink):
         super().__init__(url)
         self._last: dict[int, float] = {}
         self.errors: list[float] = []
+        self.ended_at: list[float] = []
 
     def send(self, peer: Peer, data: bytes) -> None:
         """Send, and record the time of a setpoint."""
@@ -57,6 +59,7 @@ class TimedLink(UdpLink):
             self._last[data[TARGET_SYSTEM]] = now
             if interval < MOVING:
                 self.errors.append(abs(interval - PERIOD))
+                self.ended_at.append(now)
 
 
 def _settings(*, drives: bool, is_limited: bool) -> Settings:
@@ -78,10 +81,23 @@ async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
     recorders = observers(recording, settings, None, now=now)
     tame_collector()
     clients = [UdpLink(UdpUrl("udpin", HOST, options.client_port))]
+    if options.metrics:
+        from mav_tasks.metrics.endpoint import Endpoint  # noqa: PLC0415  # an earlier one lacks it
+
+        recorders.append(
+            Endpoint(options.metrics).show(
+                engine.figures,
+                clients=clients,
+                vehicles=[vehicle_link],
+                recorders=recorders,
+                restored=None,
+                version="",
+                woke_at=lambda: runner.woke_at,
+            )
+        )
     print(READY, flush=True)
-    return await Runner(
-        engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders
-    ).run()
+    runner = Runner(engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders)
+    return await runner.run()
 
 
 def main() -> int:
@@ -92,6 +108,8 @@ def main() -> int:
     parser.add_argument("--store")
     parser.add_argument("--tlog", default="")
     parser.add_argument("--record", default="")
+    parser.add_argument("--metrics", default="")
+    parser.add_argument("--times", action="store_true")
     parser.add_argument("--profile")
     parser.add_argument("--drive", action="store_true")
     parser.add_argument("--default-limits", action="store_true")
@@ -104,7 +122,8 @@ def main() -> int:
             profiler = cProfile.Profile()
             code = profiler.runcall(asyncio.run, _serve(options, link))
             profiler.dump_stats(options.profile)
-    print(json.dumps(link.errors), flush=True)
+    pairs = list(zip(link.errors, link.ended_at, strict=True))
+    print(json.dumps(pairs if options.times else link.errors), flush=True)
     return code
 
 

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable
 from statistics import quantiles
-from time import monotonic, sleep
+from time import sleep
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Encoder
@@ -47,12 +47,14 @@ def _errors(rovers: int) -> list[float]:
         child("server", *options, quiet=True) as said,
     ):
         client.connect(loopback(port))
-        _drive(client.send, rovers)
+        start_driving(client.send, rovers)
+        sleep(DRIVING)  # it reads nothing; sending to it costs the server as much
     errors: list[float] = json.loads(said[-1])
     return errors
 
 
-def _drive(send: Callable[[bytes], object], rovers: int) -> None:
+def start_driving(send: Callable[[bytes], object], rovers: int) -> None:
+    """Wait until all rovers are known, and submit a long move to each."""
     encoder = Encoder(CLIENT)
     sleep(GATHER)
     send(encoder.encode(m.Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)))
@@ -60,6 +62,3 @@ def _drive(send: Callable[[bytes], object], rovers: int) -> None:
         move = m.CommandLong(system_id, 191, MavCmd.TASK_MOVE, 0, 100.0, 0, 0, system_id, 0, 0, 5)
         send(encoder.encode(move))
         sleep(EACH)
-    end = monotonic() + DRIVING
-    while monotonic() < end:  # it reads nothing; sending to it costs the server as much
-        sleep(0.1)

@@ -218,12 +218,12 @@ def test_of_a_bound_between_what_changes_and_what_does_not_both_stay() -> None:
     ]
 
 
-def test_links_store_identity_and_recordings_are_as_they_were_at_the_start() -> None:
+def test_links_store_identity_recordings_and_metrics_are_as_they_were_at_the_start() -> None:
     assert {name for name, key in KEYS.items() if not key.is_live} == {
         *(
             name
             for name in KEYS
-            if name.startswith(("links.", "store.", "identity.", "recording."))
+            if name.startswith(("links.", "store.", "identity.", "recording.", "metrics."))
         ),
         *("rules.arming", "rules.yaw_rate", "watch.setpoint_period", "log.format"),
         *("signing.keys", "signing.unsigned"),

@@ -1,0 +1,238 @@
+"""Metrics of a real server: the figures against what happened, probes, hung and many scrapers."""
+
+import http.client
+import re
+import socket
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.metrics.pages import dashboard
+from tests.kit.processes import (
+    Stand,
+    command_long,
+    free_tcp_ports,
+    free_udp_ports,
+    process,
+    stand,
+    submit,
+    wait_for,
+    wait_until,
+)
+from tests.kit.scraped import Figures, check_with_promtool, figure, figures_of
+
+MOVE, STOP = 54000, 54003
+LIMIT = 30.0  # s
+
+
+def asked(port: int, path: str, **headers: str) -> tuple[int, str]:
+    """Return the status and the text of an answer."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=LIMIT)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, text
+
+
+def scraped(port: int) -> Figures:
+    status, text = asked(port, "/metrics")
+    assert status == 200, text
+    check_with_promtool(text)
+    return figures_of(text)
+
+
+def once(port: int, condition: Callable[[Figures], bool]) -> Figures:
+    """Scrape until a condition is true; return those figures."""
+    found: list[Figures] = []
+
+    def is_so() -> bool:
+        found.append(scraped(port))
+        return condition(found[-1])
+
+    wait_until(is_so, within=20, what=lambda: f"the figures:\n{found[-1]}")
+    return found[-1]
+
+
+@pytest.fixture
+def port() -> int:
+    (number,) = free_tcp_ports(1)
+    return number
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "tasks.sqlite3"
+
+
+@pytest.fixture
+def running(tmp_path: Path, path: Path, port: int) -> Iterator[Stand]:
+    with stand(tmp_path, "--metrics", f"127.0.0.1:{port}", serve_store=str(path)) as it:
+        yield it
+
+
+def test_the_figures_are_what_happened(running: Stand, port: int) -> None:
+    link = running.connect()
+    submit(link, MOVE, 0.5)
+    wait_for(link, "STATUSTEXT", "'Task 1 done' in STATUSTEXT.text", within=20)
+    running.drive(link, 50.0)
+    submit(link, MOVE, 1.0)
+    submit(link, STOP)
+    wait_until(lambda: running.speed() < 0.01, within=10, what="the rover to stand")
+
+    found = once(port, lambda now: figure(now, "mav_tasks_stop_standstill_seconds_count") == 1)
+
+    def of_rover(name: str, **labels: str) -> float:
+        return figure(found, f"mav_tasks_{name}", vehicle="1", **labels)
+
+    assert of_rover("tasks_submitted_total") == 3
+    assert of_rover("tasks_total", outcome="completed", reason="none") == 1
+    assert of_rover("tasks_total", outcome="killed", reason="stop") == 1
+    assert len(found["mav_tasks_tasks_total"]) == 2
+    assert of_rover("tasks", state="queued", reason="queue_paused") == 1
+    assert len(found["mav_tasks_tasks"]) == 1
+    assert of_rover("queue_length") == 1
+    assert of_rover("queue_capacity") == 1000
+    assert of_rover("queue_paused", reason="stopped") == 1
+    assert of_rover("halts_total", reason="stopped") == 1
+    assert figure(found, "mav_tasks_task_wait_seconds_count") == 2
+    driven = re.findall(r"task \d (?:completed|killed).*; (\d+) setpoints at", running.server.text)
+    assert of_rover("setpoint_interval_seconds_count") == sum(map(int, driven)) > 20
+    assert figure(found, "mav_tasks_stop_latency_seconds_count") == 1
+    assert 0 < figure(found, "mav_tasks_stop_latency_seconds_sum") < LIMIT
+    assert 0 < figure(found, "mav_tasks_stop_standstill_seconds_sum") < LIMIT
+    assert figure(found, "mav_tasks_store_writable") == 1
+    assert figure(found, "mav_tasks_store_commit_seconds_count") > 5
+    to_rover = f"udpout:127.0.0.1:{running.rover_port}"
+    assert figure(found, "mav_tasks_link_up", link=to_rover, side="vehicles") == 1
+    for direction in ("sent", "received"):
+        packets = figure(found, "mav_tasks_link_packets_total", link=to_rover, direction=direction)
+        assert packets > 50
+    assert figure(found, "process_resident_memory_bytes") > 1e7
+    assert asked(port, "/grafana.json") == (200, dashboard().decode())
+
+
+def test_a_restart_counts_anew_and_knows_what_waits(tmp_path: Path, path: Path, port: int) -> None:
+    options = ("--metrics", f"127.0.0.1:{port}")
+    with stand(tmp_path, *options, serve_store=str(path)) as first:
+        link = first.connect()
+        for nonce in (21, 22, 23):
+            submit(link, MOVE, 1.0, 0, 0, nonce, 0, 3600.0)  # an hour later
+        before = once(port, lambda now: figure(now, "mav_tasks_queue_length", vehicle="1") == 3)
+        first.server.end()
+    with stand(tmp_path, *options, serve_store=str(path)):
+        after = scraped(port)
+    waiting = {"vehicle": "1", "state": "scheduled", "reason": "start_time"}
+    for found in (before, after):
+        assert figure(found, "mav_tasks_tasks", **waiting) == 3
+    assert figure(before, "mav_tasks_tasks_submitted_total", vehicle="1") == 3
+    assert "mav_tasks_tasks_submitted_total" not in after
+
+
+def test_scrapers_that_hang_or_flood_keep_no_rover_from_its_end(running: Stand, port: int) -> None:
+    link = running.connect()
+    with ExitStack() as opened, ThreadPoolExecutor(50) as pool:
+        for _ in range(20):
+            hanging = opened.enter_context(
+                socket.create_connection(("127.0.0.1", port), timeout=LIMIT)
+            )
+            hanging.sendall(b"GET /metrics HTTP/1.1\r\n")
+        submit(link, MOVE, 2.0)
+        at_once = [pool.submit(asked, port, "/metrics") for _ in range(50)]
+        wait_for(link, "STATUSTEXT", "'Task 1 done' in STATUSTEXT.text", within=20)
+        assert command_long(link, STOP).result == 0
+        answers = []
+        for each in at_once:
+            try:
+                answers.append(each.result()[0])
+            except OSError:  # the kernel refuses what does not fit into the backlog
+                answers.append(0)
+        assert set(answers) <= {0, 200}
+        assert asked(port, "/healthz") == (200, "ok\n")
+
+
+def test_who_may_read_it_and_how(running: Stand, port: int) -> None:
+    assert asked(port, "/metrics", Host="evil.example")[0] == 403
+    assert asked(port, "/metrics", Host=f"localhost:{port}")[0] == 200
+    assert asked(port, "/")[0] == 404
+    assert asked(port, "/" + "x" * 20_000)[0] == 431
+    found = once(port, lambda now: figure(now, "mav_tasks_metrics_requests_total", code="431") == 1)
+    assert figure(found, "mav_tasks_metrics_requests_total", code="403") == 1
+
+
+def test_it_is_ready_while_the_store_can_be_written(running: Stand, port: int, path: Path) -> None:
+    link = running.connect()
+    assert asked(port, "/readyz") == (200, "ok\n")
+    away = path.with_name("away")
+    path.rename(away)
+    assert command_long(link, MOVE, 1.0, 0, 0, 11).result != 0
+    wait_until(lambda: asked(port, "/readyz")[0] == 503, within=10, what="503")
+    _, text = asked(port, "/readyz")
+    assert text.startswith("new tasks are refused: store ")
+    assert text.count("\n") == 1
+    assert asked(port, "/healthz") == (200, "ok\n")
+    assert figure(once(port, lambda _: True), "mav_tasks_store_writable") == 0
+    away.rename(path)
+    wait_until(
+        lambda: command_long(link, MOVE, 0.2, 0, 0, 13).result == 0, within=10, what="a task"
+    )
+    assert asked(port, "/readyz") == (200, "ok\n")
+
+
+def serve(folder: Path, *options: str) -> tuple[str, ...]:
+    (client_port,) = free_udp_ports(1)
+    client = ("--client", f"udpin:127.0.0.1:{client_port}", "--no-push")
+    return ("-m", "mav_tasks.cli", "serve", *client, "--store", ":memory:", *options)
+
+
+def test_a_rover_whose_link_is_not_open_makes_it_not_ready(tmp_path: Path, port: int) -> None:
+    (rover_port,) = free_tcp_ports(1)
+    options = ("--vehicle", f"tcp:127.0.0.1:{rover_port}", "--metrics", f"127.0.0.1:{port}")
+    with process(*serve(tmp_path, *options), folder=tmp_path, name="server") as server:
+        server.wait_for("store ")
+        wanted = (503, "no link to a rover is open\n")
+        wait_until(lambda: asked(port, "/readyz") == wanted, within=10)
+        with socket.create_server(("127.0.0.1", rover_port)):
+            wait_until(lambda: asked(port, "/readyz") == (200, "ok\n"), within=10)
+
+
+def test_a_port_in_use_ends_the_start_before_a_rover_hears_anything(
+    tmp_path: Path, port: int
+) -> None:
+    with (
+        socket.create_server(("127.0.0.1", port)),
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as rover,
+    ):
+        rover.bind(("127.0.0.1", 0))
+        rover.setblocking(False)
+        to_rover = f"udpout:127.0.0.1:{rover.getsockname()[1]}"
+        options = ("--vehicle", to_rover, "--metrics", f"127.0.0.1:{port}")
+        with process(*serve(tmp_path, *options), folder=tmp_path, name="server") as server:
+            assert server.popen.wait(LIMIT) == 2
+            assert server.text == (
+                f"mav-tasks: metrics: 127.0.0.1:{port} cannot be opened: Address already in use;"
+                " choose another address\n"
+            )
+        with pytest.raises(BlockingIOError):
+            rover.recv(1)
+
+
+def test_off_by_default_and_without_an_address_on_the_usual_one(tmp_path: Path) -> None:
+    with process(*serve(tmp_path), folder=tmp_path, name="off") as server:
+        server.wait_for("store ")
+        assert "metrics" not in server.text
+    with process(*serve(tmp_path, "--metrics"), folder=tmp_path, name="usual") as server:
+        said = server.wait_for(r"metrics on http://(\S+)/metrics|metrics: (\S+) cannot be opened")
+        assert "127.0.0.1:8561" in said.groups()
+
+
+def test_an_address_that_others_reach_is_warned_of(tmp_path: Path, port: int) -> None:
+    with process(
+        *serve(tmp_path, "--metrics", f"0.0.0.0:{port}"), folder=tmp_path, name="far"
+    ) as server:
+        server.wait_for("WARNING metrics on 0.0.0.0:.*: other machines can read them")
+        server.wait_for("store ")
+        assert asked(port, "/healthz", Host="rover.example")[0] == 200
