@@ -149,16 +149,16 @@ def test_who_hangs_is_closed_and_others_have_their_turn(
 def test_who_reads_nothing_is_closed(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http_server, "ANSWER_WITHIN", 0.2)
     with ExitStack() as opened:
-        for _ in range(CONNECTIONS):
-            slow = opened.enter_context(socket.socket())
+        all_slow = [opened.enter_context(socket.socket()) for _ in range(CONNECTIONS)]
+        for slow in all_slow:
             slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             slow.settimeout(LIMIT)
             slow.connect(("127.0.0.1", port))
             slow.sendall(b"GET /large HTTP/1.1\r\n" + HOST + b"\r\n")
-        assert got(port, "/small") == (200, b"small\n")
+        assert got(port, "/small") == (200, b"small\n")  # once the first of them is closed
         received = 0
         with suppress(ConnectionResetError):
-            while data := slow.recv(65_536):
+            while data := all_slow[0].recv(65_536):
                 received += len(data)
         assert received < len(LARGE)
 
