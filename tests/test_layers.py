@@ -191,6 +191,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.web": frozenset(
         {
+            "mav_tasks.histogram",
+            "mav_tasks.metrics",
             "mav_tasks.client",
             "mav_tasks.logs",
             "mav_tasks.store",

@@ -301,7 +301,7 @@ class MissionReceiver:
         if len(self._sends_int) > INT_SENDERS:
             del self._sends_int[next(iter(self._sends_int))]
 
-    def _note_in_vain(self, session: _Session, *, now: float) -> None:
+    def _note_in_vain(self, session: _Session, refused: Item | None = None, *, now: float) -> None:
         """An upload came to nothing: its client will try again, and mean what it meant."""
         upload = (session.sender, session.mission_type)
         self._ended = {key: at for key, at in self._ended.items() if now - at <= LATE}
@@ -311,7 +311,7 @@ class MissionReceiver:
             for key, tries in self._in_vain.items()
             if now - tries.ended_at <= ANOTHER_TRY
         }
-        items = tuple(session.items)
+        items = (*session.items, *(() if refused is None else (refused,)))
         before = session.before
         if before is not None and _begin_alike(items, before.items):
             items = max(items, before.items, key=len)
@@ -334,7 +334,8 @@ class MissionReceiver:
         session = self._session
         assert session is not None, "an upload is under way"
         self._session = None
-        self._note_in_vain(session, now=now)
+        refused = None if session.is_whole else last
+        self._note_in_vain(session, refused, now=now)
         sender, kind = session.sender, session.mission_type
         if result == MavMissionResult.ACCEPTED:
             del self._in_vain[sender, kind]

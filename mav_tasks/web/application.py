@@ -6,11 +6,13 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
+from mav_tasks.metrics.exposition import CONTENT_TYPE
 from mav_tasks.web import api_past, api_rovers, api_session, api_tasks, pages
+from mav_tasks.web.figures import Figures
 from mav_tasks.web.guard import Guard
 from mav_tasks.web.identity import Identity
 from mav_tasks.web.openapi import document_of
@@ -35,10 +37,25 @@ def application(
     async def openapi(_request: Request) -> Response:
         return JSONResponse(document)
 
+    figures = Figures(services.live)
+
+    async def metrics(_request: Request) -> Response:
+        return Response(figures.text(), headers={"content-type": CONTENT_TYPE})
+
+    async def healthz(_request: Request) -> Response:
+        return PlainTextResponse("ok\n")
+
+    async def readyz(_request: Request) -> Response:
+        why = services.live.why_not_ready()
+        return PlainTextResponse(f"{why or 'ready'}\n", status_code=503 if why else 200)
+
     app = Starlette(
         routes=[
             *(_route(operation) for operation in operations),
             Route(f"{ROOT}/openapi.json", openapi),
+            Route("/metrics", metrics),
+            Route("/healthz", healthz),
+            Route("/readyz", readyz),
             *pages.routes(services.tiles),
         ],
         exception_handlers={HTTPException: _failed, Problem: _failed, 500: _broken},
@@ -50,6 +67,7 @@ def application(
         sessions=services.sessions,
         open_identity=open_identity,
         tile_origins=() if services.tiles is None else services.tiles.origins,
+        note_answer=figures.note_answer,
     )
 
 

@@ -7,7 +7,7 @@ from running or framing anything else.
 """
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 
@@ -24,6 +24,7 @@ METHODS = SAFE | {"POST", "PUT", "PATCH", "DELETE"}
 API = "/api/"
 SESSION = "/api/v1/session"
 STOP = "/api/v1/stop"
+METRICS = "/metrics"
 
 SMALL_BODY = 64 * 1024  # bytes
 PLAN_BODY = 24 * 1024 * 1024  # bytes: a plan file of 10 MB, escaped
@@ -50,6 +51,7 @@ class Guard:
 
     ``hosts`` are the values of Host that are accepted, in lower case. ``open_identity`` is that of
     requests without a token; None: a token is required. ``tile_origins`` are the sites of tiles.
+    ``note_answer`` gets the status of each answer.
     """
 
     def __init__(
@@ -61,6 +63,7 @@ class Guard:
         sessions: Sessions,
         open_identity: Identity | None,
         tile_origins: tuple[str, ...] = (),
+        note_answer: Callable[[int], None] = lambda _status: None,
     ) -> None:
         self._app = app
         self._hosts = frozenset(hosts)
@@ -68,6 +71,7 @@ class Guard:
         self._sessions = sessions
         self._open_identity = open_identity
         self._tile_origins = tile_origins
+        self._note_answer = note_answer
         self._rates = Rates()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -79,6 +83,7 @@ class Guard:
 
         async def guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
+                self._note_answer(message["status"])
                 message["headers"] = [*message.get("headers", ()), *self._headers()]
             await send(message)
 
@@ -113,7 +118,7 @@ class Guard:
         identity, session = self._identity(headers)
         scope.setdefault("state", {})
         scope["state"]["identity"], scope["state"]["session"] = identity, session
-        if not scope["path"].startswith(API):
+        if not scope["path"].startswith((API, METRICS)):
             return
         is_login = scope["path"] == SESSION and scope["method"] == "POST"
         if identity is None and not is_login:

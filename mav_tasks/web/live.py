@@ -70,7 +70,7 @@ class Live:
         return {
             "now": round(time.time(), 3),
             "reachable": self.is_reachable,
-            "detail": self._why_unreachable(),
+            "detail": self.why_not_ready(),
             "vehicles": self.vehicle_forms(),
             "queues": [self.queue_form(each) for each in self.queues.values()],
             "texts": list(self._texts)[-TEXTS_AT_FIRST:],
@@ -231,10 +231,11 @@ class Live:
         is_reachable = time.monotonic() - self._heard_at < UNREACHED
         if is_reachable != self.is_reachable:
             self.is_reachable = is_reachable
-            detail = self._why_unreachable()
+            detail = self.why_not_ready()
             self.hub.publish("server", {"reachable": is_reachable, "detail": detail})
 
-    def _why_unreachable(self) -> str | None:
+    def why_not_ready(self) -> str | None:
+        """Return why the page cannot show what is; None: the task server is heard."""
         if self.is_reachable:
             return None
         return f"no answer from the task server at {self._server}: is it running?"

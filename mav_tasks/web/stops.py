@@ -55,6 +55,8 @@ class Stops:
         self._open: set[Stop] = set()
         self._following: set[asyncio.Task[None]] = set()
         self._count = 0
+        #: called with the outcome of each STOP, and after how long it was acknowledged
+        self.on_outcome: Callable[[str, float | None], None] = lambda _outcome, _after: None
 
     def forms(self) -> list[dict[str, Any]]:
         """Return the latest STOPs, the oldest first."""
@@ -75,10 +77,12 @@ class Stops:
             stop.detail = str(error)
             self._open.discard(stop)
             self._publish(stop)
+            self.on_outcome(stop.phase, None)
             raise
         stop.acknowledged_after = time.monotonic() - stop.begun
         stop.phase = "acknowledged"
         self._publish(stop)
+        self.on_outcome(stop.phase, stop.acknowledged_after)
         following = asyncio.create_task(self._follow(stop))
         self._following.add(following)
         following.add_done_callback(self._following.discard)

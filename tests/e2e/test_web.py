@@ -12,6 +12,7 @@ from typing import Any
 import httpx
 import jsonschema
 import pytest
+from prometheus_client.parser import text_string_to_metric_families
 
 from mav_tasks.web.schemas import SCHEMAS
 from tests.kit.processes import Stand, process, stand, wait_until
@@ -105,6 +106,37 @@ def test_answers_are_as_the_document_says(page: Web) -> None:
         ("Entries", "/journal?limit=20"),
     ):
         check(name, page.get(path))
+
+
+def test_metrics_say_what_happened(page: Web) -> None:
+    before = _metrics(page)
+    page.post("/stop", {})
+    page.client.get("/api/v1/nothing")
+    move(page, 1.0, delay=700)
+    wait_until(lambda: page.get("/vehicles/1/queue")["waiting_count"], within=5, what="a task")
+    waiting = 'mav_tasks_queue_length{vehicle="1"}'
+    wait_until(lambda: _metrics(page).get(waiting) == 1, within=10, what="a queue of one")
+    after = _metrics(page)
+    count = "mav_tasks_web_stop_acknowledged_seconds_count"
+    assert after[count] == before[count] + 1
+    assert after['mav_tasks_web_requests_total{code="404"}'] >= 1
+    assert after['mav_tasks_queue_paused{reason="stopped",vehicle="1"}'] == 1
+    assert after["mav_tasks_web_server_reachable"] == 1
+    assert after["process_open_fds"] > 5
+    assert page.client.get("/healthz").text == "ok\n"
+    assert page.client.get("/readyz").status_code == 200
+
+
+def _metrics(it: Web) -> dict[str, float]:
+    """Return each sample of the metrics, read by Prometheus' own parser."""
+    answer = it.client.get("/metrics")
+    assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
+    found = {}
+    for family in text_string_to_metric_families(answer.text):
+        for sample in family.samples:
+            labels = ",".join(f'{name}="{value}"' for name, value in sorted(sample.labels.items()))
+            found[f"{sample.name}{{{labels}}}" if labels else sample.name] = sample.value
+    return found
 
 
 def test_one_key_makes_one_task(page: Web) -> None:

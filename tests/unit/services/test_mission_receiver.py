@@ -306,6 +306,22 @@ def test_a_try_with_other_items_is_another_upload(again: list[int], is_same: boo
     assert rig.uploads[-1].begun_at == (0.0 if is_same else 1.0)
 
 
+@pytest.mark.parametrize(("north", "is_same"), [(1, True), (2, False)])
+def test_a_try_that_begins_otherwise_than_a_refused_item_is_another_upload(
+    north: int, is_same: bool
+) -> None:
+    rig = Rig(refused=16).count(1)
+    rig.item(0, north=1)
+    rig.said()
+    rig.refused = None
+    rig.run(1.0)
+    rig.count(1)
+    rig.run(1.0 + QUIET)
+    rig.item(0, north=north)
+    rig.said()
+    assert rig.uploads[0].begun_at == (0.0 if is_same else 1.0)
+
+
 def test_items_without_a_value_are_the_same_again() -> None:
     rig = Rig()
     for begun in (0.0, 1.0):

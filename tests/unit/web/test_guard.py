@@ -134,6 +134,7 @@ async def test_without_a_token_nothing_but_the_page_and_the_login(tmp_path: Path
     assert stop.status_code == 401
     assert stop.headers["www-authenticate"] == "Bearer"
     assert (await rig.client.get("/")).status_code == 200
+    assert (await rig.client.get("/metrics")).status_code == 401
     login = await rig.client.post("/api/v1/session", headers=JSON, content="{}")
     assert login.json()["who"] is None
 
