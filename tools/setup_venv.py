@@ -30,6 +30,7 @@ DIALECT = ROOT / "mav_tasks" / "mavlink" / "_dialect.py"
 #: Inputs of the environment. Written last; "unfinished" while a new one is being made.
 STAMP = VENV / ".mav-tasks-setup"
 UNFINISHED = "unfinished\n"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 #: A change of any of these requires an update.
 INPUTS = (
     "pyproject.toml",
@@ -83,6 +84,28 @@ def set_up(wanted: str) -> None:
         version = _version_of(VENV_PYTHON) or ""
         STAMP.write_text(_stamp(version, wanted), encoding="utf-8")
         _say(f"ready: {VENV.name} has Python {version}{_note_on_pybullet()}")
+
+
+def lacks_browser() -> bool:
+    """Return whether there is no Chromium."""
+    return not any(shutil.which(name) for name in BROWSERS)
+
+
+def install_browser() -> None:
+    """Install Chromium where that is possible; else say that its tests will be skipped."""
+    if not lacks_browser():
+        return
+    if os.geteuid() != 0 or shutil.which("apt-get") is None:
+        _say("no browser: it takes root and apt-get; the tests of the web page are skipped")
+        return
+    _say("installing Chromium with apt-get (a minute)")
+    try:
+        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+        for command in (["apt-get", "-q", "update"], ["apt-get", "-qy", "install", "chromium"]):
+            subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
+    except subprocess.CalledProcessError as error:
+        last = (error.stderr or error.stdout).strip().splitlines()[-1:]
+        _say(f"no browser: {' '.join(error.cmd)} failed: {' '.join(last)}")
 
 
 def _usable_version() -> str | None:
@@ -224,13 +247,21 @@ def main() -> int:
         "--is-current", action="store_true", help="do nothing; 0 if there is nothing to do"
     )
     parser.add_argument(
+        "--browser",
+        action="store_true",
+        help="also install Chromium for the tests of the web page, with apt as root",
+    )
+    parser.add_argument(
         "wanted", nargs="?", choices=LOCK_OF, default=DEVELOPMENT, help="default: %(default)s"
     )
     arguments = parser.parse_args()
     if arguments.is_current:
-        return 0 if is_current(arguments.wanted) else 1
+        is_done = is_current(arguments.wanted) and not (arguments.browser and lacks_browser())
+        return 0 if is_done else 1
     try:
         set_up(arguments.wanted)
+        if arguments.browser:
+            install_browser()
     except SetupError as error:
         print(f"setup: {error}", file=sys.stderr)
         return 1

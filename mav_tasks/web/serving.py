@@ -4,9 +4,10 @@ import asyncio
 import logging
 import resource
 import secrets
+import signal
 import socket
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
 
@@ -131,6 +132,14 @@ class _Server(uvicorn.Server):
             )
         )
         self._live = live
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """End in order on SIGINT and SIGTERM, and at once on the second one."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self.handle_exit, number, None)
+        yield
 
     async def until_ended(self, sockets: list[socket.socket], viewing: asyncio.Task[None]) -> None:
         """Serve; then end the view."""

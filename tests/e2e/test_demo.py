@@ -7,7 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import httpx
 import pytest
+
+from tests.kit.processes import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -114,3 +117,34 @@ def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
     output, _ = running.communicate(timeout=20)
     assert running.returncode in (130, -signal.SIGINT)
     assert "Traceback" not in output
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(150)
+def test_the_demo_with_the_web_page_goes_on_until_ctrl_c(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "rover_sim.demo", "--web", "--body", "kinematic"]
+    log = tmp_path / "demo.log"
+    with log.open("wb") as output:
+        it = subprocess.Popen(
+            [*command, "--output", str(tmp_path)],
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            env={name: value for name, value in os.environ.items() if "DISPLAY" not in name},
+        )
+    try:
+        text = log.read_text
+        wait_until(lambda: "press Ctrl-C" in text(), within=90, what=text)
+        found = re.search(r"web page: (\S+)/", text())
+        assert found is not None
+        tasks = httpx.get(f"{found[1]}/api/v1/vehicles/1/history").json()["tasks"]
+        assert [task["state"] for task in tasks] == ["completed"] * 3
+        os.killpg(it.pid, signal.SIGINT)  # as a terminal does
+        assert it.wait(20) == 0, text()
+        assert "demo: all correct" in text()
+    finally:
+        it.kill()
+        it.wait()
+    refused = demo("--web", "--fast")
+    assert refused.returncode == 2
+    assert "--web needs real time" in refused.stdout

@@ -465,6 +465,6 @@ def test_it_ends_at_once_with_streams_open(tmp_path: Path, both: tuple[Stand, We
         next(stream)
         began = time.monotonic()
         it.process.popen.send_signal(signal.SIGTERM)
-        assert it.process.popen.wait(10) in (0, -signal.SIGTERM, 143)
+        assert it.process.popen.wait(10) == 0
         assert time.monotonic() - began < 8
         assert "Traceback" not in it.process.text

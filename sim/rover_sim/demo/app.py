@@ -13,6 +13,7 @@ from rich.console import Console
 from mav_tasks.errors import RecordError
 from rover_sim.bullet import NO_PYBULLET, has_pybullet
 from rover_sim.demo import fast, real
+from rover_sim.demo.processes import DemoError
 from rover_sim.demo.report import draw, print_table, problems
 from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import Place, ThirdParty
@@ -29,6 +30,8 @@ NO_PICTURE = (
 )
 NO_WINDOW = "demo: --gui shows pybullet's window: it needs pybullet, and cannot be used with --fast"
 
+NO_PAGE = "demo: --web needs real time, and cannot be used with --fast"
+
 
 def main() -> int:
     """Run the demonstration; return the exit status."""
@@ -42,10 +45,13 @@ def main() -> int:
     if options.gui and (options.fast or body != "bullet"):
         _say(console, NO_WINDOW)
         return 2
+    if options.web and options.fast:
+        _say(console, NO_PAGE)
+        return 2
     try:
         with Screen(console) as screen:
             party, track = _drive(screen, options, body)
-    except (real.DemoError, MissingExtra, RecordError) as error:
+    except (DemoError, MissingExtra, RecordError) as error:
         _say(console, f"demo: {error}")
         return 2
     picture = None if options.gui else Path(options.output).resolve() / PICTURE
@@ -70,6 +76,7 @@ def _drive(
         gui=options.gui,
         seed=options.seed,
         record=options.record,
+        web=options.web,
     )
 
 
@@ -101,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
         "--noise", choices=("on", "off"), default="on", help="off: no errors of the simulated rover"
     )
     add("--gui", action="store_true", help="show pybullet's window instead of writing a picture")
+    add("--web", action="store_true", help="serve the web page, too, until Ctrl-C")
     add("--body", choices=("bullet", "kinematic"), help="default: bullet if it is installed")
     add(
         "--record",
