@@ -1,0 +1,32 @@
+"""An agent's idempotency key as the numbers that the task server compares. Pure.
+
+A nonce has 30 bits, and all clients of one MAVLink address and key share them. With 1,000 tasks
+remembered, a new key meets the nonce of another one once in a million submissions. So 31 more bits
+of the key, with the label, go into the plan: the server compares them with the rest of the plan,
+and refuses a key that only looks like another one. It never takes one task for the other.
+"""
+
+from hashlib import sha256
+from typing import NamedTuple
+
+from mav_tasks.client.wire import LARGEST
+from mav_tasks.tasks.task import MAX_NONCE
+
+LONGEST = 200  # characters of a key
+
+
+class Numbers(NamedTuple):
+    """The nonce of a key, and the check that goes with it."""
+
+    nonce: int
+    check: int
+
+
+def numbers_of(key: str, *, label: str) -> Numbers:
+    """Return the numbers of a key; the check depends on the label, too.
+
+    The server sets a label after the submission, and does not compare it itself.
+    """
+    nonce = int.from_bytes(sha256(key.encode()).digest()[:16]) % MAX_NONCE + 1
+    whole = sha256(f"{len(key)} {key} {label}".encode()).digest()
+    return Numbers(nonce, int.from_bytes(whole[:16]) % LARGEST + 1)
