@@ -4,6 +4,8 @@ The server may be away at the start, or later: each call looks for it, and raise
 not there.
 """
 
+import asyncio
+
 from mav_tasks.agents.limits import Limits
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
@@ -19,6 +21,8 @@ class Rovers:
         self._client = client
         self._only = only
         self.limits = limits
+        #: held while a task is submitted: one at a time
+        self.submitting = asyncio.Lock()
 
     async def client(self) -> Client:
         """Return the client once it has found the server. Raise NoAnswer if it does not."""

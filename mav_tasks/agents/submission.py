@@ -54,7 +54,11 @@ async def submit(rovers: Rovers, wish: Wish) -> TaskStatus:
 
     Raise UsageError beyond a limit, or if the key is used up; Refused, NoAnswer as the client.
     """
-    client = await rovers.client()
+    async with rovers.submitting:  # else two at once would be one too many for --max-queued
+        return await _submit(await rovers.client(), rovers, wish)
+
+
+async def _submit(client: Client, rovers: Rovers, wish: Wish) -> TaskStatus:
     numbers = numbers_of(wish.key, label=wish.label)
     earlier, queued = await _looked_up(client, wish.rover, numbers)
     if earlier is None:

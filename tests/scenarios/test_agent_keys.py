@@ -115,6 +115,17 @@ def test_equal_submissions_at_once_are_one_task(world: RoverWorld) -> None:
     world.run(script())
 
 
+def test_tasks_that_come_at_once_are_not_more_than_a_limit(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with agent(world, max_queued=2) as rovers:
+            keys = (submitted(rovers, key) for key in "abcd")
+            answers = await asyncio.gather(*keys, return_exceptions=True)
+        refused = [str(each) for each in answers if isinstance(each, UsageError)]
+        assert refused == ["--max-queued 2: the rover has 2 tasks; wait for one"] * 2
+
+    world.run(script())
+
+
 def test_a_second_try_is_no_further_task_for_a_limit(world: RoverWorld) -> None:
     async def script() -> None:
         async with agent(world, max_queued=1, max_distance=1.0) as rovers:
