@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mav_tasks.cli.command import command
-from mav_tasks.cli.options import Common
+from mav_tasks.cli.options import Reach
 from mav_tasks.cli.session import unfound
 from mav_tasks.errors import UsageError
 
@@ -45,7 +45,7 @@ class LimitOptions:
 
 @command
 async def mcp(
-    common: Common,
+    reach: Reach,
     limits: LimitOptions,
     http: Annotated[
         str,
@@ -71,8 +71,8 @@ async def mcp(
 
     place = place_of(http) if http else None
     allowed = Limits(limits.max_distance, limits.max_speed, limits.max_queued)
-    async with unfound(common) as client:
-        rovers = Rovers(client, only=common.vehicle, limits=allowed)
+    async with unfound(reach) as client:
+        rovers = Rovers(client, only=reach.vehicle, limits=allowed)
         server = server_of(rovers, is_read_only=limits.read_only)
         if place is None:
             await serve_stdio(server)

@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any
 
-from mav_tasks.cli.options import Common, TaskOptions, seconds_of, start_of
+from mav_tasks.cli.options import Common, Reach, TaskOptions, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.errors import NoAnswer, UsageError
@@ -19,7 +19,7 @@ def read(terms: TaskOptions) -> dict[str, Any]:
 
 
 @asynccontextmanager
-async def opened(common: Common) -> AsyncIterator[Client]:
+async def opened(common: Reach) -> AsyncIterator[Client]:
     """Yield a client that has found the server and the rovers."""
     async with unfound(common) as client:
         await client.found()
@@ -27,7 +27,7 @@ async def opened(common: Common) -> AsyncIterator[Client]:
 
 
 @asynccontextmanager
-async def unfound(common: Common) -> AsyncIterator[Client]:
+async def unfound(common: Reach) -> AsyncIterator[Client]:
     """Yield a client whose link is open, without waiting for the server."""
     if common.keys and not common.sign:
         raise UsageError("--keys needs --sign NAME")
