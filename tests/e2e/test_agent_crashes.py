@@ -5,7 +5,6 @@ import subprocess
 import sys
 from collections import Counter
 from itertools import pairwise
-from math import dist
 from pathlib import Path
 
 import pytest
@@ -21,8 +20,8 @@ pytestmark = pytest.mark.slow
 
 FEW, MANY = 15, 1000
 SEED = 20_261_125
+INACCURACY = 0.3  # of a step: the rover rolls on for some millimetres
 LAST_TASKS = 120.0  # s for those that still wait at the end
-INACCURACY = 0.005  # m by which a step of the rover may be longer or shorter
 
 
 def crash(folder: Path, crashes: int, *, limit: float) -> None:
@@ -46,7 +45,7 @@ def crash(folder: Path, crashes: int, *, limit: float) -> None:
             return queue["running"] is None and not queue["waiting"]
 
         wait_until(is_idle, within=LAST_TASKS, what="the last task")
-        places = [(row["north"], row["east"]) for row in it.truth()]
+        places = [row["north"] for row in it.truth()]
     told = {key: set(ids) for key, ids in found["told"].items()}
     assert all(len(ids) == 1 for ids in told.values()), "a key was told two tasks"
     tasks = {next(iter(ids)) for ids in told.values()}
@@ -62,12 +61,12 @@ def crash(folder: Path, crashes: int, *, limit: float) -> None:
     assert executed == once, "a task was driven twice, or never"
     assert completed == once
 
-    driven = sum(dist(one, other) for one, other in pairwise(places))
-    wanted = len(tasks) * agent_crashes.STEP
-    assert abs(driven - wanted) < len(tasks) * INACCURACY + agent_crashes.STEP / 2
+    # The journal is exact; the rover's true way shows that it is about the rover at all.
+    driven = sum(abs(after - before) for before, after in pairwise(places))
+    assert driven == pytest.approx(len(tasks) * agent_crashes.STEP, rel=INACCURACY)
     kills = found["kills"]
     assert sum(kills.values()) == crashes, "each crash is one of these"
-    print(f"{crashes} crashes, {len(tasks)} tasks, {driven:.2f} of {wanted:.2f} m: {kills}")
+    print(f"{crashes} crashes, {len(tasks)} tasks, {driven:.2f} m: {kills}")
 
 
 @pytest.mark.timeout(120)
