@@ -37,7 +37,7 @@ def advice_of(status: TaskStatus) -> str:
             "It ended without being completed. Look at queue: it may be paused. To drive again, "
             "submit a new task with a new idempotency_key."
         )
-    if status.reason in UNTIL_RESUMED:
+    if status.reason in UNTIL_RESUMED or status.reason is TaskReason.STOPPED:
         return _resume(why_of(status), epoch)
     if status.reason is TaskReason.HELD_AHEAD:
         return "A held task of this rover blocks it: look at queue, and release that task."
