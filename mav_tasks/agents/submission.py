@@ -17,6 +17,7 @@ from mav_tasks.client.values import TaskStatus
 from mav_tasks.client.wire import Goal
 from mav_tasks.errors import NoAnswer, Refused, UsageError
 from mav_tasks.tasks.deduplicator import NONCE_KEPT
+from mav_tasks.tasks.lifecycle import TERMINAL
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
 
 LOOKED_AT = 100  # waiting, and finished, tasks of the rover
@@ -96,9 +97,12 @@ async def _looked_up(client: Client, rover: int, numbers: Numbers) -> tuple[Task
     """Return the task that the key has at a rover, if it has one, and how many are not over.
 
     The server does not compare the keys of tasks that ended long ago, but it still lists them.
+    Raise NoAnswer if some of them are lost on the way: one may be the key's.
     """
     queue = await client.queue(vehicle=rover, limit=LOOKED_AT)
     over = await client.history(vehicle=rover, limit=LOOKED_AT)
+    if len(over) < min(LOOKED_AT, sum(queue.counts.get(state, 0) for state in TERMINAL)):
+        raise NoAnswer("the finished tasks did not all arrive: nothing was submitted, try again")
     current = () if queue.current is None else (queue.current,)
     tasks = (*current, *queue.waiting, *over)
     earlier = next((task for task in tasks if task.nonce == numbers.nonce), None)
