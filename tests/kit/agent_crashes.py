@@ -14,7 +14,7 @@ import select
 import signal
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from random import Random
@@ -36,7 +36,7 @@ META = {
 LONGEST = 30.0  # s for an answer
 #: kills come within so many times the usual time of a submission
 SPREAD = 1.6
-CALM = 5  # submissions without a crash, to measure that time
+CALM = 9  # the last submissions without a crash, which measure that time
 KILLED_AGAIN = 0.3  # of the lives that ask again
 MANY = 40  # waiting tasks, beyond which the next submission waits
 STEP = 0.02  # m, there and back
@@ -136,21 +136,15 @@ class Story:
         self.random = Random(seed)
         self.told: dict[str, list[int]] = {}
         self.kills: Counter[str] = Counter()
-        self.usual = 0.0  # s that a submission takes
+        self._took: deque[float] = deque(maxlen=CALM)  # s that the last submissions took
         self._pending = ""  # key whose submission was interrupted
         self._unheard = ""  # how it was, if nobody was answered
 
     def begin(self) -> None:
         """Submit some tasks without a crash, each in a life of its own."""
-        took = []
         for _ in range(CALM):
-            key = self._new_key()
-            with living(self.url) as life:
-                make_room(life)  # it has found the server
-                began = time.monotonic()
-                self.told[key].append(life.call("submit", **wish_of(key))["id"])
-                took.append(time.monotonic() - began)
-        self.usual = median(took)
+            self._pending = self._new_key()
+            self.settle()
 
     def crash(self) -> None:
         """Live one life, up to its crash; if it is the first with a key, after one that asks again.
@@ -170,7 +164,9 @@ class Story:
             return
         with living(self.url) as life:
             self._note_what_became_of_it(make_room(life))
+            began = time.monotonic()
             self.told[self._pending].append(life.call("submit", **wish_of(self._pending))["id"])
+            self._took.append(time.monotonic() - began)
         self._pending = ""
 
     def _live_and_crash(self, which: str) -> None:
@@ -183,6 +179,11 @@ class Story:
             was_there = nonce_of(self._pending) in nonces
             self.kills[f"{self._unheard}{'stored' if was_there else 'not stored'}"] += 1
             self._unheard = ""
+
+    @property
+    def usual(self) -> float:
+        """How long a submission takes at present, s. The more tasks are over, the longer."""
+        return median(self._took)
 
     def _new_key(self) -> str:
         key = f"key {len(self.told)}"
