@@ -186,6 +186,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
+    "mav_tasks.agents": frozenset(
+        {"mav_tasks.client", "mav_tasks.mavlink", "mav_tasks.tasks", "mav_tasks.errors"}
+    ),
     "mav_tasks.qgc_actions": frozenset(
         {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
     ),
@@ -239,6 +242,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.probing",
             "mav_tasks.web",
             "mav_tasks.client",
+            "mav_tasks.agents",
             "mav_tasks.plan_files",
             "mav_tasks.whole_file",
             "mav_tasks.mavlink",

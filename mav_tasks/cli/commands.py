@@ -43,5 +43,6 @@ COMMANDS = (
         "qgc_actions:qgc_actions",
         "Print or install action buttons for QGroundControl.",
     ),
+    Lazy("mcp", "mcp:mcp", "Offer the task server to AI agents (Model Context Protocol)."),
     Lazy("dialect", "dialect:dialect", "Print the MAVLink definitions of the task messages."),
 )

@@ -13,6 +13,7 @@ from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import is_alone, opened, unfound
 from mav_tasks.cli.words import line_of, resume_command
 from mav_tasks.client.aio import Client
+from mav_tasks.client.descriptions import SILENT_BUT_STOPPED
 from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
@@ -37,11 +38,9 @@ async def stop(
             await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
         except Refused as error:
             if error.reason == TaskReason.VEHICLE_SILENT:
-                words = (
-                    "STOP is in force, but a rover is silent and may still move;"
-                    " the server stops it when it is heard again"
-                )
-                raise Refused(words, result=error.result, reason=error.reason) from error
+                raise Refused(
+                    SILENT_BUT_STOPPED, result=error.result, reason=error.reason
+                ) from error
             raise
     which, way_on = "every rover", "mav-tasks resume --all"
     if common.vehicle is not None:

@@ -47,8 +47,8 @@ TaskId = Annotated[int, typer.Argument(metavar="ID", min=1, help="Id of the task
 
 
 @dataclass(frozen=True, slots=True)
-class Common:
-    """Options for reaching the server and showing its answers."""
+class Reach:
+    """Options for reaching the server."""
 
     server: Annotated[
         str,
@@ -70,7 +70,6 @@ class Common:
         float,
         typer.Option(min=0.1, metavar="SECONDS", help="How long to look for the server."),
     ] = 5.0
-    json: Json = False
     sign: Annotated[
         str,
         typer.Option(
@@ -81,6 +80,13 @@ class Common:
         ),
     ] = ""
     keys: RingFile = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Common(Reach):
+    """Options for reaching the server and showing its answers."""
+
+    json: Json = False
 
 
 @dataclass(frozen=True, slots=True)

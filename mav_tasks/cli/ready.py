@@ -8,8 +8,9 @@ import typer
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
-from mav_tasks.cli.session import all_show, opened
+from mav_tasks.cli.session import opened
 from mav_tasks.client.json_form import vehicle_json
+from mav_tasks.client.telemetry import all_show
 from mav_tasks.client.values import VehicleStatus
 from mav_tasks.errors import Refused
 

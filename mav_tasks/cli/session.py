@@ -1,19 +1,13 @@
 """A client for one command, opened with the command's options."""
 
-import asyncio
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any
 
-from mav_tasks.cli.options import Common, TaskOptions, seconds_of, start_of
-from mav_tasks.cli.words import silence_of
+from mav_tasks.cli.options import Common, Reach, TaskOptions, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
-from mav_tasks.client.values import VehicleStatus
 from mav_tasks.errors import NoAnswer, UsageError
-
-LOOK = 0.01  # s between two checks
-LOOKS = 150
 
 
 def read(terms: TaskOptions) -> dict[str, Any]:
@@ -25,7 +19,7 @@ def read(terms: TaskOptions) -> dict[str, Any]:
 
 
 @asynccontextmanager
-async def opened(common: Common) -> AsyncIterator[Client]:
+async def opened(common: Reach) -> AsyncIterator[Client]:
     """Yield a client that has found the server and the rovers."""
     async with unfound(common) as client:
         await client.found()
@@ -33,7 +27,7 @@ async def opened(common: Common) -> AsyncIterator[Client]:
 
 
 @asynccontextmanager
-async def unfound(common: Common) -> AsyncIterator[Client]:
+async def unfound(common: Reach) -> AsyncIterator[Client]:
     """Yield a client whose link is open, without waiting for the server."""
     if common.keys and not common.sign:
         raise UsageError("--keys needs --sign NAME")
@@ -54,19 +48,6 @@ async def unfound(common: Common) -> AsyncIterator[Client]:
         ) from None
     finally:
         await client.close()
-
-
-async def all_show(client: Client, is_shown: Callable[[VehicleStatus], bool]) -> None:
-    """Wait until each rover shows what is wanted or is known to be silent, for 1.5 s at most.
-
-    The server is found by its own heartbeat; a rover's comes in a packet behind it, and telemetry
-    once a second.
-    """
-    for _ in range(LOOKS):
-        rovers = client.vehicles()
-        if all(is_shown(each) or silence_of(each.heartbeat_age) for each in rovers):
-            return
-        await asyncio.sleep(LOOK)
 
 
 @contextmanager

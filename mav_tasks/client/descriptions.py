@@ -16,6 +16,11 @@ UNTIL_RESUMED = (
     TaskReason.RESTARTED,
 )
 
+SILENT_BUT_STOPPED = (
+    "STOP is in force, but a rover is silent and may still move;"
+    " the server stops it when it is heard again"
+)
+
 
 def state_of(status: TaskStatus) -> str:
     return status.state.name.lower()

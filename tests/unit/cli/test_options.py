@@ -28,7 +28,7 @@ def test_a_group_stands_for_its_options() -> None:
     made = command(body)
     names = list(inspect.signature(made).parameters)
     assert names[:3] == ["number", "priority", "after"]
-    assert names[-6:] == ["server", "vehicle", "timeout", "json", "sign", "keys"]
+    assert names[-6:] == ["server", "vehicle", "timeout", "sign", "keys", "json"]
     assert (made.__name__, made.__doc__) == ("body", "Say it.")
     defaults = {
         name: each.default

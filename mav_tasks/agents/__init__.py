@@ -1,0 +1,1 @@
+"""Offers a task server to AI agents, by the Model Context Protocol."""

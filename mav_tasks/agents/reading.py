@@ -1,0 +1,166 @@
+"""The tools that change nothing: vehicles, queue, history, task, wait."""
+
+import asyncio
+from datetime import UTC, datetime
+from typing import Any
+
+from mav_tasks.agents.advice import needs_decision
+from mav_tasks.agents.arguments import Argument
+from mav_tasks.agents.forms import (
+    FINISHED,
+    QUEUE,
+    TASK,
+    VEHICLE,
+    a_list,
+    an_object,
+    history_form,
+    queue_form,
+    task_form,
+)
+from mav_tasks.agents.rovers import Rovers
+from mav_tasks.agents.tool import Report, Tool, Values
+from mav_tasks.client.descriptions import state_of, what_of, why_of
+from mav_tasks.client.handle import Task
+from mav_tasks.client.json_form import vehicle_json
+from mav_tasks.client.values import TaskStatus
+
+LONGEST_WAIT = 300  # s
+USUAL_WAIT = 30  # s; many programs of agents end a call after a minute
+REPORTS = 1.0  # s between two reports of progress
+LEAST_STEP = 1e-6  # between two reports
+
+VEHICLE_ID = Argument(
+    "vehicle",
+    {
+        "type": "integer",
+        "minimum": 1,
+        "maximum": 255,
+        "description": "system id of the rover; can be left out if there is only one",
+    },
+)
+TASK_ID = Argument(
+    "id", {"type": "integer", "minimum": 1, "description": "id of the task"}, is_required=True
+)
+LIMIT = Argument(
+    "limit",
+    {"type": "integer", "minimum": 0, "maximum": 100, "description": "most tasks; default 20"},
+)
+SECONDS = Argument(
+    "seconds",
+    {
+        "type": "number",
+        "minimum": 0,
+        "maximum": LONGEST_WAIT,
+        "description": f"how long to wait at most, s; default {USUAL_WAIT}",
+    },
+)
+
+
+async def _vehicles(rovers: Rovers, _values: Values, _report: Report) -> dict[str, Any]:
+    return {"vehicles": [vehicle_json(each) for each in await rovers.all()]}
+
+
+async def _queue(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
+    vehicle = await rovers.vehicle(values["vehicle"])
+    client = await rovers.client()
+    return queue_form(await client.queue(vehicle=vehicle, limit=_limit(values)))
+
+
+async def _history(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
+    vehicle = await rovers.vehicle(values["vehicle"])
+    client = await rovers.client()
+    tasks = await client.history(vehicle=vehicle, limit=_limit(values))
+    return history_form(tasks, now=datetime.now(UTC))
+
+
+async def _task(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
+    return task_form(await rovers.status(values["id"]))
+
+
+async def _wait(rovers: Rovers, values: Values, report: Report) -> dict[str, Any]:
+    task = await rovers.task(values["id"])
+    seconds = USUAL_WAIT if values["seconds"] is None else values["seconds"]
+    try:
+        async with asyncio.timeout(seconds):
+            await _until_over(task, report)
+    except TimeoutError:
+        pass
+    return task_form(await task.refresh())
+
+
+async def _until_over(task: Task, report: Report) -> None:
+    """Report progress until a task is over, or held: then it goes on only if it is released.
+
+    The protocol wants each report to be above the one before; a task's progress may also fall.
+    """
+    told, before = -LEAST_STEP, ""
+    async for status in task.updates(interval=REPORTS):
+        line = _line(status)
+        progress = max(status.progress or 0.0, told + LEAST_STEP)
+        if line != before or progress > told + LEAST_STEP:
+            told, before = progress, line
+            await report(progress, line)
+        if needs_decision(status):
+            return
+
+
+def _line(status: TaskStatus) -> str:
+    why = f" ({why_of(status)})" if status.reason else ""
+    return f"task {status.id}: {what_of(status)}: {state_of(status)}{why}"
+
+
+def _limit(values: Values) -> int:
+    return 20 if values["limit"] is None else values["limit"]
+
+
+READING = (
+    Tool(
+        "vehicles",
+        "Rovers",
+        "Show the rovers: position, heading, mode, whether each is armed and heard. Read this "
+        "first. A rover that is not heard cannot be driven now.",
+        (),
+        an_object(vehicles=a_list(VEHICLE)),
+        _vehicles,
+        is_reading=True,
+    ),
+    Tool(
+        "queue",
+        "Queue",
+        "Show the running and the waiting tasks of a rover, why each waits, whether the queue is "
+        "paused, and the halt_epoch that resume and release need. 'advice' says what to do now.",
+        (VEHICLE_ID, LIMIT),
+        QUEUE,
+        _queue,
+        is_reading=True,
+    ),
+    Tool(
+        "history",
+        "Finished tasks",
+        "List finished tasks of a rover, newest first: how each ended, why and when.",
+        (VEHICLE_ID, LIMIT),
+        an_object(tasks=a_list(FINISHED)),
+        _history,
+        is_reading=True,
+    ),
+    Tool(
+        "task",
+        "Task",
+        "Show one task: its state, progress, why it waits, and in 'advice' what to do now.",
+        (TASK_ID,),
+        TASK,
+        _task,
+        is_reading=True,
+    ),
+    Tool(
+        "wait",
+        "Wait for a task",
+        "Wait until a task has ended, or until it is held, or for so many seconds. Then show the "
+        "task as it is: if is_over is false, do what 'advice' says, or call wait again. "
+        "A task that is held does not continue by itself: it needs release.",
+        (TASK_ID, SECONDS),
+        TASK,
+        _wait,
+        is_reading=True,
+    ),
+)

@@ -1,0 +1,118 @@
+"""Submits an agent's task: once for each idempotency key, within the limits.
+
+A task is submitted as a plan, also a single goal: a plan carries its goals and all its terms at
+once, so that the server compares all of them with those of an earlier submission of the key.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mav_tasks.agents.rovers import Rovers
+from mav_tasks.client.aio import Client
+from mav_tasks.client.descriptions import state_of
+from mav_tasks.client.goal_form import goal_of
+from mav_tasks.client.idempotency import Numbers, numbers_of
+from mav_tasks.client.values import TaskStatus
+from mav_tasks.client.wire import Goal
+from mav_tasks.errors import NoAnswer, Refused, UsageError
+from mav_tasks.tasks.deduplicator import NONCE_KEPT
+from mav_tasks.tasks.lifecycle import TERMINAL
+from mav_tasks.tasks.task import DEFAULT_PRIORITY
+
+LOOKED_AT = 100  # waiting, and finished, tasks of the rover
+MARGIN = 60.0  # s before the server forgets a nonce; a submission takes less
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What an agent asks for. ``key`` is its idempotency key, ``rover`` its system id."""
+
+    rover: int
+    goals: Sequence[Goal]
+    key: str
+    label: str
+    terms: dict[str, Any]
+
+    @classmethod
+    def of(cls, rover: int, values: dict[str, Any]) -> "Wish":
+        """Return the wish in a tool's arguments. Raise UsageError if a goal is invalid."""
+        try:
+            goals = [goal_of(form, f"goals[{at}]") for at, form in enumerate(values["goals"])]
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+        terms = {
+            "priority": DEFAULT_PRIORITY if values["priority"] is None else values["priority"],
+            "after": values["after"] or 0,
+            "delay": values["start_in"] or 0.0,
+            "deadline": values["deadline"] or 0.0,
+        }
+        return cls(rover, goals, values["idempotency_key"], values["label"] or "", terms)
+
+
+async def submit(rovers: Rovers, wish: Wish) -> TaskStatus:
+    """Submit a task, or find the task of an earlier submission with this key.
+
+    Raise UsageError beyond a limit, or if the key is used up; Refused, NoAnswer as the client.
+    """
+    async with rovers.submitting:  # else two at once would be one too many for --max-queued
+        return await _submit(await rovers.client(), rovers, wish)
+
+
+async def _submit(client: Client, rovers: Rovers, wish: Wish) -> TaskStatus:
+    numbers = numbers_of(wish.key, label=wish.label)
+    earlier, queued = await _looked_up(client, wish.rover, numbers)
+    if earlier is None:
+        await _check(rovers, wish, queued=queued)
+    elif (earlier.ended_ago or 0.0) > NONCE_KEPT - MARGIN:
+        words = f"it was task {earlier.id}, {state_of(earlier)} {earlier.ended_ago:.0f} s ago"
+        raise UsageError(f"{_of(wish)}: {words}. To drive again, use a new key")
+    try:
+        task = await client.submit_mission(
+            wish.goals,
+            vehicle=wish.rover,
+            nonce=numbers.nonce,
+            check=numbers.check,
+            label=wish.label,
+            **wish.terms,
+        )
+        return await task.refresh()
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    except NoAnswer as error:
+        words = "The task may exist: submit the same again with the same idempotency_key"
+        raise NoAnswer(f"{error}. {words}", nonce=numbers.nonce) from error
+    except Refused as error:
+        if f"nonce {numbers.nonce} " not in str(error):
+            raise
+        words = "it was used for another task; repeat that exactly, or use a new key"
+        raise Refused(f"{_of(wish)}: {words}", result=error.result, reason=error.reason) from error
+
+
+def _of(wish: Wish) -> str:
+    return f"idempotency_key {wish.key!r}"
+
+
+async def _looked_up(client: Client, rover: int, numbers: Numbers) -> tuple[TaskStatus | None, int]:
+    """Return the task that the key has at a rover, if it has one, and how many are not over.
+
+    The server does not compare the keys of tasks that ended long ago, but it still lists them.
+    Raise NoAnswer if some of them are lost on the way: one may be the key's.
+    """
+    queue = await client.queue(vehicle=rover, limit=LOOKED_AT)
+    over = await client.history(vehicle=rover, limit=LOOKED_AT)
+    if len(over) < min(LOOKED_AT, sum(queue.counts.get(state, 0) for state in TERMINAL)):
+        raise NoAnswer("the finished tasks did not all arrive: nothing was submitted, try again")
+    current = () if queue.current is None else (queue.current,)
+    tasks = (*current, *queue.waiting, *over)
+    earlier = next((task for task in tasks if task.nonce == numbers.nonce), None)
+    return earlier, queue.waiting_count + len(current)
+
+
+async def _check(rovers: Rovers, wish: Wish, *, queued: int) -> None:
+    """Raise UsageError, with the limit's name, if a new task is beyond a limit."""
+    rovers.limits.check_queue(queued)
+    rovers.limits.check_speed(wish.goals)
+    if rovers.limits.max_distance is not None:  # it may take a second until a position comes
+        (rover,) = (each for each in await rovers.all() if each.id == wish.rover)
+        rovers.limits.check_distance(wish.goals, rover=rover)

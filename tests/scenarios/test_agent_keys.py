@@ -1,0 +1,162 @@
+"""An agent's idempotency keys: for how long, and for what, a key is one task; in virtual time."""
+
+import asyncio
+from collections.abc import AsyncIterator, Coroutine, Iterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from mav_tasks.agents import submission
+from mav_tasks.agents.limits import Limits
+from mav_tasks.agents.rovers import Rovers
+from mav_tasks.agents.submission import Wish
+from mav_tasks.client.idempotency import Numbers, numbers_of
+from mav_tasks.client.values import TaskStatus
+from mav_tasks.errors import NoAnswer, Refused, UsageError
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.deduplicator import NONCE_KEPT
+from rover_sim.testing.options import RoverOptions
+from rover_sim.testing.rover_world import RoverWorld
+
+MOVE = {"kind": "move", "distance": 0.5}
+TERMS = dict.fromkeys(("priority", "after", "start_in", "deadline", "label"))
+
+
+@pytest.fixture
+def world() -> Iterator[RoverWorld]:
+    """A rover and a server that is ready."""
+    world = RoverWorld(RoverOptions(), seed=1, settings=Settings())
+    world.server.start()
+    world.until(lambda: world.server.is_ready)
+    yield world
+    world.close()
+
+
+@asynccontextmanager
+async def agent(world: RoverWorld, **limits: Any) -> AsyncIterator[Rovers]:
+    """Yield the rovers of one life of an agent."""
+    async with world.client() as client:
+        yield Rovers(client, only=None, limits=Limits(**limits))
+
+
+def submitted(rovers: Rovers, key: str, **other: Any) -> Coroutine[Any, Any, TaskStatus]:
+    """Submit a move, with other content if some is named."""
+    values = {"goals": [MOVE], "idempotency_key": key, **TERMS, **other}
+    return submission.submit(rovers, Wish.of(1, values))
+
+
+async def driven(rovers: Rovers, key: str) -> TaskStatus:
+    """Submit a task and wait for its end."""
+    task = await rovers.task((await submitted(rovers, key)).id)
+    return await task.done()
+
+
+def test_a_key_is_one_task_until_the_server_forgets_it_and_is_refused_from_then_on(
+    world: RoverWorld,
+) -> None:
+    async def script() -> None:
+        async with agent(world) as rovers:
+            first = await driven(rovers, "once")
+            north = world.rovers[0].north
+        await asyncio.sleep(NONCE_KEPT - 2 * submission.MARGIN)
+        async with agent(world) as rovers:
+            assert (await submitted(rovers, "once")).id == first.id
+            with pytest.raises(Refused, match="'once': it was used for another task"):
+                await submitted(rovers, "once", priority=9)
+        for later in (submission.MARGIN, NONCE_KEPT, 2 * NONCE_KEPT):
+            await asyncio.sleep(later)
+            async with agent(world) as rovers:
+                with pytest.raises(UsageError, match=f"'once': it was task {first.id}, completed"):
+                    await submitted(rovers, "once")
+        assert world.rovers[0].north == pytest.approx(north, abs=0.01)
+        async with agent(world) as rovers:
+            assert (await driven(rovers, "twice")).id != first.id
+
+    world.run(script())
+
+
+def test_a_key_outlives_the_server(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with agent(world) as rovers:
+            task = await submitted(rovers, "kept", start_in=3000.0)
+        world.server.kill()
+        world.server.start()
+        async with agent(world) as rovers:
+            assert (await submitted(rovers, "kept", start_in=3000.0)).id == task.id
+
+    world.run(script())
+
+
+def test_another_key_with_the_same_nonce_is_refused_though_the_content_is_equal(
+    world: RoverWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def colliding(key: str, *, label: str) -> Numbers:
+        return numbers_of(key, label=label)._replace(nonce=4711)
+
+    monkeypatch.setattr(submission, "numbers_of", colliding)
+
+    async def script() -> None:
+        async with agent(world) as rovers:
+            first = await submitted(rovers, "one")
+            with pytest.raises(Refused, match="'other': it was used for another task"):
+                await submitted(rovers, "other")
+            assert (await submitted(rovers, "one")).id == first.id
+
+    world.run(script())
+
+
+def test_equal_submissions_at_once_are_one_task(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with agent(world) as rovers:
+            tasks = await asyncio.gather(*(submitted(rovers, "at once") for _ in range(5)))
+        assert len({task.id for task in tasks}) == 1
+
+    world.run(script())
+
+
+def test_nothing_is_submitted_while_finished_tasks_may_be_missing(
+    world: RoverWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script() -> None:
+        async with agent(world) as rovers:
+            await driven(rovers, "first")
+            client = await rovers.client()
+            with monkeypatch.context() as patch:
+                patch.setattr(client, "history", nothing)
+                with pytest.raises(NoAnswer, match="nothing was submitted, try again"):
+                    await submitted(rovers, "second")
+            assert (await client.queue()).waiting_count == 0
+            assert len(await client.history()) == 1
+
+    async def nothing(**_which: Any) -> tuple[TaskStatus, ...]:
+        return ()
+
+    world.run(script())
+
+
+def test_tasks_that_come_at_once_are_not_more_than_a_limit(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with agent(world, max_queued=2) as rovers:
+            keys = (submitted(rovers, key) for key in "abcd")
+            answers = await asyncio.gather(*keys, return_exceptions=True)
+        refused = [str(each) for each in answers if isinstance(each, UsageError)]
+        assert refused == ["--max-queued 2: the rover has 2 tasks; wait for one"] * 2
+
+    world.run(script())
+
+
+def test_a_second_try_is_no_further_task_for_a_limit(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with agent(world, max_queued=1, max_distance=1.0) as rovers:
+            goals = [{"kind": "goto", "north": 0.9, "east": 0.0}]
+            task = await rovers.task((await submitted(rovers, "a", goals=goals)).id)
+            with pytest.raises(UsageError, match="--max-queued 1"):
+                await submitted(rovers, "b")
+            assert (await submitted(rovers, "a", goals=goals)).id == task.id
+            await task.done()
+            goals = [{"kind": "goto", "north": -0.9, "east": 0.0}]
+            with pytest.raises(UsageError, match=r"--max-distance 1 m: this task may drive 1\.8 m"):
+                await submitted(rovers, "b", goals=goals)
+
+    world.run(script())
