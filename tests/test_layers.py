@@ -196,6 +196,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         {
             "mav_tasks.histogram",
             "mav_tasks.metrics",
+            "mav_tasks.recording",
             "mav_tasks.client",
             "mav_tasks.logs",
             "mav_tasks.store",

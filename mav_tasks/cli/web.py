@@ -1,6 +1,7 @@
 """``mav-tasks web``: serve the web page and the HTTP API; and the tokens of their users."""
 
 import os
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -74,6 +75,13 @@ def web(
             'started last on this machine; "": none.',
         ),
     ] = None,
+    records: Annotated[
+        str,
+        typer.Option(
+            metavar="FOLDER",
+            help="Show the recordings in this folder (serve --tlog and --record) on the map.",
+        ),
+    ] = "",
     token_file: TokenFile = "",
     sign: Annotated[
         str,
@@ -96,6 +104,7 @@ def web(
     host, port = _address(listen)
     if role and role not in ROLES:
         raise UsageError(f"--role {role}: expected one of {', '.join(ROLES)}")
+    from mav_tasks.web.records import Records  # noqa: PLC0415
     from mav_tasks.web.tiles import tiles_of  # noqa: PLC0415  # with the extra only
     from mav_tasks.web.tokens import Tokens, load, path_of_tokens  # noqa: PLC0415
 
@@ -116,6 +125,7 @@ def web(
         key=_key(sign, keys),
         journal=_journal(store),
         tiles=tiles_of(tiles) if tiles else None,
+        records=Records(Path(records).expanduser()) if records else None,
     )
     bound = serving.listening(options)
     serving.run(options, bound, started=lambda address: output.say(f"web page: {address}"))

@@ -7,11 +7,11 @@ from typing import BinaryIO
 
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mcap_export.log_facts import LogFacts
-from mav_tasks.mcap_export.sources import Happened, Heard, Restored, items_of
 from mav_tasks.mcap_export.task_views import TaskViews
 from mav_tasks.mcap_export.views import Views
 from mav_tasks.mcap_export.writing import McapWriter
 from mav_tasks.recording.decisions import project_version
+from mav_tasks.recording.sources import Happened, Heard, Restored, items_of
 
 
 @dataclass(slots=True)

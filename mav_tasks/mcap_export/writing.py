@@ -24,8 +24,8 @@ from mav_tasks.mcap_export.convention import (
 from mav_tasks.mcap_export.log_facts import LogFacts
 from mav_tasks.mcap_export.message_json import MessageJson
 from mav_tasks.mcap_export.schemas import Schema, message_schema
-from mav_tasks.mcap_export.sources import Heard, Way
 from mav_tasks.mcap_export.views import Seen
+from mav_tasks.recording.sources import Heard, Way
 
 #: MCAP numbers them with 16 bits; a log of noise could have more
 MOST_CHANNELS = 20_000

@@ -1,6 +1,9 @@
 """Operations on what has happened: texts and the journal."""
 
+import asyncio
 from typing import Any
+
+from starlette.responses import Response
 
 from mav_tasks.tasks.task import MAX_TASK_ID
 from mav_tasks.web.fields import Field
@@ -8,6 +11,7 @@ from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 
+NO_RECORDS = "the web process shows no recordings: start it with --records FOLDER"
 LIMIT = Field("limit", "integer", "at most so many, the latest", False, 1, 2000)
 
 
@@ -29,7 +33,26 @@ def operations(services: Services) -> list[Operation]:
         )
         return {"entries": entries, "next": entries[-1]["number"] if entries else None}
 
+    async def records(_call: Call) -> Any:
+        if services.records is None:
+            raise not_found(NO_RECORDS)
+        return {"records": await asyncio.to_thread(services.records.forms)}
+
+    async def record(call: Call) -> Any:
+        if services.records is None:
+            raise not_found(NO_RECORDS)
+        data = await services.records.run(str(call.path["record"]))
+        return Response(data, media_type="application/json")
+
     return [
+        Operation("GET", "/records", "Recorded runs, the newest first", records, answer="Records"),
+        Operation(
+            "GET",
+            "/records/{record}",
+            "One recorded run: where its rovers were, and what happened",
+            record,
+            answer="Record",
+        ),
         Operation(
             "GET",
             "/texts",

@@ -32,7 +32,7 @@ def operations(services: Services) -> list[Operation]:
             "instance": services.instance,
             "tiles": None if services.tiles is None else services.tiles.form,
             "journal": services.journal is not None and services.journal.is_readable(),
-            "records": False,
+            "records": services.records is not None,
             "goals": [
                 {
                     "kind": kind.name,

@@ -8,6 +8,7 @@ browsers look.
 import asyncio
 import time
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -33,6 +34,7 @@ PROGRESS = 0.5  # s between statuses of a running task
 UNREACHED = 3.0  # s without a packet
 PREARM = "prearm"
 PREARM_LASTS = 35.0  # s; an autopilot repeats what is wrong every 30 s
+PLAN = "plan of "  # the description of a mission
 PLACES = 5000  # tasks whose places are remembered
 MOST_TOLD = 20_000
 
@@ -52,6 +54,9 @@ class Live:
         self._texts: deque[dict[str, Any]] = deque(maxlen=TEXTS)
         self._text_count = 0
         self._prearm: dict[int, dict[str, float]] = {}
+        #: looks up the places of a task that another client submitted
+        self.on_unknown_places: Callable[[int], None] = lambda _task: None
+        self._looked_up: dict[int, None] = {}
         self._told: dict[int, object] = {}  # what the page knows of tasks
         self._running: dict[int, TaskStatus] = {}
         self._dirty: dict[int, asyncio.Event] = {}
@@ -102,13 +107,26 @@ class Live:
         return task_form(status, goals={status.id: self.places_of(status)})
 
     def places_of(self, status: TaskStatus) -> list[Place] | None:
-        """Return the places that a task drives to; None: not known."""
-        return self.places.get(status.id) or places_of_words(what_of(status))
+        """Return the places that a task drives to; None: not known (yet)."""
+        known = self.places.get(status.id)
+        is_plan = what_of(status).startswith(PLAN) and not status.is_over
+        if known is None and is_plan and status.id not in self._looked_up:
+            self._looked_up[status.id] = None
+            _shorten(self._looked_up, PLACES)
+            self.on_unknown_places(status.id)
+        return known or places_of_words(what_of(status))
 
     def remember_places(self, task_id: int, places: list[Place]) -> None:
         """Keep the places of a task that was submitted here."""
         self.places[task_id] = places
         _shorten(self.places, PLACES)
+
+    def show_again(self, task_id: int) -> None:
+        """Publish the queue of a task again: its places are known now."""
+        for queue in self.queues.values():
+            current = () if queue.current is None else (queue.current,)
+            if any(each.id == task_id for each in (*current, *queue.waiting)):
+                self.hub.publish("queue", self.queue_form(queue))
 
     def texts(self, *, before: int | None, limit: int) -> list[dict[str, Any]]:
         """Return texts, the newest last."""

@@ -16,7 +16,11 @@ INTRODUCTION = (
     " refused."
 )
 EVENTS = "text/event-stream"
-PATH_NAMES = {"vehicle": "system id of a rover", "task": "id of a task"}
+PATH_NAMES = {
+    "vehicle": "system id of a rover",
+    "task": "id of a task",
+    "record": "name of a recorded run",
+}
 
 
 def document_of(operations: Iterable[Operation]) -> dict[str, Any]:
@@ -49,7 +53,7 @@ def _described(operation: Operation) -> dict[str, Any]:
             "in": "path",
             "required": True,
             "description": PATH_NAMES[name],
-            "schema": {"type": "integer"},
+            "schema": {"type": "string" if name == "record" else "integer"},
         }
         for name in named
     ]

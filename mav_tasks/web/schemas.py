@@ -258,6 +258,57 @@ SCHEMAS: dict[str, Schema] = {
         },
         "required": ["entries"],
     },
+    "Records": whole(
+        {
+            "records": listed(
+                whole(
+                    {
+                        "name": TEXT,
+                        "bytes": INTEGER,
+                        "changed": said(NUMBER, "seconds since 1970"),
+                        "files": listed(TEXT),
+                    }
+                )
+            )
+        }
+    ),
+    "Record": whole(
+        {
+            "begins": said(NUMBER, "seconds since 1970"),
+            "ends": NUMBER,
+            "vehicles": listed(
+                whole(
+                    {
+                        "vehicle": INTEGER,
+                        "points": listed(
+                            {
+                                "type": "array",
+                                "description": "time, north and east (m), heading (deg), m/s",
+                                "items": MAYBE,
+                                "minItems": 5,
+                                "maxItems": 5,
+                            }
+                        ),
+                        "modes": said(
+                            listed({"type": "array", "minItems": 3, "maxItems": 3}),
+                            "time, mode, whether it was armed",
+                        ),
+                    }
+                )
+            ),
+            "events": listed(
+                whole(
+                    {
+                        "at": NUMBER,
+                        "words": TEXT,
+                        "kind": {"type": "string", "enum": ["event", "text"]},
+                        "vehicle": or_null(INTEGER),
+                        "task": or_null(INTEGER),
+                    }
+                )
+            ),
+        }
+    ),
     "Session": whole(
         {
             "name": TEXT,

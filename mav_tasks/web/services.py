@@ -1,15 +1,19 @@
 """What the operations of the API work on."""
 
 import asyncio
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from mav_tasks.client.aio import Client
 from mav_tasks.errors import StoreError
+from mav_tasks.tasks.goal import GoTo, Plan
+from mav_tasks.web.goal_places import places_of_goals
 from mav_tasks.web.identity import Identity
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live
 from mav_tasks.web.problems import Problem
+from mav_tasks.web.records import Records
 from mav_tasks.web.sessions import Sessions
 from mav_tasks.web.tiles import Tiles
 from mav_tasks.web.tokens import Tokens
@@ -31,7 +35,29 @@ class Services:
     server: str
     journal: Journal | None = None
     tiles: Tiles | None = None
+    records: Records | None = None
     owners: dict[int, str] = field(default_factory=dict)
+    _looking: set[asyncio.Task[None]] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.live.on_unknown_places = self._look_up_places
+
+    def _look_up_places(self, task: int) -> None:
+        """Read the places of another client's plan from the journal, in the background."""
+        if self.journal is None:
+            return
+        looking = asyncio.get_running_loop().create_task(self._remember_places(self.journal, task))
+        self._looking.add(looking)
+        looking.add_done_callback(self._looking.discard)
+
+    async def _remember_places(self, journal: Journal, task: int) -> None:
+        with suppress(StoreError):  # the map lacks the places; nothing else does
+            goal = await asyncio.to_thread(journal.goal_of, task)
+            steps = goal.steps if isinstance(goal, Plan) else ()
+            places = places_of_goals([step for step in steps if isinstance(step, GoTo)])
+            if places:
+                self.live.remember_places(task, places)
+                self.live.show_again(task)
 
     def own(self, task: int, identity: Identity) -> None:
         """Note who submitted a task."""

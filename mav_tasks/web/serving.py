@@ -22,6 +22,7 @@ from mav_tasks.web.connections import PatientProtocol
 from mav_tasks.web.identity import Identity
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live
+from mav_tasks.web.records import Records
 from mav_tasks.web.services import Services
 from mav_tasks.web.sessions import Sessions
 from mav_tasks.web.tiles import Tiles
@@ -47,6 +48,7 @@ class WebOptions:
     key: Key | None
     journal: Journal | None
     tiles: Tiles | None
+    records: Records | None
 
 
 def listening(options: WebOptions) -> socket.socket:
@@ -101,6 +103,7 @@ async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str
             options.server,
             options.journal,
             options.tiles,
+            options.records,
         )
         identity = Identity("local", options.role) if options.role else None
         app = application(services, hosts=_hosts(options, port), open_identity=identity)

@@ -14,6 +14,7 @@ import jsonschema
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from mav_tasks import GoTo, LocalPlace, SyncClient, Wait
 from mav_tasks.web.schemas import SCHEMAS
 from tests.kit.processes import Stand, process, stand, wait_until
 from tests.kit.web import Web, has_rover, web
@@ -468,3 +469,54 @@ def test_it_ends_at_once_with_streams_open(tmp_path: Path, both: tuple[Stand, We
         assert it.process.popen.wait(10) == 0
         assert time.monotonic() - began < 8
         assert "Traceback" not in it.process.text
+
+
+def test_a_recorded_run_is_shown_as_it_was(tmp_path: Path) -> None:
+    folder = tmp_path / "records"
+    with stand(tmp_path, "--tlog", str(folder), "--record", str(folder)) as it:
+        with web(tmp_path, it, name="live") as page:
+            has_rover(page)
+            driven = page.wait_for(move(page, 1.0)["id"], "completed")
+        it.server.end()
+        (folder / "not a record.tlog").write_bytes(b"x" * 100)
+        with web(tmp_path, it, "--records", str(folder), name="past") as page:
+            listed = page.get("/records")
+            check("Records", listed)
+            names = {each["name"]: each for each in listed["records"]}
+            (name,) = set(names) - {"not a record"}
+            assert len(names[name]["files"]) == 2
+            run = page.get(f"/records/{name}")
+            check("Record", run)
+            (rover,) = run["vehicles"]
+            norths = [point[1] for point in rover["points"]]
+            assert max(norths) - min(norths) == pytest.approx(1.0, abs=0.1)
+            assert ["GUIDED", True] in [mode[1:] for mode in rover["modes"]]
+            words = [each["words"] for each in run["events"] if each["task"] == driven["id"]]
+            assert any("completed" in each for each in words)
+            assert any(each["kind"] == "text" for each in run["events"])
+            assert all(run["begins"] <= each["at"] <= run["ends"] for each in run["events"])
+            broken = page.client.get("/api/v1/records/not a record")
+            assert broken.status_code == 422
+            assert "not a telemetry log" in broken.json()["detail"]
+            for other in ("none", "..%2Fx", "%2Fetc%2Fpasswd"):
+                assert page.client.get(f"/api/v1/records/{other}").status_code == 404
+
+
+def test_the_places_of_another_clients_plan_come_from_the_journal(
+    both: tuple[Stand, Web], page: Web
+) -> None:
+    goals = [GoTo(LocalPlace(3.0, 1.0)), GoTo(LocalPlace(-2.0, 4.0)), Wait(1.0), Wait(2.0)]
+    goals += [GoTo(LocalPlace(5.0, 5.0))]
+    url = f"udpout:127.0.0.1:{both[0].client_port}"
+    with SyncClient(url) as other:
+        task = other.submit(goals, delay=500.0)
+    places = [
+        {"north": 3.0, "east": 1.0},
+        {"north": -2.0, "east": 4.0},
+        {"north": 5.0, "east": 5.0},
+    ]
+    wait_until(
+        lambda: page.task(task.id)["goals"] == places,
+        within=10,
+        what=lambda: f"{places} in {page.task(task.id)}",
+    )

@@ -1,4 +1,4 @@
-"""The recordings to export, as one stream of what happened, in the order of its times.
+"""Recordings as one stream of what happened, in the order of its times: for exports and the map.
 
 A telemetry log has the packets, received and sent. A record of decisions has the events of the
 tasks, and the packets that were received, with their links; of what was sent it has a digest only.

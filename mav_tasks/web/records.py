@@ -1,0 +1,92 @@
+"""The recordings in a folder, for the page: which runs there are, and one run's way on the map."""
+
+import asyncio
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mav_tasks.errors import UsageError
+from mav_tasks.recording.decisions import SUFFIX
+from mav_tasks.web.problems import Problem, not_found
+
+TLOG = ".tlog"
+WITHIN = 120.0  # s to read a run
+MOST = 500  # runs that are listed, the newest
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """The files of one run."""
+
+    name: str
+    paths: tuple[Path, ...]
+
+    @property
+    def form(self) -> dict[str, Any]:
+        """The run as JSON."""
+        found = [path.stat() for path in self.paths]
+        return {
+            "name": self.name,
+            "bytes": sum(each.st_size for each in found),
+            "changed": max(each.st_mtime for each in found),
+            "files": [path.name for path in self.paths],
+        }
+
+
+class Records:
+    """The runs in a folder. One is read at a time."""
+
+    def __init__(self, folder: Path) -> None:
+        if not folder.is_dir():
+            raise UsageError(f"--records {folder}: no such folder")
+        self._folder = folder
+        self._reading = asyncio.Lock()
+
+    def __repr__(self) -> str:
+        return f"Records({self._folder})"
+
+    def forms(self) -> list[dict[str, Any]]:
+        """Return the runs, the newest first. Blocks; raise Problem if the folder is unreadable."""
+        try:
+            forms = [each.form for each in self._runs().values()]
+        except OSError as error:
+            words = f"{self._folder}: {error.strerror}"
+            raise Problem(503, "Recordings cannot be read", words) from error
+        return sorted(forms, key=lambda form: form["changed"], reverse=True)[:MOST]
+
+    async def run(self, name: str) -> bytes:
+        """Return a run as JSON. Raise Problem if there is no such run, or it is unreadable."""
+        files = (await asyncio.to_thread(self._runs)).get(name)
+        if files is None:
+            raise not_found(f"there is no recording {name[:80]!r}")
+        async with self._reading:
+            return await _read(files)
+
+    def _runs(self) -> dict[str, Files]:
+        found: dict[str, list[Path]] = {}
+        for path in sorted(self._folder.iterdir()):
+            for suffix in (TLOG, SUFFIX):
+                if path.name.endswith(suffix) and path.is_file():
+                    found.setdefault(path.name.removesuffix(suffix), []).append(path)
+        return {name: Files(name, tuple(paths)) for name, paths in found.items()}
+
+
+async def _read(files: Files) -> bytes:
+    command = [sys.executable, "-m", "mav_tasks.web.recorded", *map(str, files.paths)]
+    reading = await asyncio.create_subprocess_exec(
+        *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+    )
+    try:
+        async with asyncio.timeout(WITHIN):
+            data, words = await reading.communicate()
+    except TimeoutError:
+        raise Problem(504, "Too long", f"{files.name}: not read within {WITHIN:g} s") from None
+    finally:
+        if reading.returncode is None:
+            reading.kill()
+            await reading.wait()
+    if reading.returncode:
+        detail = words.decode(errors="replace").strip().rpartition("\n")[2]
+        raise Problem(422, "Recording cannot be read", detail[:500])
+    return data
