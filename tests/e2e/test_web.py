@@ -505,16 +505,12 @@ def test_a_recorded_run_is_shown_as_it_was(tmp_path: Path) -> None:
 def test_the_places_of_another_clients_plan_come_from_the_journal(
     both: tuple[Stand, Web], page: Web
 ) -> None:
-    goals = [GoTo(LocalPlace(3.0, 1.0)), GoTo(LocalPlace(-2.0, 4.0)), Wait(1.0), Wait(2.0)]
-    goals += [GoTo(LocalPlace(5.0, 5.0))]
+    ways = [(3.0, 1.0), (-2.0, 4.0), (5.0, 5.0)]
+    goals = [*(GoTo(LocalPlace(*way)) for way in ways), Wait(1.0), Wait(2.0)]
     url = f"udpout:127.0.0.1:{both[0].client_port}"
     with SyncClient(url) as other:
         task = other.submit(goals, delay=500.0)
-    places = [
-        {"north": 3.0, "east": 1.0},
-        {"north": -2.0, "east": 4.0},
-        {"north": 5.0, "east": 5.0},
-    ]
+    places = [{"north": north, "east": east} for north, east in ways]
     wait_until(
         lambda: page.task(task.id)["goals"] == places,
         within=10,

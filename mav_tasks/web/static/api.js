@@ -42,7 +42,7 @@ export async function request(method, path, body, { key, within = WITHIN } = {})
   throw new Problem(answer.status, problem.detail ?? `answer ${answer.status}`, problem.reason ?? null);
 }
 
-export const get = (path) => request("GET", path);
+export const get = (path, options) => request("GET", path, undefined, options);
 export const post = (path, body, options) => request("POST", path, body, options);
 
 /** A new idempotency key: the same request may be sent again with it. */

@@ -6,6 +6,7 @@ import { logIn } from "./login.js";
 import * as map from "./map.js";
 import * as past from "./past.js";
 import * as queue from "./queue.js";
+import * as records from "./records.js";
 import * as routes from "./routes.js";
 import * as rovers from "./rovers.js";
 import * as stop from "./stop.js";
@@ -46,6 +47,7 @@ async function start() {
     map.begin();
     queue.begin();
     past.begin();
+    records.begin();
     texts.begin();
     timeline.begin();
     routes.begin();
@@ -97,14 +99,18 @@ function tabs() {
       each.tabIndex = isChosen ? 0 : -1;
       document.getElementById(each.getAttribute("aria-controls")).hidden = !isChosen;
     }
-    if (tab.id === "tab-texts" && isBegun) texts.shown();
+    if (!isBegun) return;
+    if (tab.id === "tab-texts") texts.shown();
+    if (tab.id === "tab-records") records.shown();
+    else records.left();
   };
   for (const [at, tab] of all.entries()) {
     tab.addEventListener("click", () => choose(tab));
     tab.addEventListener("keydown", (event) => {
       const step = { ArrowRight: 1, ArrowLeft: all.length - 1 }[event.key];
       if (!step) return;
-      const next = all[(at + step) % all.length];
+      let next = all[(at + step) % all.length];
+      if (next.hidden) next = all[(at + 2 * step) % all.length];
       choose(next);
       next.focus();
     });

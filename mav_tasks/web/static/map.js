@@ -23,7 +23,9 @@ let groundLayer = null;
 let goalLayer = null;
 let previewLayer = null;
 let taskTrackLayer = null;
+let runLayer = null;
 let isFitted = false;
+let isPast = false; // a recorded run is shown
 const marks = new Map();
 const drawnTracks = new Map();
 
@@ -44,7 +46,7 @@ export function begin() {
     grid().addTo(map);
   }
   map.setView([0, 0], hasTiles ? 3 : 3);
-  [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer] = Array.from({ length: 5 }, () => L.layerGroup().addTo(map));
+  [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer, runLayer] = Array.from({ length: 6 }, () => L.layerGroup().addTo(map));
   map.on("click", (event) => clicked(event.latlng));
   new ResizeObserver(() => map.invalidateSize()).observe(document.getElementById("map"));
   onChange((names) => {
@@ -108,6 +110,7 @@ function here(vehicle) {
 }
 
 function drawRovers() {
+  if (isPast) return;
   for (const vehicle of state.vehicles.values()) {
     const at = here(vehicle);
     if (!at) continue;
@@ -137,7 +140,7 @@ function drawRovers() {
   if (!isFitted && marks.size) fit();
 }
 
-function makeMark(id, at) {
+function makeMark(id, at, layer = map) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   svg.setAttribute("viewBox", "0 0 28 28");
   const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
@@ -150,7 +153,7 @@ function makeMark(id, at) {
     choose(id);
     centre();
   });
-  mark.addTo(map);
+  mark.addTo(layer);
   mark._svg = svg;
   return mark;
 }
@@ -298,7 +301,40 @@ export function showTrack(track) {
   map.fitBounds(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 20 : 4 });
 }
 
+/**
+ * Show the ways of a recorded run instead of the present; null: the present again.
+ * Return a function that shows the rovers at a place of their ways.
+ */
+export function showRun(run) {
+  if (!runLayer) return () => {};
+  runLayer.clearLayers();
+  document.getElementById("map").classList.toggle("past", Boolean(run));
+  for (const layer of [trackLayer, goalLayer]) run ? layer.remove() : layer.addTo(map);
+  for (const mark of marks.values()) run ? mark.remove() : mark.addTo(map);
+  isPast = Boolean(run);
+  if (!run) {
+    drawRovers();
+    return () => {};
+  }
+  const all = [];
+  const shown = new Map();
+  for (const rover of run.vehicles) {
+    const vehicle = state.vehicles.get(rover.vehicle) ?? null;
+    const places = rover.points.map(([, north, east]) => point({ north, east }, vehicle) ?? [north, east]);
+    if (places.length > 1) L.polyline(places, { color: taskColour(rover.vehicle), weight: 2, opacity: 0.6, interactive: false }).addTo(runLayer);
+    if (places.length) shown.set(rover.vehicle, { mark: makeMark(rover.vehicle, places[0], runLayer), places });
+    all.push(...places);
+  }
+  if (all.length) map.fitBounds(L.latLngBounds(all).pad(0.3), { maxZoom: hasTiles ? 20 : 4 });
+  return (vehicle, index, heading) => {
+    const { mark, places } = shown.get(vehicle);
+    mark.setLatLng(places[index]);
+    mark._svg.style.transform = `rotate(${heading ?? 0}deg)`;
+  };
+}
+
 function clicked(latlng) {
+  if (isPast) return;
   const vehicle = state.vehicles.get(state.chosen);
   if (!vehicle) return;
   const place = placeAt(latlng, vehicle);

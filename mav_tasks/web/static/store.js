@@ -53,7 +53,7 @@ export function takeVehicles(vehicles) {
     state.vehicles.set(vehicle.vehicle, vehicle);
     addToTrack(vehicle);
   }
-  if (state.chosen === null && state.vehicles.size) state.chosen = Math.min(...state.vehicles.keys());
+  if (state.chosen === null && state.vehicles.size) choose(Math.min(...state.vehicles.keys()));
   change("vehicles");
 }
 

@@ -10,9 +10,9 @@ const place = document.getElementById("timeline");
 const line = h("div", { class: "now-line" });
 const bars = h("div", {});
 const ticks = h("div", { "aria-hidden": "true" });
-const BEFORE = 900; // s
-const AHEAD = 900;
-const TICK = 300;
+const BEFORE = 300; // s
+const AHEAD = 300;
+const TICK = 60;
 const SHORTEST = 5; // s
 
 export function begin() {
