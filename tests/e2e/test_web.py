@@ -15,6 +15,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from mav_tasks import GoTo, LocalPlace, SyncClient, Wait
+from mav_tasks.client.wire import Goal
 from mav_tasks.web.schemas import SCHEMAS
 from tests.kit.processes import Stand, process, stand, wait_until
 from tests.kit.web import Web, has_rover, web
@@ -506,7 +507,7 @@ def test_the_places_of_another_clients_plan_come_from_the_journal(
     both: tuple[Stand, Web], page: Web
 ) -> None:
     ways = [(3.0, 1.0), (-2.0, 4.0), (5.0, 5.0)]
-    goals = [*(GoTo(LocalPlace(*way)) for way in ways), Wait(1.0), Wait(2.0)]
+    goals: list[Goal] = [*(GoTo(LocalPlace(*way)) for way in ways), Wait(1.0), Wait(2.0)]
     url = f"udpout:127.0.0.1:{both[0].client_port}"
     with SyncClient(url) as other:
         task = other.submit(goals, delay=500.0)
