@@ -4,8 +4,8 @@ import time
 from collections import OrderedDict
 from math import ceil
 
-PER_SECOND = 50.0
-AT_ONCE = 200.0
+PER_SECOND = 200.0
+AT_ONCE = 400.0
 MOST = 1000  # buckets
 
 

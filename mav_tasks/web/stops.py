@@ -14,6 +14,8 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 KEPT = 50
 STANDS = 0.1  # m/s; below this a rover counts as standing: measured speeds are noisy
 STANDS_WITHIN = 30.0  # s
+TASKS_WITHIN = 5.0  # s
+CLOCKS = 0.01  # s by which a time of the server may be early, rounded as it is
 FRESH = 1.5  # s; an older position says nothing about now
 
 
@@ -89,13 +91,18 @@ class Stops:
         return stop
 
     def on_task(self, status: TaskStatus) -> None:
-        """Note a task that a STOP has ended."""
+        """Note a task that a STOP has ended: the latest one that may have."""
         if status.state is not TaskState.KILLED or status.reason is not TaskReason.STOP:
             return
-        for stop in self._open:
-            if stop.vehicle in (None, status.vehicle) and status.id not in stop.tasks:
-                stop.tasks.append(status.id)
-                self._publish(stop)
+        # its end is reported once it is durable, perhaps after the rover stands; and when asked for
+        ended_at = time.monotonic() - (status.ended_ago or 0.0)
+        for stop in reversed(self._kept):
+            is_in_time = stop.begun < ended_at + CLOCKS < stop.begun + TASKS_WITHIN
+            if is_in_time and stop.vehicle in (None, status.vehicle):
+                if status.id not in stop.tasks:
+                    stop.tasks.append(status.id)
+                    self._publish(stop)
+                return
 
     def on_vehicles(self) -> None:
         """Look whether the rovers of open STOPs stand now."""

@@ -35,19 +35,23 @@ export function ask({ title, words = [], word, act, fields, other = [] }) {
     }
   });
   const cover = h("div", { class: "cover" }, form);
-  cover.addEventListener("keydown", (event) => {
-    if (event.key === "Escape") close();
-    if (event.key === "Tab") keepFocus(event, form);
-  });
+  document.addEventListener("keydown", onKey);
   cover.addEventListener("pointerdown", (event) => event.target === cover && close());
   cover._before = before;
   place().append(cover);
-  (form.querySelector("input, select, textarea") ?? go).focus();
+  (form.querySelector("input:not(.quiet), select, textarea") ?? go).focus();
   return form;
+}
+
+function onKey(event) {
+  const form = place().querySelector("form");
+  if (event.key === "Escape") close();
+  if (event.key === "Tab" && form) keepFocus(event, form);
 }
 
 /** Close the open dialogue. */
 export function close() {
+  document.removeEventListener("keydown", onKey);
   const cover = place().firstElementChild;
   if (!cover) return;
   const before = cover._before;

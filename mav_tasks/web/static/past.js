@@ -6,7 +6,7 @@ import { h, reconcile, say, show } from "./dom.js";
 import { showTrack } from "./map.js";
 import { onChange, state } from "./store.js";
 import { goTo, showTask } from "./routes.js";
-import { clock, duration, progressWords, quick, stateWords, taskName } from "./words.js";
+import { OVER, clock, duration, progressWords, quick, stateWords, taskName } from "./words.js";
 
 const panel = document.getElementById("panel-past");
 const list = h("ol", { "aria-label": "Finished tasks, the newest first" });
@@ -110,14 +110,14 @@ function drawFacts(task) {
   if (task.why) rows.push(["Why", task.why]);
   if (task.remedy) rows.push(["What helps", task.remedy.words]);
   rows.push(["Rover", String(task.vehicle)], ["Priority", String(task.priority)]);
-  if (progressWords(task)) rows.push(["Progress", progressWords(task)]);
+  if (!OVER.has(task.state) && progressWords(task)) rows.push(["Progress", progressWords(task)]);
   if (task.after) rows.push(["After", `task ${task.after}`]);
   if (task.execution_time) rows.push(["Driven", duration(task.execution_time)]);
   if (task.ended_at) rows.push(["Ended", new Date(task.ended_at).toLocaleString()]);
   rows.push(["Submitted by", task.submitter]);
   const kept = [...facts.children].filter((each) => each.dataset.kept);
   facts.replaceChildren(...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]), ...kept);
-  const isOver = ["completed", "failed", "cancelled", "killed", "expired"].includes(task.state);
+  const isOver = OVER.has(task.state);
   const made = [];
   if (task.state === "held" && acts.may("release")) made.push(h("button", { class: "small main-word", type: "button", onclick: () => acts.release(task, task.halt_epoch) }, "Release…"));
   if (!isOver && (acts.may("cancel") || acts.may("submit"))) made.push(h("button", { class: "small", type: "button", onclick: () => acts.cancel(task) }, "Cancel…"));

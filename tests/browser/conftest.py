@@ -1,0 +1,36 @@
+"""A real Chromium, driven by playwright; without one these tests are skipped, and say so."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is missing")
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+#: what a browser itself logs for an answer that a test provokes
+OF_THE_BROWSER = "Failed to load resource"
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """One browser process for all tests."""
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        pytest.skip("no Chromium: tools/setup --browser installs it, as root with apt-get")
+    options = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=options)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def shots(tmp_path: Path) -> Path:
+    """The folder of screenshots: MAV_TASKS_SCREENSHOTS, else this test's own."""
+    folder = Path(os.environ.get("MAV_TASKS_SCREENSHOTS") or tmp_path)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

@@ -1,0 +1,76 @@
+"""A page in the browser, and what it must never do: log an error, or ask another host."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from tests.browser.conftest import OF_THE_BROWSER
+from tests.kit.web import Web
+
+DESKTOP = (1280, 800)
+PHONE = (360, 740)
+LIMIT = 15_000  # ms
+
+
+@contextmanager
+def opened(
+    chromium: Any,
+    it: Web,
+    *,
+    path: str = "/",
+    size: tuple[int, int] = DESKTOP,
+    scheme: str = "light",
+    waits: bool = True,
+    may_fail: bool = False,
+) -> Iterator[Any]:
+    """Yield a page; afterwards its console must hold no error.
+
+    ``waits``: until it shows a rover. ``may_fail``: the browser may log answers that are refusals.
+    """
+    context = chromium.new_context(
+        viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, locale="en-GB"
+    )
+    page = context.new_page()
+    page.set_default_timeout(LIMIT)
+    said: list[str] = []
+    asked: list[str] = []
+    page.on(
+        "console",
+        lambda message: said.append(message.text) if message.type in ("error", "warning") else None,
+    )
+    page.on("pageerror", lambda error: said.append(f"uncaught: {error}"))
+    page.on("request", lambda request: asked.append(request.url))
+    try:
+        page.goto(f"{it.url}{path}")
+        if waits:
+            page.wait_for_selector(".card")
+            page.wait_for_selector(".rover-mark", state="attached")
+        yield page
+    finally:
+        context.close()
+    wrong = [text for text in said if not (may_fail and OF_THE_BROWSER in text)]
+    assert not wrong, wrong
+    strange = [url for url in asked if not url.startswith((f"{it.url}/", "blob:", "data:"))]
+    assert not strange, strange
+
+
+def text_of(page: Any, selector: str) -> str:
+    """Return the text of an element, on one line."""
+    return " ".join(str(page.inner_text(selector)).split())
+
+
+def says(page: Any, selector: str, words: str) -> None:
+    """Wait until an element's text has these words."""
+    try:
+        _wait_for_words(page, selector, words)
+    except Exception as error:
+        texts = [element.inner_text() for element in page.query_selector_all(selector)]
+        raise AssertionError(f"{words!r} not in {texts}") from error
+
+
+def _wait_for_words(page: Any, selector: str, words: str) -> None:
+    page.wait_for_function(
+        "([selector, words]) => [...document.querySelectorAll(selector)]"
+        ".some((each) => !each.closest('[hidden]') && each.textContent.includes(words))",
+        arg=[selector, words],
+    )
