@@ -30,7 +30,7 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture
 def shots(tmp_path: Path) -> Path:
-    """The folder of screenshots: MAV_TASKS_SCREENSHOTS, else this test's own."""
-    folder = Path(os.environ.get("MAV_TASKS_SCREENSHOTS") or tmp_path)
+    """The folder of screenshots: SCREENSHOTS, else this test's own."""
+    folder = Path(os.environ.get("SCREENSHOTS") or tmp_path)
     folder.mkdir(parents=True, exist_ok=True)
     return folder

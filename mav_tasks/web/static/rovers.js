@@ -11,6 +11,7 @@ const list = document.getElementById("rovers");
 const none = document.getElementById("no-rovers");
 const OLD = 3; // s; data of a rover that is heard come several times a second
 const LOW = 20; // percent
+const MANY = 6; // rovers; beyond that only the chosen one shows all its facts
 
 export function begin() {
   onChange((names) => {
@@ -23,13 +24,14 @@ function draw() {
   show(none, rovers.length === 0);
   if (!rovers.length) say(none, state.stream.isOpen ? "No rover yet: the task server has not heard one. Is a rover on and connected?" : "Connecting…");
   // ages change by themselves: each card is looked at again, and changes only what differs
+  list.classList.toggle("many", rovers.length > MANY);
   reconcile(list, rovers.map((rover) => ({ rover })), ({ rover }) => rover.vehicle, make);
 }
 
 function make({ rover }) {
   const id = rover.vehicle;
   const pick = h("button", { class: "pick", type: "button", onclick: () => choose(id) }, `Rover ${id}`);
-  const facts = h("p", { class: "facts" });
+  const facts = h("p", { class: "facts facts-more" });
   const ages = h("p", { class: "facts" });
   const says = h("p", { class: "says" });
   const prearm = h("ul", { class: "says warn" });
