@@ -62,6 +62,7 @@ class Live:
         self._dirty: dict[int, asyncio.Event] = {}
         self._changed: set[int] = set()
         self._flush: asyncio.TimerHandle | None = None
+        self._since = 0.0  # when the first change since the last flush came
         self._heard_at = -UNREACHED
         self.is_reachable = False
 
@@ -221,6 +222,7 @@ class Live:
     def _mark(self, vehicle: int) -> None:
         self._changed.add(vehicle)
         if self._flush is None:
+            self._since = time.time()
             loop = asyncio.get_running_loop()
             self._flush = loop.call_later(FRAME, self._publish_vehicles)
 
@@ -237,10 +239,13 @@ class Live:
         if self.hub.readers:
             vehicles = self.vehicle_forms(changed)
             if vehicles:
-                self.hub.publish_vehicles({"now": round(now, 3), "vehicles": vehicles})
+                since = round(self._since, 3)
+                form = {"now": round(now, 3), "since": since, "vehicles": vehicles}
+                self.hub.publish_vehicles(form)
 
     def _all_vehicles(self) -> dict[str, Any]:
-        return {"now": round(time.time(), 3), "vehicles": self.vehicle_forms()}
+        now = round(time.time(), 3)
+        return {"now": now, "since": now, "vehicles": self.vehicle_forms()}
 
     def _publish_stop(self, stop: Stop) -> None:
         self.hub.publish("stop", stop.form())

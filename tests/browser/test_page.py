@@ -180,10 +180,10 @@ def test_priorities_by_buttons_and_by_dragging(chromium: Any, it: Web) -> None:
         row = "#panel-queue [data-task='{}']"
         page.click(f"{row.format(second)} >> text=▲")
         says(page, row.format(second), "priority 6")
-        page.wait_for_function(f"{ORDER}.join() === '{second},{first},{third}'")
+        page.wait_for_function(f"() => {ORDER}.join() === '{second},{first},{third}'")
         page.drag_and_drop(row.format(third), row.format(second))
         says(page, row.format(third), "priority 7")
-        page.wait_for_function(f"{ORDER}.join() === '{third},{second},{first}'")
+        page.wait_for_function(f"() => {ORDER}.join() === '{third},{second},{first}'")
         page.click(f"{row.format(third)} >> text=▼")
         says(page, row.format(third), "priority 6")
 
@@ -346,7 +346,7 @@ def judge(axe: Any, page: Any, where: str) -> None:
 
 def test_the_whole_page_is_small_and_soon_there(chromium: Any, it: Web) -> None:
     with opened(chromium, it) as page:
-        page.wait_for_function(f"{PAINTS}.length === 1")
+        page.wait_for_function(f"() => {PAINTS}.length === 1")
         urls = page.evaluate("performance.getEntriesByType('resource').map((each) => each.name)")
     files = {url for url in urls if not url.endswith("/events")} | {f"{it.url}/"}
     sizes = {url: len(gzip.compress(it.client.get(url).content)) for url in files}
@@ -430,8 +430,8 @@ def test_twenty_rovers_and_a_thousand_tasks(chromium: Any, tmp_path: Path, shots
             wait_until(partial(paused, it, rover), within=10, what="a pause")
         submit_all(both_of_them.client_port)
         with opened(chromium, it) as page:
-            page.wait_for_function("document.querySelectorAll('.card').length === 20")
-            page.wait_for_function("document.querySelectorAll('.rover-mark').length === 20")
+            page.wait_for_function("() => document.querySelectorAll('.card').length === 20")
+            page.wait_for_function("() => document.querySelectorAll('.rover-mark').length === 20")
             page.click(".card >> nth=6 >> .pick")
             says(page, "#panel-queue .what", "Rover 7: no task runs, 50 wait")
             assert page.is_visible("#stop-one")

@@ -28,6 +28,7 @@ from . import (
     telemetry,
     turns,
     uploads,
+    web,
 )
 from .table import Row, render
 
@@ -47,6 +48,7 @@ MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "start": start.measure,
     "calls": calls.measure,
     "uploads": uploads.measure,
+    "web": web.measure,
 }
 PROFILED: dict[str, Callable[[str], list[Row]]] = {
     "commands": commands.measure,

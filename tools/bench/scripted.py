@@ -37,10 +37,14 @@ class ScriptedVehicle:
         for packet in split_datagram(data):
             message = self._decoder.decode(packet)
             if isinstance(message, m.CommandLong):
-                self.send(m.CommandAck(message.command, MavResult.ACCEPTED))
+                self.acknowledge(message)
             elif isinstance(message, m.Heartbeat):
                 self.beat()
         return True
+
+    def acknowledge(self, command: m.CommandLong) -> None:
+        """Accept a command."""
+        self.send(m.CommandAck(command.command, MavResult.ACCEPTED))
 
     def beat(self) -> None:
         """Send a heartbeat."""
