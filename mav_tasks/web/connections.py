@@ -4,14 +4,11 @@ uvicorn waits without limit for the first byte and for the end of a request's he
 """
 
 import asyncio
-import socket
-from contextlib import suppress
 from typing import Any, ClassVar
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 REQUEST_WITHIN = 10.0  # s without a request that is being answered
-QUICK_ACK: int | None = getattr(socket, "TCP_QUICKACK", None)  # Linux
 MOST = 800  # connections; the one that has been idle for the longest time makes room
 
 
@@ -44,7 +41,6 @@ class PatientProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Take bytes; a request whose headers are whole is being answered from then on."""
-        self._acknowledge()
         super().data_received(data)
         if not self.is_idle:
             self.open_ones[self] = self.loop.time()
@@ -54,16 +50,6 @@ class PatientProtocol(H11Protocol):
         if self in self.open_ones:
             self.open_ones[self] = self.loop.time()
         super().on_response_complete()
-
-    def _acknowledge(self) -> None:
-        """Acknowledge what came at once: a browser sends a body only after the headers' ACK.
-
-        The kernel would wait up to 40 ms with it, and a STOP as long for its body.
-        """
-        connection = self.transport.get_extra_info("socket")
-        if QUICK_ACK is not None and connection is not None:
-            with suppress(OSError):
-                connection.setsockopt(socket.IPPROTO_TCP, QUICK_ACK, 1)
 
     def _look(self) -> None:
         begun = self.open_ones.get(self, 0.0)
