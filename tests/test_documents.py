@@ -35,9 +35,17 @@ CONTRACT = DOCUMENTS["dialects/README.md"]
 ALL = "\n".join(DOCUMENTS.values())
 MOST_WORDS = 1300  # of the README
 
+WITH_CURL = (
+    "curl http://127.0.0.1:8560/api/v1/vehicles/1/tasks -H 'Content-Type: application/json'"
+    """ -d '{"goals": [{"kind": "move", "distance": 2}]}'"""
+)
+
 #: each command that is not run here, and what runs it
 COMMANDS = {
     "./tools/demo": "tests/e2e/test_demo.py",
+    "mav-tasks web": "tests/e2e/test_web.py",
+    "mav-tasks web tokens add anna --role operator": "tests/e2e/test_web.py",
+    WITH_CURL: "tests/e2e/test_web.py",
     "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
 }
 

@@ -1,8 +1,11 @@
 """The HTTP API of a real web process, beside a real server and rover."""
 
+import json
+import shlex
 import signal
 import socket
 import stat
+import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -517,3 +520,28 @@ def test_the_places_of_another_clients_plan_come_from_the_journal(
         within=10,
         what=lambda: f"{places} in {page.task(task.id)}",
     )
+
+
+#: the commands of the guide
+WEB = "web"
+ADD = "web tokens add anna --role operator"
+WITH_CURL = """curl http://127.0.0.1:8560/api/v1/vehicles/1/tasks -H 'Content-Type: application/json' -d '{"goals": [{"kind": "move", "distance": 2}]}'"""  # noqa: E501  # as in the guide
+
+
+def test_the_commands_of_the_guide(both: tuple[Stand, Web], page: Web, tmp_path: Path) -> None:
+    with process("-m", "mav_tasks.cli", *ADD.split(), folder=tmp_path, name="add") as adding:
+        assert adding.popen.wait(20) == 0
+        assert len(adding.text.strip()) > 40
+    with process("-m", "mav_tasks.cli", WEB, folder=tmp_path, name="usual") as usual:
+        usual.wait_for("web page: http://127.0.0.1:8560/\n")
+        assert httpx.get("http://127.0.0.1:8560/healthz").text == "ok\n"
+        assert httpx.get("http://127.0.0.1:8560/readyz").status_code == 503  # no server there
+    curl, url, *options = shlex.split(WITH_CURL)
+    done = subprocess.run(
+        [curl, "-sS", url.replace("http://127.0.0.1:8560", page.url), *options],
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=True,
+    )
+    assert json.loads(done.stdout)["what"] == "move 2 m"
