@@ -14,7 +14,7 @@ from mav_tasks.errors import UsageError
 ROLES = ("observer", "submitter", "operator", "safety")
 DEFAULT_LISTEN = "127.0.0.1:8560"
 
-app = group("Show and steer the rovers in a browser.")
+app = typer.Typer(rich_markup_mode=None)  # without a command it serves
 tokens = group("Add, list and revoke the tokens of the web page and the HTTP API.")
 app.add_typer(tokens, name="tokens")
 
@@ -94,7 +94,9 @@ def web(
     ] = "",
     keys: RingFile = "",
 ) -> None:
-    """Serve the web page and the HTTP API until Ctrl-C.
+    """Show and steer the rovers in a browser.
+
+    Serves the web page and the HTTP API until Ctrl-C.
 
     On loopback no token is needed. The page is a client of the task server, like any other one.
     """
