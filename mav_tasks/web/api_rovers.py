@@ -63,16 +63,16 @@ def operations(services: Services) -> list[Operation]:
 
     async def pause(call: Call) -> None:
         await client.pause(vehicle=known(call))
-        live.hurry(call.vehicle)
+        await live.refresh(call.vehicle)
 
     async def resume(call: Call) -> None:
         await client.resume(epoch=call.body["epoch"], vehicle=known(call))
-        live.hurry(call.vehicle)
+        await live.refresh(call.vehicle)
 
     async def clear(call: Call) -> None:
         running_too = bool(call.body["running_too"])
         await client.clear(running_too=running_too, vehicle=known(call))
-        live.hurry(call.vehicle)
+        await live.refresh(call.vehicle)
 
     async def queue(call: Call) -> object:
         limit = call.query["limit"]

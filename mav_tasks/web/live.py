@@ -139,6 +139,11 @@ class Live:
         if vehicle in self._dirty:
             self._dirty[vehicle].set()
 
+    async def refresh(self, vehicle: int) -> None:
+        """Request a rover's queue now, so that the next answer shows what has been asked of it."""
+        with suppress(ClientError):  # the page shows how old its data are
+            await self._fetch(vehicle)
+
     # the view
 
     async def run(self) -> None:
@@ -162,8 +167,7 @@ class Live:
         with self.client.streaming(vehicle, PROGRESS):
             while True:
                 dirty.clear()
-                with suppress(ClientError):  # the page shows how old its data are
-                    await self._fetch(vehicle)
+                await self.refresh(vehicle)
                 await asyncio.sleep(GAP)
                 with suppress(TimeoutError):
                     async with asyncio.timeout(PERIOD - GAP):
