@@ -39,6 +39,7 @@ from mav_tasks.tasks.lifecycle import TaskReason, words_of
 WORDS_WITHIN = 0.25
 #: Hz of telemetry; a client's share of a busy link is small
 TELEMETRY_RATE = 1
+ALL, POSITION, ATTITUDE = 0, 6, 10  # MAV_DATA_STREAM
 EVERYBODY = 0  # target_system
 FOLLOWED_AGAIN = 3.0  # s for which a request about a followed task is repeated
 
@@ -288,6 +289,14 @@ class Session:
         )
         self.call(Call(command, FOLLOWED_AGAIN), lambda _reply: None, now=now)
 
+    def _request_telemetry(self, vehicle: int) -> None:
+        """Request all streams at the usual rate, and position and attitude at ours."""
+        self.send(m.RequestDataStream(vehicle, AUTOPILOT, ALL, TELEMETRY_RATE, 1))
+        if self._telemetry_rate != TELEMETRY_RATE:
+            for stream in (POSITION, ATTITUDE):
+                rate = self._telemetry_rate
+                self.send(m.RequestDataStream(vehicle, AUTOPILOT, stream, rate, 1))
+
     # received messages
 
     def _heard(self, packet: Packet, message: m.Heartbeat, *, now: float) -> None:
@@ -296,7 +305,7 @@ class Session:
         self.on_vehicle(vehicle)
         if not is_new:
             return
-        self.send(m.RequestDataStream(vehicle, AUTOPILOT, 0, self._telemetry_rate, 1))
+        self._request_telemetry(vehicle)
         self.watch.hurry(vehicle, now=now)
         interval = self.watch.stream_of(vehicle)
         if interval is not None:

@@ -107,7 +107,7 @@ class SyncClient(BlockingClient):
     With a ``key`` of 32 bytes the client signs all packets (MAVLink 2) and drops packets that the
     server has not signed with this key. ``link_id``, 0 to 255, goes into the signatures; None: a
     random one. Raise ValueError if the key is invalid. ``telemetry_rate``: Hz of the rovers'
-    telemetry that the client asks for.
+    position and attitude that the client asks for.
 
     Every method may raise NoAnswer, Refused and NoSuchVehicle.
 

@@ -15,11 +15,13 @@ from typing import Any
 import httpx
 import jsonschema
 import pytest
+from aiopenapi3 import OpenAPI
 from prometheus_client.parser import text_string_to_metric_families
 
 from mav_tasks import GoTo, LocalPlace, SyncClient, Wait
 from mav_tasks.client.wire import Goal
 from mav_tasks.web.schemas import SCHEMAS
+from tests.kit.awaited import awaited
 from tests.kit.processes import Stand, process, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
@@ -545,3 +547,28 @@ def test_the_commands_of_the_guide(both: tuple[Stand, Web], page: Web, tmp_path:
         check=True,
     )
     assert json.loads(done.stdout)["what"] == "move 2 m"
+
+
+@awaited
+async def test_a_client_made_of_the_document_drives_a_task(both: tuple[Stand, Web]) -> None:
+    """Its models are those of the document: they refuse an answer that is not as it says."""
+    url = f"{both[1].url}/api/v1/openapi.json"
+    api: Any = OpenAPI(url, both[1].get("/openapi.json"))
+    made = api._
+    rover = {"vehicle": 1}
+    queue = await made.get_vehicles_by_vehicle_queue(parameters=rover)
+    await made.post_vehicles_by_vehicle_resume(parameters=rover, data={"epoch": queue.halt_epoch})
+    goals = [{"kind": "move", "distance": 0.3}]
+    named = rover | {"idempotency-key": "made of the document"}
+    task = await made.post_vehicles_by_vehicle_tasks(parameters=named, data={"goals": goals})
+    again = await made.post_vehicles_by_vehicle_tasks(parameters=named, data={"goals": goals})
+    assert (task.what, task.id) == ("move 0.3 m", again.id)
+    while task.state != "completed":
+        task = await made.get_tasks_by_task(parameters={"task": task.id})
+        assert task.state in ("queued", "starting", "executing", "completed")
+    timing = await made.get_tasks_by_task_timing(parameters={"task": task.id})
+    assert timing.count > 5
+    assert (await made.get_vehicles()).vehicles[0].vehicle == 1
+    stop = await made.post_stop(data={"vehicle": 1})
+    assert stop.phase == "acknowledged"
+    both[1].post("/vehicles/1/resume", {"epoch": both[1].get("/vehicles/1/queue")["halt_epoch"]})
