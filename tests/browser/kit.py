@@ -1,6 +1,6 @@
 """A page in the browser, and what it must never do: log an error, or ask another host."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -22,10 +22,12 @@ def opened(
     scheme: str = "light",
     waits: bool = True,
     may_fail: bool = False,
+    before: Callable[[Any], None] = lambda _page: None,
 ) -> Iterator[Any]:
     """Yield a page; afterwards its console must hold no error.
 
     ``waits``: until it shows a rover. ``may_fail``: the browser may log answers that are refusals.
+    ``before`` is called with the page before it loads anything.
     """
     context = chromium.new_context(
         viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, locale="en-GB"
@@ -40,6 +42,7 @@ def opened(
     )
     page.on("pageerror", lambda error: said.append(f"uncaught: {error}"))
     page.on("request", lambda request: asked.append(request.url))
+    before(page)
     try:
         page.goto(f"{it.url}{path}")
         if waits:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from mav_tasks import Move, SyncClient
-from tests.browser.kit import PHONE, opened, says, text_of
+from tests.browser.kit import DESKTOP, PHONE, opened, says, text_of
 from tests.kit.processes import Stand, process, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
@@ -109,6 +109,63 @@ def test_stop_acts_at_once_and_says_what_came_of_it(
     assert it.task(task["id"])["state"] == "killed"
 
 
+def test_stop_says_what_came_of_it_without_the_event_stream(chromium: Any, it: Web) -> None:
+    task = move(it, 9.0)
+    it.wait_for(task["id"], "executing")
+    with opened(chromium, it, waits=False, may_fail=True, before=without_events) as page:
+        says(page, "#banner", "The connection to the web process is lost")
+        page.click("#stop-all")
+        says(page, "#stop-outcome", "STOP: acknowledged")
+    assert it.wait_for(task["id"], "killed")
+
+
+def without_events(page: Any) -> None:
+    page.route("**/api/v1/events", lambda route: route.abort())
+
+
+@pytest.mark.parametrize("hours", [-30, 30])
+def test_the_clock_of_the_device_may_be_wrong(chromium: Any, it: Web, hours: int) -> None:
+    task = move(it, 0.3)
+    it.wait_for(task["id"], "completed")
+    shifted = f"const now = Date.now; Date.now = () => now() + {hours} * 3600e3;"
+    with opened(chromium, it, before=lambda page: page.add_init_script(shifted)) as page:
+        page.wait_for_selector(f"#timeline .bar[title^='Task {task['id']}:']")
+        page.click("#stop-all")
+        says(page, "#stop-outcome", "STOP: acknowledged")
+        says(page, "#stop-outcome", "standing")
+
+
+def test_caps_lock_does_not_keep_the_key_from_stopping(chromium: Any, it: Web) -> None:
+    with opened(chromium, it) as page:
+        page.evaluate(
+            "() => document.body.dispatchEvent(new KeyboardEvent('keydown',"
+            " {key: 's', shiftKey: true, bubbles: true}))"
+        )
+        says(page, "#stop-outcome", "STOP: acknowledged")
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_a_dialogue_covers_neither_stop_nor_its_outcome(
+    chromium: Any, it: Web, size: tuple[int, int]
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    with opened(chromium, it, size=size) as page:
+        if size == PHONE:
+            page.click("[data-show=side]")
+        page.click("text=Add a task…")
+        for _ in range(2):  # the outcomes make the bar higher
+            page.click("#stop-all")
+            says(page, "#stop-outcome", "standing")
+        top, box = (page.locator(name).bounding_box() for name in (".top", ".box"))
+        assert (top["x"], top["width"]) == (0, size[0])
+        assert box["y"] >= top["y"] + top["height"]
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= size[0]
+        page.keyboard.press("Escape")
+        page.click("#panel-queue >> text=Add a task…")  # what was below is in reach again
+
+
 def test_stop_is_in_reach_above_a_dialogue(chromium: Any, it: Web, shots: Path) -> None:
     task = move(it, 9.0)
     it.wait_for(task["id"], "executing")
@@ -186,6 +243,14 @@ def test_priorities_by_buttons_and_by_dragging(chromium: Any, it: Web) -> None:
         page.wait_for_function(f"() => {ORDER}.join() === '{third},{second},{first}'")
         page.click(f"{row.format(third)} >> text=▼")
         says(page, row.format(third), "priority 6")
+        page.drag_and_drop(row.format(second), row.format(first))  # down: behind that one
+        says(page, row.format(second), "priority 5")
+        page.wait_for_function(f"() => {ORDER}.join() === '{third},{first},{second}'")
+        it.send("PATCH", f"/tasks/{third}", {"priority": 10})
+        it.send("PATCH", f"/tasks/{first}", {"priority": 10})
+        says(page, row.format(first), "priority 10")
+        page.drag_and_drop(row.format(third), row.format(first))
+        says(page, "#panel-queue .failure", f"No priority puts task {third} before task {first}")
 
 
 ORDER = "[...document.querySelectorAll('#panel-queue [data-task]')].map((e) => e.dataset.task)"
@@ -203,6 +268,44 @@ def test_tasks_are_cancelled_one_by_one_and_all(chromium: Any, it: Web) -> None:
         says(page, ".box", "2 tasks will be cancelled.")
         page.click(".box >> text='Cancel them'")
         says(page, "#panel-queue", "Nothing waits.")
+
+
+PLAN = """{{"fileType": "Plan", "version": 1, "groundStation": "test",
+"mission": {{"version": 2, "firmwareType": 3, "vehicleType": 10, "cruiseSpeed": 1, "hoverSpeed": 1,
+"plannedHomePosition": [{0}, {1}, 0], "items": []}},
+"geoFence": {{"version": 2, "polygons": [],
+"circles": [{{"version": 1, "inclusion": true,
+"circle": {{"center": [{0}, {1}], "radius": 40}}}}]}},
+"rallyPoints": {{"version": 2, "points": [[{0}, {1}, 0]]}}}}"""
+
+
+def test_a_fence_and_rally_points_of_a_file_are_set_and_removed(
+    chromium: Any, it: Web, shots: Path
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    rover = it.get("/vehicles/1")
+    text = PLAN.format(rover["latitude"], rover["longitude"])
+    with opened(chromium, it) as page:
+        drop(page, "fence.plan", text)
+        says(page, ".box", "fence.plan has no mission.")
+        says(page, ".box", "Set its fence (1 shape). It replaces the present fence")
+        page.screenshot(path=str(shots / "fence of a plan.png"))
+        page.click(".box >> text='Back'")
+        assert it.get("/vehicles/1/fence")["shapes"] == []
+        drop(page, "fence.plan", text)
+        page.click(".box >> text='Set it'")
+        page.wait_for_selector(".box", state="detached")
+        (shape,) = it.get("/vehicles/1/fence")["shapes"]
+        assert shape["radius"] == 40
+        assert len(it.get("/vehicles/1/rally")["places"]) == 1
+        page.focus("#map")
+        page.keyboard.press("Enter")
+        page.wait_for_selector(".leaflet-popup >> text=Remove its fence…")
+        assert "Go here" in page.evaluate("() => document.activeElement.textContent")
+        page.click(".leaflet-popup >> text=Remove its fence…")
+        page.click(".box >> text='Remove the fence'")
+        page.wait_for_selector(".box", state="detached")
+        assert it.get("/vehicles/1/fence")["shapes"] == []
 
 
 ITEM = "{}\t{}\t{}\t16\t0\t0\t0\t0\t{}\t{}\t0\t1\n"
@@ -386,7 +489,8 @@ def test_it_goes_on_after_the_web_process_and_the_server_were_killed(
                     command = ("--listen", f"127.0.0.1:{port}")
                     with web(tmp_path, both_of_them, *command, name="second") as second:
                         page.wait_for_selector("#banner", state="hidden", timeout=30_000)
-                        says(page, "#stop-outcome", "acknowledged")
+                        says(page, "#stop-outcome", "STOP: acknowledged")
+                        assert "not acknowledged" not in text_of(page, "#stop-outcome")
                         says(page, ".card", "STOP is in force")
                         resume(second)
                         task = move(second, 0.3)

@@ -18,6 +18,7 @@ import { duration } from "./words.js";
 
 const link = document.getElementById("link");
 const banner = document.getElementById("banner");
+const [bannerWords, bannerAge] = banner.children;
 const AGAIN = 3000; // ms
 let isBegun = false;
 
@@ -74,13 +75,15 @@ function leaflet() {
 
 function drawLink() {
   let trouble = "";
+  let age = "";
   if (state.session && !state.stream.isOpen) {
-    const since = state.stream.heardAt ? ` What you see is ${duration(now() - state.stream.heardAt)} old.` : "";
-    trouble = `The connection to the web process is lost; trying again.${since} STOP is still sent when you press it.`;
+    if (state.stream.heardAt) age = `What you see is ${duration(now() - state.stream.heardAt)} old.`;
+    trouble = "The connection to the web process is lost; trying again. STOP is still sent when you press it.";
   } else if (!state.server.reachable) {
     trouble = `${sentence(state.server.detail ?? "the task server does not answer")} What you see may be old.`;
   }
-  say(banner, trouble);
+  say(bannerWords, trouble);
+  say(bannerAge, age);
   show(banner, Boolean(trouble));
   if (!state.session) return;
   const who = state.session.name === "local" ? state.session.role : `${state.session.name}, ${state.session.role}`;

@@ -5,11 +5,15 @@ import { h, say, show } from "./dom.js";
 
 const place = () => document.getElementById("dialogs");
 
+// what is below a dialogue: neither the keyboard nor a screen reader reaches it
+const below = () => [document.getElementById("main"), document.querySelector(".views")];
+
 /**
  * Open a dialogue. "act" does what it is for, and may throw a Problem; then it stays open and says why.
- * @param {{title: string, words?: (string|Node)[], word: string, act: (form: any) => Promise<any>, fields?: Node, other?: Node[]}} what
+ * "isBeside": it leaves the map in sight. "onClose" is called once it is gone, whatever was chosen.
+ * @param {{title: string, words?: (string|Node)[], word: string, act: (form: any) => Promise<any>, fields?: Node, isBeside?: boolean, onClose?: () => void}} what
  */
-export function ask({ title, words = [], word, act, fields, other = [] }) {
+export function ask({ title, words = [], word, act, fields, isBeside = false, onClose = () => {} }) {
   close();
   const before = document.activeElement;
   const failure = h("p", { class: "failure", role: "alert", hidden: true });
@@ -19,7 +23,7 @@ export function ask({ title, words = [], word, act, fields, other = [] }) {
     ...words.map((each) => (each instanceof Node ? each : h("p", {}, each))),
     fields,
     failure,
-    h("div", { class: "row" }, ...other, h("button", { class: "small", type: "button", onclick: () => close() }, "Back"), go));
+    h("div", { class: "row" }, h("button", { class: "small", type: "button", onclick: () => close() }, "Back"), go));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     if (go.disabled) return;
@@ -34,11 +38,13 @@ export function ask({ title, words = [], word, act, fields, other = [] }) {
       go.disabled = false;
     }
   });
-  const cover = h("div", { class: "cover" }, form);
+  const cover = h("div", { class: isBeside ? "cover beside" : "cover" }, form);
   document.addEventListener("keydown", onKey);
   cover.addEventListener("pointerdown", (event) => event.target === cover && close());
   cover._before = before;
+  cover._onClose = onClose;
   place().append(cover);
+  for (const each of below()) each.inert = true;
   (form.querySelector("input:not(.quiet), select, textarea") ?? go).focus();
   return form;
 }
@@ -54,9 +60,10 @@ export function close() {
   document.removeEventListener("keydown", onKey);
   const cover = place().firstElementChild;
   if (!cover) return;
-  const before = cover._before;
   cover.remove();
-  if (before && before.isConnected) before.focus();
+  for (const each of below()) each.inert = false;
+  if (cover._before && cover._before.isConnected) cover._before.focus();
+  cover._onClose();
 }
 
 // STOP is part of the round, though it is not in the dialogue

@@ -25,6 +25,13 @@ export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+/** Set texts that follow each other, each of which stays on one line. */
+export function sayParts(element, parts) {
+  while (element.childElementCount > parts.length) element.lastElementChild.remove();
+  while (element.childElementCount < parts.length) element.append(h("span", { class: "part" }));
+  for (const [at, part] of parts.entries()) say(element.children[at], at < parts.length - 1 ? `${part} ·` : part);
+}
+
 /** Show or hide. */
 export function show(element, isShown) {
   if (element.hidden === isShown) element.hidden = !isShown;

@@ -13,6 +13,7 @@ const hint = document.getElementById("map-hint");
 const METRES = 111318.845; // of a degree of latitude, as the server converts
 const OLD = 3; // s
 const FENCE_RADIUS = 20; // m
+const PIECE = 200; // points of a track in one line
 const REFRESH = 30000; // ms
 
 let map = null;
@@ -48,6 +49,11 @@ export function begin() {
   map.setView([0, 0], hasTiles ? 3 : 3);
   [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer, runLayer] = Array.from({ length: 6 }, () => L.layerGroup().addTo(map));
   map.on("click", (event) => clicked(event.latlng));
+  map.getContainer().addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" || event.target !== map.getContainer()) return;
+    event.preventDefault();
+    clicked(map.getCenter());
+  });
   new ResizeObserver(() => map.invalidateSize()).observe(document.getElementById("map"));
   onChange((names) => {
     if (names.has("whole")) reset();
@@ -168,7 +174,7 @@ function fit() {
 function centre() {
   const mark = marks.get(state.chosen);
   if (mark && isFitted) map.panTo(mark.getLatLng());
-  const words = state.chosen === null ? "" : `Click the map to send rover ${state.chosen} there, or to turn it. ${hasTiles ? "" : "Grid in metres, north is up."}`;
+  const words = state.chosen === null ? "" : `Click the map, or press Enter on it, to send rover ${state.chosen} there or to turn it.${hasTiles ? "" : " Grid in metres, north is up."}`;
   say(hint, words);
   loadGround();
 }
@@ -181,20 +187,48 @@ function drawTracks() {
     const vehicle = state.vehicles.get(id);
     if (!vehicle) continue;
     let drawn = drawnTracks.get(id);
-    if (!drawn) drawnTracks.set(id, (drawn = { version: -1, layer: L.layerGroup().addTo(trackLayer) }));
+    if (!drawn) drawnTracks.set(id, (drawn = { shown: "", count: 0, line: null, layer: L.layerGroup().addTo(trackLayer) }));
     if (id === state.chosen && !track.isWhole) loadTrack(id, track);
-    if (drawn.version === track.version) continue;
-    drawn.version = track.version;
-    drawn.layer.clearLayers();
-    for (const part of pieces(track.points)) {
-      const places = part.points.map(([, north, east]) => point({ north, east }, vehicle)).filter(Boolean);
-      if (places.length > 1) L.polyline(places, { color: taskColour(part.task), weight: part.task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }).addTo(drawn.layer);
-    }
+    extendTrack(drawn, track, vehicle);
   }
   for (const [id, drawn] of drawnTracks) {
     if (shown.has(id)) continue;
     drawn.layer.remove();
     drawnTracks.delete(id);
+  }
+}
+
+// Only what is new is drawn: a track has thousands of points and grows ten times a second. Short pieces, because
+// Leaflet projects all points of a line again when one is added.
+function extendTrack(drawn, track, vehicle) {
+  const { latitude, longitude } = vehicle.origin ?? {};
+  const shown = `${track.revision} ${latitude} ${longitude}`;
+  if (drawn.shown !== shown) {
+    Object.assign(drawn, { shown, count: 0, line: null });
+    drawn.layer.clearLayers();
+  }
+  const { points } = track;
+  for (; drawn.count < points.length; drawn.count += 1) {
+    const [, north, east, , task] = points[drawn.count];
+    const at = point({ north, east }, vehicle);
+    if (!at) continue;
+    if (drawn.line && drawn.task === task && drawn.places.length < PIECE) {
+      drawn.places.push(at);
+      continue;
+    }
+    finishPiece(drawn);
+    const last = drawn.places ? drawn.places[drawn.places.length - 1] : null;
+    drawn.places = last && drawn.count ? [last, at] : [at];
+    drawn.task = task;
+    drawn.line = L.polyline([], { color: taskColour(task), weight: task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }).addTo(drawn.layer);
+  }
+  finishPiece(drawn);
+}
+
+function finishPiece(drawn) {
+  if (drawn.line && drawn.line._count !== drawn.places.length) {
+    drawn.line.setLatLngs(drawn.places);
+    drawn.line._count = drawn.places.length;
   }
 }
 
@@ -204,24 +238,11 @@ async function loadTrack(id, track) {
     const { points } = await get(`/vehicles/${id}/track`);
     const first = track.points.length ? track.points[0][0] : Infinity;
     track.points.unshift(...points.filter((each) => each[0] < first));
-    track.version += 1;
+    track.revision += 1;
     change("vehicles");
   } catch {
     track.isWhole = false;
   }
-}
-
-function* pieces(points) {
-  let part = null;
-  for (const each of points) {
-    if (!part || part.task !== each[4]) {
-      if (part) part.points.push(each);
-      if (part) yield part;
-      part = { task: each[4], points: [] };
-    }
-    part.points.push(each);
-  }
-  if (part) yield part;
 }
 
 function drawGoals() {
@@ -274,8 +295,12 @@ function drawShapes(shapes, vehicle, layer) {
   }
 }
 
-/** Show what a plan file would do; null: nothing. */
-export function preview(plan) {
+/**
+ * Show what a plan file would do; null: nothing. "beside" covers part of the map.
+ * @param {any} plan
+ * @param {Element} [beside]
+ */
+export function preview(plan, beside) {
   if (!previewLayer) return;
   previewLayer.clearLayers();
   if (!plan) return;
@@ -284,9 +309,23 @@ export function preview(plan) {
   if (path.length) {
     L.polyline(path, { color: "#d1602d", weight: 4, interactive: false }).addTo(previewLayer);
     for (const at of path) L.circleMarker(at, { radius: 4, color: "#d1602d", fillOpacity: 1, interactive: false }).addTo(previewLayer);
-    map.fitBounds(L.latLngBounds(path).pad(0.3), { maxZoom: hasTiles ? 20 : 4 });
+  }
+  for (const place of plan.rally) {
+    const at = point(place, vehicle);
+    if (at) L.circleMarker(at, { radius: 6, color: "#6a4fb3", weight: 2, fill: false, interactive: false }).addTo(previewLayer);
   }
   drawShapes(plan.fence, vehicle, previewLayer);
+  const bounds = L.featureGroup(previewLayer.getLayers()).getBounds();
+  if (bounds.isValid()) map.fitBounds(bounds.pad(0.2), { maxZoom: hasTiles ? 20 : 4, paddingBottomRight: covered(beside) });
+}
+
+// how much of the map a dialogue covers from the right, else from below
+function covered(element) {
+  if (!element) return [0, 0];
+  const box = element.getBoundingClientRect();
+  const { left, right, bottom } = map.getContainer().getBoundingClientRect();
+  const isBelow = box.width > (right - left) / 2;
+  return isBelow ? [0, Math.max(0, bottom - box.top)] : [Math.max(0, right - box.left), 0];
 }
 
 /** Show the track of one task; null: none. */
@@ -354,9 +393,12 @@ function clicked(latlng) {
     button(`Face here (${Math.round(heading)}°)…`, () => confirmGoal(id, { kind: "face", heading }, `Turn rover ${id} to ${Math.round(heading)}°?`));
   }
   if (may("fence") && "latitude" in place) button("Fence here…", () => fenceHere(id, place));
+  const ground = state.grounds.get(id);
+  if (may("fence") && ground && ground.shapes.length) button("Remove its fence…", () => removeFence(id));
   if (!buttons.length) return;
   const box = h("div", {}, h("p", {}, `Rover ${id}`), h("div", { class: "row" }, ...buttons));
   L.popup({ closeButton: true, autoPan: true }).setLatLng(latlng).setContent(box).openOn(map);
+  buttons[0].focus({ preventScroll: true });
 }
 
 function fenceHere(id, place) {
@@ -373,12 +415,26 @@ function fenceHere(id, place) {
   });
 }
 
+function removeFence(id) {
+  ask({
+    title: `Remove the fence of rover ${id}?`,
+    words: ["Nothing then keeps its tasks inside an area. The present fence is not kept anywhere else."],
+    word: "Remove the fence",
+    act: async () => {
+      await request("DELETE", `/vehicles/${id}/fence`);
+      await loadGround();
+    },
+  });
+}
+
 function offset(from, to) {
   if (!hasTiles) return [to[0] - from[0], to[1] - from[1]];
   return [(to[0] - from[0]) * METRES, (to[1] - from[1]) * METRES * Math.cos((from[0] * Math.PI) / 180)];
 }
 
 const round = (value, digits) => Number(value.toFixed(digits));
+
+const named = (metres, positive, negative) => (Math.abs(metres) < 0.05 ? "0" : `${+Math.abs(metres).toFixed(1)} ${metres > 0 ? positive : negative}`);
 
 // lines of a metre grid, drawn on canvas tiles
 function grid() {
@@ -401,7 +457,7 @@ function grid() {
       pen.moveTo(x, 0);
       pen.lineTo(x, 256);
       pen.stroke();
-      if (Math.round(north / step) % 2 === 0) pen.fillText(`${+east.toFixed(1)} E`, x + 2, 10);
+      if (Math.round(north / step) % 2 === 0) pen.fillText(named(east, "E", "W"), x + 2, 10);
     }
     for (let at = Math.floor(north / step) * step; at > north - size; at -= step) {
       const y = Math.round((north - at) * 2 ** coords.z) + 0.5;
@@ -409,7 +465,7 @@ function grid() {
       pen.moveTo(0, y);
       pen.lineTo(256, y);
       pen.stroke();
-      if (Math.round(west / step) % 2 === 0) pen.fillText(`${+at.toFixed(1)} N`, 2, y - 2);
+      if (Math.round(west / step) % 2 === 0) pen.fillText(named(at, "N", "S"), 2, y - 2);
     }
     return tile;
   };

@@ -4,7 +4,7 @@ import { failureWords, get } from "./api.js";
 import * as acts from "./acts.js";
 import { h, reconcile, say, show } from "./dom.js";
 import { showTrack } from "./map.js";
-import { onChange, state } from "./store.js";
+import { onChange, serverNow, state } from "./store.js";
 import { goTo, showTask } from "./routes.js";
 import { OVER, clock, duration, progressWords, quick, stateWords, taskName } from "./words.js";
 
@@ -41,7 +41,7 @@ async function refresh() {
     loadedFor = "";
     say(none, failureWords(error));
   }
-  for (const task of tasks) task.endedAt = task.ended_ago === null ? null : Date.now() / 1000 - task.ended_ago;
+  for (const task of tasks) task.endedAt = task.ended_ago === null ? null : serverNow() - task.ended_ago;
   reconcile(list, tasks, (task) => task.id, make);
   document.dispatchEvent(new CustomEvent("past"));
 }
@@ -67,10 +67,15 @@ function make(task) {
 
 const facts = h("dl", { class: "facts-table" });
 const title = h("h2", {});
-const buttons = h("div", { class: "row" });
+let task = null; // the one that is shown; a snapshot of the stream may not have it
+// made once: a button that is replaced between press and release is not clicked
+const release = h("button", { class: "small main-word", type: "button", hidden: true, onclick: () => acts.release(task, state.queues.get(task.vehicle)?.halt_epoch ?? task.halt_epoch) }, "Release…");
+const cancel = h("button", { class: "small", type: "button", hidden: true, onclick: () => acts.cancel(task) }, "Cancel…");
+const buttons = h("div", { class: "row" }, release, cancel);
 const failure = h("p", { class: "failure", role: "alert", hidden: true });
 const log = h("ol", { class: "log", "aria-label": "Journal of the task" });
-detail.append(h("button", { class: "small", type: "button", onclick: () => showTask(null) }, "← Back to the list"), title, facts, failure, buttons, h("h3", {}, "What happened"), log);
+const logNone = h("p", { class: "empty" });
+detail.append(h("button", { class: "small", type: "button", onclick: () => showTask(null) }, "← Back to the list"), title, facts, failure, buttons, h("h3", {}, "What happened"), log, logNone);
 
 async function open() {
   const id = state.task;
@@ -81,30 +86,43 @@ async function open() {
   say(title, `Task ${id}`);
   facts.replaceChildren();
   log.replaceChildren();
-  buttons.replaceChildren();
+  show(release, false);
+  show(cancel, false);
+  say(logNone, "");
   show(failure, false);
   try {
-    const task = await get(`/tasks/${id}`);
+    const found = await get(`/tasks/${id}`);
     if (state.task !== id) return;
-    state.tasks.set(id, task);
-    drawFacts(task);
+    drawFacts(found);
   } catch (error) {
     say(failure, failureWords(error));
     return show(failure, true);
   }
-  const [track, timing, journal] = await Promise.allSettled([get(`/tasks/${id}/track`), get(`/tasks/${id}/timing`), state.session && state.session.journal ? get(`/tasks/${id}/journal`) : null]);
-  if (state.task !== id) return;
-  if (track.status === "fulfilled") showTrack({ id, points: track.value.points, vehicle: state.tasks.get(id).vehicle });
-  if (timing.status === "fulfilled" && timing.value && timing.value.count) {
-    const { count, rate, p50, p99, max, late } = timing.value;
+  // each as soon as it has come: a slow journal keeps nothing back
+  const part = async (request, shown, failed = () => {}) => {
+    try {
+      const answer = await request;
+      if (state.task === id) shown(answer);
+    } catch (error) {
+      if (state.task === id) failed(failureWords(error));
+    }
+  };
+  part(get(`/tasks/${id}/track`), ({ points }) => showTrack({ id, points, vehicle: task.vehicle }));
+  part(get(`/tasks/${id}/timing`), (timing) => {
+    if (!timing || !timing.count) return;
+    const { count, rate, p50, p99, max, late } = timing;
     addFact("Set-points", `${count} intervals at ${rate} Hz: median ${quick(p50)}, p99 ${quick(p99)}, longest ${quick(max)}, ${late} late`);
-  }
-  const entries = journal.status === "fulfilled" && journal.value ? journal.value.entries : [];
-  log.replaceChildren(...entries.map((entry) => h("li", { class: entry.level === "warning" ? "warn" : "" }, h("time", {}, clock(entry.at)), entry.message)));
-  if (!entries.length) log.append(h("li", {}, "The web process reads no journal of this server: start it on the same machine, with --store."));
+  }, (words) => addFact("Set-points", `unknown: ${words}`));
+  if (!state.session.journal) return say(logNone, "The web process reads no journal of this server: start it on the same machine, with --store.");
+  say(logNone, "Reading the journal…");
+  part(get(`/tasks/${id}/journal`), ({ entries }) => {
+    say(logNone, entries.length ? "" : "The journal has nothing of this task.");
+    log.replaceChildren(...entries.map((entry) => h("li", { class: entry.level === "warning" ? "warn" : "" }, h("time", {}, clock(entry.at)), entry.message)));
+  }, (words) => say(logNone, words));
 }
 
-function drawFacts(task) {
+function drawFacts(found) {
+  task = found;
   say(title, taskName(task));
   const rows = [["State", stateWords(task)]];
   if (task.why) rows.push(["Why", task.why]);
@@ -117,11 +135,8 @@ function drawFacts(task) {
   rows.push(["Submitted by", task.submitter]);
   const kept = [...facts.children].filter((each) => each.dataset.kept);
   facts.replaceChildren(...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]), ...kept);
-  const isOver = OVER.has(task.state);
-  const made = [];
-  if (task.state === "held" && acts.may("release")) made.push(h("button", { class: "small main-word", type: "button", onclick: () => acts.release(task, task.halt_epoch) }, "Release…"));
-  if (!isOver && (acts.may("cancel") || acts.may("submit"))) made.push(h("button", { class: "small", type: "button", onclick: () => acts.cancel(task) }, "Cancel…"));
-  buttons.replaceChildren(...made);
+  show(release, task.state === "held" && acts.may("release"));
+  show(cancel, !OVER.has(task.state) && (acts.may("cancel") || acts.may("submit")));
 }
 
 function addFact(name, value) {

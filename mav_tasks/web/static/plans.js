@@ -1,10 +1,10 @@
 // Plan files: dropped or chosen, shown on the map, and only then queued.
 
-import { failureWords, newKey, post } from "./api.js";
+import { failureWords, newKey, post, request } from "./api.js";
 import { consequenceOf, may } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { h, say, show } from "./dom.js";
-import { preview } from "./map.js";
+import { loadGround, preview } from "./map.js";
 import { state } from "./store.js";
 
 const LARGEST = 10_000_000; // characters; the server's own limit
@@ -56,24 +56,42 @@ async function open(file) {
   const text = await file.text();
   const plan = await post("/plans", { name: file.name, text });
   const vehicle = state.chosen;
-  preview(plan);
   const key = newKey();
   const length = plan.length === null ? "" : `, ${plan.length >= 1000 ? `${(plan.length / 1000).toFixed(2)} km` : `${Math.round(plan.length)} m`} between its places`;
-  const words = [`${file.name}: ${plan.items} item${plan.items === 1 ? "" : "s"}, ${plan.path.length} place${plan.path.length === 1 ? "" : "s"}${length}. The map shows its path.`];
+  const drives = `${file.name}: ${counted(plan.items, "item")}, ${counted(plan.path.length, "place")}${length}. The map shows its path.`;
+  const words = [plan.items ? drives : `${file.name} has no mission. The map shows what else it has.`, ...(plan.warnings ?? [])];
   if (plan.items) words.push(consequenceOf(vehicle));
-  if (plan.fence.length || plan.rally.length) words.push(`It also has ${plan.fence.length} fence shape(s) and ${plan.rally.length} rally point(s); they are not sent.`);
+  const parts = [];
+  const extra = (name, what, count, consequence) => {
+    if (count) parts.push(h("label", { class: "check" }, h("input", { type: "checkbox", name, disabled: !may("fence"), checked: !plan.items && may("fence") }), `${plan.items ? "First set" : "Set"} ${what}. ${may("fence") ? consequence : "Your role may not."}`));
+  };
+  extra("fence", `its fence (${counted(plan.fence.length, "shape")})`, plan.fence.length, "It replaces the present fence; a driving rover stops at it.");
+  extra("rally", `its rally points (${plan.rally.length})`, plan.rally.length, "They replace the present ones.");
+  const terms = h("div", { class: "fields" }, h("label", {}, "Name of the task", h("input", { name: "label", maxLength: state.session.label_bytes, value: shortened(file.name) })),
+    h("label", {}, "Priority", h("input", { name: "priority", type: "number", min: state.session.priority.least, max: state.session.priority.most, value: state.session.priority.default })));
   const form = ask({
-    title: `Queue this plan for rover ${vehicle}?`, words, word: "Queue the plan",
-    fields: h("div", { class: "fields" }, h("label", {}, "Name of the task", h("input", { name: "label", maxLength: state.session.label_bytes, value: shortened(file.name) })),
-      h("label", {}, "Priority", h("input", { name: "priority", type: "number", min: 0, max: 10, value: state.session.priority.default }))),
+    title: plan.items ? `Queue this plan for rover ${vehicle}?` : `Set this for rover ${vehicle}?`, words, word: plan.items ? "Queue the plan" : "Set it", isBeside: true,
+    fields: h("div", {}, ...parts, plan.items ? terms : null),
     act: async (filled) => {
       const data = new FormData(filled);
-      await post(`/vehicles/${vehicle}/missions`, { name: file.name, text, label: String(data.get("label")), priority: Number(data.get("priority")) }, { key });
-      preview(null);
+      const body = { name: file.name, text };
+      for (const part of ["fence", "rally"]) if (data.get(part)) await request("PUT", `/vehicles/${vehicle}/${part}`, body);
+      if (plan.items) await post(`/vehicles/${vehicle}/missions`, { ...body, label: String(data.get("label")), priority: Number(data.get("priority")) }, { key });
+      loadGround();
     },
+    onClose: () => preview(null),
   });
-  if (!may("mission")) form.querySelector(".main-word").disabled = true;
+  showMap();
+  preview(plan, form);
+  if (!may(plan.items ? "mission" : "fence")) form.querySelector(".main-word").disabled = true;
 }
+
+// on a phone the map is a view of its own
+function showMap() {
+  document.querySelector("[data-show=map]").click();
+}
+
+const counted = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;
 
 // a label has at most 24 bytes of UTF-8
 function shortened(name) {

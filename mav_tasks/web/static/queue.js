@@ -20,7 +20,7 @@ const remedy = h("span");
 const go = h("button", { class: "small main-word", type: "button", onclick: () => acts.resume(chosenQueue()) }, "Resume…");
 const notice = h("div", { class: "notice", role: "status", hidden: true }, why, remedy, h("div", { class: "row" }, go));
 const failure = h("p", { class: "failure", role: "alert", hidden: true });
-const said = h("p", { class: "quiet", "aria-live": "polite" });
+const said = h("p", { class: "said", "aria-live": "polite" });
 const current = h("ol", { "aria-label": "The task that runs" });
 const list = h("ol", { "aria-label": "Waiting tasks, in the order in which they run" });
 const more = h("p", { class: "empty" });
@@ -88,8 +88,8 @@ function make(task, isCurrent) {
     if (reason.className !== mood) reason.className = mood;
     show(release, shown.state === "held" && Boolean(shown.remedy) && acts.may("release"));
     show(pause, isCurrent && ["starting", "executing"].includes(shown.state));
-    show(higher, !isCurrent && shown.priority < 10 && acts.may("modify"));
-    show(lower, !isCurrent && shown.priority > 0 && acts.may("modify"));
+    show(higher, !isCurrent && shown.priority < state.session.priority.most && acts.may("modify"));
+    show(lower, !isCurrent && shown.priority > state.session.priority.least && acts.may("modify"));
     show(cancel, shown.state !== "cancelling" && (acts.may("cancel") || acts.may("submit")));
     element.draggable = !isCurrent && acts.may("modify");
   };
@@ -119,7 +119,7 @@ async function guarded(act) {
 }
 
 async function change(task, by) {
-  await rank(task, Math.min(10, Math.max(0, task.priority + by)));
+  await rank(task, task.priority + by);
 }
 
 async function rank(task, priority) {
@@ -129,11 +129,19 @@ async function rank(task, priority) {
   });
 }
 
-/** The priority that puts a task before another one: equal ones run in the order of their ids. */
-export function priorityBefore(task, other) {
+/**
+ * What dragging a task onto another one does: upwards it gets before it, downwards behind it. Equal priorities run
+ * in the order of their ids. A priority beyond the limits is null.
+ */
+export function placeAt(task, other, order) {
+  const isUp = order.indexOf(task.id) > order.indexOf(other.id);
   const isEarlier = task.id < other.id;
-  return Math.min(10, isEarlier ? other.priority : other.priority + 1);
+  const wanted = isUp ? other.priority + (isEarlier ? 0 : 1) : other.priority - (isEarlier ? 1 : 0);
+  const { least, most } = state.session.priority;
+  return { priority: wanted < least || wanted > most ? null : wanted, where: isUp ? "before" : "after" };
 }
+
+const order = () => chosenQueue().waiting.map((task) => task.id);
 
 function makeDraggable(element, id) {
   element.addEventListener("dragstart", (event) => {
@@ -152,11 +160,16 @@ function makeDraggable(element, id) {
     if (dragged === null || dragged === id) return;
     event.preventDefault();
     element.classList.add("over-above");
-    say(said, `Task ${dragged} gets priority ${priorityBefore(find(dragged), find(id))}: it then runs before task ${id}.`);
+    const { priority, where } = placeAt(find(dragged), find(id), order());
+    say(said, priority === null ? `No priority puts task ${dragged} ${where} task ${id}.` : `Task ${dragged} gets priority ${priority}: it then runs ${where} task ${id}.`);
   });
   element.addEventListener("dragleave", () => element.classList.remove("over-above"));
   element.addEventListener("drop", (event) => {
     event.preventDefault();
-    if (dragged !== null && dragged !== id) rank(find(dragged), priorityBefore(find(dragged), find(id)));
+    if (dragged === null || dragged === id) return;
+    const { priority, where } = placeAt(find(dragged), find(id), order());
+    if (priority !== null) return rank(find(dragged), priority);
+    say(failure, `No priority puts task ${dragged} ${where} task ${id}: change that one first.`);
+    show(failure, true);
   });
 }

@@ -2,7 +2,7 @@
 
 import { failureWords } from "./api.js";
 import * as acts from "./acts.js";
-import { h, reconcile, say, show } from "./dom.js";
+import { h, reconcile, say, sayParts, show } from "./dom.js";
 import { stopButton } from "./stop.js";
 import { choose, dataAge, linkAge, onChange, state } from "./store.js";
 import { duration } from "./words.js";
@@ -15,7 +15,7 @@ const MANY = 6; // rovers; beyond that only the chosen one shows all its facts
 
 export function begin() {
   onChange((names) => {
-    if (["vehicles", "queues", "chosen", "clock", "whole"].some((name) => names.has(name))) draw();
+    if (["vehicles", "queues", "chosen", "clock", "server", "whole"].some((name) => names.has(name))) draw();
   });
 }
 
@@ -54,11 +54,11 @@ function make({ rover }) {
     const queue = state.queues.get(id);
     const isChosen = state.chosen === id;
     const trouble = shown.control === "silent" ? " silent" : shown.control === "tasks" && shown.ready !== false ? "" : " trouble";
-    const name = `card${isChosen ? " chosen" : ""}${trouble}`;
+    const name = `card${isChosen ? " chosen" : ""}${trouble}${state.stream.isOpen && state.server.reachable ? "" : " old"}`;
     if (element.className !== name) element.className = name;
     if (pick.getAttribute("aria-pressed") !== String(isChosen)) pick.setAttribute("aria-pressed", String(isChosen));
-    say(facts, factsOf(shown));
-    say(ages, agesOf(shown));
+    sayParts(facts, factsOf(shown));
+    sayParts(ages, agesOf(shown));
     const isTrouble = shown.control !== "tasks" || (queue && queue.current && queue.current.state === "held");
     const mood = shown.control === "silent" || shown.control === "stopped" ? "says bad" : isTrouble ? "says warn" : "says";
     if (says.className !== mood) says.className = mood;
@@ -80,16 +80,17 @@ function factsOf(rover) {
     if (percent !== null) parts.push(`battery ${percent} %${percent < LOW ? ", low" : ""}`);
     else if (voltage !== null) parts.push(`battery ${voltage.toFixed(1)} V`);
   }
-  return parts.join(" · ");
+  return parts;
 }
 
 function agesOf(rover) {
   const link = linkAge(rover);
   const data = dataAge(rover);
-  const parts = [link === null ? "not heard since the server started" : link < OLD ? "link good" : `not heard for ${duration(link)}`];
+  const isCut = !state.stream.isOpen || !state.server.reachable; // nothing is known of its link now
+  const parts = [isCut ? "link unknown" : link === null ? "not heard since the server started" : link < OLD ? "link good" : `not heard for ${duration(link)}`];
   if (data === null) parts.push("no position");
   else parts.push(data < OLD ? `position ${data < 1 ? "< 1" : Math.round(data)} s old` : `position is ${duration(data)} old`);
-  return parts.join(" · ");
+  return parts;
 }
 
 function doesWords(rover, queue) {

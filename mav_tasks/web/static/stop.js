@@ -1,8 +1,8 @@
 // STOP: always in reach, at once, without a question, also while the event stream is down.
 
 import { Problem, post } from "./api.js";
-import { h, say, show } from "./dom.js";
-import { onChange, state } from "./store.js";
+import { h, reconcile, say, show } from "./dom.js";
+import { now, onChange, state, takeStop } from "./store.js";
 import { quick } from "./words.js";
 
 const all = document.getElementById("stop-all");
@@ -10,16 +10,20 @@ const one = document.getElementById("stop-one");
 const outcome = document.getElementById("stop-outcome");
 const SHOWN = 30; // s
 
-let failure = "";
+const LINES = 2; // outcomes shown at once
+
+/** What was pressed and is not acknowledged yet, in words; by rover, null: all. @type {Map<number|null, {words: string, isFailure: boolean}>} */
+const tries = new Map();
 
 export function begin() {
   press(all, () => null);
   press(one, () => state.chosen);
   document.addEventListener("keydown", (event) => {
     const isTyping = event.target instanceof HTMLElement && event.target.closest("input, textarea, select");
-    if (event.key === "S" && event.shiftKey && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping) {
+    // with Caps Lock, Shift makes it small
+    if (event.key.toUpperCase() === "S" && event.shiftKey && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping) {
       event.preventDefault();
-      stop(null);
+      if (!event.repeat) stop(null);
     }
   });
   onChange((names) => {
@@ -37,22 +41,29 @@ export function stopButton(vehicle) {
 
 /** Stop a rover, null: all. */
 export async function stop(vehicle) {
-  failure = "";
-  say(outcome, "STOP sent…");
-  for (;;) {
+  const mine = { words: `${nameOf(vehicle)}: sent…`, isFailure: false };
+  tries.set(vehicle, mine); // a second press takes over from the first
+  draw();
+  while (tries.get(vehicle) === mine) {
     try {
-      await post("/stop", { vehicle }, { within: 6000 });
-      return;
+      const done = await post("/stop", { vehicle }, { within: 6000 });
+      if (tries.get(vehicle) === mine) tries.delete(vehicle);
+      takeStop(done); // the event stream may be down
+      return draw();
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
       const isGone = error.status === 0;
-      failure = `STOP not acknowledged: ${error.message}.${isGone ? " Trying again. Use the rover's own switch." : ""}`;
+      const next = isGone ? "Trying again. Use the rover's own switch." : error.status === 504 ? "Press again, or use the rover's own switch." : "";
+      mine.words = `${nameOf(vehicle)} not acknowledged: ${error.message.replace(/^STOP: /, "").replace(/\.$/, "")}. ${next}`;
+      mine.isFailure = true;
       draw();
       if (!isGone) return;
       await new Promise((resolve) => setTimeout(resolve, 500));
     }
   }
 }
+
+const nameOf = (vehicle) => (vehicle === null ? "STOP" : `STOP ${vehicle}`);
 
 // on pressing, not on letting go; a click without a press comes from a keyboard or a screen reader
 function press(button, whom) {
@@ -76,20 +87,38 @@ function drawOne() {
 }
 
 function draw() {
-  const last = state.stops[state.stops.length - 1];
-  if (failure) return say(outcome, failure);
-  if (!last || Date.now() / 1000 - last.at > SHOWN) return say(outcome, "");
-  say(outcome, outcomeWords(last));
+  for (const [vehicle, each] of tries) if (each.isFailure && wasStoppedSince(vehicle, each)) tries.delete(vehicle);
+  const lines = [...tries].map(([vehicle, each]) => ({ key: `of ${vehicle}`, words: each.words, isFailure: each.isFailure }));
+  // what this page tries is told above, until it is acknowledged
+  const recent = state.stops.filter((each) => now() - each.takenAt < SHOWN && (each.acknowledged_after !== null || !tries.has(each.vehicle)));
+  for (const each of recent.slice(-LINES)) lines.push({ key: each.number, words: outcomeWords(each), isFailure: ["refused", "unanswered"].includes(each.phase) });
+  reconcile(outcome, lines.slice(-LINES - 1), (line) => line.key, () => {
+    const element = h("span", {});
+    return {
+      element,
+      update: (line) => {
+        say(element, line.words);
+        element.className = line.isFailure ? "bad" : "";
+      },
+    };
+  });
+}
+
+// a later STOP that was acknowledged, of this page or another one, makes a failure history
+function wasStoppedSince(vehicle, tried) {
+  tried.at ??= now();
+  return state.stops.some((each) => each.acknowledged_after !== null && each.takenAt > tried.at && (each.vehicle === null || each.vehicle === vehicle));
 }
 
 /** "STOP: acknowledged 34 ms · standing 0.8 s" */
 export function outcomeWords(stop) {
-  const who = stop.vehicle === null ? "STOP" : `STOP ${stop.vehicle}`;
+  const isMine = !state.session || stop.by === state.session.name;
+  const who = `${nameOf(stop.vehicle)}${isMine ? "" : ` by ${stop.by}`}`;
   if (stop.phase === "refused" || stop.phase === "unanswered") return `${who} ${stop.phase}: ${stop.detail}`;
   const parts = [];
   if (stop.acknowledged_after === null) parts.push("sent…");
   else parts.push(`acknowledged ${quick(stop.acknowledged_after)}`);
-  if (stop.standing_after !== null) parts.push(`standing ${quick(stop.standing_after)}`);
+  if (stop.standing_after !== null) parts.push(`standing ${stop.standing_after.toFixed(1)} s`);
   else if (stop.detail) parts.push(stop.detail);
   if (stop.tasks.length) parts.push(`ended task${stop.tasks.length > 1 ? "s" : ""} ${stop.tasks.join(", ")}`);
   return `${who}: ${parts.join(" · ")}`;

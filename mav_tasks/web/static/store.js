@@ -16,6 +16,7 @@ export const state = {
 };
 
 const MOST_TEXTS = 2000;
+const MOST_TASKS = 10000;
 const listeners = [];
 let changed = new Set();
 let isAsked = false;
@@ -45,6 +46,16 @@ function tell() {
 /** Seconds of this page's clock. */
 export const now = () => performance.now() / 1000;
 
+let clockAhead = 0; // s by which the clock of the web process is ahead of this device's
+
+/** Take the time of the web process: a tablet's own clock may be hours off. */
+export function takeClock(at) {
+  clockAhead = at - Date.now() / 1000;
+}
+
+/** Seconds since 1970, by the clock of the web process. */
+export const serverNow = () => Date.now() / 1000 + clockAhead;
+
 /** Take the states of rovers. */
 export function takeVehicles(vehicles) {
   const at = now();
@@ -69,7 +80,9 @@ export function takeQueue(queue) {
 export function takeTask(task) {
   const before = state.tasks.get(task.id);
   if (before && before.version > task.version) return;
+  state.tasks.delete(task.id); // the latest ones stay
   state.tasks.set(task.id, task);
+  if (state.tasks.size > MOST_TASKS) state.tasks.delete(state.tasks.keys().next().value);
   const queue = state.queues.get(task.vehicle);
   if (queue && queue.current && queue.current.id === task.id) {
     state.queues.set(task.vehicle, { ...queue, current: task });
@@ -83,9 +96,15 @@ export function takeTexts(texts) {
   change("texts");
 }
 
-export function takeStop(stop) {
+/** Take a STOP. "age": s since it was pressed. */
+export function takeStop(stop, age = 0) {
   const place = state.stops.findIndex((each) => each.number === stop.number);
-  if (place >= 0) state.stops[place] = stop;
+  const before = state.stops[place];
+  stop.takenAt = before ? before.takenAt : now() - age;
+  // the answer of the request may come after a later event
+  const isOlder = before && ((before.acknowledged_after !== null && stop.acknowledged_after === null) || (before.standing_after !== null && stop.standing_after === null));
+  if (isOlder) return;
+  if (before) state.stops[place] = stop;
   else state.stops.push(stop);
   if (state.stops.length > 50) state.stops.shift();
   change("stops");
@@ -116,12 +135,13 @@ const MOST_POINTS = 20000;
 function addToTrack(vehicle) {
   if (vehicle.north === null) return;
   let track = state.tracks.get(vehicle.vehicle);
-  if (!track) state.tracks.set(vehicle.vehicle, (track = { points: [], isWhole: false, version: 0 }));
+  if (!track) state.tracks.set(vehicle.vehicle, (track = { points: [], isWhole: false, revision: 0 }));
   const queue = state.queues.get(vehicle.vehicle);
   const task = queue && queue.current && queue.current.state === "executing" ? queue.current.id : null;
   const last = track.points[track.points.length - 1];
   if (last && Math.hypot(last[1] - vehicle.north, last[2] - vehicle.east) < APART && last[4] === task) return;
-  track.points.push([Date.now() / 1000, vehicle.north, vehicle.east, vehicle.heading, task]);
-  track.version += 1;
-  if (track.points.length > MOST_POINTS) track.points.splice(0, track.points.length - MOST_POINTS);
+  track.points.push([serverNow(), vehicle.north, vehicle.east, vehicle.heading, task]);
+  if (track.points.length <= MOST_POINTS) return;
+  track.points.splice(0, MOST_POINTS / 10); // many at once: the map then draws all of it again
+  track.revision += 1;
 }

@@ -1,7 +1,7 @@
 // The event stream: the browser reconnects by itself, and resumes where it was.
 
 import { get } from "./api.js";
-import { change, now, state, takeQueue, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
+import { change, now, state, takeClock, takeQueue, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
 
 const SILENT = 15; // s; the web process sends something every 10 s
 const AGAIN = 3000; // ms
@@ -23,14 +23,19 @@ export function open(onRefused) {
     state.queues.clear();
     state.tasks.clear();
     state.texts.length = 0;
-    state.stops = all.stops;
+    takeClock(all.now);
+    state.stops = [];
+    for (const stop of all.stops) takeStop(stop, all.now - stop.at);
     state.server = { reachable: all.reachable, detail: all.detail ?? null };
     takeVehicles(all.vehicles);
     all.queues.forEach(takeQueue);
     takeTexts(all.texts);
     change("stops", "server", "tasks", "whole");
   });
-  on("vehicles", (news) => takeVehicles(news.vehicles));
+  on("vehicles", (news) => {
+    takeClock(news.now);
+    takeVehicles(news.vehicles);
+  });
   on("queue", takeQueue);
   on("task", takeTask);
   on("text", (text) => takeTexts([text]));

@@ -2,7 +2,7 @@
 
 import { h, reconcile, say } from "./dom.js";
 import { tasks as pastTasks } from "./past.js";
-import { chosenQueue, onChange } from "./store.js";
+import { chosenQueue, onChange, serverNow } from "./store.js";
 import { showTask } from "./routes.js";
 import { taskName } from "./words.js";
 
@@ -24,7 +24,7 @@ export function begin() {
 }
 
 function draw() {
-  const now = Date.now() / 1000;
+  const now = serverNow();
   const queue = chosenQueue();
   const shown = [];
   for (const task of queue ? pastTasks : []) {
