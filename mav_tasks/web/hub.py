@@ -13,8 +13,8 @@ from typing import Any
 
 KEPT = 2000  # events for readers that reconnect
 UNREAD = 500  # events that one reader may leave unread before it gets a snapshot instead
-SILENCE = 10.0  # s without an event, after which a comment shows that the stream is alive
-COMMENT = b": alive\n\n"
+SILENCE = 10.0  # s without an event, after which one without contents shows that the stream is alive
+ALIVE = b"event: alive\ndata: {}\n\n"  # not a comment: a page's script does not see those
 SNAPSHOT, VEHICLES = "snapshot", "vehicles"
 
 _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode
@@ -161,8 +161,8 @@ class Reader:
             async with asyncio.timeout(SILENCE):
                 await self._wake.wait()
         except TimeoutError:
-            return COMMENT
-        return self._take() or COMMENT
+            return ALIVE
+        return self._take() or ALIVE
 
     def _take(self) -> bytes:
         """Return all that is unread; b"" if there is nothing."""

@@ -4,6 +4,8 @@ import asyncio
 import json
 from typing import Any
 
+import pytest
+
 from mav_tasks.web.hub import UNREAD, Hub, Reader
 from tests.kit.awaited import awaited
 
@@ -117,3 +119,12 @@ async def test_ended_streams_end_and_are_forgotten() -> None:
     it.end()
     assert await draining >= 1
     assert it.readers == 0
+
+
+@awaited
+async def test_a_page_hears_that_a_quiet_stream_is_alive(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mav_tasks.web.hub.SILENCE", 0.0)
+    it = hub()
+    reader = it.open(None)
+    await read(reader)
+    assert await read(reader) == [("alive", None, {})]
