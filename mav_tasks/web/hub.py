@@ -13,7 +13,9 @@ from typing import Any
 
 KEPT = 2000  # events for readers that reconnect
 UNREAD = 500  # events that one reader may leave unread before it gets a snapshot instead
-SILENCE = 10.0  # s without an event, after which one without contents shows that the stream is alive
+SILENCE = (
+    10.0  # s without an event, after which one without contents shows that the stream is alive
+)
 ALIVE = b"event: alive\ndata: {}\n\n"  # not a comment: a page's script does not see those
 SNAPSHOT, VEHICLES = "snapshot", "vehicles"
 

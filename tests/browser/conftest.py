@@ -15,9 +15,13 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 OF_THE_BROWSER = "Failed to load resource"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    """One browser process for all tests."""
+    """One browser process for the tests of a module.
+
+    Not of a session: while playwright is open it runs an event loop in this thread, and tests of
+    other modules begin loops of their own.
+    """
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         pytest.skip("no Chromium: tools/setup --browser installs it, as root with apt-get")

@@ -10,6 +10,7 @@ const one = document.getElementById("stop-one");
 const outcome = document.getElementById("stop-outcome");
 const SHOWN = 30; // s
 
+const FINAL = new Set([400, 401, 403, 404, 409, 415, 422]); // the same request would get the same answer
 const LINES = 2; // outcomes shown at once
 
 /** What was pressed and is not acknowledged yet, in words; by rover, null: all. @type {Map<number|null, {words: string, isFailure: boolean}>} */
@@ -52,12 +53,12 @@ export async function stop(vehicle) {
       return draw();
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
-      const isGone = error.status === 0;
-      const next = isGone ? "Trying again. Use the rover's own switch." : error.status === 504 ? "Press again, or use the rover's own switch." : "";
+      const isFinal = FINAL.has(error.status);
+      const next = isFinal ? "" : "Trying again. Use the rover's own switch.";
       mine.words = `${nameOf(vehicle)} not acknowledged: ${error.message.replace(/^STOP: /, "").replace(/\.$/, "")}. ${next}`;
       mine.isFailure = true;
       draw();
-      if (!isGone) return;
+      if (isFinal) return;
       await new Promise((resolve) => setTimeout(resolve, 500));
     }
   }
