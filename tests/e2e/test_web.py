@@ -19,6 +19,7 @@ from aiopenapi3 import OpenAPI
 from prometheus_client.parser import text_string_to_metric_families
 
 from mav_tasks import GoTo, LocalPlace, SyncClient, Wait
+from mav_tasks.cli.web import DEFAULT_LISTEN
 from mav_tasks.client.wire import Goal
 from mav_tasks.web.schemas import SCHEMAS
 from tests.kit.awaited import awaited
@@ -534,10 +535,12 @@ def test_the_commands_of_the_guide(both: tuple[Stand, Web], page: Web, tmp_path:
     with process("-m", "mav_tasks.cli", *ADD.split(), folder=tmp_path, name="add") as adding:
         assert adding.popen.wait(20) == 0
         assert len(adding.text.strip()) > 40
-    with process("-m", "mav_tasks.cli", WEB, folder=tmp_path, name="usual") as usual:
-        usual.wait_for("web page: http://127.0.0.1:8560/\n")
-        assert httpx.get("http://127.0.0.1:8560/healthz").text == "ok\n"
-        assert httpx.get("http://127.0.0.1:8560/readyz").status_code == 503  # no server there
+    elsewhere = ("--listen", "127.0.0.1:0")  # another test may have the usual port
+    with process("-m", "mav_tasks.cli", WEB, *elsewhere, folder=tmp_path, name="usual") as usual:
+        url = usual.wait_for(r"web page: (http://127.0.0.1:\d+)/\n")[1]
+        assert httpx.get(f"{url}/healthz").text == "ok\n"
+        assert httpx.get(f"{url}/readyz").status_code == 503  # no server there
+    assert DEFAULT_LISTEN == "127.0.0.1:8560"
     curl, url, *options = shlex.split(WITH_CURL)
     done = subprocess.run(
         [curl, "-sS", url.replace("http://127.0.0.1:8560", page.url), *options],
