@@ -208,7 +208,7 @@ async def test_too_many_requests_are_refused_but_a_stop_never_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rig, now = Rig(tmp_path), 1000.0
-    monkeypatch.setattr(rates.time, "monotonic", lambda: now)
+    monkeypatch.setattr("mav_tasks.web.rates.time.monotonic", lambda: now)
 
     async def looked() -> httpx.Response:
         return await rig.client.get("/api/v1/vehicles")
