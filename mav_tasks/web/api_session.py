@@ -1,5 +1,8 @@
 """Operations of the session: who am I, log in, log out; and the event stream."""
 
+import time
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import aclosing
 from importlib.metadata import version
 
 from starlette.responses import Response, StreamingResponse
@@ -14,6 +17,7 @@ from mav_tasks.web.services import Services
 from mav_tasks.web.sessions import COOKIE, LASTS
 
 MOST_STREAMS = 200
+CHECKED = 1.0  # s between looks at the token of an open stream
 TOKEN = Field(
     "token", "string", "the token, as 'mav-tasks web tokens add' printed it", True, 1, 200
 )
@@ -80,7 +84,7 @@ def operations(services: Services) -> list[Operation]:
             raise Problem(503, "Too many streams", words, headers={"retry-after": "5"})
         reader = hub.open(call.headers.get("last-event-id"))
         return StreamingResponse(
-            reader.frames(),
+            _while_it_may(call, reader.frames(), services),
             media_type="text/event-stream",
             headers={"cache-control": "no-store", "x-accel-buffering": "no"},
         )
@@ -98,3 +102,17 @@ def operations(services: Services) -> list[Operation]:
             headers=[Field("Last-Event-ID", "string", "id of the last event that you got")],
         ),
     ]
+
+
+async def _while_it_may(
+    call: Call, frames: AsyncGenerator[bytes], services: Services
+) -> AsyncIterator[bytes]:
+    """Yield the frames of a stream until its token is revoked, or its session ends."""
+    checked_at = time.monotonic()
+    async with aclosing(frames):
+        async for frame in frames:
+            if time.monotonic() - checked_at > CHECKED:
+                checked_at = time.monotonic()
+                if not services.is_still_known(call.session, call.headers):
+                    return
+            yield frame

@@ -8,7 +8,7 @@ A reader that is slower still gets a new snapshot. No reader can hold up another
 import asyncio
 import json
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncGenerator, Callable, Iterable
 from typing import Any
 
 KEPT = 2000  # events for readers that reconnect
@@ -146,7 +146,7 @@ class Reader:
         self._is_closed = True
         self._wake.set()
 
-    async def frames(self) -> AsyncIterator[bytes]:
+    async def frames(self) -> AsyncGenerator[bytes]:
         """Yield bytes for the stream until it is closed."""
         try:
             while not self._is_closed:

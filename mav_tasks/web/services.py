@@ -1,6 +1,7 @@
 """What the operations of the API work on."""
 
 import asyncio
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -76,6 +77,15 @@ class Services:
             )
         except StoreError as error:
             raise Problem(503, "The journal cannot be read", str(error)) from error
+
+    def is_still_known(self, session: str | None, headers: Mapping[str, str]) -> bool:
+        """Return whether the session, or the token in the headers, of a request is still valid."""
+        if session is not None:
+            return self.sessions.token_of(session) is not None
+        kind, _, text = headers.get("authorization", "").partition(" ")
+        if kind.lower() != "bearer" or not text:
+            return True
+        return self.tokens.of_text(text.strip()) is not None
 
     def check_may(self, what: str, task: int, identity: Identity) -> None:
         """Raise Problem unless somebody may do this to a task."""
