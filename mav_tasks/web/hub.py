@@ -64,15 +64,20 @@ class Hub:
             reader.put_vehicles(frame)
 
     def open(self, last: str | None) -> "Reader":
-        """Return a new reader. ``last`` is the id of the last event that it got, None: none."""
-        reader = Reader(self)
+        """Return a new reader. ``last`` is the id of the last event that it got, None: none.
+
+        It counts from its first event on: one whose browser is gone before that never does.
+        """
+        return Reader(self, last)
+
+    def begin(self, reader: "Reader", last: str | None) -> None:
+        """Count a reader, and let it begin where it was."""
         missed = None if last is None else self._since(last)
         if missed is None:
             reader.is_behind = True
         else:
             reader.catch_up(missed)
         self._readers.add(reader)
-        return reader
 
     def close(self, reader: "Reader") -> None:
         """Forget a reader."""
@@ -110,8 +115,9 @@ class Hub:
 class Reader:
     """One event stream."""
 
-    def __init__(self, hub: Hub) -> None:
+    def __init__(self, hub: Hub, last: str | None) -> None:
         self._hub = hub
+        self._last = last
         self._unread: deque[bytes] = deque()
         self._vehicles: bytes | None = None
         self._wake = asyncio.Event()
@@ -148,6 +154,7 @@ class Reader:
 
     async def frames(self) -> AsyncGenerator[bytes]:
         """Yield bytes for the stream until it is closed."""
+        self._hub.begin(self, self._last)
         try:
             while not self._is_closed:
                 data = self._take()

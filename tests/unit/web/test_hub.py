@@ -15,9 +15,17 @@ def hub() -> Hub:
     return Hub("a1", snapshot=lambda: {"whole": True}, vehicles=lambda: rovers)
 
 
-async def read(reader: Reader) -> list[tuple[str, str | None, Any]]:
+class Stream:
+    """An event stream that is read."""
+
+    def __init__(self, reader: Reader) -> None:
+        self.frames = reader.frames()
+
+
+async def read(reader: Stream | Reader) -> list[tuple[str, str | None, Any]]:
     """Return what is unread: kind, id and data of each event."""
-    data = await anext(reader.frames())
+    stream = reader if isinstance(reader, Stream) else Stream(reader)
+    data = await anext(stream.frames)
     events = []
     for frame in data.decode().strip().split("\n\n"):
         parts = dict(line.split(": ", 1) for line in frame.splitlines())
@@ -29,7 +37,7 @@ async def read(reader: Reader) -> list[tuple[str, str | None, Any]]:
 async def test_a_new_reader_gets_a_snapshot_and_then_each_event() -> None:
     it = hub()
     it.publish("task", {"id": 1})
-    reader = it.open(None)
+    reader = Stream(it.open(None))
     assert await read(reader) == [("snapshot", "a1-1", {"whole": True})]
     it.publish("task", {"id": 2})
     it.publish("text", {"words": "grün\nzwei"})
@@ -80,7 +88,7 @@ async def test_what_is_kept_for_reconnecting_readers_is_bounded() -> None:
 @awaited
 async def test_a_reader_that_does_not_read_gets_a_snapshot_later_and_delays_nobody() -> None:
     it = hub()
-    slow, quick = it.open(None), it.open(None)
+    slow, quick = Stream(it.open(None)), Stream(it.open(None))
     await read(slow)
     await read(quick)
     for number in range(UNREAD + 1):
@@ -94,7 +102,7 @@ async def test_a_reader_that_does_not_read_gets_a_snapshot_later_and_delays_nobo
 @awaited
 async def test_states_of_rovers_that_a_reader_missed_are_sent_as_the_latest_of_all() -> None:
     it = hub()
-    reader = it.open(None)
+    reader = Stream(it.open(None))
     await read(reader)
     it.publish_vehicles({"vehicles": [{"vehicle": 1}]})
     assert await read(reader) == [("vehicles", None, {"vehicles": [{"vehicle": 1}]})]
@@ -108,10 +116,10 @@ async def test_states_of_rovers_that_a_reader_missed_are_sent_as_the_latest_of_a
 @awaited
 async def test_ended_streams_end_and_are_forgotten() -> None:
     it = hub()
-    reader = it.open(None)
+    reader = Stream(it.open(None))
 
     async def drain() -> int:
-        return len([frame async for frame in reader.frames()])
+        return len([frame async for frame in reader.frames])
 
     draining = asyncio.create_task(drain())
     await asyncio.sleep(0)
@@ -125,6 +133,14 @@ async def test_ended_streams_end_and_are_forgotten() -> None:
 async def test_a_page_hears_that_a_quiet_stream_is_alive(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mav_tasks.web.hub.SILENCE", 0.0)
     it = hub()
-    reader = it.open(None)
+    reader = Stream(it.open(None))
     await read(reader)
     assert await read(reader) == [("alive", None, {})]
+
+
+@awaited
+async def test_a_stream_whose_browser_is_gone_before_its_first_event_does_not_count() -> None:
+    it = hub()
+    for _ in range(3):
+        it.open(None).frames()  # nobody asks for an event
+    assert it.readers == 0
