@@ -40,6 +40,7 @@ export function open(onRefused) {
   on("task", takeTask);
   on("text", (text) => takeTexts([text]));
   on("stop", takeStop);
+  on("alive", () => {}); // nothing happened, but the stream is alive
   on("server", (server) => {
     state.server = server;
     change("server");
