@@ -15,6 +15,8 @@ const FINAL = new Set([400, 401, 403, 415, 422]);
 const AGAIN = 500; // ms
 const LATER = 3000; // ms, after SOON tries
 const SOON = 20;
+// where an S is a letter of a word; not in a field for a number or in a list
+const WITH_LETTERS = "textarea, input[type=search], input[type=password], input[type=text], input:not([type])";
 const LINES = 2; // outcomes shown at once
 
 /** What was pressed and is not acknowledged yet, in words; by rover, null: all. @type {Map<number|null, {words: string, isFailure: boolean}>} */
@@ -24,7 +26,7 @@ export function begin() {
   press(all, () => null);
   press(one, () => state.chosen);
   document.addEventListener("keydown", (event) => {
-    const isTyping = event.target instanceof HTMLElement && event.target.closest("input, textarea, select");
+    const isTyping = event.target instanceof HTMLElement && event.target.matches(WITH_LETTERS);
     // with Caps Lock, Shift makes it small
     if (event.key.toUpperCase() === "S" && event.shiftKey && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping) {
       event.preventDefault();
