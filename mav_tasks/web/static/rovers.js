@@ -32,7 +32,7 @@ function make({ rover }) {
   const id = rover.vehicle;
   const pick = h("button", { class: "pick", type: "button", onclick: () => choose(id) }, `Rover ${id}`);
   const facts = h("p", { class: "facts facts-more" });
-  const ages = h("p", { class: "facts" });
+  const ages = h("p", { class: "facts facts-more" });
   const says = h("p", { class: "says" });
   const prearm = h("ul", { class: "says warn" });
   const failure = h("p", { class: "failure", role: "alert", hidden: true });
@@ -48,8 +48,7 @@ function make({ rover }) {
     }
   });
   const element = h("li", { class: "card" },
-    h("div", { class: "head" }, pick, stopButton(id)), facts, ages, says, prearm, failure,
-    h("div", { class: "row" }, go, pause));
+    h("div", { class: "head" }, pick, go, pause, stopButton(id)), facts, ages, says, prearm, failure);
   const update = ({ rover: shown }) => {
     const queue = state.queues.get(id);
     const isChosen = state.chosen === id;
