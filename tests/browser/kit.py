@@ -4,12 +4,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import pytest
+
 from tests.browser.conftest import OF_THE_BROWSER
 from tests.kit.web import Web
 
 DESKTOP = (1280, 800)
 PHONE = (360, 740)
 LIMIT = 15_000  # ms
+HOSTILE = "<img src=x onerror=boom>"  # as long as a label may be
+SERIOUS = ("serious", "critical")
+
+axe_module = pytest.importorskip(
+    "axe_playwright_python.sync_playwright", reason="axe-playwright-python is missing"
+)
 
 
 @contextmanager
@@ -74,6 +82,31 @@ def says(page: Any, selector: str, words: str) -> None:
 def _wait_for_words(page: Any, selector: str, words: str) -> None:
     page.wait_for_function(
         "([selector, words]) => [...document.querySelectorAll(selector)]"
-        ".some((each) => !each.closest('[hidden]') && each.textContent.includes(words))",
+        ".some((each) => !each.closest('[hidden]')"
+        " && each.textContent.replace(/\\s+/g, ' ').includes(words))",
         arg=[selector, words],
     )
+
+
+def resume(it: Web, rover: int = 1) -> None:
+    """Let a rover's tasks run."""
+    epoch = it.get(f"/vehicles/{rover}/queue")["halt_epoch"]
+    it.post(f"/vehicles/{rover}/resume", {"epoch": epoch})
+
+
+def add(it: Web, goal: dict[str, Any], **terms: Any) -> Any:
+    """Submit a task for rover 1; return it."""
+    return it.post("/vehicles/1/tasks", {"goals": [goal]} | terms)
+
+
+def move(it: Web, metres: float, **terms: Any) -> Any:
+    """Submit a straight move of rover 1; return the task."""
+    return add(it, {"kind": "move", "distance": metres}, **terms)
+
+
+def judge(page: Any, where: str) -> None:
+    """Fail if axe-core finds something serious in what the page shows."""
+    found = axe_module.Axe().run(page).response["violations"]
+    serious = [each for each in found if each["impact"] in SERIOUS]
+    words = [(each["id"], [node["html"] for node in each["nodes"]][:3]) for each in serious]
+    assert not words, (where, words)

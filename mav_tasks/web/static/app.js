@@ -76,7 +76,7 @@ function leaflet() {
 function drawLink() {
   let trouble = "";
   let age = "";
-  if (state.session && !state.stream.isOpen) {
+  if (state.session && state.stream.isLost) {
     if (state.stream.heardAt) age = `What you see is ${duration(now() - state.stream.heardAt)} old.`;
     trouble = "The connection to the web process is lost; trying again. STOP is still sent when you press it.";
   } else if (!state.server.reachable) {
@@ -87,7 +87,7 @@ function drawLink() {
   show(banner, Boolean(trouble));
   if (!state.session) return;
   const who = state.session.name === "local" ? state.session.role : `${state.session.name}, ${state.session.role}`;
-  say(link, trouble ? "no connection" : `connected · you: ${who}`);
+  say(link, trouble ? "no connection" : state.stream.isOpen ? `connected · you: ${who}` : "connecting…");
   link.className = trouble ? "link bad" : "link";
 }
 

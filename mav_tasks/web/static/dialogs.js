@@ -1,7 +1,7 @@
 // Dialogues: below the bar with STOP, which stays in reach. Escape closes; the focus comes back.
 
 import { failureWords } from "./api.js";
-import { h, say, show } from "./dom.js";
+import { focusNear, h, say, show } from "./dom.js";
 
 const place = () => document.getElementById("dialogs");
 
@@ -62,7 +62,9 @@ export function close() {
   if (!cover) return;
   cover.remove();
   for (const each of below()) each.inert = false;
-  if (cover._before && cover._before.isConnected) cover._before.focus();
+  const before = cover._before && cover._before.isConnected ? cover._before : null;
+  if (before && before.checkVisibility()) before.focus();
+  else focusNear(before && before.parentElement);
   cover._onClose();
 }
 

@@ -34,7 +34,17 @@ export function sayParts(element, parts) {
 
 /** Show or hide. */
 export function show(element, isShown) {
-  if (element.hidden === isShown) element.hidden = !isShown;
+  if (element.hidden !== isShown) return;
+  const hadFocus = !isShown && element.contains(document.activeElement);
+  element.hidden = !isShown;
+  if (hadFocus) focusNear(element.parentElement);
+}
+
+/** Focus what is around a place whose focused element is gone: a keyboard does not begin at the top again. */
+export function focusNear(element) {
+  let place = element;
+  while (place && (place.hidden || !place.hasAttribute("tabindex"))) place = place.parentElement;
+  (place ?? document.getElementById("main")).focus({ preventScroll: true });
 }
 
 /**
@@ -66,7 +76,9 @@ export function reconcile(list, items, keyOf, make) {
   }
   for (const [key, row] of known) {
     if (wanted.has(key)) continue;
+    const hadFocus = row.element.contains(document.activeElement);
     row.element.remove();
     known.delete(key);
+    if (hadFocus) focusNear(list);
   }
 }

@@ -451,7 +451,8 @@ function grid() {
     pen.font = "10px system-ui";
     const west = coords.x * size;
     const north = -coords.y * size;
-    for (let east = Math.ceil(west / step) * step; east < west + size; east += step) {
+    // from one line before: its words reach into this tile
+    for (let east = (Math.ceil(west / step) - 1) * step; east < west + size; east += step) {
       const x = Math.round((east - west) * 2 ** coords.z) + 0.5;
       pen.beginPath();
       pen.moveTo(x, 0);
@@ -459,7 +460,7 @@ function grid() {
       pen.stroke();
       if (Math.round(north / step) % 2 === 0) pen.fillText(named(east, "E", "W"), x + 2, 10);
     }
-    for (let at = Math.floor(north / step) * step; at > north - size; at -= step) {
+    for (let at = Math.floor(north / step) * step; at > north - size - step; at -= step) {
       const y = Math.round((north - at) * 2 ** coords.z) + 0.5;
       pen.beginPath();
       pen.moveTo(0, y);

@@ -11,6 +11,7 @@ import { duration, progressWords, stateWords, taskName } from "./words.js";
 
 const panel = document.getElementById("panel-queue");
 const MOST = 200; // rows
+const RUNS = { starting: "starts", executing: "runs", paused: "is paused", cancelling: "is being cancelled", held: "is held" };
 
 const what = h("p", { class: "what" });
 const add = h("button", { class: "small main-word", type: "button", onclick: () => openTaskForm(state.chosen) }, "Add a task…");
@@ -18,7 +19,7 @@ const clear = h("button", { class: "small", type: "button", onclick: () => acts.
 const why = h("strong");
 const remedy = h("span");
 const go = h("button", { class: "small main-word", type: "button", onclick: () => acts.resume(chosenQueue()) }, "Resume…");
-const notice = h("div", { class: "notice", role: "status", hidden: true }, why, remedy, h("div", { class: "row" }, go));
+const notice = h("div", { class: "notice", role: "status", hidden: true }, h("div", {}, why, " ", remedy), go);
 const failure = h("p", { class: "failure", role: "alert", hidden: true });
 const said = h("p", { class: "said", "aria-live": "polite" });
 const current = h("ol", { "aria-label": "The task that runs" });
@@ -28,7 +29,7 @@ const more = h("p", { class: "empty" });
 let dragged = null;
 
 export function begin() {
-  panel.append(h("div", { class: "panel-head" }, what, add, clear), notice, failure, said, current, list, more, planDrop());
+  panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure, said, current, list, more, planDrop());
   onChange((names) => {
     if (["queues", "chosen", "tasks", "clock", "whole"].some((name) => names.has(name))) draw();
   });
@@ -46,7 +47,7 @@ function draw() {
     return;
   }
   const count = queue.waiting_count;
-  say(what, `Rover ${queue.vehicle}: ${queue.current ? "one task runs" : "no task runs"}, ${count} wait${count === 1 ? "s" : ""}`);
+  say(what, `Rover ${queue.vehicle}: ${queue.current ? `task ${queue.current.id} ${RUNS[queue.current.state] ?? queue.current.state}` : "no task runs"}, ${count} wait${count === 1 ? "s" : ""}`);
   show(notice, Boolean(queue.paused));
   if (queue.paused) {
     say(why, `No task runs: ${queue.paused_words}.`);
@@ -74,16 +75,17 @@ function make(task, isCurrent) {
   const cancel = button("Cancel…", () => acts.cancel(now()), `Cancel task ${id}`);
   const pause = button("Pause", async () => guarded(() => acts.pause(now().vehicle)), `Pause task ${id}`);
   const element = h("li", { class: isCurrent ? "task now" : "task", "data-task": String(id) },
-    h("div", { class: "line" }, h("span", { class: "title" }, link), mark), bar, info, reason,
-    h("div", { class: "row" }, release, pause, higher, lower, cancel));
+    h("div", { class: "line" }, h("span", { class: "title" }, link), h("span", { class: "row" }, release, pause, higher, lower, cancel)),
+    bar, h("div", { class: "whys" }, mark, info, reason));
   if (!isCurrent) makeDraggable(element, id);
   const update = (shown) => {
     say(link, taskName(shown));
     say(mark, stateWords(shown));
+    show(mark, shown.state !== "queued"); // "Waits" says it
     show(bar, isCurrent && shown.progress !== null);
     if (shown.progress !== null) bar.value = shown.progress;
     say(info, isCurrent ? progressWords(shown) : waitWords(shown));
-    say(reason, shown.why ? `${isCurrent ? "" : "Waits: "}${shown.why}${shown.remedy ? `. ${shown.remedy.words}` : ""}` : "");
+    say(reason, shown.why ? `${isCurrent ? "Reason" : "Waits"}: ${shown.why}${shown.remedy ? `. ${shown.remedy.words}` : ""}` : "");
     const mood = shown.remedy ? "why warn" : "why";
     if (reason.className !== mood) reason.className = mood;
     show(release, shown.state === "held" && Boolean(shown.remedy) && acts.may("release"));
@@ -103,8 +105,10 @@ function find(id) {
 
 function waitWords(task) {
   const parts = [`priority ${task.priority}`];
-  if (task.time_to_start !== null) parts.push(`starts in ${duration(task.time_to_start)}`);
-  if (task.time_to_finish !== null) parts.push(`ends in ${duration(task.time_to_finish)}`);
+  const [begin, end] = [task.time_to_start, task.time_to_finish];
+  if (begin !== null && end !== null) parts.push(`runs in ${duration(begin)} to ${duration(end)}`);
+  else if (begin !== null) parts.push(`starts in ${duration(begin)}`);
+  else if (end !== null) parts.push(`ends in ${duration(end)}`);
   return parts.join(" · ");
 }
 

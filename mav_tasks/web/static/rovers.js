@@ -32,7 +32,7 @@ function make({ rover }) {
   const id = rover.vehicle;
   const pick = h("button", { class: "pick", type: "button", onclick: () => choose(id) }, `Rover ${id}`);
   const facts = h("p", { class: "facts facts-more" });
-  const ages = h("p", { class: "facts" });
+  const ages = h("p", { class: "facts facts-more" });
   const says = h("p", { class: "says" });
   const prearm = h("ul", { class: "says warn" });
   const failure = h("p", { class: "failure", role: "alert", hidden: true });
@@ -48,21 +48,20 @@ function make({ rover }) {
     }
   });
   const element = h("li", { class: "card" },
-    h("div", { class: "head" }, pick, stopButton(id)), facts, ages, says, prearm, failure,
-    h("div", { class: "row" }, go, pause));
+    h("div", { class: "head" }, pick, go, pause, stopButton(id)), facts, ages, says, prearm, failure);
   const update = ({ rover: shown }) => {
     const queue = state.queues.get(id);
     const isChosen = state.chosen === id;
     const trouble = shown.control === "silent" ? " silent" : shown.control === "tasks" && shown.ready !== false ? "" : " trouble";
-    const name = `card${isChosen ? " chosen" : ""}${trouble}${state.stream.isOpen && state.server.reachable ? "" : " old"}`;
+    const name = `card${isChosen ? " chosen" : ""}${trouble}${isCutOff() || !shown.heard ? " old" : ""}`;
     if (element.className !== name) element.className = name;
     if (pick.getAttribute("aria-pressed") !== String(isChosen)) pick.setAttribute("aria-pressed", String(isChosen));
     sayParts(facts, factsOf(shown));
     sayParts(ages, agesOf(shown));
     const isTrouble = shown.control !== "tasks" || (queue && queue.current && queue.current.state === "held");
-    const mood = shown.control === "silent" || shown.control === "stopped" ? "says bad" : isTrouble ? "says warn" : "says";
+    const mood = isCutOff() ? "says" : shown.control === "silent" || shown.control === "stopped" ? "says bad" : isTrouble ? "says warn" : "says";
     if (says.className !== mood) says.className = mood;
-    say(says, doesWords(shown, queue));
+    say(says, isCutOff() ? lastWords(shown, queue) : doesWords(shown, queue));
     const checks = shown.prearm.length ? shown.prearm : shown.ready === false && !shown.armed ? ["Its checks before arming fail."] : [];
     reconcile(prearm, checks, (text) => text, (text) => ({ element: h("li", {}, text), update() {} }));
     show(prearm, checks.length > 0);
@@ -70,6 +69,15 @@ function make({ rover }) {
     show(pause, Boolean(queue && !queue.paused));
   };
   return { element, update };
+}
+
+// nothing newer comes: what a card says may have changed
+const isCutOff = () => !state.stream.isOpen || !state.server.reachable;
+
+// a rover that seems silent may be so only because the connection is lost
+function lastWords(rover, queue) {
+  if (rover.control === "silent") return "What it does now is not known: the connection is lost.";
+  return `Before the connection was lost: ${doesWords(rover, queue)}`;
 }
 
 function factsOf(rover) {
@@ -86,8 +94,7 @@ function factsOf(rover) {
 function agesOf(rover) {
   const link = linkAge(rover);
   const data = dataAge(rover);
-  const isCut = !state.stream.isOpen || !state.server.reachable; // nothing is known of its link now
-  const parts = [isCut ? "link unknown" : link === null ? "not heard since the server started" : link < OLD ? "link good" : `not heard for ${duration(link)}`];
+  const parts = [isCutOff() ? "link unknown" : link === null ? "not heard since the server started" : link < OLD ? "link good" : `not heard for ${duration(link)}`];
   if (data === null) parts.push("no position");
   else parts.push(data < OLD ? `position ${data < 1 ? "< 1" : Math.round(data)} s old` : `position is ${duration(data)} old`);
   return parts;

@@ -10,7 +10,13 @@ const one = document.getElementById("stop-one");
 const outcome = document.getElementById("stop-outcome");
 const SHOWN = 30; // s
 
-const FINAL = new Set([400, 401, 403, 404, 409, 415, 422]); // the same request would get the same answer
+// the same request would get the same answer; but a rover that is silent or unknown may soon be heard
+const FINAL = new Set([400, 401, 403, 415, 422]);
+const AGAIN = 500; // ms
+const LATER = 3000; // ms, after SOON tries
+const SOON = 20;
+// where an S is a letter of a word; not in a field for a number or in a list
+const WITH_LETTERS = "textarea, input[type=search], input[type=password], input[type=text], input:not([type])";
 const LINES = 2; // outcomes shown at once
 
 /** What was pressed and is not acknowledged yet, in words; by rover, null: all. @type {Map<number|null, {words: string, isFailure: boolean}>} */
@@ -20,7 +26,7 @@ export function begin() {
   press(all, () => null);
   press(one, () => state.chosen);
   document.addEventListener("keydown", (event) => {
-    const isTyping = event.target instanceof HTMLElement && event.target.closest("input, textarea, select");
+    const isTyping = event.target instanceof HTMLElement && event.target.matches(WITH_LETTERS);
     // with Caps Lock, Shift makes it small
     if (event.key.toUpperCase() === "S" && event.shiftKey && !event.ctrlKey && !event.metaKey && !event.altKey && !isTyping) {
       event.preventDefault();
@@ -45,7 +51,7 @@ export async function stop(vehicle) {
   const mine = { words: `${nameOf(vehicle)}: sent…`, isFailure: false };
   tries.set(vehicle, mine); // a second press takes over from the first
   draw();
-  while (tries.get(vehicle) === mine) {
+  for (let count = 1; tries.get(vehicle) === mine; count += 1) {
     try {
       const done = await post("/stop", { vehicle }, { within: 6000 });
       if (tries.get(vehicle) === mine) tries.delete(vehicle);
@@ -59,7 +65,7 @@ export async function stop(vehicle) {
       mine.isFailure = true;
       draw();
       if (isFinal) return;
-      await new Promise((resolve) => setTimeout(resolve, 500));
+      await new Promise((resolve) => setTimeout(resolve, count < SOON ? AGAIN : LATER));
     }
   }
 }

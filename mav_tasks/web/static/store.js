@@ -11,7 +11,7 @@ export const state = {
   stops: [],
   chosen: null,
   task: null, // the task of a permalink
-  stream: { isOpen: false, heardAt: 0 },
+  stream: { isOpen: false, isLost: false, heardAt: 0 },
   server: { reachable: true, detail: null },
 };
 

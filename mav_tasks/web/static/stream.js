@@ -15,7 +15,7 @@ export function open(onRefused) {
   if (source) source.close();
   source = new EventSource("/api/v1/events");
   const on = (kind, take) => source.addEventListener(kind, (event) => {
-    heard(true);
+    heard();
     take(JSON.parse(event.data));
   });
   on("snapshot", (all) => {
@@ -40,13 +40,14 @@ export function open(onRefused) {
   on("task", takeTask);
   on("text", (text) => takeTexts([text]));
   on("stop", takeStop);
+  on("alive", () => {}); // nothing happened, but the stream is alive
   on("server", (server) => {
     state.server = server;
     change("server");
   });
-  source.onopen = () => heard(true);
+  source.onopen = () => heard();
   source.onerror = () => {
-    heard(false);
+    lose();
     if (source.readyState !== EventSource.CLOSED) return; // it tries again by itself
     get("/session").then(
       () => retry(onRefused),
@@ -59,7 +60,7 @@ export function open(onRefused) {
 export function watch(onRefused) {
   setInterval(() => {
     if (state.stream.isOpen && now() - state.stream.heardAt > SILENT) {
-      heard(false);
+      lose();
       open(onRefused);
     }
     change("clock");
@@ -71,9 +72,18 @@ function retry(onRefused) {
   timer = setTimeout(() => open(onRefused), AGAIN);
 }
 
-function heard(isOpen) {
-  state.stream.heardAt = isOpen ? now() : state.stream.heardAt;
-  if (state.stream.isOpen === isOpen) return;
-  state.stream.isOpen = isOpen;
+function heard() {
+  state.stream.heardAt = now();
+  if (state.stream.isOpen) return;
+  state.stream.isOpen = true;
+  state.stream.isLost = false;
+  change("server");
+}
+
+// a stream that is not open yet is not lost: the page does not begin with an alarm
+function lose() {
+  if (state.stream.isLost) return;
+  state.stream.isOpen = false;
+  state.stream.isLost = true;
   change("server");
 }

@@ -12,7 +12,8 @@ const bars = h("div", {});
 const ticks = h("div", { "aria-hidden": "true" });
 const BEFORE = 300; // s
 const AHEAD = 300;
-const TICK = 60;
+const TICKS = [60, 120, 300]; // s between two times; the first for which there is room
+const ROOM = 58; // px for a time
 const SHORTEST = 5; // s
 
 export function begin() {
@@ -58,15 +59,21 @@ function draw() {
         element.style.width = `${Math.max(0.4, Math.min(100, x(bar.to)) - left)}%`;
         const name = `bar ${bar.kind}`;
         if (element.className !== name) element.className = name;
-        say(element, `${bar.task.id}`);
+        // a number that does not fit would lie on the next one's
+        const width = (x(bar.to) - left) * place.clientWidth / 100;
+        say(element, width > 8 * String(bar.task.id).length + 8 ? `${bar.task.id}` : "");
         element.title = `${taskName(bar.task)}: ${bar.task.state}`;
         element.setAttribute("aria-label", element.title);
       },
     };
   });
   line.style.left = `${x(now)}%`;
-  const first = Math.ceil((now - BEFORE) / TICK) * TICK;
-  const marks = Array.from({ length: Math.floor((BEFORE + AHEAD) / TICK) }, (_, n) => first + n * TICK);
+  const pixels = place.clientWidth / (BEFORE + AHEAD); // of a second
+  const tick = TICKS.find((each) => each * pixels >= ROOM) ?? TICKS[TICKS.length - 1];
+  const edge = ROOM / 2 / pixels;
+  const first = Math.ceil((now - BEFORE + edge) / tick) * tick;
+  const count = pixels ? Math.floor((now + AHEAD - edge - first) / tick) + 1 : 0;
+  const marks = Array.from({ length: Math.max(0, count) }, (_, n) => first + n * tick);
   reconcile(ticks, marks, (at) => at, (at) => ({
     element: h("span", { class: "tick" }, new Date(at * 1000).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })),
     update() {},

@@ -13,7 +13,7 @@ export function duration(seconds) {
 /** Milliseconds below a second, else seconds with a decimal. */
 export function quick(seconds) {
   if (seconds === null || seconds === undefined) return "";
-  return seconds < 1 ? `${Math.round(seconds * 1000)} ms` : `${seconds.toFixed(1)} s`;
+  return seconds < 1 ? `${Math.round(seconds * 1000)}\u00a0ms` : `${seconds.toFixed(1)}\u00a0s`;
 }
 
 /** The local time of seconds since 1970. */

@@ -1,0 +1,189 @@
+"""What the page says and does while a rover, the server or the web process is away."""
+
+import signal
+import socket
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import pytest
+
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Encoder
+from tests.browser.kit import HOSTILE, judge, move, opened, resume, says, text_of
+from tests.kit.processes import Process, Stand, free_udp_ports, process, stand, wait_until
+from tests.kit.web import Web, has_rover, web
+
+pytestmark = pytest.mark.slow
+
+AWAY = 30_000  # ms, for a process to start again and be noticed
+RELEASES = {
+    "remainder": "The rover drives what is left of the task.",
+    "again": "From where the rover is now, the whole task is driven again.",
+    "skip": "The task ends as cancelled. The next task then starts.",
+}
+
+
+@pytest.fixture
+def lost(tmp_path: Path) -> Iterator[tuple[Stand, Web]]:
+    """A server, rover and web process of this test alone: it kills them."""
+    store = str(tmp_path / "tasks.sqlite3")
+    with stand(tmp_path, serve_store=store) as it, web(tmp_path, it, name="first") as page:
+        has_rover(page)
+        yield it, page
+
+
+def serve_again(it: Stand, folder: Path, name: str = "again") -> AbstractContextManager[Process]:
+    """Run the server once more, on the same ports and store."""
+    return process(
+        *("-m", "mav_tasks.cli", "serve", "--no-push", "--store", str(folder / "tasks.sqlite3")),
+        *("--client", f"udpin:127.0.0.1:{it.client_port}"),
+        *("--vehicle", f"udpout:127.0.0.1:{it.rover_port}"),
+        folder=folder,
+        name=name,
+    )
+
+
+def test_it_goes_on_after_the_server_and_the_web_process_were_killed(
+    chromium: Any, lost: tuple[Stand, Web], tmp_path: Path, shots: Path
+) -> None:
+    it, first = lost
+    port = first.url.rpartition(":")[2]
+    with opened(chromium, first, may_fail=True) as page:
+        page.evaluate("() => { window.isMarked = true; }")
+        it.server.end(signal.SIGKILL)
+        says(page, "#banner", "is it running? What you see may be old.")
+        page.wait_for_selector(".rover-mark.old", state="attached")
+        says(page, ".card.old", "the connection is lost.")
+        judge(page, "no server")
+        page.click("#stop-all")
+        says(page, "#stop-outcome", "STOP not acknowledged: no answer within")
+        says(page, "#stop-outcome", "Trying again. Use the rover's own switch.")
+        page.screenshot(path=str(shots / "no server.png"))
+        with serve_again(it, tmp_path):
+            # nobody presses it again
+            says(page, "#stop-outcome", "STOP: acknowledged")
+            page.wait_for_selector("#banner", state="hidden", timeout=AWAY)
+            says(page, ".card", "STOP is in force")
+            resume(first)
+            first.process.end(signal.SIGKILL)
+            says(page, "#banner", "The connection to the web process is lost; trying again.")
+            says(page, "#banner", "STOP is still sent when you press it.")
+            page.wait_for_selector(".rover-mark.old", state="attached")
+            page.click(".card .stop-small")
+            says(
+                page, "#stop-outcome", "STOP 1 not acknowledged: the web process cannot be reached."
+            )
+            says(page, "#stop-outcome", "Trying again.")
+            page.screenshot(path=str(shots / "no web process.png"))
+            with web(tmp_path, it, "--listen", f"127.0.0.1:{port}", name="second") as second:
+                says(page, "#stop-outcome", "STOP 1: acknowledged")
+                page.wait_for_selector("#banner", state="hidden", timeout=AWAY)
+                page.wait_for_selector(".card:not(.old)")
+                page.wait_for_selector(".rover-mark:not(.old)", state="attached")
+                says(page, ".card", "STOP is in force")
+                resume(second)
+                task = move(second, 0.3)
+                page.click("#tab-past")
+                says(page, "#panel-past .task", f"Task {task['id']}: move 0.3 m")
+                assert page.evaluate("window.isMarked")  # it was not loaded again
+
+
+def test_a_task_that_the_servers_end_interrupted_is_released(
+    chromium: Any, lost: tuple[Stand, Web], tmp_path: Path, shots: Path
+) -> None:
+    it, page_process = lost
+    task = move(page_process, 4.0)
+    page_process.wait_for(task["id"], "executing")
+    wait_until(lambda: it.speed() > 0.3, within=15, what="the rover at speed")
+    with opened(chromium, page_process, may_fail=True) as page:
+        page.wait_for_selector(".task.now")
+        it.server.end(signal.SIGKILL)
+        says(page, "#banner", "is it running?")
+        with serve_again(it, tmp_path):
+            page.wait_for_selector("#banner", state="hidden", timeout=AWAY)
+            says(page, ".task.now", "⚠ held")
+            page.screenshot(path=str(shots / "held.png"))
+            page.click(".task.now >> text=Release…")
+            for how, consequence in RELEASES.items():
+                page.select_option(".box [name=how]", how)
+                says(page, ".box", consequence)
+            judge(page, "a release")
+            page.screenshot(path=str(shots / "release.png"))
+            page.select_option(".box [name=how]", "remainder")
+            page_process.post("/vehicles/1/pause", {})  # somebody halts it meanwhile
+            page.click(".box >> text='Release'")
+            says(page, ".box .failure", "Something halted the rover after this page was drawn.")
+            page.click(".box >> text='Back'")
+            page.click(".task.now >> text=Release…")
+            page.select_option(".box [name=how]", "remainder")
+            page.click(".box >> text='Release'")
+            page.wait_for_selector(".box", state="detached")
+            if page.is_visible(".notice >> text=Resume…"):
+                page.click(".notice >> text=Resume…")
+                page.click(".box >> text='Resume'")
+            page_process.wait_for(task["id"], "completed")
+            page.click("#tab-past")
+            says(page, "#panel-past .task", "✓ completed")
+
+
+def test_hostile_texts_names_and_files_and_a_rover_that_falls_silent(
+    chromium: Any, tmp_path: Path, shots: Path
+) -> None:
+    folder = tmp_path / "records"
+    folder.mkdir()
+    (folder / f"{HOSTILE}.tlog").write_bytes(b"x" * 100)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as rover:
+        rover.bind(("127.0.0.1", 0))
+        port = rover.getsockname()[1]
+        (client_port,) = free_udp_ports(1)
+        is_over = Event()
+        playing = Thread(target=_play, args=(rover, is_over))
+        serve = ("-m", "mav_tasks.cli", "serve", "--no-push", "--store", ":memory:")
+        ends = (
+            "--client",
+            f"udpin:127.0.0.1:{client_port}",
+            "--vehicle",
+            f"udpout:127.0.0.1:{port}",
+        )
+        with process(*serve, *ends, folder=tmp_path, name="server") as server:
+            playing.start()
+            try:
+                it = Stand(server, server, client_port, port, 0, tmp_path)
+                with (
+                    web(tmp_path, it, "--records", str(folder)) as shown,
+                    opened(chromium, shown, waits=False, may_fail=True) as page,
+                ):
+                    says(page, ".card .warn", f"PreArm: {HOSTILE}")
+                    page.click("#tab-texts")
+                    says(page, "#panel-texts li", f"rover 7: PreArm: {HOSTILE}")
+                    page.click("#tab-records")
+                    page.click(f"#panel-records .pick >> text={HOSTILE}")
+                    says(page, "#panel-records .failure", "not a telemetry log")
+                    assert page.query_selector("img[src=x]") is None
+                    is_over.set()
+                    says(page, ".card.silent", "Rover 7 is silent. Check its radio and power.")
+                    assert "not heard for" in text_of(page, ".card")
+                    judge(page, "silent")
+                    page.screenshot(path=str(shots / "silent.png"))
+            finally:
+                is_over.set()
+                playing.join()
+
+
+def _play(sock: socket.socket, is_over: Event) -> None:
+    """Play a rover that has nothing good to say, until told to stop."""
+    encoder = Encoder(Address(7, 1))
+    sock.settimeout(0.5)
+    where = None
+    while not is_over.wait(0.2):
+        try:
+            _, where = sock.recvfrom(2048)
+        except TimeoutError:
+            if where is None:
+                continue
+        sock.sendto(encoder.encode(m.Heartbeat(10, 3, 0, 4, 3, 3)), where)
+        sock.sendto(encoder.encode(m.Statustext(4, f"PreArm: {HOSTILE}".encode(), 0, 0)), where)
