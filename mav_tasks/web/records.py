@@ -1,6 +1,7 @@
 """The recordings in a folder, for the page: which runs there are, and one run's way on the map."""
 
 import asyncio
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,5 +89,7 @@ async def _read(files: Files) -> bytes:
             await reading.wait()
     if reading.returncode:
         detail = words.decode(errors="replace").strip().rpartition("\n")[2]
+        # the folder is the server's own affair
+        detail = detail.replace(f"{files.paths[0].parent}{os.sep}", "")
         raise Problem(422, "Recording cannot be read", detail[:500])
     return data

@@ -162,7 +162,8 @@ def test_hostile_texts_names_and_files_and_a_rover_that_falls_silent(
                     says(page, "#panel-texts li", f"rover 7: PreArm: {HOSTILE}")
                     page.click("#tab-records")
                     page.click(f"#panel-records .pick >> text={HOSTILE}")
-                    says(page, "#panel-records .failure", "not a telemetry log")
+                    says(page, "#panel-records .failure", f"{HOSTILE}.tlog: not a telemetry log")
+                    assert str(folder) not in text_of(page, "#panel-records")
                     assert page.query_selector("img[src=x]") is None
                     is_over.set()
                     says(page, ".card.silent", "Rover 7 is silent. Check its radio and power.")
