@@ -255,7 +255,7 @@ def test_every_pin_has_a_hash_and_the_set_up_asks_for_it() -> None:
         pins = [block for block in text.replace("\\\n", " ").splitlines() if "==" in block]
         assert pins
         assert [pin for pin in pins if "--hash=sha256:" not in pin] == []
-        assert "http" not in text, "where packages come from is the machine's business"
+        assert "://" not in text, "where packages come from is the machine's business"
     source = (ROOT / "tools" / "setup_venv.py").read_text("utf-8")
     installs = [line.strip() for line in source.splitlines() if "_pip_install(" in line]
     installs = [line for line in installs if not line.startswith("def ")]
