@@ -12,8 +12,6 @@ MAY = {
 }
 MAY["safety"] = MAY["operator"] | {"fence"}
 
-ORDER = ("observer", "submitter", "operator", "safety")
-
 
 @dataclass(frozen=True, slots=True)
 class Identity:

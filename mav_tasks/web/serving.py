@@ -66,7 +66,7 @@ def listening(options: WebOptions) -> socket.socket:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether only this machine reaches an address. Raise UsageError if it is none."""
+    """Return whether only this machine reaches an address. Raise UsageError if it is no address."""
     if host == "localhost":
         return True
     try:

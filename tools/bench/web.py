@@ -1,7 +1,7 @@
 """The web page in a real Chromium: how large and quick it is, and what browsers cost the server.
 
 All clocks are of this machine. STOP is measured from the press of the button in the page to the
-zero setpoint at the rover's socket; a change of a rover from its packet at the web process to the
+HOLD at the rover's socket, which leaves with the zero setpoint; a change of a rover from its packet at the web process to the
 frame in which the page has painted it.
 """
 
@@ -142,7 +142,7 @@ def _of_presses(browser: Any, url: str, seen: list[float]) -> Iterator[Row]:
         figures[browsers] = cuts[49], cuts[98]
     (p50, p99), alone = figures[BROWSERS], figures[1]
     yield Row(
-        f"STOP in the page → zero setpoint, p99, {BROWSERS} browsers",
+        f"STOP in the page → HOLD at the rover, p99, {BROWSERS} browsers",
         f"{p99 * 1e3:.1f} ms",
         f"{alone[1] * 1e3:.1f} ms with one",
         f"{p99 / alone[1]:.1f}×",
