@@ -112,7 +112,7 @@ class Tokens:
         return f"Tokens({self._path}, {len(self._tokens)})"
 
     def of_text(self, text: str) -> Token | None:
-        """Return the token of a text; None if the file has no such token, or is unreadable."""
+        """Return the token of a text; None if the file does not have it, or is unreadable."""
         digest = _digest(text)
         found = [each for each in self._current() if compare_digest(each.digest, digest)]
         return found[0] if found else None

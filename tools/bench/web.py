@@ -1,8 +1,8 @@
 """The web page in a real Chromium: how large and quick it is, and what browsers cost the server.
 
 All clocks are of this machine. STOP is measured from the press of the button in the page to the
-HOLD at the rover's socket, which leaves with the zero setpoint; a change of a rover from its packet at the web process to the
-frame in which the page has painted it.
+HOLD at the rover's socket, which leaves with the zero setpoint; a change of a rover from its packet
+at the web process to the frame in which the page has painted it.
 """
 
 import gzip
