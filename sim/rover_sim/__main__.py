@@ -222,10 +222,10 @@ def run(options: Options, stack: ExitStack) -> None:
     options = _with_body(options)
     key = _key(options)
     stop = _stop_signals(stack)
+    bodies = [_make_body(options, index, stack) for index in range(options.count)]
     server = _open_socket(options, stack)
     truth = _open_truth(options, stack)
     clock = Clock(options.speed)
-    bodies = [_make_body(options, index, stack) for index in range(options.count)]
     now = clock.now()  # one start time for all rovers, so that they wake up together
     vehicles = [
         make_vehicle(

@@ -1,10 +1,21 @@
 """`mav-tasks sim` and `mav-tasks serve` by hand, without a flag, on their own ports."""
 
+import fcntl
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.kit.processes import process
+
+
+@pytest.fixture(autouse=True)
+def default_ports() -> Iterator[None]:
+    """Have the default ports for this test alone: another worker may run the other test."""
+    with (Path(tempfile.gettempdir()) / "mav-tasks-default-ports.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 @pytest.mark.pybullet

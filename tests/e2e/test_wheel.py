@@ -109,7 +109,8 @@ def test_a_later_python_has_all_but_the_real_body(version: str, tmp_path: Path) 
     for command in (*registered(), "fence upload", "keys add", "submit move"):
         done = run(python, "-m", "mav_tasks.cli", *command.split(), "--help", folder=tmp_path)
         assert (done.returncode, done.stderr) == (0, ""), command
-    refused = run(python, "-m", "rover_sim", "--body", "bullet", folder=tmp_path)
+    bullet = ("-m", "rover_sim", "--port", "0", "--body", "bullet")
+    refused = run(python, *bullet, folder=tmp_path)
     assert refused.returncode == 2
     assert "wheels are for Python 3.11 at most" in refused.stderr
     with serving(python, tmp_path) as (rover, url):
@@ -148,7 +149,8 @@ def without_extras(python: str, folder: Path) -> None:
         assert (Path(path).parents[1] / document).is_file()
     assert (Path(path).parents[1] / "metrics" / "grafana.json").is_file()
 
-    refused = run(python, "-m", "mav_tasks.cli", "sim", "--body", "bullet", folder=folder)
+    sim = ("-m", "mav_tasks.cli", "sim", "--port", "0")
+    refused = run(python, *sim, "--body", "bullet", folder=folder)
     assert refused.returncode == 2, refused.stdout
     assert "pip install pybullet numpy" in refused.stderr
 
