@@ -1,5 +1,9 @@
-"""Of the product of several parameters, those that ``tools/test`` runs: every pair of values."""
+"""Of the product of several parameters, those in which every two or three values meet.
 
+``MAV_TASKS_PRODUCTS=1`` adds the rest of each product.
+"""
+
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, product
 from typing import Any
@@ -10,16 +14,20 @@ Chosen = tuple[int, ...]  # the index of a value for each parameter
 
 
 def every_pair(**values: Sequence[Any] | Mapping[str, Any]) -> pytest.MarkDecorator:
-    """Parametrize with the whole product; what no pair of values needs is a volume.
+    """Parametrize so that every two values meet; as a volume, so that every three do.
 
     The values of a parameter may be given by their names.
     """
     axes = [list(named(each)) for each in values.values()]
-    needed = covering([len(axis) for axis in axes])
+    sizes = [len(axis) for axis in axes]
+    pairs = covering(sizes, together=2)
+    volume = covering(sizes, together=3) if len(sizes) > 2 else set()
     cases = []
-    for chosen in product(*(range(len(axis)) for axis in axes)):
+    for chosen in product(*map(range, sizes)):
+        if chosen not in pairs | volume and "MAV_TASKS_PRODUCTS" not in os.environ:
+            continue
         names, picked = zip(*(axis[i] for axis, i in zip(axes, chosen, strict=True)), strict=True)
-        marks = () if chosen in needed else (pytest.mark.volume,)
+        marks = () if chosen in pairs else (pytest.mark.volume,)
         cases.append(pytest.param(*picked, id="-".join(names), marks=marks))
     return pytest.mark.parametrize(tuple(values), cases)
 
@@ -29,18 +37,17 @@ def named(values: Sequence[Any] | Mapping[str, Any]) -> Iterable[tuple[str, Any]
     return values.items() if isinstance(values, Mapping) else ((str(each), each) for each in values)
 
 
-def covering(sizes: Sequence[int]) -> set[Chosen]:
-    """Return combinations in which every two values of two parameters meet, the same each time."""
+def covering(sizes: Sequence[int], *, together: int) -> set[Chosen]:
+    """Return combinations in which every so many values meet, the same each time."""
+
+    def met(chosen: Chosen) -> set[Any]:
+        return set(combinations(enumerate(chosen), together))
+
     everything = list(product(*map(range, sizes)))
-    missing = {pair for chosen in everything for pair in pairs_of(chosen)}
+    missing = {each for chosen in everything for each in met(chosen)}
     found: set[Chosen] = set()
     while missing:
-        best = max(everything, key=lambda chosen: len(missing & pairs_of(chosen)))
+        best = max(everything, key=lambda chosen: len(missing & met(chosen)))
         found.add(best)
-        missing -= pairs_of(best)
+        missing -= met(best)
     return found
-
-
-def pairs_of(chosen: Chosen) -> set[Any]:
-    """Return the pairs of values that meet in a combination."""
-    return set(combinations(enumerate(chosen), 2))

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and ends
 
 TOOL = Path(__file__).resolve().parents[2] / "tools/control_states.py"
 LIMIT = 170  # s for a search that takes ten
-MOST = 12  # states from which everything is tried
+MOST = 8  # states from which everything is tried
 STARTS = (
     (),
     ("task",),

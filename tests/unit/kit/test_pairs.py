@@ -1,27 +1,42 @@
 """Pairs of parameters: few combinations, in which every two values meet."""
 
 from itertools import combinations, product
+from typing import Any
 
 import pytest
 
 from tests.kit.pairs import covering, every_pair
 
+BOTH = [False, True]
+SIZES = [(2, 2), (4, 2, 3, 5), (4, 2, 3, 4), (2, 2, 5, 3)]
 
-@pytest.mark.parametrize(
-    ("sizes", "most"), [((2, 2), 4), ((4, 2, 3, 5), 24), ((4, 2, 3, 4), 20), ((2, 2, 5, 3), 18)]
-)
+
+@pytest.mark.parametrize(("sizes", "most"), [*zip(SIZES, [4, 24, 20, 18], strict=True)])
 def test_every_two_values_meet(sizes: tuple[int, ...], most: int) -> None:
-    found = covering(sizes)
+    found = covering(sizes, together=2)
     for (i, many), (j, others) in combinations(enumerate(sizes), 2):
         met = {(chosen[i], chosen[j]) for chosen in found}
         assert met == set(product(range(many), range(others)))
     assert len(found) <= most
 
 
-def test_nothing_of_the_product_is_left_out() -> None:
-    mark = every_pair(letter="ab", number={"one": 1, "two": 2}, is_so=[False, True])
-    names, cases = mark.args
-    assert names == ("letter", "number", "is_so")
-    assert {case.values for case in cases} == set(product("ab", (1, 2), (False, True)))
-    assert cases[0].id == "a-one-False"
-    assert 4 <= sum(not case.marks for case in cases) < 8
+@pytest.mark.parametrize(("sizes", "most"), [*zip(SIZES[1:], [70, 60, 40], strict=True)])
+def test_every_three_values_meet(sizes: tuple[int, ...], most: int) -> None:
+    found = covering(sizes, together=3)
+    for which in combinations(range(len(sizes)), 3):
+        met = {tuple(chosen[i] for i in which) for chosen in found}
+        assert met == set(product(*(range(sizes[i]) for i in which)))
+    assert len(found) <= most
+
+
+def test_the_rest_of_the_product_is_there_on_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    def cases() -> Any:
+        return every_pair(letter="ab", number={"one": 1, "two": 2}, is_so=BOTH, is_it=BOTH).args[1]
+
+    few = cases()
+    assert few[0].id == "a-one-False-False"
+    assert 4 <= sum(not case.marks for case in few) < len(few) < 16
+    monkeypatch.setenv("MAV_TASKS_PRODUCTS", "1")
+    every = {case.values for case in cases()}
+    assert every == set(product("ab", (1, 2), BOTH, BOTH))
+    assert {case.values for case in few} < every
