@@ -7,7 +7,7 @@ pass a STOP on at once. Prints one JSON object, or an error on standard error.
 import json
 import sys
 from collections.abc import Sequence
-from math import degrees, hypot
+from math import ceil, degrees, floor, hypot
 from pathlib import Path
 from typing import Any
 
@@ -64,8 +64,9 @@ class Run:
     def form(self) -> dict[str, Any]:
         """Return the run as JSON: rovers with points, modes, and events."""
         return {
-            "begins": self._begins or 0.0,
-            "ends": self._ends,
+            # outwards, because the times between them are rounded
+            "begins": floor((self._begins or 0.0) * 100.0) / 100.0,
+            "ends": ceil(self._ends * 100.0) / 100.0,
             "vehicles": [
                 {"vehicle": rover, "points": points, "modes": self._modes.get(rover, [])}
                 for rover, points in sorted(self._points.items())
