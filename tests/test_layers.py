@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.errors": frozenset(),
     "mav_tasks.clock": frozenset(),
+    "mav_tasks.fleet": frozenset(),
     "mav_tasks.histogram": frozenset(),
     "mav_tasks.link_reader": frozenset({"mav_tasks.engine", "mav_tasks.links"}),
     "mav_tasks.setting_keys": frozenset({"mav_tasks.errors"}),
@@ -289,6 +290,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
 
 #: pure: no I/O, no clock, no chance
 PURE = (
+    "mav_tasks.fleet",
     "mav_tasks.errors",
     "mav_tasks.histogram",
     "mav_tasks.settings",
