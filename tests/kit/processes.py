@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -20,6 +19,7 @@ os.environ.setdefault("MAVLINK20", "1")
 from pymavlink import mavutil
 
 from mav_tasks.services.command_receiver import COPIED
+from tests.kit.forked import Popen, started
 
 T = TypeVar("T")
 
@@ -34,7 +34,7 @@ TOLD_OF_A_FAILURE = 8_000  # characters of each process's output
 class Process:
     """A started process, and its output."""
 
-    popen: subprocess.Popen[bytes]
+    popen: Popen
     output: Path
 
     @property
@@ -85,18 +85,12 @@ def process(
     configuration or keys.
     """
     output = folder / f"{name}.log"
-    with output.open("wb") as sink:
-        popen = subprocess.Popen(
-            [python, *arguments],
-            stdout=sink,
-            stderr=subprocess.STDOUT,
-            cwd=folder,
-            env=environment_with(
-                MAV_TASKS_STORE=str(folder / f"{name}.sqlite3"),
-                XDG_CONFIG_HOME=str(folder),
-                XDG_STATE_HOME=str(folder),
-            ),
-        )
+    env = environment_with(
+        MAV_TASKS_STORE=str(folder / f"{name}.sqlite3"),
+        XDG_CONFIG_HOME=str(folder),
+        XDG_STATE_HOME=str(folder),
+    )
+    popen = started(arguments, python=python, output=output, folder=folder, env=env)
     running = Process(popen, output)
     try:
         yield running
