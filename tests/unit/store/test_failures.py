@@ -16,8 +16,8 @@ import pytest
 
 from mav_tasks.errors import StoreError
 from mav_tasks.store import Kept
+from mav_tasks.store.durable import CLOSE_LIMIT
 from mav_tasks.store.schema import MIGRATIONS
-from mav_tasks.store.sqlite import CLOSE_LIMIT
 from mav_tasks.store.writer import LAST_TRY
 from mav_tasks.tasks.events import TaskSubmitted
 from tests.kit.processes import free_udp_ports

@@ -43,7 +43,7 @@ def full(monkeypatch: pytest.MonkeyPatch) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Database, "write", write)
-    monkeypatch.setattr("mav_tasks.store.sqlite.CLOSE_LIMIT", 0.1)
+    monkeypatch.setattr("mav_tasks.store.durable.CLOSE_LIMIT", 0.1)
 
 
 def life(path: Path, *events: Event) -> None:
@@ -102,7 +102,7 @@ def test_an_older_database_put_back_forgets_no_stop_and_gives_no_id_twice(path: 
 
 
 def test_a_word_that_is_cut_short_leaves_the_one_before(path: Path) -> None:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     for number in (1, 2, 3):
         record.write(Word(9, number, R.STOPPED, "ä" * 40, 5.0))
     record.close()
@@ -111,11 +111,11 @@ def test_a_word_that_is_cut_short_leaves_the_one_before(path: Path) -> None:
     assert words(path)[0].actor == "ä" * 19
     damage(path, slot=1, vehicle=9)
     with pytest.raises(StoreError, match="damaged"):
-        HaltRecord(path)
+        HaltRecord(path, name=str(path))
 
 
 def words(path: Path) -> list[Word]:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     record.close()
     return record.words_after(0)
 
@@ -167,7 +167,7 @@ def test_a_halt_that_neither_keeps_is_reported_and_one_that_the_database_keeps_i
         store.append([STOP])
         outcomes = wait_for(store, 1)
         monkeypatch.setattr(Database, "write", _fail)
-        monkeypatch.setattr("mav_tasks.store.sqlite.CLOSE_LIMIT", 0.1)
+        monkeypatch.setattr("mav_tasks.store.durable.CLOSE_LIMIT", 0.1)
         store.append([QueuePaused(2, R.STOPPED, "client", 102.0), QueueContinued(3, "client", 1.0)])
         while not any(isinstance(outcome, HaltNotKept) for outcome in outcomes):
             outcomes += next_outcomes(store)
@@ -204,11 +204,11 @@ def test_on_a_file_system_that_is_full_the_record_takes_a_stop_and_nothing_else_
 
 
 def test_the_latest_task_id_counts_though_a_higher_one_came_before(path: Path) -> None:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     record.note_next_id(16_777_215, number=10)
     record.note_next_id(2, number=20)
     record.close()
-    again = HaltRecord(path)
+    again = HaltRecord(path, name=str(path))
     again.close()
     assert [again.next_id_after(number) for number in (9, 19, 20)] == [2, 2, None]
 
@@ -216,11 +216,11 @@ def test_the_latest_task_id_counts_though_a_higher_one_came_before(path: Path) -
 def test_that_somebody_has_disarmed_is_a_word_and_an_older_record_is_made_longer(
     path: Path, record_path: Path
 ) -> None:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     record.write(Word(9, 1, R.STOPPED, "somebody", 5.0))
     record.close()
     record_path.write_bytes(record_path.read_bytes()[: len(HEADER) + 2 * CELLS * CELL])
-    older = HaltRecord(path)
+    older = HaltRecord(path, name=str(path))
     disarming = word_of(VehicleArmingSet(9, False, 7.0), 2, offset=1.0)
     assert disarming is not None
     older.write(disarming)

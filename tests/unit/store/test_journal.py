@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.errors import StoreError
-from mav_tasks.store import journal as module
 from mav_tasks.store import schema
+from mav_tasks.store import sqlite_reader as module
 from mav_tasks.store.base import Which
-from mav_tasks.store.journal import PAGE, Journal
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store.journal import PAGE
+from mav_tasks.store.sqlite import SqliteStore, open_journal
 from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
@@ -49,7 +49,7 @@ def keep(store: SqliteStore, events: list[Event], *, through: int | None = None)
 
 
 def read(path: Path, which: Which | None = None) -> list[tuple[int, Event]]:
-    with closing(Journal(path, which)) as it:
+    with closing(open_journal(str(path), which or Which())) as it:
         return list(it.take(offset=OFFSET))
 
 
@@ -72,7 +72,7 @@ def test_what_comes_later_is_given_to_who_goes_on_reading(store: SqliteStore, pa
     first = history(3)
     then: list[Event] = [VehicleSeen(1, "found", 99.0), submitted(4)]
     keep(store, first)
-    with closing(Journal(path)) as it:
+    with closing(open_journal(str(path), Which())) as it:
         seen = it.version()
         assert [event for _, event in it.take(offset=OFFSET)] == first
         assert it.version() == seen
@@ -102,7 +102,7 @@ def test_some_of_it(store: SqliteStore, path: Path) -> None:
 
 def test_a_reader_that_stays_keeps_nothing_from_the_writer(store: SqliteStore, path: Path) -> None:
     keep(store, history(PAGE))
-    with closing(Journal(path)) as it, closing(sqlite3.connect(path)) as other:
+    with closing(open_journal(str(path), Which())) as it, closing(sqlite3.connect(path)) as other:
         events = it.take(offset=OFFSET)
         assert len(list(islice(events, 10))) == 10  # the pager has no room for more
         keep(store, [VehicleSeen(1, "found", 99.0)], through=2 * PAGE + 1)
@@ -124,7 +124,7 @@ def test_reading_changes_nothing_and_needs_no_lock(store: SqliteStore, path: Pat
 
 def test_no_more_is_read_than_a_page_ahead(store: SqliteStore, path: Path) -> None:
     keep(store, history(3 * PAGE))
-    with closing(Journal(path)) as it:
+    with closing(open_journal(str(path), Which())) as it:
         for number, _ in it.take(offset=OFFSET):
             ahead = int(repr(it).removesuffix(")").rpartition(" ")[2])
             assert number <= ahead < number + 2 * PAGE

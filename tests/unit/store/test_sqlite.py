@@ -241,7 +241,7 @@ def test_retention_takes_the_oldest_that_are_over_and_their_events(path: Path) -
 
 
 def test_the_trimmer_goes_on_beside_the_writer(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mav_tasks.store.sqlite.TRIM_AT_OPEN", 0.0)
+    monkeypatch.setattr("mav_tasks.store.durable.TRIM_AT_OPEN", 0.0)
     registry = TaskRegistry()
     for number in range(1, 601):
         registry.submit(draft(), now=1.0)
@@ -275,7 +275,7 @@ def test_a_locked_file_holds_nothing_up_and_nothing_is_lost(path: Path) -> None:
 
 
 def test_a_stuck_disk_is_given_up_in_the_end(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mav_tasks.store.sqlite.CLOSE_LIMIT", 0.3)
+    monkeypatch.setattr("mav_tasks.store.durable.CLOSE_LIMIT", 0.3)
     with opened(path) as store, sqlite3.connect(path, isolation_level=None) as other:
         other.execute("BEGIN IMMEDIATE")
         store.append([submitted(1)])
