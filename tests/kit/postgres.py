@@ -42,11 +42,14 @@ class PostgresServer:
         self._bin = self._reachable(install) / "bin"
         self._process: subprocess.Popen[bytes] | None = None
         self._names = count(1)
-        if os.geteuid() == 0:
-            os.chown(self.folder, NOBODY, NOBODY)
+        self.owner = NOBODY if os.geteuid() == 0 else os.geteuid()
+        os.chown(self.folder, self.owner, -1)
         how = ["--auth=trust", "--encoding=UTF8", "--locale=C", "--username=postgres"]
         # what initdb writes is synced by the first checkpoint; a crash before that loses a test
         self._run("initdb", "--no-sync", *how, "-D", str(self.folder / "data"))
+        rules = self.folder / "data" / "pg_hba.conf"
+        guarded = "host all guarded all scram-sha-256\n"  # everybody else needs no password
+        rules.write_text(guarded + rules.read_text(encoding="utf-8"), encoding="utf-8")
 
     def __repr__(self) -> str:
         return f"PostgresServer(port {self.port})"
@@ -90,6 +93,20 @@ class PostgresServer:
         finally:
             for pid in pids:
                 _signal(pid, signal.SIGCONT)
+
+    @contextmanager
+    def as_replica(self) -> Iterator[None]:
+        """Let it be a replica, which is in recovery, for a block."""
+        signal_file = self.folder / "data" / "standby.signal"
+        self.stop()
+        signal_file.touch()
+        self.start()
+        try:
+            yield
+        finally:
+            self.stop()
+            signal_file.unlink()
+            self.start()
 
     def pids(self) -> list[int]:
         """Return the ids of the server's process and of its children."""

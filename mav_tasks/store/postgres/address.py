@@ -32,10 +32,11 @@ class Address:
 def parse(place: str) -> Address:
     """Return the address in a URL. Raise StoreError, without what may be part of a password."""
     scheme, _, rest = place.partition("://")
+    user = ""
+    if "@" in rest.partition("/")[0]:  # as libpq does: ? is a character of a name or a password
+        user, _, rest = rest.partition("@")
     path, mark, query = rest.partition("?")
-    authority, slash, database = path.partition("/")
-    user, at, host = authority.rpartition("@")
-    if "@" in user or "@" in database:
+    if "@" in path:
         raise _refusal(place, ESCAPES)
     try:
         found = conninfo_to_dict(place)
@@ -46,10 +47,10 @@ def parse(place: str) -> Address:
     for port in filter(None, parameters.get("port", "").split(",")):
         if not port.isdecimal() or not 0 < int(port) < 1 << 16:
             raise _refusal(place, f"{FORM}; the port is a number, and {ESCAPES}")
-    kept = [each for each in query.split("&") if each.partition("=")[0] not in _SECRET]
+    kept = "&".join(p for p in query.split("&") if p.partition("=")[0] not in _SECRET)
     name = user.partition(":")[0]
-    shown = f"{scheme}://{name}{at if name else ''}{host}{slash}{database}"
-    return Address(shown + (mark + "&".join(kept) if kept != [""] and kept else ""), parameters)
+    shown = f"{scheme}://{name}{'@' if name else ''}{path}{mark if kept else ''}{kept}"
+    return Address(shown, parameters)
 
 
 def _refusal(place: str, words: str) -> StoreError:

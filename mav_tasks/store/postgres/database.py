@@ -111,6 +111,7 @@ class PostgresDatabase:
             self._session = Session(self._address, purpose="serve")
             try:
                 _check_writable(self._session)
+                self._ownership.lock(self._session)
                 self._ownership.resume(self._session)
             except BaseException as error:
                 self._session.close()

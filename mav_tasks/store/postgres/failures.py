@@ -62,6 +62,8 @@ def failure(error: Exception) -> str | None:
         return None
     code = error.sqlstate
     words = _WORDS.get(code) or _WORDS.get(code[:2])
+    if code == "42501" and "for database" in str(error):
+        words = "the role may not create the schema mav_tasks: GRANT CREATE ON DATABASE … TO it"
     return f"{words} ({error})" if words else str(error)
 
 
