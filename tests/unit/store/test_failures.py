@@ -18,8 +18,8 @@ from mav_tasks.store import Kept
 from mav_tasks.store.durable import CLOSE_LIMIT
 from mav_tasks.store.writer import LAST_TRY
 from mav_tasks.tasks.events import TaskSubmitted
+from tests.kit.databases import foreign, newer, tables
 from tests.kit.processes import free_udp_ports
-from tests.unit.store.databases import foreign, newer, tables
 from tests.unit.store.samples import (
     FOR_EVER,
     PATIENCE,

@@ -14,7 +14,7 @@ from mav_tasks.store.halt_record import CELL, HEADER, SIZE, HaltRecord, Word, ev
 from mav_tasks.store.halt_record import FIRST_ONES as CELLS
 from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused, VehicleArmingSet
 from mav_tasks.tasks.lifecycle import TaskReason
-from tests.unit.store.databases import database_of, disk_error, halts_of
+from tests.kit.databases import database_of, disk_error, halts_of
 from tests.unit.store.full_disk import NO_NAMESPACE
 from tests.unit.store.samples import next_outcomes, opened, submitted, wait_for
 

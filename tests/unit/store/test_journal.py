@@ -19,7 +19,7 @@ from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
-from tests.unit.store.databases import foreign, newer, tables
+from tests.kit.databases import foreign, newer, tables
 from tests.unit.store.samples import OFFSET, finish, opened, submitted, wait_for
 from tests.unit.tasks.samples import draft
 

@@ -9,7 +9,7 @@ from mav_tasks.settings import Retention
 from mav_tasks.store import retention
 from mav_tasks.store.connection import Connection
 from mav_tasks.store.retention import Trimmer
-from tests.unit.store.databases import is_file
+from tests.kit.databases import is_file
 from tests.unit.store.samples import opened
 
 NOW = 1.8e9

@@ -25,7 +25,7 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import MAX_TASK_ID, Frame, Pose, Progress, TaskId, Terms
-from tests.unit.store.databases import disk_error, locked, tables
+from tests.kit.databases import disk_error, locked, tables
 from tests.unit.store.samples import (
     OFFSET,
     finish,

@@ -1,4 +1,4 @@
-"""Each test of a durable store is run on each kind of it."""
+"""A fixture: the place of a store that does not exist yet, of each durable kind in turn."""
 
 from pathlib import Path
 
