@@ -141,3 +141,24 @@ def test_a_database_that_cannot_be_used_is_told_in_one_line(
         assert (done.status, len(done.error.splitlines())) == (2, 1), done
         assert words in done.error
         assert "secret" not in done.error
+
+
+def test_a_database_that_is_made_as_the_guide_says_serves(
+    tmp_path: Path, postgres: PostgresServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PGPORT", str(postgres.port))
+    for what in ("DATABASE IF EXISTS fleet", "ROLE IF EXISTS rover"):  # of a run before this one
+        postgres.execute(f"DROP {what}")
+    create = {"PGHOST": "127.0.0.1", "PGUSER": "postgres"}
+    for command in ("createuser rover", "createdb --owner=rover fleet"):
+        postgres.run(*command.split(), **create)
+    client, vehicle = free_udp_ports(2)
+    command = "serve --store postgresql://rover@localhost/fleet"
+    options = ["--no-push", "--client", f"udpin:127.0.0.1:{client}"]
+    options += ["--vehicle", f"udpout:127.0.0.1:{vehicle}"]
+    with process(
+        "-m", "mav_tasks.cli", *command.split(), *options, folder=tmp_path, name="serve"
+    ) as server:
+        server.wait_for("store postgresql://rover@localhost/fleet, 0 tasks")
+        server.end()
+        assert server.popen.returncode == 0

@@ -46,7 +46,7 @@ class PostgresServer:
         os.chown(self.folder, self.owner, -1)
         how = ["--auth=trust", "--encoding=UTF8", "--locale=C", "--username=postgres"]
         # what initdb writes is synced by the first checkpoint; a crash before that loses a test
-        self._run("initdb", "--no-sync", *how, "-D", str(self.folder / "data"))
+        self.run("initdb", "--no-sync", *how, "-D", str(self.folder / "data"))
         rules = self.folder / "data" / "pg_hba.conf"
         guarded = "host all guarded all scram-sha-256\n"  # everybody else needs no password
         rules.write_text(guarded + rules.read_text(encoding="utf-8"), encoding="utf-8")
@@ -154,12 +154,14 @@ class PostgresServer:
             return False
         return True
 
-    def _run(self, program: str, *arguments: str) -> None:
+    def run(self, program: str, *arguments: str, **environment: str) -> None:
+        """Run one of PostgreSQL's programs."""
         done = subprocess.run(
             [self._bin / program, *arguments],
             capture_output=True,
             text=True,
             check=False,
+            env={**os.environ, **environment},
             **_ordinary(),
         )
         assert done.returncode == 0, done.stderr

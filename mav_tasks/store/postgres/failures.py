@@ -77,5 +77,6 @@ def connecting(text: str) -> str:
 def in_one_line(text: str) -> str:
     """Return the first line of a text of libpq, without its general beginning."""
     first = text.strip().partition("\n")[0].strip()
-    first = first.removeprefix("connection failed: ").removeprefix("connection is bad: ")
+    for beginning in ("connection failed: ", "connection is bad: ", "consuming input failed: "):
+        first = first.removeprefix(beginning)
     return re.sub(r"\b(FATAL|ERROR): +", "", first)

@@ -64,6 +64,8 @@ class Ownership:
             holder = _holder_if_any(session)
             if self.epoch and holder is not None and holder.epoch > self.epoch:
                 raise _replaced_by(holder) from error
+            if self.epoch and holder is not None and holder.epoch == self.epoch:
+                raise PostgresError("the database has not ended the lost session yet") from error
             words = str(holder) if holder is not None and holder.epoch else "another server"
             raise PostgresError(f"in use by {words}") from error
         found = session.execute(_OWN_BACKEND).fetchone()

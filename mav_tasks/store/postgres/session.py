@@ -16,6 +16,7 @@ from typing import Any
 
 import psycopg
 from psycopg import pq
+from psycopg.adapt import Transformer
 
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import LOST, PostgresError, connecting
@@ -37,10 +38,6 @@ _LIVELINESS = {
     "keepalives_count": "3",
     "tcp_user_timeout": str(int(ANSWER_LIMIT * 1000)),
 }
-_INTEGERS = (20, 21, 23, 26)  # types: int8, int2, int4, oid
-_FLOATS = (700, 701)
-_BOOL = 16
-
 _OK = (pq.ExecStatus.COMMAND_OK, pq.ExecStatus.TUPLES_OK, pq.ExecStatus.EMPTY_QUERY)
 
 
@@ -97,7 +94,8 @@ class Session:
         self._poll = select.poll()
         self._poll.register(self._pg.socket)
         self._names: dict[str, bytes] = {}  # of prepared statements, by their SQL
-        self._new: list[str] = []  # prepared since the last sync
+        #: what was sent since the last sync: SQL to be prepared, or None: a statement's execution
+        self._sent: list[str | None] = []
         self._numbers = count(1)
         self._is_batch = False
         self._warnings: list[str] = []
@@ -126,7 +124,7 @@ class Session:
     def execute(self, statement: str, values: Sequence[Any] = ()) -> Found:
         """Execute a statement and return its rows; within ``batch`` queue it, and return none."""
         self._send(statement, values)
-        return Found([] if self._is_batch else _rows(self._sync()[-1]))
+        return Found([] if self._is_batch else self._rows(self._sync()[-1]))
 
     def executemany(self, statement: str, rows: Iterable[Sequence[Any]]) -> None:
         """Execute a statement for each row, all of them in one round trip."""
@@ -218,8 +216,9 @@ class Session:
             name = self._names.get(statement)
             if name is None:
                 name = self._names[statement] = b"s%d" % next(self._numbers)
-                self._new.append(statement)
+                self._sent.append(statement)
                 self._pg.send_prepare(name, _numbered(statement))
+            self._sent.append(None)
             self._pg.send_query_prepared(name, [_text(value) for value in values])
         except psycopg.Error as error:
             raise self._loss(str(error)) from None
@@ -249,12 +248,18 @@ class Session:
                     failed = _error_of(result)
         except psycopg.Error as error:
             raise failed or self._loss(str(error)) from None
-        new, self._new = self._new, []
+        sent, self._sent = self._sent, []
         if failed is not None:
-            for statement in new:  # which of them were prepared is not known
-                del self._names[statement]
+            for statement in sent[len(results) :]:  # the first that failed, and what was skipped
+                if statement is not None:
+                    del self._names[statement]
             raise failed
         return results
+
+    def _rows(self, result: pq.abc.PGresult) -> list[tuple[Any, ...]]:
+        found = Transformer(self._connection)
+        found.set_pgresult(result)
+        return found.load_rows(0, result.ntuples, tuple)
 
     def _wait(self, events: int) -> None:
         self._poll.modify(self._pg.socket, events)
@@ -305,25 +310,6 @@ def _text(value: Any) -> bytes | None:
     if isinstance(value, float):
         return repr(value).encode()
     return b"%d" % value
-
-
-def _rows(result: pq.abc.PGresult) -> list[tuple[Any, ...]]:
-    kinds = [result.ftype(column) for column in range(result.nfields)]
-    columns = [
-        [_value(result.get_value(row, column), kind) for row in range(result.ntuples)]
-        for column, kind in enumerate(kinds)
-    ]
-    return list(zip(*columns, strict=True))
-
-
-def _value(text: bytes | None, kind: int) -> Any:
-    if text is None:
-        return None
-    if kind in _INTEGERS:
-        return int(text)
-    if kind in _FLOATS:
-        return float(text)
-    return text == b"t" if kind == _BOOL else text.decode()
 
 
 def _error_of(result: pq.abc.PGresult) -> PostgresError:

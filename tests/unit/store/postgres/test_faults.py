@@ -406,6 +406,26 @@ def test_a_stop_is_kept_without_the_database(
         assert (found.paused, found.ended_well) == ({1: TaskReason.STOPPED}, False)
 
 
+def test_a_long_failure_leaves_no_statements_behind(url: str) -> None:
+    with opened(url) as store, connected(url) as other:
+        session: Any = store._database
+        other.execute("ALTER TABLE tasks RENAME TO hidden")
+        store.append([submitted(1)])
+        reopened = store._database.reopen
+        tries: list[int] = []
+
+        def counted() -> None:
+            found = session._session.execute("SELECT count(*) FROM pg_prepared_statements")
+            tries.append(found.fetchone()[0])
+            reopened()
+
+        session.reopen = counted
+        wait_until(lambda: len(tries) > 3, within=20, what="attempts")
+        assert len(set(tries[1:])) == 1
+        other.execute("ALTER TABLE hidden RENAME TO tasks")
+        wait_for(store, 1)
+
+
 def test_a_dead_server_frees_the_database_at_once(url: str) -> None:
     for _ in range(3):
         with child(url) as process:
