@@ -212,6 +212,7 @@ class Session:
         self._sync()
 
     def _send(self, statement: str, values: Sequence[Any]) -> None:
+        texts = [_text(value) for value in values]
         try:
             name = self._names.get(statement)
             if name is None:
@@ -219,7 +220,7 @@ class Session:
                 self._sent.append(statement)
                 self._pg.send_prepare(name, _numbered(statement))
             self._sent.append(None)
-            self._pg.send_query_prepared(name, [_text(value) for value in values])
+            self._pg.send_query_prepared(name, texts)
         except psycopg.Error as error:
             raise self._loss(str(error)) from None
 
