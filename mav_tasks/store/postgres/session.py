@@ -87,6 +87,8 @@ class Session:
             parameters.setdefault("target_session_attrs", "read-write")
         try:
             self._connection = psycopg.connect(**parameters, autocommit=True)
+        except UnicodeError:
+            raise PostgresError("the host's name is not valid", sqlstate=LOST) from None
         except psycopg.Error as error:
             raise PostgresError(connecting(str(error)), sqlstate=LOST) from None
         self._pg = self._connection.pgconn

@@ -44,6 +44,12 @@ def test_an_unknown_host() -> None:
     assert text.endswith("check the host's name in the URL")
 
 
+def test_what_is_no_host_no_service_and_no_option() -> None:
+    assert "the host's name is not valid" in refusal("postgresql://a..b/fleet")
+    assert 'definition of service "none" not found' in refusal("postgresql:///?service=none")
+    assert "connect_timeout" in refusal("postgresql://127.0.0.1/fleet?connect_timeout=x")
+
+
 def test_nobody_listens() -> None:
     (port,) = free_tcp_ports(1)
     assert "is the server running there?" in refusal(f"postgresql://127.0.0.1:{port}/fleet")
