@@ -696,12 +696,15 @@ class ServerSettings:
     links: Links = field(default_factory=Links)
     store: str = setting(
         "",
-        Text('a path, ":memory:" for no file, "" for mav-tasks.sqlite3 in your data folder'),
-        "SQLite file of the tasks",
+        Text(
+            "a path, postgresql://USER@HOST/DATABASE,"
+            ' ":memory:" for no store, "" for mav-tasks.sqlite3 in your data folder'
+        ),
+        "SQLite file or PostgreSQL database of the tasks",
         key="store.path",
         is_live=False,
         variable="MAV_TASKS_STORE",  # older than the rule for names of variables
-        options=(Option("--store", "PATH|:memory:"),),
+        options=(Option("--store", "PATH|URL|:memory:"),),
     )
     engine: Settings = field(default_factory=Settings)
     profiles: str = setting(

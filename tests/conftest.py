@@ -7,6 +7,9 @@ import threading
 import pytest
 
 from mav_tasks.engine import engine
+from tests.kit.places import place as place
+from tests.kit.postgres import postgres as postgres
+from tests.kit.postgres import postgres_server as postgres_server
 from tests.kit.run_again import RunAgain
 
 for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:

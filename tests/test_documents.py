@@ -46,6 +46,9 @@ COMMANDS = {
     "mav-tasks web": "tests/e2e/test_web.py",
     "mav-tasks web tokens add anna --role operator": "tests/e2e/test_web.py",
     WITH_CURL: "tests/e2e/test_web.py",
+    "createuser rover": "tests/e2e/test_postgres.py",
+    "createdb --owner=rover fleet": "tests/e2e/test_postgres.py",
+    "mav-tasks serve --store postgresql://rover@localhost/fleet": "tests/e2e/test_postgres.py",
     "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
 }
 

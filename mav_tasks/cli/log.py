@@ -27,8 +27,8 @@ def log(
     store: Annotated[
         str | None,
         typer.Option(
-            metavar="PATH",
-            help="Store file; default: store.path of the configuration, else the store of the "
+            metavar="PATH|URL",
+            help="Store; default: store.path of the configuration, else the store of the "
             "server that was started last.",
         ),
     ] = None,
@@ -53,7 +53,7 @@ def log(
 ) -> None:
     """Print the journal, one event per line; times are UTC.
 
-    Reads the store file; the server need not run. On a terminal, long lines wrap at words.
+    Reads the store; the server need not run. On a terminal, long lines wrap at words.
     """
     if as_json and as_csv:
         raise UsageError("--json and --csv: choose one of them")
@@ -62,7 +62,7 @@ def log(
             raise UsageError(f"{flag} {number}: not a valid id")
     begin = None if since is None else export.parse_since(since, now=time.time())
     if store == "":
-        raise StoreError("--store: expected the path of a store file")
+        raise StoreError("--store: expected the path or the URL of a store")
     if store is None:
         store = Sources(None, dict(os.environ)).load().settings.store or latest_store() or ""
     which = Which(task=task, vehicle=vehicle, since=begin)

@@ -14,7 +14,7 @@ from mav_tasks.store.opening import IN_MEMORY
 def serve_with(flags: Sequence[Flag], *, set_: Sequence[str], config: str | None) -> int:
     """Run a server; return its exit status. Raise StoreError if the store has no name."""
     if any((flag.where, flag.value) == ("--store", "") for flag in flags):
-        raise StoreError(f"--store: expected a path, or {IN_MEMORY}")
+        raise StoreError(f"--store: expected a path, a URL of PostgreSQL, or {IN_MEMORY}")
     sources = Sources(config, dict(os.environ), [*flags, *map(flag_of_set, set_)])
     configuration = sources.load()
     return serve(configuration.settings, reload=Reload(sources, configuration))

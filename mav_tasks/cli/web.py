@@ -70,7 +70,7 @@ def web(
     store: Annotated[
         str | None,
         typer.Option(
-            metavar="PATH",
+            metavar="PATH|URL",
             help="Store whose journal the page shows; default: the store of the server that was "
             'started last on this machine; "": none.',
         ),

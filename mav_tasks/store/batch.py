@@ -27,7 +27,7 @@ from mav_tasks.tasks.task import following
 
 
 class Batch:
-    """Rows of events, numbered from ``first`` over the life of the file.
+    """Rows of events, numbered from ``first`` over the life of the store.
 
     A submission becomes a row of ``tasks``, and none of ``journal``. Of several changes of one task
     only the last updates its row in ``tasks``.
@@ -121,6 +121,6 @@ class Batch:
             case ParameterSet():
                 self.parameters[event.name] = (event.name, event.value)
             case VehicleArmingSet():
-                self.vehicles["may_arm", event.vehicle] = event.may_arm
+                self.vehicles["may_arm", event.vehicle] = int(event.may_arm)
             case VehicleSpeedSet():
                 self.vehicles["speed", event.vehicle] = event.speed

@@ -6,20 +6,21 @@ sqlite3's errors.
 
 import os
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from errno import ENOENT
+from math import inf
 from pathlib import Path
 from typing import Any
 
 from mav_tasks.errors import StoreError
 from mav_tasks.store import schema
 from mav_tasks.store.batch import Batch
-from mav_tasks.store.codec import Encoder, dumps, format_of
-from mav_tasks.store.failures import words_for
+from mav_tasks.store.batch_writing import find_format, write_batch
+from mav_tasks.store.failures import failure
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.schema import transaction
-from mav_tasks.tasks.events import Event
+from mav_tasks.store.sqlite_reader import SqliteReader
 
 BUSY_TIMEOUT = 0.25  # s, SQLite's wait for another program's lock
 GONE = "the file was removed or replaced while it was in use"
@@ -36,7 +37,12 @@ _PRAGMAS = (
 
 
 class Database:
-    """An open store file. The constructor raises StoreError if the file cannot be used."""
+    """An open store file; implements ``EventDatabase``.
+
+    The constructor raises StoreError if the file cannot be used.
+    """
+
+    look_period = inf  # a file is not lost by itself
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -48,7 +54,8 @@ class Database:
                 _check_whole(self._connection)
                 _set_up(self._connection)
                 schema.migrate(self._connection)
-                self.format_id = self._find_format()
+                with transaction(self._connection):
+                    self.format_id = find_format(self._connection)
                 row = self._meta("next_id, last_number, last_write, ended_well")
                 with transaction(self._connection):  # durable before any rover is moved
                     self._connection.execute("UPDATE meta SET ended_well = 0")
@@ -59,7 +66,7 @@ class Database:
         except StoreError as error:
             raise StoreError(f"store {path}: {error}") from None
         except (OSError, sqlite3.Error) as error:
-            raise StoreError(f"store {path}: {words_for(error)}") from error
+            raise StoreError(f"store {path}: {failure(error) or error}") from error
         self.next_id: int = row[0]
         self.last_number: int = row[1]
         self.last_write: float | None = row[2]  # UTC seconds, of an earlier process
@@ -67,6 +74,10 @@ class Database:
 
     def __repr__(self) -> str:
         return f"Database({self._path.name}, event {self.last_number})"
+
+    def is_open(self) -> bool:
+        """Return True: whether the file is still there is seen when it is written to."""
+        return True
 
     def reopen(self) -> None:
         """Open the file again after a failure, and read the number of its last event.
@@ -84,65 +95,11 @@ class Database:
 
     def write(self, batch: Batch, *, utc: float) -> None:
         """Make a batch durable, as a whole or not at all."""
-        connection = self._connection
-        with transaction(connection):
-            # task ids wrap around: without retention an old task may still have the id
-            _insert(
-                connection,
-                "OR REPLACE INTO tasks (id, number, vehicle, state, changed_at, submitted)",
-                batch.tasks,
-            )
-            _insert(
-                connection,
-                "INTO journal (number, utc, kind, task_id, vehicle, body)",
-                batch.journal,
-            )
-            for statement, rows in (
-                (
-                    "UPDATE tasks SET state = ?, changed_at = ?, changed = ? WHERE id = ?",
-                    batch.changed,
-                ),
-                ("UPDATE tasks SET modified = ? WHERE id = ?", batch.modified),
-                ("UPDATE tasks SET advanced = ? WHERE id = ?", batch.advanced),
-                ("INSERT OR REPLACE INTO plans VALUES (?, ?, ?, ?)", batch.plans),
-                ("INSERT OR REPLACE INTO parameters VALUES (?, ?)", batch.parameters),
-            ):
-                if rows:  # an executemany without rows still takes time
-                    connection.executemany(statement, rows.values())
-            if batch.withdrawn:
-                self._withdraw(batch.withdrawn)
-            for (column, vehicle), value in batch.vehicles.items():
-                connection.execute(
-                    f"INSERT INTO vehicles (vehicle, {column}) VALUES (?, ?)"
-                    f" ON CONFLICT (vehicle) DO UPDATE SET {column} = excluded.{column}",
-                    (vehicle, value),
-                )
-            if batch.signatures:
-                _keep_signatures(connection, batch.signatures)
-            connection.execute(
-                "UPDATE meta SET next_id = ifnull(?, next_id), last_number = ?, last_write = ?,"
-                " signed_until = max(signed_until, ?)",
-                (batch.next_id, batch.last, utc, batch.signed_until),
-            )
+        with transaction(self._connection):
+            write_batch(self._connection, batch, insert=self._insert, utc=utc)
         if _identities(self._path) != self._files:
             raise OSError(ENOENT, GONE)  # the batch went to a file that is no longer there
         self.last_number = batch.last
-
-    def catch_up(
-        self, events: Sequence[Event], *, last_number: int, next_id: int | None, offset: float
-    ) -> None:
-        """Write events that an earlier process could not, before any other; raise StoreError.
-
-        ``last_number`` is the last event number that the earlier process is known to have used.
-        """
-        first, encoder = last_number + 1, Encoder()
-        batch = Batch(events, first=first, encoder=encoder, format_id=self.format_id, offset=offset)
-        batch.next_id = next_id
-        try:
-            self.write(batch, utc=self.last_write or 0.0)
-        except (OSError, sqlite3.Error) as error:
-            self._connection.close()
-            raise StoreError(f"store {self._path}: {words_for(error)}") from error
 
     def is_certain(self) -> bool:
         """Checkpoint the WAL; return whether all of its pages are in the database file.
@@ -169,21 +126,32 @@ class Database:
         finally:
             self._connection.close()
 
-    def _withdraw(self, ids: Sequence[tuple[int]]) -> None:
-        """Delete tasks, but keep their submissions in the journal."""
-        self._connection.executemany(
-            "INSERT INTO journal SELECT number, changed_at, 'TaskSubmitted', id, vehicle, submitted"
-            " FROM tasks WHERE id = ?",
-            ids,
-        )
-        self._connection.executemany("DELETE FROM tasks WHERE id = ?", ids)
+    def reader(self) -> SqliteReader:
+        """Return a new read-only connection."""
+        return SqliteReader(self._path)
 
-    def _find_format(self) -> int:
-        names = dumps(format_of(*Event.__args__))
-        with transaction(self._connection):
-            self._connection.execute("INSERT OR IGNORE INTO formats (names) VALUES (?)", (names,))
-        query = "SELECT id FROM formats WHERE names = ?"
-        return int(self._connection.execute(query, (names,)).fetchone()[0])
+    def failure(self, error: Exception) -> str | None:
+        """Return the words for a disk failure; None: it is a bug of ours."""
+        return failure(error)
+
+    def _insert(self, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
+        """Insert many rows with few statements.
+
+        sqlite3 releases and acquires the GIL for each statement, which is slow per row beside a
+        busy engine. Chunk sizes are powers of two, so that few statements are compiled. Task ids
+        wrap around: without retention an old task may still have the id, hence OR REPLACE.
+        """
+        into = f"INSERT OR REPLACE INTO {table} ({','.join(columns)}) VALUES "
+        mark = f"({','.join('?' * len(columns))})"
+        done, size = 0, MOST_ROWS
+        while done < len(rows):
+            while size > len(rows) - done:
+                size //= 2
+            self._connection.execute(
+                into + ",".join([mark] * size),
+                [value for row in rows[done : done + size] for value in row],
+            )
+            done += size
 
     def _meta(self, columns: str) -> tuple[Any, ...]:
         row: tuple[Any, ...] | None = self._connection.execute(
@@ -239,36 +207,3 @@ def _check_whole(connection: sqlite3.Connection) -> None:
     (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if found != "ok":
         raise StoreError(f"it is damaged ({found.splitlines()[-1]})")
-
-
-def _keep_signatures(
-    connection: sqlite3.Connection, times: Mapping[tuple[Any, ...], int | None]
-) -> None:
-    connection.executemany(
-        "DELETE FROM signatures"
-        " WHERE key = ? AND link_id = ? AND system_id = ? AND component_id = ?",
-        [sender for sender, time in times.items() if time is None],
-    )
-    connection.executemany(
-        "INSERT OR REPLACE INTO signatures VALUES (?, ?, ?, ?, ?)",
-        [(*sender, time) for sender, time in times.items() if time is not None],
-    )
-
-
-def _insert(connection: sqlite3.Connection, into: str, rows: list[tuple[Any, ...]]) -> None:
-    """Insert many rows with few statements.
-
-    sqlite3 releases and acquires the GIL for each statement, which is slow per row beside a busy
-    engine. Chunk sizes are powers of two, so that few statements are compiled.
-    """
-    done, size = 0, MOST_ROWS
-    while done < len(rows):
-        while size > len(rows) - done:
-            size //= 2
-        chunk = rows[done : done + size]
-        marks = f"({','.join('?' * len(chunk[0]))})"
-        connection.execute(
-            f"INSERT {into} VALUES {','.join([marks] * size)}",
-            [value for row in chunk for value in row],
-        )
-        done += size

@@ -1,4 +1,4 @@
-"""Disk failures, and texts for them. Other sqlite3 errors are bugs of ours, and are raised."""
+"""Disk failures of SQLite, and texts for them. Its other errors are bugs of ours."""
 
 import sqlite3
 
@@ -16,16 +16,18 @@ _WORDS = {
 }
 
 
-def is_failure(error: Exception) -> bool:
-    """Whether an error is a disk failure, which may be temporary, and not a bug."""
-    return isinstance(error, OSError) or type(error) in (
+def failure(error: Exception) -> str | None:
+    """Return the words for a disk failure, which may be temporary; None: it is a bug of ours."""
+    if isinstance(error, OSError):
+        return words_for(error)
+    if type(error) not in (
         sqlite3.OperationalError,
         sqlite3.DatabaseError,  # itself: damage; its other subclasses: misuse
-    )
-
-
-def words_for(error: Exception) -> str:
-    if isinstance(error, OSError):
-        return error.strerror or str(error)
+    ):
+        return None
     words = _WORDS.get(getattr(error, "sqlite_errorcode", 0) & 0xFF)
     return f"{words} ({error})" if words else str(error)
+
+
+def words_for(error: OSError) -> str:
+    return error.strerror or str(error)

@@ -114,15 +114,18 @@ def event_of(word: Word, *, offset: float) -> Event:
 class HaltRecord:
     """The open file. Methods raise OSError if a write fails; one thread writes each cell."""
 
-    def __init__(self, store: Path) -> None:
-        """Open or create the record of a store; raise StoreError if that fails."""
+    def __init__(self, store: Path, *, name: str) -> None:
+        """Open or create the record beside ``store``; raise StoreError if that fails.
+
+        ``name`` is what people call the store.
+        """
         self._path = store.with_name(f"{store.name}.halts")
         try:
             if not os.path.lexists(self._path):
                 _make(self._path)
             self._fd = os.open(self._path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
         except OSError as error:
-            raise StoreError(f"store {store}: {self._path.name}: {error.strerror}") from error
+            raise StoreError(f"store {name}: {self._path.name}: {error.strerror}") from error
         try:
             content = os.pread(self._fd, SIZE + 1, 0)
             if len(content) == FIRST_SIZE:
@@ -134,7 +137,7 @@ class HaltRecord:
         except (OSError, ValueError) as error:
             os.close(self._fd)
             words = getattr(error, "strerror", None) or str(error)
-            raise StoreError(f"store {store}: {self._path.name}: {words}") from error
+            raise StoreError(f"store {name}: {self._path.name}: {words}") from error
 
     def __repr__(self) -> str:
         return f"HaltRecord({self._path.name}, {len(self._newest)} words)"

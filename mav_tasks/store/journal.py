@@ -1,20 +1,17 @@
-"""Reads the journal of a store file as events, also while a server writes it.
+"""Reads the journal of a store as events, also while a server writes it.
 
-The reader is read-only, takes no lock of the server's, and reads each page in its own transaction.
-A long transaction, of a reader whose output waits in a pager, say, would keep the server from
-checkpointing the WAL, and a store that recovers from a full disk needs a full checkpoint.
+Each page is read in its own transaction. A long transaction, of a reader whose output waits in a
+pager, say, would keep the server from checkpointing the WAL, and a store that recovers from a full
+disk needs a full checkpoint.
 """
 
-import sqlite3
 from collections.abc import Iterable, Iterator
 from operator import itemgetter
-from pathlib import Path
 from typing import Any
 
-from mav_tasks.errors import StoreError
-from mav_tasks.store import schema
 from mav_tasks.store.base import Which
 from mav_tasks.store.codec import Unreadable
+from mav_tasks.store.event_database import Reader
 from mav_tasks.store.reading import Rows, in_one_line
 from mav_tasks.tasks.events import Event
 
@@ -24,42 +21,37 @@ _KINDS = {kind.__name__: kind for kind in Event.__args__}
 
 
 class Journal:
-    """Implements ``JournalReader`` for a file."""
+    """Implements ``JournalReader`` for every kind of database."""
 
-    def __init__(self, path: Path, which: Which | None = None) -> None:
-        self._path = path.expanduser().absolute()
-        self._which = which or Which()
-        if not self._path.is_file():
-            raise StoreError(f"store {path} does not exist; choose another with --store")
-        with in_one_line(self._path):
-            self._connection = _connect(self._path)
+    def __init__(self, reader: Reader, which: Which) -> None:
+        self._reader = reader
+        self._which = which
         self._number = 0  # of the last event returned
         self._task = 0  # id of the last task whose submission was returned
 
     def __repr__(self) -> str:
-        return f"Journal({self._path.name}, event {self._number})"
+        return f"Journal({self._reader.name}, event {self._number})"
 
     def take(self, *, offset: float) -> Iterator[tuple[int, Event]]:
         """Yield the events after those yielded before, as JournalReader says."""
         while True:
-            with in_one_line(self._path):
+            with in_one_line(self._reader):
                 page, has_more = self._page(offset)
             yield from page
             if not has_more:
                 return
 
     def version(self) -> int:
-        """Return a number that changes when another connection has written to the file."""
-        with in_one_line(self._path):
-            return int(self._connection.execute("PRAGMA data_version").fetchone()[0])
+        """Return a number that changes when the store was written to."""
+        with in_one_line(self._reader):
+            return self._reader.version()
 
     def close(self) -> None:
-        self._connection.close()
+        self._reader.close()
 
     def _page(self, offset: float) -> tuple[list[tuple[int, Event]], bool]:
-        with self._connection:  # ends the transaction
-            self._connection.execute("BEGIN")
-            rows = Rows(self._connection)
+        with self._reader.snapshot():
+            rows = Rows(self._reader.connection)
             noted = self._rows("number, kind, body, 0", "journal", "number", self._number)
             begun = self._rows("number, 'TaskSubmitted', submitted, id", "tasks", "id", self._task)
         full = [found[-1][0] for found in (noted, begun) if len(found) == PAGE]
@@ -87,7 +79,7 @@ class Journal:
         }
         asked = {term: value for term, value in wanted.items() if value is not None}
         where = " AND ".join(asked)
-        return self._connection.execute(
+        return self._reader.connection.execute(
             f"SELECT {columns} FROM {table} WHERE {where} ORDER BY {key} LIMIT {PAGE}",
             tuple(asked.values()),
         ).fetchall()
@@ -105,25 +97,3 @@ def _events(
             raise Unreadable(f"this version does not know {kind}")
         values = rows.values(_KINDS[kind], [body for _, body in some], offset)
         yield from zip((number for number, _ in some), values, strict=True)
-
-
-def _connect(path: Path) -> sqlite3.Connection:
-    """Open a file read-only; as immutable if SQLite cannot write its index and no WAL exists."""
-    try:
-        return _checked(path, "mode=ro")
-    except sqlite3.OperationalError:
-        if path.with_name(f"{path.name}-wal").exists():
-            raise
-        return _checked(path, "immutable=1")
-
-
-def _checked(path: Path, how: str) -> sqlite3.Connection:
-    connection = sqlite3.connect(f"{path.as_uri()}?{how}", uri=True, isolation_level=None)
-    try:
-        schema.check(connection)
-        if schema.is_empty(connection):
-            raise StoreError("it is empty")
-    except BaseException:
-        connection.close()
-        raise
-    return connection

@@ -14,13 +14,13 @@ from mav_tasks.errors import StoreError
 
 
 class Lock:
-    """A lock, held from creation until ``release``.
+    """A lock, held from creation until ``release``; ``name`` is what people call the store.
 
     The constructor raises StoreError if another process holds the lock, or the file cannot be
     opened.
     """
 
-    def __init__(self, store: Path) -> None:
+    def __init__(self, store: Path, *, name: str) -> None:
         self._fd: int | None = None
         path = store.with_name(f"{store.name}.lock")
         try:
@@ -29,20 +29,20 @@ class Lock:
         except OSError as error:
             if error.errno == errno.ELOOP:
                 words = f"{path.name} is a symbolic link: remove it"
-                raise StoreError(f"store {store}: {words}") from None
-            raise StoreError(f"store {store}: {path.name}: {error.strerror}") from error
+                raise StoreError(f"store {name}: {words}") from None
+            raise StoreError(f"store {name}: {path.name}: {error.strerror}") from error
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             holder = os.read(fd, 20).decode("ascii", "replace").strip()
             os.close(fd)
             raise StoreError(
-                f"store {store}: in use by another process"
+                f"store {name}: in use by another process"
                 + (f", pid {holder}" if holder.isdecimal() else "")
             ) from None
         except OSError as error:
             os.close(fd)
-            raise StoreError(f"store {store}: cannot be locked: {error.strerror}") from error
+            raise StoreError(f"store {name}: cannot be locked: {error.strerror}") from error
         self._fd = fd
         with suppress(OSError):  # on a full disk; the pid is only for the message
             os.ftruncate(fd, 0)

@@ -9,6 +9,7 @@ from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.settings import Retention
 from mav_tasks.store.base import JournalReader, Store, Which
+from mav_tasks.store.place import without_password
 
 IN_MEMORY = ":memory:"
 
@@ -16,6 +17,8 @@ IN_MEMORY = ":memory:"
 KINDS = {
     "": "mav_tasks.store.sqlite",  # a path; "": the file in the user's data folder
     IN_MEMORY: "mav_tasks.store.memory",
+    "postgresql://": "mav_tasks.store.postgres.store",
+    "postgres://": "mav_tasks.store.postgres.store",  # libpq takes both
 }
 
 
@@ -41,8 +44,12 @@ def kind_of(place: str) -> StoreKind:
     """Return the kind of a store: the one in KINDS with the longest beginning that fits."""
     beginning = max(filter(place.startswith, KINDS), key=len)
     if not beginning and "://" in place:
-        raise StoreError(f"store {place}: unknown kind; expected a path, or {IN_MEMORY}")
-    return cast(StoreKind, import_module(KINDS[beginning]))
+        expected = f"a path, postgresql://USER@HOST/DATABASE, or {IN_MEMORY}"
+        raise StoreError(f"store {without_password(place)}: unknown kind; expected {expected}")
+    try:
+        return cast(StoreKind, import_module(KINDS[beginning]))
+    except StoreError as error:  # a package is not installed
+        raise StoreError(f"store {without_password(place)}: {error}") from error
 
 
 def open_store(place: str, retention: Retention | None = None) -> Store:

@@ -1,22 +1,20 @@
-"""Reads the state of a store file, from which a server resumes.
+"""Reads the state of a store, from which a server resumes.
 
-Reading uses its own connection and one transaction: it sees one state of the file, whatever is
+Reading uses its own connection and one transaction: it sees one state of the store, whatever is
 written meanwhile.
 """
 
-import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from itertools import groupby
 from operator import itemgetter
-from pathlib import Path
 from typing import Any
 
 from mav_tasks.errors import StoreError
 from mav_tasks.store.codec import Decoder, Unreadable, loads
-from mav_tasks.store.failures import words_for
-from mav_tasks.store.schema import check
+from mav_tasks.store.connection import Connection
+from mav_tasks.store.event_database import Reader
 from mav_tasks.tasks.events import (
     TaskAdvanced,
     TaskChanged,
@@ -39,9 +37,10 @@ _OF_TASK = {
 }
 
 
-def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -> Restored:
-    """Return the state in a store file, times reduced by ``offset``; raise StoreError."""
-    with _connected(path, mode="rw") as connection:
+def read_restored(reader: Reader, *, offset: float, ended_well: bool, idle: float) -> Restored:
+    """Return the state in a store, times reduced by ``offset``; raise StoreError."""
+    connection = reader.connection
+    with in_one_line(reader), reader.snapshot():
         rows = Rows(connection)
         next_id, signed_until = connection.execute(
             "SELECT next_id, signed_until FROM meta"
@@ -90,25 +89,17 @@ def read_restored(path: Path, *, offset: float, ended_well: bool, idle: float) -
         )
 
 
-def read_parameters(path: Path) -> dict[str, float]:
-    """Return the parameters that clients have set, by name; raise StoreError.
-
-    The store may be in use: nothing is written. A file of an older version, which may lack the
-    table, is not migrated.
-    """
-    with _connected(path, mode="ro") as connection:
-        check(connection)
-        query = "SELECT count(*) FROM sqlite_master WHERE name = 'parameters'"
-        if not connection.execute(query).fetchone()[0]:
-            return {}
-        found = connection.execute("SELECT name, value FROM parameters").fetchall()
+def read_parameters(reader: Reader) -> dict[str, float]:
+    """Return the parameters that clients have set, by name; raise StoreError."""
+    with in_one_line(reader):
+        found = reader.connection.execute("SELECT name, value FROM parameters").fetchall()
         return {name: value for name, value in found if value is not None}
 
 
 class Rows:
     """Decodes stored texts, each by the format in which it was written."""
 
-    def __init__(self, connection: sqlite3.Connection) -> None:
+    def __init__(self, connection: Connection) -> None:
         self._decoders = {
             number: Decoder(loads(names))
             for number, names in connection.execute("SELECT id, names FROM formats")
@@ -137,25 +128,18 @@ def _changed(task: Task, rows: Rows, texts: Sequence[str | None], offset: float)
 
 
 @contextmanager
-def _connected(path: Path, *, mode: str) -> Iterator[sqlite3.Connection]:
-    with (
-        in_one_line(path),
-        closing(sqlite3.connect(f"{path.as_uri()}?mode={mode}", uri=True)) as connection,
-    ):
-        connection.execute("BEGIN")  # one state of the file for every query
-        yield connection
-
-
-@contextmanager
-def in_one_line(path: Path) -> Iterator[None]:
-    """Convert every error of reading a file to a StoreError with a text of one line."""
+def in_one_line(reader: Reader) -> Iterator[None]:
+    """Convert every error of reading to a StoreError with a text of one line."""
     try:
         yield
     except Unreadable as error:
-        raise StoreError(f"store {path}: its contents are invalid: {error}") from error
+        raise StoreError(f"store {reader.name}: its contents are invalid: {error}") from error
     except StoreError as error:
-        raise StoreError(f"store {path}: {error}") from error
+        raise StoreError(f"store {reader.name}: {error}") from error
     except (ValueError, LookupError) as error:  # not JSON, or not what we write
-        raise StoreError(f"store {path}: it is damaged ({error})") from error
-    except sqlite3.Error as error:
-        raise StoreError(f"store {path}: {words_for(error)}") from error
+        raise StoreError(f"store {reader.name}: it is damaged ({error})") from error
+    except Exception as error:
+        words = reader.failure(error)
+        if words is None:
+            raise
+        raise StoreError(f"store {reader.name}: {words}") from error

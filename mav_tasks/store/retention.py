@@ -4,10 +4,10 @@ Events without a task are limited in number as well as in age: any sender can ca
 that has not ended is never deleted, and neither are its events.
 """
 
-import sqlite3
 from math import inf
 
 from mav_tasks.settings import Retention
+from mav_tasks.store.connection import Connection
 
 STEP = 250  # tasks deleted in one transaction
 SWEEP = 2_000  # journal rows examined in one transaction
@@ -23,13 +23,13 @@ class Trimmer:
         self._retention = retention
         self._swept = 0  # number of the last journal row examined
 
-    def step(self, connection: sqlite3.Connection, *, utc: float) -> bool:
+    def step(self, connection: Connection, *, utc: float) -> bool:
         """Delete some rows that are too old or too many; return whether there may be more."""
         deleted = self._delete_tasks(connection, utc)
         others = self._delete_others(connection)
         return self._sweep(connection, utc) or deleted >= STEP or others >= SWEEP
 
-    def _delete_tasks(self, connection: sqlite3.Connection, utc: float) -> int:
+    def _delete_tasks(self, connection: Connection, utc: float) -> int:
         ids: list[tuple[int]] = []
         if self._retention.max_age is not None:
             ids = _oldest(connection, STEP, before=utc - self._retention.max_age)
@@ -38,11 +38,12 @@ class Trimmer:
             excess = min(count - self._retention.max_count, STEP)
             if excess > len(ids):
                 ids = _oldest(connection, excess, before=inf)
-        connection.executemany("DELETE FROM journal WHERE task_id = ?", ids)
-        connection.executemany("DELETE FROM tasks WHERE id = ?", ids)
+        if ids:
+            connection.executemany("DELETE FROM journal WHERE task_id = ?", ids)
+            connection.executemany("DELETE FROM tasks WHERE id = ?", ids)
         return len(ids)
 
-    def _delete_others(self, connection: sqlite3.Connection) -> int:
+    def _delete_others(self, connection: Connection) -> int:
         """Delete the oldest events without a task above MOST_OTHERS: a client could fill a disk."""
         query = "SELECT count(*) FROM journal WHERE task_id IS NULL"
         (count,) = connection.execute(query).fetchone()
@@ -55,7 +56,7 @@ class Trimmer:
             )
         return int(max(excess, 0))
 
-    def _sweep(self, connection: sqlite3.Connection, utc: float) -> bool:
+    def _sweep(self, connection: Connection, utc: float) -> bool:
         """Delete old events without a stored task; return whether more rows must be examined."""
         if self._retention.max_age is None:
             return False
@@ -79,7 +80,7 @@ class Trimmer:
         return True
 
 
-def _oldest(connection: sqlite3.Connection, most: int, *, before: float) -> list[tuple[int]]:
+def _oldest(connection: Connection, most: int, *, before: float) -> list[tuple[int]]:
     return connection.execute(
         f"SELECT id FROM tasks WHERE {_OVER} AND changed_at < ? ORDER BY changed_at, id LIMIT ?",
         (before, most),

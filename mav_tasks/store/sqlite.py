@@ -1,42 +1,33 @@
-"""The store on disk: a SQLite file that one server owns, with its own writer thread."""
+"""The store on disk: a SQLite file that one server owns."""
 
 import os
 import stat
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
 
 from platformdirs import user_data_path
 
-from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.folders import make_private
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
-from mav_tasks.store.base import Outcome, Which
+from mav_tasks.store.base import Which
 from mav_tasks.store.database import Database
-from mav_tasks.store.halt_keeper import HaltKeeper
-from mav_tasks.store.halt_record import HaltRecord, event_of, word_of
+from mav_tasks.store.durable import DurableStore
+from mav_tasks.store.halt_record import HaltRecord
 from mav_tasks.store.journal import Journal
 from mav_tasks.store.lock import Lock
-from mav_tasks.store.mailbox import Mailbox
-from mav_tasks.store.retention import Trimmer
-from mav_tasks.store.writer import Writer
-from mav_tasks.tasks.events import Event
-from mav_tasks.tasks.restored import Restored
+from mav_tasks.store.sqlite_reader import SqliteReader
 
 DEFAULT_STORE = "mav-tasks.sqlite3"
-HALTS_LIMIT = 1.0  # s at shutdown for writing the last halts
-CLOSE_LIMIT = 3.0  # s at shutdown for writing the remaining events
-TRIM_AT_OPEN = 0.5  # s of deleting expired rows at start; the rest is done while serving
 
 
-class SqliteStore:
-    """Implements ``Store`` in a SQLite file. Files and folders that it creates are private.
+class SqliteStore(DurableStore):
+    """A store in a SQLite file. Files and folders that it creates are private.
 
-    ``wall_offset`` returns the current UTC minus ``boot_time``. The constructor raises StoreError,
-    with a text of one line, if the file cannot be used: in use by another process, damaged, newer,
-    read-only, disk full.
+    The constructor raises StoreError, with a text of one line, if the file cannot be used: in use
+    by another process, damaged, newer, read-only, disk full.
     """
 
     def __init__(
@@ -46,102 +37,22 @@ class SqliteStore:
         wall_offset: Callable[[], float],
         retention: Retention | None = None,
     ) -> None:
-        self._wall_offset = wall_offset
-        self._path = _real_path(Path(path))
-        self.name = self.place = str(self._path)
+        path = _real_path(Path(path))
+        name = str(path)
         with ExitStack() as opened:
-            opened.callback(Lock(self._path).release)
-            record = HaltRecord(self._path)
+            opened.callback(Lock(path, name=name).release)
+            record = HaltRecord(path, name=name)
             opened.callback(record.close)
-            database = Database(self._path)
-            was_complete = self._catch_up(database, record)
+            database = Database(path)
             release = opened.pop_all().close
-        utc = boot_time() + wall_offset()
-        self._ended_well = database.ended_well and was_complete
-        self._idle = 0.0 if database.last_write is None else max(0.0, utc - database.last_write)
-        self._mail = Mailbox()
-        trimmer = Trimmer(retention or Retention())
-        self._writer = Writer(
+        super().__init__(
             database,
-            self._mail,
-            trimmer,
-            name=self.name,
+            record,
+            name=name,
             wall_offset=wall_offset,
-            record=record,
+            retention=retention,
             release=release,
         )
-        self._number = database.last_number
-        self._keeper = HaltKeeper(
-            record, self._mail, name=self.name, kept_through=lambda: database.last_number
-        )
-        self._is_open = True
-        self._writer.trim_for(TRIM_AT_OPEN)
-        self._writer.start()
-        self._keeper.start()
-
-    def __repr__(self) -> str:
-        return f"SqliteStore({str(self._path)!r})"
-
-    def load(self) -> Restored:
-        """Return the stored state, times in this process's monotonic seconds; raise StoreError."""
-        return reading.read_restored(
-            self._path, offset=self._wall_offset(), ended_well=self._ended_well, idle=self._idle
-        )
-
-    def journal(self) -> Iterator[tuple[int, Event]]:
-        """Yield every stored event, numbered over the life of the file; raise StoreError."""
-        with closing(Journal(self._path)) as journal:
-            yield from journal.take(offset=self._wall_offset())
-
-    def append(self, events: Sequence[Event]) -> None:
-        """Queue events to be made durable, without blocking; raise ValueError after ``close``."""
-        if not self._is_open:
-            raise ValueError("the store is closed")
-        first, offset = self._number + 1, self._wall_offset()
-        self._number += len(events)
-        words = [
-            word_of(event, number, offset=offset) for number, event in enumerate(events, first)
-        ]
-        halts = [word for word in words if word is not None]
-        if halts:
-            self._keeper.append(halts)
-        self._writer.append(tuple(events))
-
-    def take_outcomes(self) -> list[Outcome]:
-        """Return the outcomes since the last call; raise an exception of the store's threads."""
-        return self._mail.take()
-
-    def fileno(self) -> int | None:
-        """Return a descriptor that is readable while there are outcomes; None once closed."""
-        return self._mail.fileno()
-
-    def close(self) -> None:
-        """Write the remaining events, record the clean end and release the lock.
-
-        Give up after CLOSE_LIMIT if the disk fails or is stuck; the file stays locked while the
-        disk is stuck.
-        """
-        if self._is_open:
-            self._is_open = False
-            self._keeper.close(within=HALTS_LIMIT)
-            self._writer.close(within=CLOSE_LIMIT)
-            self._keeper.report_lost()
-            self._mail.close()
-
-    def _catch_up(self, database: Database, record: HaltRecord) -> bool:
-        """Write newer words of the halt record to the database; return False if it lacked any."""
-        newer = record.words_after(database.last_number)
-        next_id = record.next_id_after(database.last_number)
-        if not newer and next_id is None:
-            return True
-        offset = self._wall_offset()
-        database.catch_up(
-            [event_of(word, offset=offset) for word in newer],
-            last_number=record.last_number,
-            next_id=next_id,
-            offset=offset,
-        )
-        return False
 
 
 def open_store(place: str, wall_offset: Callable[[], float], retention: Retention) -> SqliteStore:
@@ -150,14 +61,28 @@ def open_store(place: str, wall_offset: Callable[[], float], retention: Retentio
 
 
 def open_journal(place: str, which: Which) -> Journal:
-    return Journal(_path_of(place), which)
+    """Open the journal of a file; raise StoreError if it does not exist."""
+    path = _path_of(place).expanduser().absolute()
+    if not path.is_file():
+        raise StoreError(f"store {_path_of(place)} does not exist; choose another with --store")
+    reader = SqliteReader(path)
+    if reader.is_empty():
+        reader.close()
+        raise StoreError(f"store {path}: it is empty")
+    return Journal(reader, which)
 
 
 def read_parameters(place: str) -> dict[str, float]:
-    """Return the parameters in a file; {} if it does not exist."""
+    """Return the parameters in a file; {} if it does not exist.
+
+    A file of an older version, which may lack the table, is not migrated.
+    """
     try:
         path = _path_of(place).expanduser().absolute()
-        return reading.read_parameters(path) if path.exists() else {}
+        if not path.exists():
+            return {}
+        with closing(SqliteReader(path)) as reader:
+            return reading.read_parameters(reader) if reader.has("parameters") else {}
     except (OSError, RuntimeError) as error:
         raise StoreError(f"store {place}: {error}") from error
 

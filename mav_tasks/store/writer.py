@@ -13,8 +13,7 @@ from mav_tasks.clock import boot_time
 from mav_tasks.store.base import Kept, NotKept
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
-from mav_tasks.store.database import Database
-from mav_tasks.store.failures import is_failure, words_for
+from mav_tasks.store.event_database import EventDatabase
 from mav_tasks.store.halt_record import HaltRecord
 from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.store.retention import Trimmer
@@ -33,7 +32,7 @@ class Writer:
 
     def __init__(
         self,
-        database: Database,
+        database: EventDatabase,
         mail: Mailbox,
         trimmer: Trimmer,
         *,
@@ -90,6 +89,7 @@ class Writer:
             is_all_written = True
             while is_all_written and not self._is_closing:
                 events = self._collect()
+                self._look()
                 is_all_written = not events or self._write(events)
                 self._trim()
             self._end(is_all_written)
@@ -99,10 +99,11 @@ class Writer:
             self._release()
 
     def _collect(self) -> list[Event]:
-        """Wait for events, or until trimming is due; return up to about MOST_EVENTS events."""
+        """Return up to about MOST_EVENTS events; wait for them, or until something else is due."""
         events: list[Event] = []
+        until_trim = max(0.001, self._trim_at - time.monotonic())
         try:
-            item = self._waiting.get(timeout=max(0.001, self._trim_at - time.monotonic()))
+            item = self._waiting.get(timeout=min(until_trim, self._look_period()))
             while True:
                 if item is None:
                     self._is_closing = True
@@ -114,6 +115,24 @@ class Writer:
         except Empty:
             pass
         return events
+
+    def _look_period(self) -> float:
+        return RETRY if self._must_reopen else self._database.look_period
+
+    def _look(self) -> None:
+        """Reopen a database that was lost while there was nothing to write, and report that."""
+        if self._is_closing or not (self._must_reopen or not self._database.is_open()):
+            return
+        self._must_reopen = True
+        try:
+            self._database.reopen()
+        except Exception as error:  # noqa: BLE001 - raised again if it is a bug
+            self._note_failure(error)
+            return
+        self._must_reopen = False
+        if self._reported_at is not None:
+            self._reported_at = None
+            self._mail.put(Kept(self._database.last_number - self._base))
 
     def _write(self, events: Sequence[Event]) -> bool:
         """Retry until the events are written; return False if closing ran out of time."""
@@ -147,20 +166,22 @@ class Writer:
                 self._database.write(batch, utc=self.utc())
             elif not self._database.is_certain():  # the failed commit is in the WAL
                 return False
-        except Exception as error:
-            if not is_failure(error):
-                raise
-            self._must_reopen = True
-            self._report(error)
+        except Exception as error:  # noqa: BLE001 - raised again if it is a bug
+            self._note_failure(error)
             return False
         self._must_reopen = False
         return True
 
-    def _report(self, error: Exception) -> None:
+    def _note_failure(self, error: Exception) -> None:
+        """Report a failure; raise the error if it is none."""
+        words = self._database.failure(error)
+        if words is None:
+            raise error
+        self._must_reopen = True
         now = time.monotonic()
         if self._reported_at is None or now >= self._reported_at + REPORT:
             self._reported_at = now
-            self._mail.put(NotKept(f"store {self._name}: {words_for(error)}"))
+            self._mail.put(NotKept(f"store {self._name}: {words}"))
 
     def _trim(self, *, pause: float = TRIM_PAUSE) -> None:
         """Delete some expired rows if that is due; a disk failure waits for the next time."""
@@ -169,15 +190,16 @@ class Writer:
         try:
             has_more = self._database.trim(self._trimmer, utc=self.utc())
         except Exception as error:
-            if not is_failure(error):
+            if self._database.failure(error) is None:
                 raise
-            has_more = False
+            self._must_reopen, has_more = True, False
         self._trim_at = time.monotonic() + (pause if has_more else TRIM_PERIOD)
 
     def _end(self, is_all_written: bool) -> None:
         try:
             self._database.close(utc=self.utc() if is_all_written else None)
         except Exception as error:
-            if not is_failure(error):
+            words = self._database.failure(error)
+            if words is None:
                 raise
-            self._mail.put(NotKept(f"store {self._name}: not closed cleanly: {words_for(error)}"))
+            self._mail.put(NotKept(f"store {self._name}: not closed cleanly: {words}"))

@@ -2,11 +2,10 @@
 
 import resource
 import signal
-import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic, time
 from typing import Any
@@ -15,6 +14,7 @@ import pytest
 
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
+from tests.kit.databases import locked, tables
 from tests.kit.processes import (
     Stand,
     after_a_restart,
@@ -45,6 +45,13 @@ def running(tmp_path: Path, path: Path) -> Iterator[Stand]:
         yield it
 
 
+@pytest.fixture
+def serving(tmp_path: Path, place: str) -> Iterator[Stand]:
+    """A server and a rover, on each kind of store."""
+    with stand(tmp_path, "--store", place) as it:
+        yield it
+
+
 @contextmanager
 def full_disk(running: Stand) -> Iterator[None]:
     """No file of the server can grow while the block runs."""
@@ -57,10 +64,11 @@ def full_disk(running: Stand) -> Iterator[None]:
         resource.prlimit(process, resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def stored(path: Path) -> list[int]:
-    """The ids of the tasks that are in the file."""
-    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as connection:
-        return [row[0] for row in connection.execute("SELECT id FROM tasks ORDER BY id")]
+def stored(place: str | Path) -> list[int]:
+    """The ids of the tasks that are in a store."""
+    with tables(str(place)) as connection:
+        found = connection.execute("SELECT id FROM tasks ORDER BY id").fetchall()
+        return [row[0] for row in found]
 
 
 def hold_is_seen(link: Any) -> None:
@@ -119,17 +127,16 @@ def test_a_store_that_is_removed_under_the_server_refuses_new_tasks_and_nothing_
     assert "Traceback" not in running.server.text
 
 
-def test_stop_does_not_wait_for_a_blocked_store(running: Stand, path: Path) -> None:
-    link = running.connect()
-    rover = running.connect_to_rover()
-    running.drive(link, 50.0)
-    with closing(sqlite3.connect(path, timeout=5, isolation_level=None)) as other:
-        other.execute("BEGIN IMMEDIATE")
+def test_stop_does_not_wait_for_a_blocked_store(serving: Stand, place: str) -> None:
+    link = serving.connect()
+    rover = serving.connect_to_rover()
+    serving.drive(link, 50.0)
+    with locked(place) as other:
         asked = monotonic()
         ack = command_long(link, STOP)
         answered = monotonic() - asked
         wait_for(rover, "HEARTBEAT", f"HEARTBEAT.type==10 and HEARTBEAT.custom_mode=={HOLD}")
-        wait_until(lambda: running.speed() < 0.01, within=5, what="the rover to stand")
+        wait_until(lambda: serving.speed() < 0.01, within=5, what="the rover to stand")
         refused = command_long(link, MOVE, 1.0, 0, 0, 11)
         wait_until(lambda: monotonic() - asked > BLOCKED, within=2 * BLOCKED)
         other.execute("ROLLBACK")
@@ -141,16 +148,16 @@ def test_stop_does_not_wait_for_a_blocked_store(running: Stand, path: Path) -> N
 
 
 def test_after_a_kill_the_acknowledged_task_is_held_and_can_be_finished(
-    tmp_path: Path, path: Path
+    tmp_path: Path, place: str
 ) -> None:
-    with stand(tmp_path, "--store", str(path)) as running:
+    with stand(tmp_path, "--store", place) as running:
         link = running.connect()
         running.drive(link, 3.0)
         waiting = submit(link, 54001, 45.0)
         running.server.end(signal.SIGKILL)
         wait_until(lambda: running.speed() < 0.01, within=10, what="the rover to stand")
         stopped = running.truth()[-1]
-        with restarted(running, path) as server_log:
+        with restarted(running, tmp_path, place) as server_log:
             wait_until(lambda: "found" in server_log.read_text(), within=20, what="the rover")
             link = running.connect()
             hold_is_seen(link)
@@ -176,10 +183,10 @@ def test_after_a_kill_the_acknowledged_task_is_held_and_can_be_finished(
 
 
 @contextmanager
-def restarted(running: Stand, path: Path) -> Iterator[Path]:
+def restarted(running: Stand, folder: Path, place: str) -> Iterator[Path]:
     """Another server on the same store and ports."""
-    log = path.with_suffix(".log")
-    with log.open("w") as sink, server(running.client_port, running.rover_port, path, sink) as it:
+    log = folder / "restarted.log"
+    with log.open("w") as sink, server(running.client_port, running.rover_port, place, sink) as it:
         try:
             yield log
         finally:
@@ -188,10 +195,10 @@ def restarted(running: Stand, path: Path) -> Iterator[Path]:
 
 @contextmanager
 def server(
-    client_port: int, rover_port: int, path: Path, sink: Any = subprocess.PIPE
+    client_port: int, rover_port: int, place: str, sink: Any = subprocess.PIPE
 ) -> Iterator[subprocess.Popen[str]]:
     command = [sys.executable, "-m", "mav_tasks.cli", "serve", "--no-push"]
-    command += ["--client", f"udpin:127.0.0.1:{client_port}", "--store", str(path)]
+    command += ["--client", f"udpin:127.0.0.1:{client_port}", "--store", place]
     command += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
     it = subprocess.Popen(command, stdout=sink, stderr=subprocess.STDOUT, text=True)
     try:
@@ -202,26 +209,26 @@ def server(
         it.wait(10)
 
 
-def refusal(path: Path) -> str:
+def refusal(place: str) -> str:
     """What a server says that cannot use a store."""
     ports = free_udp_ports(2)
-    with server(ports[0], ports[1], path) as it:
+    with server(ports[0], ports[1], place) as it:
         said = it.communicate(timeout=20)[0]
         assert it.returncode == 2, said
     assert "Traceback" not in said
     return said.splitlines()[-1]
 
 
-def test_a_store_in_use_is_refused_and_its_owner_named(running: Stand, path: Path) -> None:
-    said = refusal(path)
-    assert str(path) in said
-    assert str(running.server.popen.pid) in said
+def test_a_store_in_use_is_refused_and_its_owner_named(serving: Stand, place: str) -> None:
+    said = refusal(place)
+    assert place in said
+    assert f"pid {serving.server.popen.pid}" in said
 
 
 @pytest.mark.parametrize("content", [b"not a database at all, but long enough to be one" * 40])
 def test_a_damaged_store_is_refused_in_one_line(path: Path, content: bytes) -> None:
     path.write_bytes(content)
-    assert str(path) in refusal(path)
+    assert str(path) in refusal(str(path))
     assert path.read_bytes() == content
 
 
@@ -229,16 +236,16 @@ def test_a_damaged_store_is_refused_in_one_line(path: Path, content: bytes) -> N
     ("option", "kept"), [(("--keep-tasks", "2"), 2), (("--keep-days", "0"), 0)]
 )
 def test_as_much_of_what_is_over_is_kept_as_the_operator_says(
-    tmp_path: Path, path: Path, option: tuple[str, str], kept: int
+    tmp_path: Path, place: str, option: tuple[str, str], kept: int
 ) -> None:
     registry = TaskRegistry()
     for number in range(1, 7):
         registry.submit(draft(), now=1.0)
         if number < 6:
             finish(registry, number, now=1.0)
-    with opened(path, offset=time() - monotonic()) as store:
+    with opened(place, offset=time() - monotonic()) as store:
         store.append(registry.take_events())
-    with stand(tmp_path, "--store", str(path), *option) as it:
-        wait_until(lambda: len(stored(path)) == kept + 1, within=10, what="the rest forgotten")
+    with stand(tmp_path, "--store", place, *option) as it:
+        wait_until(lambda: len(stored(place)) == kept + 1, within=10, what="the rest forgotten")
         it.connect()
-    assert stored(path) == [*range(6 - kept, 6), 6]
+    assert stored(place) == [*range(6 - kept, 6), 6]

@@ -19,6 +19,7 @@ from . import (
     commands,
     floods,
     forwarding,
+    postgres,
     queue,
     scrapers,
     setpoints,
@@ -35,6 +36,7 @@ from .table import Row, render
 MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "commands": commands.measure,
     "durable": commands.measure_durable,
+    "postgres": postgres.measure,
     "recorded": commands.measure_recorded,
     "turns": turns.measure,
     "stop": stop.measure,

@@ -6,7 +6,8 @@ message id of an answer.
 
 import os
 import socket
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 from statistics import quantiles
@@ -38,12 +39,12 @@ PAGE = 4_096  # bytes
 
 def measure(profile: str | None = None) -> list[Row]:
     """Return the rows of latency and of rate, with the store in memory."""
-    packets = _packets()
-    echo = _echo(packets)
-    ours = _server(packets, *(() if profile is None else ("--profile", profile)))
+    supply = packets()
+    echo = _echo(supply)
+    ours = _server(supply, *(() if profile is None else ("--profile", profile)))
     return [
-        _latency("command → ack, p50", ours[0], echo[0], goal=GOAL_RATIO),
-        _latency("command → ack, p99", ours[1], echo[1], goal=None),
+        latency("command → ack, p50", ours[0], echo[0], goal=GOAL_RATIO),
+        latency("command → ack, p99", ours[1], echo[1], goal=None),
         Row(
             f"acks, {OUTSTANDING} outstanding",
             f"{ours[2]:,.0f} /s",
@@ -57,17 +58,16 @@ def measure(profile: str | None = None) -> list[Row]:
 
 def measure_durable() -> list[Row]:
     """Return the rows with the store on a disk, compared with an echo plus one fsync."""
-    packets = _packets()
+    supply = packets()
     with TemporaryDirectory(dir=Path.cwd()) as folder:  # the project's disk
         sync = _fsync(Path(folder))
-        echo = _echo(packets)
-        ours = _server(packets, "--store", str(Path(folder) / "tasks.sqlite3"))
-    yardstick = echo[0] + sync[0], echo[1] + sync[1]
+        echo = _echo(supply)
+        ours = _server(supply, "--store", str(Path(folder) / "tasks.sqlite3"))
+    yardstick, of = (echo[0] + sync[0], echo[1] + sync[1]), "echo + fsync"
     rows = [
-        _latency("durable → ack, p50", ours[0], yardstick[0], goal=GOAL_DURABLE_RATIO),
-        _latency("durable → ack, p99", ours[1], yardstick[1], goal=None),
+        latency("durable → ack, p50", ours[0], yardstick[0], goal=GOAL_DURABLE_RATIO, of=of),
+        latency("durable → ack, p99", ours[1], yardstick[1], goal=None, of=of),
     ]
-    rows = [replace(row, yardstick=row.yardstick.replace("echo", "echo + fsync")) for row in rows]
     rate = Row(
         f"durable acks, {OUTSTANDING} outstanding",
         f"{ours[2]:,.0f} /s",
@@ -81,14 +81,14 @@ def measure_durable() -> list[Row]:
 
 def measure_recorded() -> list[Row]:
     """Return latency and rate with each kind of record, compared with those without."""
-    packets = _packets()
-    without = _server(packets)
+    supply = packets()
+    without = _server(supply)
     rows: list[Row] = []
     with TemporaryDirectory() as folder:
         for option, words in (("--tlog", "telemetry log"), ("--record", "decisions")):
-            kept = _server(packets, option, folder)
-            row = _latency(f"command → ack, p50, {words}", kept[0], without[0], goal=None)
-            rows.append(replace(row, yardstick=row.yardstick.replace("echo", "without")))
+            kept = _server(supply, option, folder)
+            what = f"command → ack, p50, {words}"
+            rows.append(latency(what, kept[0], without[0], goal=None, of="without"))
             rate = f"acks, {OUTSTANDING} outstanding, {words}"
             yardstick = f"{without[2]:,.0f} /s without"
             ratio = f"{kept[2] / without[2]:.0%}"
@@ -103,7 +103,14 @@ def _echo(packets: list[bytes]) -> tuple[float, float, float]:
         return _run(client, packets, answer_id=m.CommandLong.id, vehicle=None)
 
 
-def _server(packets: list[bytes], *options: str) -> tuple[float, float, float]:
+def _server(commands: list[bytes], *options: str) -> tuple[float, float, float]:
+    with server(*options) as (client, vehicle):
+        return _run(client, commands, answer_id=m.CommandAck.id, vehicle=vehicle)
+
+
+@contextmanager
+def server(*options: str) -> Iterator[tuple[socket.socket, ScriptedVehicle]]:
+    """Run a server with options for a block; yield the client's socket and the vehicle."""
     port = free_port()
     with udp_socket() as client, udp_socket() as vehicle_socket:
         vehicle_port: int = vehicle_socket.getsockname()[1]
@@ -111,7 +118,7 @@ def _server(packets: list[bytes], *options: str) -> tuple[float, float, float]:
             vehicle = ScriptedVehicle(vehicle_socket)
             meet(vehicle, client, loopback(port))
             client.connect(loopback(port))
-            return _run(client, packets, answer_id=m.CommandAck.id, vehicle=vehicle)
+            yield client, vehicle
 
 
 def _fsync(folder: Path) -> tuple[float, float]:
@@ -127,11 +134,11 @@ def _fsync(folder: Path) -> tuple[float, float]:
     return cuts[49], cuts[98]
 
 
-def _latency(what: str, ours: float, echo: float, *, goal: float | None) -> Row:
+def latency(what: str, ours: float, echo: float, *, goal: float | None, of: str = "echo") -> Row:
     return Row(
         what,
         f"{ours * 1e6:.0f} µs",
-        f"{echo * 1e6:.0f} µs echo",
+        f"{echo * 1e6:.0f} µs {of}",
         f"{ours / echo:.1f}×",
         "" if goal is None else f"≤ {goal:g}×",
         None if goal is None else ours <= goal * echo,
@@ -147,15 +154,16 @@ def _run(
 ) -> tuple[float, float, float]:
     """Return p50 and p99 in seconds with one outstanding command, and answers/s with many."""
     supply = iter(packets)
-    _one_by_one(client, list(islice(supply, WARM_UP)), answer_id, vehicle)
-    times = _one_by_one(client, list(islice(supply, ONE_BY_ONE)), answer_id, vehicle)
+    one_by_one(client, list(islice(supply, WARM_UP)), answer_id, vehicle)
+    times = one_by_one(client, list(islice(supply, ONE_BY_ONE)), answer_id, vehicle)
     cuts = quantiles(times, n=100)
-    return cuts[49], cuts[98], _many(client, list(supply), answer_id, vehicle)
+    return cuts[49], cuts[98], many(client, list(supply), answer_id, vehicle)
 
 
-def _one_by_one(
+def one_by_one(
     client: socket.socket, packets: list[bytes], answer_id: int, vehicle: ScriptedVehicle | None
 ) -> list[float]:
+    """Return the seconds until each answer, with one outstanding command."""
     times: list[float] = []
     next_beat = monotonic()
     for packet in packets:
@@ -170,7 +178,7 @@ def _one_by_one(
     return times
 
 
-def _many(
+def many(
     client: socket.socket, packets: list[bytes], answer_id: int, vehicle: ScriptedVehicle | None
 ) -> float:
     """Return the answers per second with OUTSTANDING commands under way."""
@@ -205,7 +213,8 @@ def _many(
     return rate
 
 
-def _packets() -> list[bytes]:
+def packets() -> list[bytes]:
+    """Return the commands of a run."""
     encoder = Encoder(CLIENT)
     total = WARM_UP + ONE_BY_ONE + MANY
     return [

@@ -5,6 +5,7 @@ writes them when the next server loads, so that virtual time needs no real disk.
 """
 
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from mav_tasks.settings import Retention
@@ -50,7 +51,8 @@ class Disk:
 
     def load(self, *, ended_well: bool, idle: float) -> Restored:
         """Return the state that the next server restores."""
-        return read_restored(self.path, offset=self.wall_offset, ended_well=ended_well, idle=idle)
+        with closing(self._database.reader()) as reader:
+            return read_restored(reader, offset=self.wall_offset, ended_well=ended_well, idle=idle)
 
     def close(self) -> None:
         """Close the file."""

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.cli.app import main
-from mav_tasks.store.reading import read_parameters
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store.sqlite import SqliteStore, read_parameters
 from mav_tasks.tasks.server_events import ParameterSet
 
 Result = tuple[int, str, str]
@@ -130,7 +129,7 @@ def test_what_a_client_has_set_is_shown_from_the_store(run: Run, tmp_path: Path)
     )
     assert re.search(r"^driving\.speed = 0\.5 +# m/s, default$", output, re.MULTILINE)
     before = path.read_bytes()
-    assert read_parameters(path) == {"TSK_SPEED": 2.5}
+    assert read_parameters(str(path)) == {"TSK_SPEED": 2.5}
     assert path.read_bytes() == before
 
 

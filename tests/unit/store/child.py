@@ -1,6 +1,6 @@
 """A process that keeps submitting to a store, and says on standard output what became of it.
 
-``python -m tests.unit.store.child PATH [LIMIT]``: LIMIT is the largest file, bytes, that it may
+``python -m tests.unit.store.child PLACE [LIMIT]``: LIMIT is the largest file, bytes, that it may
 write from then on, which stands in for a full disk; a line on standard input lifts it. One line for
 each outcome: ``kept N``, or the words of the failure.
 """
@@ -11,19 +11,20 @@ import signal
 import sys
 import time
 
-from mav_tasks.clock import boot_time
 from mav_tasks.store import Kept
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store.opening import open_store
 from tests.unit.store.samples import submitted
 
 UNDER_WAY = 50  # events appended and not yet kept
 
 
-def main(path: str, limit: int | None) -> None:
+def main(place: str, limit: int | None) -> None:
     """Run until killed."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # a write beyond the limit fails instead
-    store = SqliteStore(path, wall_offset=lambda: time.time() - boot_time())
-    last = kept = max((task.id for task in store.load().tasks), default=0)
+    store = open_store(place)
+    restored = store.load()
+    assert restored is not None
+    last = kept = max((task.id for task in restored.tasks), default=0)
     before = last
     descriptor = store.fileno()
     assert descriptor is not None

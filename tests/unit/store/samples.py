@@ -8,7 +8,8 @@ from pathlib import Path
 
 from mav_tasks.settings import Retention
 from mav_tasks.store import Kept, NotKept, Outcome, Store
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store.durable import DurableStore
+from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks.events import TaskSubmitted
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
@@ -45,10 +46,11 @@ def finish(registry: TaskRegistry, number: int, *, now: float) -> None:
 
 @contextmanager
 def opened(
-    path: Path, *, offset: float = OFFSET, retention: Retention = FOR_EVER
-) -> Iterator[SqliteStore]:
-    """Return a store; it is closed after the block."""
-    store = SqliteStore(path, wall_offset=lambda: offset, retention=retention)
+    place: str | Path, *, offset: float = OFFSET, retention: Retention = FOR_EVER
+) -> Iterator[DurableStore]:
+    """Return the store at a place, of any durable kind; it is closed after the block."""
+    store = kind_of(str(place)).open_store(str(place), lambda: offset, retention)
+    assert isinstance(store, DurableStore)
     try:
         yield store
     finally:
@@ -63,7 +65,7 @@ def wait_for(store: Store, through: int) -> list[Outcome]:
     return outcomes
 
 
-def wait_for_failure(store: SqliteStore) -> NotKept:
+def wait_for_failure(store: Store) -> NotKept:
     """Wait until the store says that something is not kept."""
     while True:
         for outcome in next_outcomes(store):

@@ -10,11 +10,11 @@ import pytest
 
 from mav_tasks.errors import StoreError
 from mav_tasks.store import HaltNotKept
-from mav_tasks.store.database import Database
 from mav_tasks.store.halt_record import CELL, HEADER, SIZE, HaltRecord, Word, event_of, word_of
 from mav_tasks.store.halt_record import FIRST_ONES as CELLS
 from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused, VehicleArmingSet
 from mav_tasks.tasks.lifecycle import TaskReason
+from tests.kit.databases import database_of, disk_error, halts_of
 from tests.unit.store.full_disk import NO_NAMESPACE
 from tests.unit.store.samples import next_outcomes, opened, submitted, wait_for
 
@@ -36,58 +36,60 @@ def record_path(path: Path) -> Path:
 
 
 @pytest.fixture
-def full(monkeypatch: pytest.MonkeyPatch) -> None:
+def full(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """From now on no database takes anything."""
+    refuse_writes(place, monkeypatch)
 
+
+def refuse_writes(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def write(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device")
+        raise disk_error(place)
 
-    monkeypatch.setattr(Database, "write", write)
-    monkeypatch.setattr("mav_tasks.store.sqlite.CLOSE_LIMIT", 0.1)
+    monkeypatch.setattr(database_of(place), "write", write)
+    monkeypatch.setattr("mav_tasks.store.durable.CLOSE_LIMIT", 0.1)
 
 
-def life(path: Path, *events: Event) -> None:
+def life(place: str | Path, *events: Event) -> None:
     """Let a store take events, as well as it can, and end."""
-    with opened(path) as store:
+    with opened(place) as store:
         store.append(events)
 
 
-def paused(path: Path) -> dict[int, TaskReason]:
-    with opened(path) as store:
+def paused(place: str | Path) -> dict[int, TaskReason]:
+    with opened(place) as store:
         return dict(store.load().paused)
 
 
 def test_a_stop_that_only_the_record_took_is_in_force_in_the_next_life(
-    path: Path, monkeypatch: pytest.MonkeyPatch, full: None
+    place: str, monkeypatch: pytest.MonkeyPatch, full: None
 ) -> None:
-    life(path, submitted(1), STOP)
+    life(place, submitted(1), STOP)
     monkeypatch.undo()
-    with opened(path) as store:
+    with opened(place) as store:
         found = store.load()
         journal = list(store.journal())
     assert (found.paused, found.ended_well) == ({1: R.STOPPED}, False)
     assert journal == [(3, STOP)]  # 1 and 2 are lost numbers, which no other event gets
-    assert paused(path) == {1: R.STOPPED}
+    assert paused(place) == {1: R.STOPPED}
 
 
 def test_the_newest_word_wins_whoever_kept_it(
-    path: Path, monkeypatch: pytest.MonkeyPatch, full: None
+    place: str, monkeypatch: pytest.MonkeyPatch, full: None
 ) -> None:
-    life(path, STOP, CONTINUE)
+    life(place, STOP, CONTINUE)
     monkeypatch.undo()
-    assert paused(path) == {}
-    life(path, QueuePaused(1, R.OPERATOR, "client", 102.0))
-    assert paused(path) == {1: R.OPERATOR}
+    assert paused(place) == {}
+    life(place, QueuePaused(1, R.OPERATOR, "client", 102.0))
+    assert paused(place) == {1: R.OPERATOR}
 
 
-def test_a_database_that_knows_more_than_the_record_is_believed(
-    path: Path, record_path: Path
-) -> None:
-    life(path, STOP)
+def test_a_database_that_knows_more_than_the_record_is_believed(place: str, tmp_path: Path) -> None:
+    life(place, STOP)
+    record_path = halts_of(place, tmp_path)
     older = record_path.read_bytes()
-    life(path, CONTINUE)
+    life(place, CONTINUE)
     record_path.write_bytes(older)
-    assert paused(path) == {}
+    assert paused(place) == {}
 
 
 def test_an_older_database_put_back_forgets_no_stop_and_gives_no_id_twice(path: Path) -> None:
@@ -102,7 +104,7 @@ def test_an_older_database_put_back_forgets_no_stop_and_gives_no_id_twice(path: 
 
 
 def test_a_word_that_is_cut_short_leaves_the_one_before(path: Path) -> None:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     for number in (1, 2, 3):
         record.write(Word(9, number, R.STOPPED, "ä" * 40, 5.0))
     record.close()
@@ -111,11 +113,11 @@ def test_a_word_that_is_cut_short_leaves_the_one_before(path: Path) -> None:
     assert words(path)[0].actor == "ä" * 19
     damage(path, slot=1, vehicle=9)
     with pytest.raises(StoreError, match="damaged"):
-        HaltRecord(path)
+        HaltRecord(path, name=str(path))
 
 
 def words(path: Path) -> list[Word]:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     record.close()
     return record.words_after(0)
 
@@ -159,15 +161,14 @@ def test_a_record_with_holes_gets_its_blocks_when_it_is_opened(
 
 
 def test_a_halt_that_neither_keeps_is_reported_and_one_that_the_database_keeps_is_not(
-    path: Path, record_path: Path, monkeypatch: pytest.MonkeyPatch
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mav_tasks.store.halt_keeper.GRACE", 0.3)
-    with opened(path) as store:
-        record_path.unlink()
+    with opened(place) as store:
+        halts_of(place, tmp_path).unlink()
         store.append([STOP])
         outcomes = wait_for(store, 1)
-        monkeypatch.setattr(Database, "write", _fail)
-        monkeypatch.setattr("mav_tasks.store.sqlite.CLOSE_LIMIT", 0.1)
+        refuse_writes(place, monkeypatch)
         store.append([QueuePaused(2, R.STOPPED, "client", 102.0), QueueContinued(3, "client", 1.0)])
         while not any(isinstance(outcome, HaltNotKept) for outcome in outcomes):
             outcomes += next_outcomes(store)
@@ -178,12 +179,8 @@ def test_a_halt_that_neither_keeps_is_reported_and_one_that_the_database_keeps_i
     assert "No such file" in told[0].text
     assert "lost: rover 2: STOP by client" in told[1].text
     monkeypatch.undo()
-    with opened(path) as store:
+    with opened(place) as store:
         assert not store.load().ended_well
-
-
-def _fail(*_: object, **__: object) -> None:
-    raise OSError(5, "Input/output error")
 
 
 def test_on_a_file_system_that_is_full_the_record_takes_a_stop_and_nothing_else_is_kept() -> None:
@@ -204,11 +201,11 @@ def test_on_a_file_system_that_is_full_the_record_takes_a_stop_and_nothing_else_
 
 
 def test_the_latest_task_id_counts_though_a_higher_one_came_before(path: Path) -> None:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     record.note_next_id(16_777_215, number=10)
     record.note_next_id(2, number=20)
     record.close()
-    again = HaltRecord(path)
+    again = HaltRecord(path, name=str(path))
     again.close()
     assert [again.next_id_after(number) for number in (9, 19, 20)] == [2, 2, None]
 
@@ -216,11 +213,11 @@ def test_the_latest_task_id_counts_though_a_higher_one_came_before(path: Path) -
 def test_that_somebody_has_disarmed_is_a_word_and_an_older_record_is_made_longer(
     path: Path, record_path: Path
 ) -> None:
-    record = HaltRecord(path)
+    record = HaltRecord(path, name=str(path))
     record.write(Word(9, 1, R.STOPPED, "somebody", 5.0))
     record.close()
     record_path.write_bytes(record_path.read_bytes()[: len(HEADER) + 2 * CELLS * CELL])
-    older = HaltRecord(path)
+    older = HaltRecord(path, name=str(path))
     disarming = word_of(VehicleArmingSet(9, False, 7.0), 2, offset=1.0)
     assert disarming is not None
     older.write(disarming)

@@ -1,8 +1,8 @@
-"""The journal of a store file, read page by page beside whoever writes it."""
+"""The journal of a store, read page by page beside whoever writes it."""
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
@@ -10,14 +10,16 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.errors import StoreError
-from mav_tasks.store import journal as module
 from mav_tasks.store import schema
-from mav_tasks.store.base import Which
-from mav_tasks.store.journal import PAGE, Journal
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store import sqlite_reader as module
+from mav_tasks.store.base import JournalReader, Which
+from mav_tasks.store.durable import DurableStore
+from mav_tasks.store.journal import PAGE
+from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
+from tests.kit.databases import foreign, newer, tables
 from tests.unit.store.samples import OFFSET, finish, opened, submitted, wait_for
 from tests.unit.tasks.samples import draft
 
@@ -28,8 +30,8 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def store(path: Path) -> Iterator[SqliteStore]:
-    with opened(path) as it:
+def store(place: str) -> Iterator[DurableStore]:
+    with opened(place) as it:
         yield it
 
 
@@ -42,37 +44,43 @@ def history(count: int, *, vehicle: int = 1, at: float = 10.0) -> list[Event]:
     return list(registry.take_events())
 
 
-def keep(store: SqliteStore, events: list[Event], *, through: int | None = None) -> list[Event]:
+def keep(store: DurableStore, events: list[Event], *, through: int | None = None) -> list[Event]:
     store.append(events)
     wait_for(store, through or len(events))
     return events
 
 
-def read(path: Path, which: Which | None = None) -> list[tuple[int, Event]]:
-    with closing(Journal(path, which)) as it:
+def journal_of(place: str | Path, which: Which | None = None) -> JournalReader:
+    return kind_of(str(place)).open_journal(str(place), which or Which())
+
+
+def read(place: str | Path, which: Which | None = None) -> list[tuple[int, Event]]:
+    with closing(journal_of(place, which)) as it:
         return list(it.take(offset=OFFSET))
 
 
 @pytest.mark.parametrize("count", [0, 1, PAGE // 2, PAGE // 2 + 1, 2 * PAGE + 7])
-def test_every_event_is_given_once_in_its_order(store: SqliteStore, path: Path, count: int) -> None:
+def test_every_event_is_given_once_in_its_order(
+    store: DurableStore, place: str, count: int
+) -> None:
     events: list[Event] = [VehicleSeen(1, "found", 1.0), *history(count)]
-    assert read(path) == []
+    assert read(place) == []
     keep(store, events)
-    assert read(path) == list(enumerate(events, 1))
+    assert read(place) == list(enumerate(events, 1))
 
 
-def test_many_submissions_in_one_piece_and_then_their_ends(store: SqliteStore, path: Path) -> None:
+def test_many_submissions_in_one_piece_and_then_their_ends(store: DurableStore, place: str) -> None:
     tasks: list[Event] = [submitted(number) for number in range(1, 2 * PAGE + 4)]
     notes: list[Event] = [VehicleSeen(1, str(number), 1.0) for number in range(3 * PAGE)]
     events = keep(store, tasks + notes)
-    assert read(path) == list(enumerate(events, 1))
+    assert read(place) == list(enumerate(events, 1))
 
 
-def test_what_comes_later_is_given_to_who_goes_on_reading(store: SqliteStore, path: Path) -> None:
+def test_what_comes_later_is_given_to_who_goes_on_reading(store: DurableStore, place: str) -> None:
     first = history(3)
     then: list[Event] = [VehicleSeen(1, "found", 99.0), submitted(4)]
     keep(store, first)
-    with closing(Journal(path)) as it:
+    with closing(journal_of(place)) as it:
         seen = it.version()
         assert [event for _, event in it.take(offset=OFFSET)] == first
         assert it.version() == seen
@@ -83,26 +91,31 @@ def test_what_comes_later_is_given_to_who_goes_on_reading(store: SqliteStore, pa
 
 
 def test_a_submission_that_was_withdrawn_stays_in_the_journal(
-    store: SqliteStore, path: Path
+    store: DurableStore, place: str
 ) -> None:
     events = keep(store, [submitted(1), submitted(2), TaskWithdrawn(TaskId(1), 1, 100.5)])
-    assert read(path) == list(enumerate(events, 1))
+    assert read(place) == list(enumerate(events, 1))
 
 
-def test_some_of_it(store: SqliteStore, path: Path) -> None:
+def test_some_of_it(store: DurableStore, place: str) -> None:
     ours, theirs = history(4), VehicleSeen(2, "found", 50.0)
     keep(store, [*ours, theirs])
-    assert [event for _, event in read(path, Which(task=3))] == ours[4:6]
-    assert [event for _, event in read(path, Which(vehicle=2))] == [theirs]
-    assert [event for _, event in read(path, Which(vehicle=1))] == ours
-    late = read(path, Which(since=OFFSET + 13.5))  # the third is submitted before, ends after it
+    assert [event for _, event in read(place, Which(task=3))] == ours[4:6]
+    assert [event for _, event in read(place, Which(vehicle=2))] == [theirs]
+    assert [event for _, event in read(place, Which(vehicle=1))] == ours
+    late = read(place, Which(since=OFFSET + 13.5))  # the third is submitted before, ends after it
     assert [event for _, event in late] == [*ours[5:], theirs]
-    assert read(path, Which(task=3, vehicle=2)) == []
+    assert read(place, Which(task=3, vehicle=2)) == []
 
 
-def test_a_reader_that_stays_keeps_nothing_from_the_writer(store: SqliteStore, path: Path) -> None:
+def test_a_reader_that_stays_keeps_nothing_from_the_writer(path: Path) -> None:
+    with opened(path) as store:
+        _stay(store, path)
+
+
+def _stay(store: DurableStore, path: Path) -> None:
     keep(store, history(PAGE))
-    with closing(Journal(path)) as it, closing(sqlite3.connect(path)) as other:
+    with closing(journal_of(path)) as it, closing(sqlite3.connect(path)) as other:
         events = it.take(offset=OFFSET)
         assert len(list(islice(events, 10))) == 10  # the pager has no room for more
         keep(store, [VehicleSeen(1, "found", 99.0)], through=2 * PAGE + 1)
@@ -111,20 +124,26 @@ def test_a_reader_that_stays_keeps_nothing_from_the_writer(store: SqliteStore, p
         assert len(list(events)) == 2 * PAGE + 1 - 10
 
 
-def test_reading_changes_nothing_and_needs_no_lock(store: SqliteStore, path: Path) -> None:
+def test_reading_needs_no_lock_and_no_server(store: DurableStore, place: str) -> None:
     keep(store, history(3))
-    before = path.read_bytes()
-    assert len(read(path)) == 6
-    assert path.read_bytes() == before
+    assert len(read(place)) == 6
     store.close()
-    assert len(read(path)) == 6
-    with opened(path) as again:
+    assert len(read(place)) == 6
+    with opened(place) as again:
         assert again.load().ended_well
 
 
-def test_no_more_is_read_than_a_page_ahead(store: SqliteStore, path: Path) -> None:
+def test_reading_a_file_changes_nothing(path: Path) -> None:
+    with opened(path) as store:
+        keep(store, history(3))
+        before = path.read_bytes()
+        assert len(read(path)) == 6
+        assert path.read_bytes() == before
+
+
+def test_no_more_is_read_than_a_page_ahead(store: DurableStore, place: str) -> None:
     keep(store, history(3 * PAGE))
-    with closing(Journal(path)) as it:
+    with closing(journal_of(place)) as it:
         for number, _ in it.take(offset=OFFSET):
             ahead = int(repr(it).removesuffix(")").rpartition(" ")[2])
             assert number <= ahead < number + 2 * PAGE
@@ -164,32 +183,6 @@ def damaged(path: Path) -> None:
     path.write_bytes(b"not a database at all, but long enough to be one" * 40)
 
 
-def foreign(path: Path) -> None:
-    with closing(sqlite3.connect(path)) as connection:
-        connection.execute("CREATE TABLE theirs (x)")
-
-
-def newer(path: Path) -> None:
-    with opened(path):
-        pass
-    with closing(sqlite3.connect(path)) as connection:
-        connection.execute(f"PRAGMA user_version = {len(schema.MIGRATIONS) + 1}")
-
-
-def unknown_event(path: Path) -> None:
-    with opened(path) as store:
-        keep(store, [VehicleSeen(1, "found", 1.0)])
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute("UPDATE journal SET kind = 'Later'")
-
-
-def no_json(path: Path) -> None:
-    with opened(path) as store:
-        keep(store, [submitted(1)])
-    with closing(sqlite3.connect(path)) as connection, connection:
-        connection.execute("UPDATE tasks SET submitted = '[1, what'")
-
-
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
@@ -197,23 +190,62 @@ def no_json(path: Path) -> None:
         (lambda path: path.mkdir(), "does not exist"),
         (lambda path: path.touch(), "it is empty"),
         (damaged, "damaged"),
+    ],
+)
+def test_what_is_no_file_of_a_store_is_told_in_one_line(
+    path: Path, spoil: object, words: str
+) -> None:
+    assert callable(spoil)
+    spoil(path)
+    before = {each.name for each in path.parent.iterdir()}
+    assert words in refusal(str(path))
+    assert before >= {
+        each.name for each in path.parent.iterdir() if not each.name.endswith(("-wal", "-shm"))
+    }
+
+
+def refusal(place: str) -> str:
+    with pytest.raises(StoreError) as told:
+        read(place)
+    assert place in str(told.value)
+    assert "\n" not in str(told.value)
+    return str(told.value)
+
+
+def outdated(place: str) -> None:
+    with opened(place):
+        pass
+    newer(place)
+
+
+def unknown_event(place: str) -> None:
+    with opened(place) as store:
+        keep(store, [VehicleSeen(1, "found", 1.0)])
+    with tables(place) as connection:
+        connection.execute("UPDATE journal SET kind = 'Later'")
+
+
+def no_json(place: str) -> None:
+    with opened(place) as store:
+        keep(store, [submitted(1)])
+    with tables(place) as connection:
+        connection.execute("UPDATE tasks SET submitted = '[1, what'")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
         (foreign, "another program"),
-        (newer, "newer version"),
+        (outdated, "newer version"),
         (unknown_event, "this version does not know Later"),
         (no_json, "damaged"),
     ],
 )
-def test_what_is_no_store_is_told_in_one_line(path: Path, spoil: object, words: str) -> None:
-    assert callable(spoil)
-    spoil(path)
-    before = sorted(path.parent.iterdir())
-    with pytest.raises(StoreError, match=words) as told:
-        read(path)
-    assert str(path) in str(told.value)
-    assert "\n" not in str(told.value)
-    assert {each.name for each in before} >= {
-        each.name for each in path.parent.iterdir() if not each.name.endswith(("-wal", "-shm"))
-    }
+def test_what_this_version_cannot_read_is_told_in_one_line(
+    place: str, spoil: Callable[[str], None], words: str
+) -> None:
+    spoil(place)
+    assert words in refusal(place)
 
 
 def test_a_file_of_the_first_schema_is_read_without_being_changed(path: Path) -> None:

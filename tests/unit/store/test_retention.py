@@ -1,37 +1,42 @@
 """What is forgotten of the journal, in bounded steps."""
 
-import sqlite3
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from mav_tasks.settings import Retention
 from mav_tasks.store import retention
+from mav_tasks.store.connection import Connection
 from mav_tasks.store.retention import Trimmer
-from mav_tasks.store.schema import migrate
+from tests.kit.databases import is_file
+from tests.unit.store.samples import opened
 
 NOW = 1.8e9
 
 
 @pytest.fixture
-def connection() -> sqlite3.Connection:
-    made = sqlite3.connect(":memory:", isolation_level=None)
-    migrate(made)
-    return made
+def connection(place: str) -> Iterator[Connection]:
+    """The connection of a store's own database."""
+    with opened(place) as store:
+        database: Any = store._database
+        yield database._connection if is_file(place) else database._session
 
 
-def note(connection: sqlite3.Connection, *numbers: int, task: int | None = None) -> None:
+def note(connection: Connection, *numbers: int, task: int | None = None) -> None:
     connection.executemany(
-        "INSERT INTO journal VALUES (?, ?, 'x', ?, 1, '')",
+        "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
+        " VALUES (?, ?, 'x', ?, 1, '')",
         [(number, NOW, task) for number in numbers],
     )
 
 
-def left(connection: sqlite3.Connection) -> list[int]:
+def left(connection: Connection) -> list[int]:
     return [row[0] for row in connection.execute("SELECT number FROM journal ORDER BY number")]
 
 
 def test_events_of_no_task_are_bounded_in_number(
-    connection: sqlite3.Connection, monkeypatch: pytest.MonkeyPatch
+    connection: Connection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(retention, "MOST_OTHERS", 10)
     monkeypatch.setattr(retention, "SWEEP", 4)

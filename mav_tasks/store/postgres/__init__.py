@@ -1,0 +1,11 @@
+"""The store in a PostgreSQL database. Importing it raises StoreError without the package psycopg.
+
+``session`` sends SQL, ``ownership`` decides which server may write, ``database`` writes batches.
+"""
+
+from mav_tasks.errors import StoreError
+
+try:
+    import psycopg as psycopg
+except ImportError as error:  # it, or its compiled part
+    raise StoreError("needs the package psycopg: pip install 'mav-tasks[fleet]'") from error
