@@ -23,6 +23,7 @@ export function open(onRefused) {
     state.queues.clear();
     state.tasks.clear();
     state.texts.length = 0;
+    state.areTextsWhole = false;
     takeClock(all.now);
     state.stops = [];
     for (const stop of all.stops) takeStop(stop, all.now - stop.at);
