@@ -274,6 +274,24 @@ def test_tasks_are_cancelled_one_by_one_and_all(chromium: Any, it: Web) -> None:
         says(page, "#panel-queue", "Nothing waits.")
 
 
+def test_the_running_task_is_cancelled_or_killed(chromium: Any, it: Web, shots: Path) -> None:
+    with opened(chromium, it) as page:
+        for how, state in (("cancel", "cancelled"), ("kill", "killed")):
+            task, after = move(it, 9.0)["id"], move(it, 0.1)["id"]
+            page.click(f".task.now[data-task='{task}'] >> text=Cancel…")
+            says(page, ".box", "The rover slows down and stops; the task ends once it stands.")
+            page.select_option(".box [name=how]", how)
+            if how == "kill":
+                says(page, ".box", "The task ends at once, without waiting until the rover stands.")
+                says(page, ".box", "The queue is not paused: the next task starts once the rover")
+                judge(page, "a kill")
+                page.screenshot(path=str(shots / "kill.png"))
+            page.click(f".box >> text='{how.capitalize()} the task'")
+            page.wait_for_selector(".box", state="detached")
+            it.wait_for(after, "completed")  # as the dialogue said
+            assert it.task(task)["state"] == state
+
+
 PLAN = """{{"fileType": "Plan", "version": 1, "groundStation": "test",
 "mission": {{"version": 2, "firmwareType": 3, "vehicleType": 10, "cruiseSpeed": 1, "hoverSpeed": 1,
 "plannedHomePosition": [{0}, {1}, 0], "items": []}},

@@ -136,6 +136,7 @@ function drawFacts(found) {
   const kept = [...facts.children].filter((each) => each.dataset.kept);
   facts.replaceChildren(...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]), ...kept);
   show(release, task.state === "held" && acts.may("release"));
+  say(cancel, task.state === "cancelling" ? "Kill…" : "Cancel…");
   show(cancel, !OVER.has(task.state) && (acts.may("cancel") || acts.may("submit")));
 }
 

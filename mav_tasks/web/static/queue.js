@@ -92,7 +92,10 @@ function make(task, isCurrent) {
     show(pause, isCurrent && ["starting", "executing"].includes(shown.state));
     show(higher, !isCurrent && shown.priority < state.session.priority.most && acts.may("modify"));
     show(lower, !isCurrent && shown.priority > state.session.priority.least && acts.may("modify"));
-    show(cancel, shown.state !== "cancelling" && (acts.may("cancel") || acts.may("submit")));
+    const isCancelling = shown.state === "cancelling";
+    say(cancel, isCancelling ? "Kill…" : "Cancel…");
+    cancel.setAttribute("aria-label", `${isCancelling ? "Kill" : "Cancel"} task ${id}`);
+    show(cancel, acts.may("cancel") || acts.may("submit"));
     element.draggable = !isCurrent && acts.may("modify");
   };
   return { element, update };
