@@ -1,7 +1,9 @@
 """The web page in a real Chromium, on a real server and rover: each button and dialogue."""
 
 import gzip
+import os
 import re
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -498,6 +500,50 @@ def test_the_whole_page_is_small_and_soon_there(chromium: Any, it: Web) -> None:
 
 
 PAINTS = "performance.getEntriesByName('first-contentful-paint')"
+
+
+def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
+    chromium: Any, both: tuple[Stand, Web], it: Web, tmp_path: Path, shots: Path, other_version: str
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    task = move(it, 0.2)["id"]
+    with web(tmp_path, both[0], name="first") as first:
+        port = first.url.rpartition(":")[2]
+        with opened(chromium, first, path=f"/tasks/{task}", may_fail=True) as page:
+            says(page, "#link", "you: safety")
+            page.wait_for_selector("#panel-past >> text=Cancel…")
+            first.process.end(signal.SIGKILL)
+            says(page, "#banner", "The connection to the web process is lost")
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setenv("PYTHONPATH", other_version)
+                options = ("--role", "observer", "--listen", f"127.0.0.1:{port}")
+                with web(tmp_path, both[0], *options, name="second"):
+                    says(page, "#link", "you: observer")
+                    page.wait_for_selector("#panel-past >> text=Cancel…", state="hidden")
+                    page.click("#tab-queue")
+                    page.wait_for_selector(f"#panel-queue [data-task='{task}']")
+                    for button in ("Add a task…", "Cancel all…", "Resume…", "▲", "Cancel…"):
+                        assert not page.is_visible(f"button:text-is('{button}')"), button
+                    assert page.is_visible("#stop-all")
+                    says(page, "#news", "The web process has version 9.9.9 now, this page has")
+                    judge(page, "another version")
+                    page.screenshot(path=str(shots / "another version.png"))
+                    page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
+                    page.emulate_media(color_scheme="dark")
+                    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+                    page.screenshot(path=str(shots / "another version 360.png"))
+                    page.click("#news >> text=Load again")
+                    says(page, "#link", "you: observer")
+                    page.wait_for_selector("#news", state="hidden")
+
+
+@pytest.fixture
+def other_version(tmp_path: Path) -> str:
+    """PYTHONPATH of a process that takes itself for another version of mav-tasks."""
+    folder = tmp_path / "site" / "mav_tasks-9.9.9.dist-info"
+    folder.mkdir(parents=True)
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: mav-tasks\nVersion: 9.9.9\n")
+    return os.pathsep.join((str(folder.parent), os.environ.get("PYTHONPATH", "")))
 
 
 def test_a_token_opens_the_page_and_its_revocation_closes_it(

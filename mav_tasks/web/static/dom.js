@@ -47,6 +47,11 @@ export function focusNear(element) {
   (place ?? document.getElementById("main")).focus({ preventScroll: true });
 }
 
+/** Let the next "reconcile" update all elements of a list: something else that they show has changed. */
+export function renew(list) {
+  for (const row of list._rows?.values() ?? []) row.item = undefined;
+}
+
 /**
  * Make a list show items: elements of unchanged items stay as they are, with their focus.
  * @param {HTMLElement} list

@@ -22,6 +22,7 @@ export function begin() {
   onChange((names) => {
     if (names.has("route")) open();
     if (names.has("tasks") && state.task !== null && state.tasks.has(state.task)) drawFacts(state.tasks.get(state.task));
+    if (names.has("session") && task && task.id === state.task) drawFacts(task);
     if (["chosen", "tasks", "queues", "whole"].some((name) => names.has(name))) refresh();
   });
 }

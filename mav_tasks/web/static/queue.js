@@ -2,7 +2,7 @@
 
 import { failureWords } from "./api.js";
 import * as acts from "./acts.js";
-import { h, reconcile, say, show } from "./dom.js";
+import { h, reconcile, renew, say, show } from "./dom.js";
 import { openTaskForm } from "./task_form.js";
 import { planDrop } from "./plans.js";
 import { chosenQueue, onChange, state } from "./store.js";
@@ -31,7 +31,8 @@ let dragged = null;
 export function begin() {
   panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure, said, current, list, more, planDrop());
   onChange((names) => {
-    if (["queues", "chosen", "tasks", "clock", "whole"].some((name) => names.has(name))) draw();
+    if (names.has("session")) for (const each of [current, list]) renew(each);
+    if (["queues", "chosen", "tasks", "clock", "whole", "session"].some((name) => names.has(name))) draw();
   });
 }
 

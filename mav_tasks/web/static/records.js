@@ -32,7 +32,9 @@ export function begin() {
   panel.append(failure, one, all);
   scrub.addEventListener("input", () => go(run.begins + (Number(scrub.value) / 1000) * (run.ends - run.begins)));
   onChange((names) => {
-    if (names.has("session")) show(tab, Boolean(state.session && state.session.records));
+    if (!names.has("session")) return;
+    show(tab, Boolean(state.session && state.session.records));
+    if (tab.hidden && tab.ariaSelected === "true") document.getElementById("tab-queue").click();
   });
 }
 
