@@ -61,11 +61,17 @@ export function renew(list) {
  */
 export function reconcile(list, items, keyOf, make) {
   const known = list._rows ?? (list._rows = new Map());
-  const wanted = new Set();
+  const focused = list.contains(document.activeElement) ? document.activeElement : null;
+  const wanted = new Set(items.map(keyOf));
+  // first, so that what follows a row that is gone is not moved: an element that is moved loses its focus
+  for (const [key, row] of known) {
+    if (wanted.has(key)) continue;
+    row.element.remove();
+    known.delete(key);
+  }
   let before = null;
   for (const item of items) {
     const key = keyOf(item);
-    wanted.add(key);
     let row = known.get(key);
     if (!row) {
       row = make(item);
@@ -79,11 +85,7 @@ export function reconcile(list, items, keyOf, make) {
     if (place !== row.element) list.insertBefore(row.element, place);
     before = row.element;
   }
-  for (const [key, row] of known) {
-    if (wanted.has(key)) continue;
-    const hadFocus = row.element.contains(document.activeElement);
-    row.element.remove();
-    known.delete(key);
-    if (hadFocus) focusNear(list);
-  }
+  if (!focused || focused === document.activeElement) return;
+  if (!list.contains(focused)) focusNear(list);
+  else if (focused.checkVisibility()) focused.focus({ preventScroll: true });
 }
