@@ -241,9 +241,11 @@ def test_priorities_by_buttons_and_by_dragging(chromium: Any, it: Web) -> None:
     first, second, third = (move(it, 0.1 * n)["id"] for n in (1, 2, 3))
     with opened(chromium, it) as page:
         row = "#panel-queue [data-task='{}']"
-        page.click(f"{row.format(second)} >> text=▲")
+        page.focus(f"{row.format(second)} >> text=▲")
+        page.keyboard.press("Enter")
         says(page, row.format(second), "priority 6")
         page.wait_for_function(f"() => {ORDER}.join() === '{second},{first},{third}'")
+        assert page.evaluate(FOCUSED) == "▲"  # though its row has moved
         page.drag_and_drop(row.format(third), row.format(second))
         says(page, row.format(third), "priority 7")
         page.wait_for_function(f"() => {ORDER}.join() === '{third},{second},{first}'")
@@ -452,9 +454,68 @@ def test_tabs_and_the_time_line_work_by_keyboard(chromium: Any, it: Web) -> None
         assert page.evaluate("document.activeElement.id") == "tab-texts"
         page.keyboard.press("ArrowRight")
         assert page.is_visible("#panel-queue")
-        page.focus(f"#timeline .bar[title^='Task {task['id']}:']")
+        page.focus("#timeline select")
+        page.keyboard.press("Tab")
+        page.keyboard.press("ArrowRight")  # from the buttons to the bars
+        assert page.evaluate("document.activeElement.title").startswith(f"Task {task['id']}:")
         page.keyboard.press("Enter")
         says(page, "#panel-past h2", f"Task {task['id']}")
+
+
+def test_the_time_line_is_lengthened_and_moved(chromium: Any, it: Web, shots: Path) -> None:
+    soon, late = (move(it, 0.1, delay=delay)["id"] for delay in (120, 2 * 3600))
+    bar = "#timeline .bar[title^='Task {}:']"
+    with opened(chromium, it) as page:
+        page.wait_for_selector(bar.format(soon))
+        assert page.query_selector(bar.format(late)) is None
+        page.select_option("#timeline select", label="6 h")
+        page.wait_for_selector(bar.format(late))
+        present, near, far, strip = (
+            page.locator(name).bounding_box()
+            for name in (
+                "#timeline .now-line",
+                bar.format(soon),
+                bar.format(late),
+                "#timeline .strip",
+            )
+        )
+        hour = strip["width"] / 6
+        assert 0 < near["x"] - present["x"] < hour / 10
+        assert far["x"] - present["x"] == pytest.approx(2 * hour, abs=3)
+        judge(page, "time line")
+        page.screenshot(path=str(shots / "6 hours.png"))
+        page.reload()  # it is kept
+        page.wait_for_selector(bar.format(late))
+        box = page.locator("#timeline .strip").bounding_box()
+        page.mouse.move(box["x"] + 20, box["y"] + 45)
+        page.mouse.wheel(0, -100)  # 1 h
+        page.wait_for_selector(bar.format(late), state="detached")
+        page.wait_for_selector(bar.format(soon))
+        page.focus(bar.format(soon))
+        page.keyboard.press("-")  # 6 h
+        page.wait_for_selector(bar.format(late))
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("document.activeElement.title").startswith(f"Task {late}:")
+        page.keyboard.press("ArrowLeft")
+        page.keyboard.press("+")  # 1 h
+        for _ in range(8):  # 2 h
+            page.keyboard.press("PageDown")
+        page.wait_for_selector(bar.format(late))
+        assert page.get_attribute("#timeline button:text-is('Now')", "aria-pressed") == "false"
+        assert not page.is_visible("#timeline .now-line")
+        page.click("#timeline button:text-is('Now')")
+        page.wait_for_selector("#timeline .now-line")
+        page.mouse.move(box["x"] + box["width"] - 20, box["y"] + 45)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 20, box["y"] + 45, steps=4)  # almost an hour
+        page.mouse.up()
+        page.wait_for_selector("#timeline .now-line", state="hidden")
+    with opened(chromium, it, size=PHONE, scheme="dark") as page:
+        page.click("[data-show=map]")
+        page.select_option("#timeline select", label="24 h")
+        page.wait_for_selector(bar.format(late))
+        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+        page.screenshot(path=str(shots / "24 hours 360.png"))
 
 
 def test_hostile_words_are_only_words(chromium: Any, it: Web) -> None:
