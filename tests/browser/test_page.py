@@ -264,6 +264,63 @@ def test_priorities_by_buttons_and_by_dragging(chromium: Any, it: Web) -> None:
 ORDER = "[...document.querySelectorAll('#panel-queue [data-task]')].map((e) => e.dataset.task)"
 
 
+def test_a_finger_drags_a_task_by_its_handle_and_else_scrolls(
+    chromium: Any, it: Web, shots: Path
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    ids = [move(it, 0.1)["id"] for _ in range(12)]
+    last, first = ids[-1], ids[0]
+    with opened(chromium, it, size=PHONE, touch=True) as page:
+        page.click("[data-show=side]")
+        finger = page.context.new_cdp_session(page)
+
+        def touch(kind: str, x: float = 0.0, y: float = 0.0) -> None:
+            points = [] if kind == "touchEnd" else [{"x": x, "y": y}]
+            finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        def middle(selector: str) -> tuple[float, float]:
+            box = page.locator(selector).bounding_box()
+            return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+        row = "#panel-queue [data-task='{}']"
+        third = ids[2]
+        x, y = middle(f"{row.format(third)} .grip")
+        above = middle(row.format(first))[1]
+        touch("touchStart", x, y)
+        for part in (0.25, 0.5, 0.75, 1.0):
+            touch("touchMove", x, y + (above - y) * part)
+        says(page, "#panel-queue .said", f"Task {third} gets priority 6: it then runs before task")
+        assert page.is_visible(f"{row.format(first)}.over-above")
+        page.screenshot(path=str(shots / "finger.png"))
+        touch("touchEnd")
+        says(page, row.format(third), "priority 6")
+        page.wait_for_function(f"() => {ORDER}[0] === '{third}'")
+        assert not page.query_selector(".over-above, .dragged")
+
+        # at the edge of the list it scrolls
+        page.locator(row.format(first)).scroll_into_view_if_needed()
+        x, y = middle(f"{row.format(first)} .grip")
+        edge = page.locator(".side").bounding_box()
+        touch("touchStart", x, y)
+        for part in (0.5, 1.0):
+            touch("touchMove", x, y + (edge["y"] + edge["height"] - 10 - y) * part)
+        says(page, "#panel-queue .said", f"it then runs after task {last}.")
+        touch("touchEnd")
+        says(page, row.format(first), "priority 4")
+
+        # a finger beside the handle scrolls, and moves no task
+        order = page.evaluate(ORDER)
+        page.evaluate("() => document.querySelector('.side').scrollTo(0, 0)")
+        x, y = middle(f"{row.format(ids[3])} .whys")
+        touch("touchStart", x, y)
+        for step in range(1, 9):
+            touch("touchMove", x, y - 20 * step)
+        touch("touchEnd")
+        page.wait_for_function("() => document.querySelector('.side').scrollTop > 0")
+        assert page.evaluate(ORDER) == order
+        judge(page, "touch")
+
+
 def test_tasks_are_cancelled_one_by_one_and_all(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     first, *_ = (move(it, 0.1)["id"] for _ in range(3))
