@@ -260,12 +260,12 @@ export function showTrack(track) {
   const places = track.points.map(([, north, east]) => point({ north, east }, vehicle)).filter(Boolean);
   if (places.length < 2) return;
   L.polyline(places, { color: taskColour(track.id), weight: 7, opacity: 0.5, interactive: false }).addTo(taskTrackLayer);
-  lookAt(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 20 : 4 });
+  lookAt(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 21 : 4 });
 }
 
 /**
  * Show the ways of a recorded run instead of the present; null: the present again.
- * Return a function that shows the rovers at a place of their ways.
+ * Return a function that shows the rovers at a place of their ways; -1: before the first one.
  */
 export function showRun(run) {
   if (!runLayer) return () => {};
@@ -287,10 +287,11 @@ export function showRun(run) {
     if (places.length) shown.set(rover.vehicle, { mark: makeMark(rover.vehicle, places[0], runLayer), places });
     all.push(...places);
   }
-  if (all.length) lookAt(L.latLngBounds(all).pad(0.3), { maxZoom: hasTiles ? 20 : 4 });
+  if (all.length) lookAt(L.latLngBounds(all).pad(0.3), { maxZoom: hasTiles ? 21 : 4 });
   return (vehicle, index, heading) => {
     const { mark, places } = shown.get(vehicle);
-    mark.setLatLng(places[index]);
+    mark.setLatLng(places[Math.max(index, 0)]);
+    mark.getElement().classList.toggle("old", index < 0); // it comes to be there
     mark._svg.style.transform = `rotate(${heading ?? 0}deg)`;
   };
 }
