@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.browser.kit import DESKTOP, HOSTILE, PHONE, judge, move, opened, says, text_of
-from tests.kit.processes import Stand, process
+from tests.kit.processes import Stand, frozen, process
 from tests.kit.web import Web, web
 
 pytestmark = pytest.mark.slow
@@ -71,6 +71,26 @@ def test_stop_says_what_came_of_it_without_the_event_stream(chromium: Any, it: W
         page.click("#stop-all")
         says(page, "#stop-outcome", "STOP: acknowledged")
     assert it.wait_for(task["id"], "killed")
+
+
+def test_a_stream_that_goes_quiet_is_lost_after_15_s(chromium: Any, it: Web, shots: Path) -> None:
+    with opened(chromium, it, before=lambda page: page.clock.install()) as page:
+        page.wait_for_selector(".card:not(.old)")
+        page.clock.pause_at(page.evaluate("Date.now() / 1000 + 1"))
+        with frozen(it.process):  # its connections stay open
+            page.clock.run_for(14_000)
+            assert not page.is_visible("#banner"), text_of(page, "#banner")
+            page.clock.run_for(4_000)
+            says(page, "#banner", "The connection to the web process is lost; trying again.")
+            says(page, "#banner", "What you see is 1")
+            says(page, "#link", "no connection")
+            says(page, ".card.old", "link unknown")
+            says(page, ".card.old", "position is 1")
+            assert page.query_selector(".rover-mark.old")
+            page.screenshot(path=str(shots / "quiet.png"))
+        page.clock.resume()
+        page.wait_for_selector("#banner", state="hidden")
+        page.wait_for_selector(".card:not(.old)")
 
 
 def without_events(page: Any) -> None:
