@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 from math import asinh, floor, pi, radians, tan
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 
 from tests.browser.kit import HOSTILE, PHONE, judge, move, opened, says, text_of
-from tests.kit.processes import stand
+from tests.kit.processes import stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
 pytestmark = pytest.mark.slow
@@ -89,9 +90,17 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, Path
     ):
         has_rover(page)
         page.wait_for(move(page, DRIVEN)["id"], "completed")
-        for path in records.iterdir():  # the server writes on
-            shutil.copy(path, whole)
+        wait_until(partial(is_whole, page, records, whole), within=20, what="a whole recording")
         yield page, whole
+
+
+def is_whole(page: Web, records: Path, copies: Path) -> bool:
+    """Copy what the server has written so far; return whether the task's end is in it."""
+    for path in records.iterdir():
+        shutil.copy(path, copies)
+    (run,) = page.get("/records")["records"]
+    answer = page.client.get(f"/api/v1/records/{run['name']}")
+    return answer.is_success and "completed" in answer.text
 
 
 def test_tiles_of_a_file_are_below_the_rover(
