@@ -39,8 +39,8 @@ def routes(tiles: Tiles | None) -> list[Route | Mount]:
             return Response(status_code=404)
         place = (request.path_params[name] for name in ("zoom", "column", "row"))
         found = await run_in_threadpool(tiles.tile, *place)
-        if found is None:
-            return Response(status_code=404)
+        if found is None:  # a hole in the file is no error that a browser should log
+            return Response(status_code=204)
         data, kind = found
         return Response(data, media_type=kind, headers={"cache-control": "max-age=86400"})
 

@@ -30,15 +30,20 @@ def opened(
     scheme: str = "light",
     waits: bool = True,
     may_fail: bool = False,
+    touch: bool = False,
     before: Callable[[Any], None] = lambda _page: None,
 ) -> Iterator[Any]:
     """Yield a page; afterwards its console must hold no error.
 
     ``waits``: until it shows a rover. ``may_fail``: the browser may log answers that are refusals.
-    ``before`` is called with the page before it loads anything.
+    ``touch``: its pointer is a finger. ``before`` is called with the page before it loads anything.
     """
     context = chromium.new_context(
-        viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, locale="en-GB"
+        viewport={"width": size[0], "height": size[1]},
+        color_scheme=scheme,
+        locale="en-GB",
+        has_touch=touch,
+        is_mobile=touch,
     )
     page = context.new_page()
     page.set_default_timeout(LIMIT)

@@ -4,6 +4,7 @@ import signal
 import socket
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -19,6 +20,7 @@ from tests.kit.web import Web, has_rover, web
 
 pytestmark = pytest.mark.slow
 
+FAR = 4.0  # m; a rover drives on for a while when the server is gone
 AWAY = 30_000  # ms, for a process to start again and be noticed
 RELEASES = {
     "remainder": "The rover drives what is left of the task.",
@@ -92,42 +94,71 @@ def test_it_goes_on_after_the_server_and_the_web_process_were_killed(
                 assert page.evaluate("window.isMarked")  # it was not loaded again
 
 
-def test_a_task_that_the_servers_end_interrupted_is_released(
-    chromium: Any, lost: tuple[Stand, Web], tmp_path: Path, shots: Path
+def test_tasks_that_the_servers_end_interrupted_are_released(
+    chromium: Any, tmp_path: Path, shots: Path
 ) -> None:
-    it, page_process = lost
-    task = move(page_process, 4.0)
-    page_process.wait_for(task["id"], "executing")
-    wait_until(lambda: it.speed() > 0.3, within=15, what="the rover at speed")
-    with opened(chromium, page_process, may_fail=True) as page:
-        page.wait_for_selector(".task.now")
+    store, options = str(tmp_path / "tasks.sqlite3"), ("--count", str(len(RELEASES)))
+    with (
+        stand(tmp_path, serve_store=store, rover_options=options) as it,
+        web(tmp_path, it) as shown,
+        opened(chromium, shown, may_fail=True) as page,
+    ):
+        starts = [shown.get(f"/vehicles/{rover}")["north"] for rover in (1, 2, 3)]
+        goal = {"kind": "move", "distance": FAR}
+        tasks = {
+            how: shown.post(f"/vehicles/{rover}/tasks", {"goals": [goal]})["id"]
+            for rover, how in enumerate(RELEASES, 1)
+        }
+        after = shown.post("/vehicles/3/tasks", {"goals": [{"kind": "move", "distance": 0.2}]})
+        for rover, start in enumerate(starts, 1):
+            wait_until(partial(is_beyond, shown, rover, start), within=15, what="a moving rover")
         it.server.end(signal.SIGKILL)
         says(page, "#banner", "is it running?")
         with serve_again(it, tmp_path):
             page.wait_for_selector("#banner", state="hidden", timeout=AWAY)
-            says(page, ".task.now", "⚠ held")
-            page.screenshot(path=str(shots / "held.png"))
-            page.click(".task.now >> text=Release…")
-            for how, consequence in RELEASES.items():
+            begins = {}
+            for rover, how in enumerate(RELEASES, 1):
+                page.click(f".card .pick >> text='Rover {rover}'")
+                says(page, ".task.now", "⚠ held")
+                page.click(".task.now >> text=Release…")
                 page.select_option(".box [name=how]", how)
-                says(page, ".box", consequence)
-            judge(page, "a release")
-            page.screenshot(path=str(shots / "release.png"))
-            page.select_option(".box [name=how]", "remainder")
-            page_process.post("/vehicles/1/pause", {})  # somebody halts it meanwhile
-            page.click(".box >> text='Release'")
-            says(page, ".box .failure", "Something halted the rover after this page was drawn.")
-            page.click(".box >> text='Back'")
-            page.click(".task.now >> text=Release…")
-            page.select_option(".box [name=how]", "remainder")
-            page.click(".box >> text='Release'")
-            page.wait_for_selector(".box", state="detached")
-            if page.is_visible(".notice >> text=Resume…"):
-                page.click(".notice >> text=Resume…")
-                page.click(".box >> text='Resume'")
-            page_process.wait_for(task["id"], "completed")
-            page.click("#tab-past")
-            says(page, "#panel-past .task", "✓ completed")
+                says(page, ".box", RELEASES[how])
+                if how == "remainder":
+                    judge(page, "a release")
+                    page.screenshot(path=str(shots / "release.png"))
+                    shown.post(f"/vehicles/{rover}/pause", {})  # somebody halts it meanwhile
+                    page.click(".box >> text='Release'")
+                    says(page, ".box .failure", "Something halted the rover after this page was")
+                    page.click(".box >> text='Back'")
+                    page.click(".task.now >> text=Release…")
+                    page.select_option(".box [name=how]", how)
+                begins[how] = shown.get(f"/vehicles/{rover}")["north"]
+                page.click(".box >> text='Release'")
+                page.wait_for_selector(".box", state="detached")
+                if how == "skip":  # it halts the rover once more: the page must know
+                    page.wait_for_selector(".task.now", state="detached")
+                if shown.get(f"/vehicles/{rover}/queue")["paused"]:
+                    page.click(".notice >> text=Resume…")
+                    page.click(".box >> text='Resume'")
+                    page.wait_for_selector(".box", state="detached")
+            assert shown.wait_for(tasks["skip"], "cancelled")
+            shown.wait_for(after["id"], "completed")
+            says(page, "#panel-queue .what", "Rover 3: no task runs, 0 wait")
+            driven = {}
+            for rover, how in ((1, "remainder"), (2, "again")):
+                shown.wait_for(tasks[how], "completed")
+                driven[how] = shown.get(f"/vehicles/{rover}")["north"] - begins[how]
+                page.click(f".card .pick >> text='Rover {rover}'")
+                page.click("#tab-past")
+                says(page, "#panel-past .task", f"Task {tasks[how]}: move {FAR:g} m")
+                says(page, "#panel-past .task", "✓ completed")
+            assert driven["again"] == pytest.approx(FAR, abs=0.2)
+            assert 0 < driven["remainder"] < FAR - 0.2
+
+
+def is_beyond(it: Web, rover: int, start: float) -> bool:
+    """Return whether a rover has driven some way to the north."""
+    return bool(it.get(f"/vehicles/{rover}")["north"] > start + 0.3)
 
 
 def test_hostile_texts_names_and_files_and_a_rover_that_falls_silent(

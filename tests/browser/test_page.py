@@ -1,6 +1,5 @@
-"""The web page in a real Chromium, on a real server and rover: each button and dialogue."""
+"""Steering by the web page in a real Chromium, on a real rover: each button and dialogue."""
 
-import gzip
 import re
 from pathlib import Path
 from typing import Any
@@ -8,12 +7,9 @@ from typing import Any
 import pytest
 
 from tests.browser.kit import DESKTOP, HOSTILE, PHONE, judge, move, opened, says, text_of
-from tests.kit.processes import Stand, process
-from tests.kit.web import Web, web
+from tests.kit.web import Web
 
 pytestmark = pytest.mark.slow
-
-LARGEST = 250_000  # bytes of the whole page, compressed
 
 
 def test_a_new_user_finds_out_why_a_paused_task_does_not_run_and_gets_it_going(
@@ -59,32 +55,6 @@ def test_stop_acts_at_once_and_says_what_came_of_it(
         assert re.search(r"acknowledged \d+ ms · standing [\d.]+ m?s", outcome)
         page.screenshot(path=str(shots / f"stop by {how}.png"))
     assert it.task(task["id"])["state"] == "killed"
-
-
-def test_stop_says_what_came_of_it_without_the_event_stream(chromium: Any, it: Web) -> None:
-    task = move(it, 9.0)
-    it.wait_for(task["id"], "executing")
-    with opened(chromium, it, waits=False, may_fail=True, before=without_events) as page:
-        says(page, "#banner", "The connection to the web process is lost")
-        page.click("#stop-all")
-        says(page, "#stop-outcome", "STOP: acknowledged")
-    assert it.wait_for(task["id"], "killed")
-
-
-def without_events(page: Any) -> None:
-    page.route("**/api/v1/events", lambda route: route.abort())
-
-
-@pytest.mark.parametrize("hours", [-30, 30])
-def test_the_clock_of_the_device_may_be_wrong(chromium: Any, it: Web, hours: int) -> None:
-    task = move(it, 0.3)
-    it.wait_for(task["id"], "completed")
-    shifted = f"const now = Date.now; Date.now = () => now() + {hours} * 3600e3;"
-    with opened(chromium, it, before=lambda page: page.add_init_script(shifted)) as page:
-        page.wait_for_selector(f"#timeline .bar[title^='Task {task['id']}:']")
-        page.click("#stop-all")
-        says(page, "#stop-outcome", "STOP: acknowledged")
-        says(page, "#stop-outcome", "standing")
 
 
 def test_caps_lock_does_not_keep_the_key_from_stopping(chromium: Any, it: Web) -> None:
@@ -239,9 +209,11 @@ def test_priorities_by_buttons_and_by_dragging(chromium: Any, it: Web) -> None:
     first, second, third = (move(it, 0.1 * n)["id"] for n in (1, 2, 3))
     with opened(chromium, it) as page:
         row = "#panel-queue [data-task='{}']"
-        page.click(f"{row.format(second)} >> text=▲")
+        page.focus(f"{row.format(second)} >> text=▲")
+        page.keyboard.press("Enter")
         says(page, row.format(second), "priority 6")
         page.wait_for_function(f"() => {ORDER}.join() === '{second},{first},{third}'")
+        assert page.evaluate(FOCUSED) == "▲"  # though its row has moved
         page.drag_and_drop(row.format(third), row.format(second))
         says(page, row.format(third), "priority 7")
         page.wait_for_function(f"() => {ORDER}.join() === '{third},{second},{first}'")
@@ -260,6 +232,63 @@ def test_priorities_by_buttons_and_by_dragging(chromium: Any, it: Web) -> None:
 ORDER = "[...document.querySelectorAll('#panel-queue [data-task]')].map((e) => e.dataset.task)"
 
 
+def test_a_finger_drags_a_task_by_its_handle_and_else_scrolls(
+    chromium: Any, it: Web, shots: Path
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    ids = [move(it, 0.1)["id"] for _ in range(12)]
+    last, first = ids[-1], ids[0]
+    with opened(chromium, it, size=PHONE, touch=True) as page:
+        page.click("[data-show=side]")
+        finger = page.context.new_cdp_session(page)
+
+        def touch(kind: str, x: float = 0.0, y: float = 0.0) -> None:
+            points = [] if kind == "touchEnd" else [{"x": x, "y": y}]
+            finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        def middle(selector: str) -> tuple[float, float]:
+            box = page.locator(selector).bounding_box()
+            return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+        row = "#panel-queue [data-task='{}']"
+        third = ids[2]
+        x, y = middle(f"{row.format(third)} .grip")
+        above = middle(row.format(first))[1]
+        touch("touchStart", x, y)
+        for part in (0.25, 0.5, 0.75, 1.0):
+            touch("touchMove", x, y + (above - y) * part)
+        says(page, "#panel-queue .said", f"Task {third} gets priority 6: it then runs before task")
+        assert page.is_visible(f"{row.format(first)}.over-above")
+        page.screenshot(path=str(shots / "finger.png"))
+        touch("touchEnd")
+        says(page, row.format(third), "priority 6")
+        page.wait_for_function(f"() => {ORDER}[0] === '{third}'")
+        assert not page.query_selector(".over-above, .dragged")
+
+        # at the edge of the list it scrolls
+        page.locator(row.format(first)).scroll_into_view_if_needed()
+        x, y = middle(f"{row.format(first)} .grip")
+        edge = page.locator(".side").bounding_box()
+        touch("touchStart", x, y)
+        for part in (0.5, 1.0):
+            touch("touchMove", x, y + (edge["y"] + edge["height"] - 10 - y) * part)
+        says(page, "#panel-queue .said", f"it then runs after task {last}.")
+        touch("touchEnd")
+        says(page, row.format(first), "priority 4")
+
+        # a finger beside the handle scrolls, and moves no task
+        order = page.evaluate(ORDER)
+        page.evaluate("() => document.querySelector('.side').scrollTo(0, 0)")
+        x, y = middle(f"{row.format(ids[3])} .whys")
+        touch("touchStart", x, y)
+        for step in range(1, 9):
+            touch("touchMove", x, y - 20 * step)
+        touch("touchEnd")
+        page.wait_for_function("() => document.querySelector('.side').scrollTop > 0")
+        assert page.evaluate(ORDER) == order
+        judge(page, "touch")
+
+
 def test_tasks_are_cancelled_one_by_one_and_all(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     first, *_ = (move(it, 0.1)["id"] for _ in range(3))
@@ -272,6 +301,24 @@ def test_tasks_are_cancelled_one_by_one_and_all(chromium: Any, it: Web) -> None:
         says(page, ".box", "2 tasks will be cancelled.")
         page.click(".box >> text='Cancel them'")
         says(page, "#panel-queue", "Nothing waits.")
+
+
+def test_the_running_task_is_cancelled_or_killed(chromium: Any, it: Web, shots: Path) -> None:
+    with opened(chromium, it) as page:
+        for how, state in (("cancel", "cancelled"), ("kill", "killed")):
+            task, after = move(it, 9.0)["id"], move(it, 0.1)["id"]
+            page.click(f".task.now[data-task='{task}'] >> text=Cancel…")
+            says(page, ".box", "The rover slows down and stops; the task ends once it stands.")
+            page.select_option(".box [name=how]", how)
+            if how == "kill":
+                says(page, ".box", "The task ends at once, without waiting until the rover stands.")
+                says(page, ".box", "The queue is not paused: the next task starts once the rover")
+                judge(page, "a kill")
+                page.screenshot(path=str(shots / "kill.png"))
+            page.click(f".box >> text='{how.capitalize()} the task'")
+            page.wait_for_selector(".box", state="detached")
+            it.wait_for(after, "completed")  # as the dialogue said
+            assert it.task(task)["state"] == state
 
 
 PLAN = """{{"fileType": "Plan", "version": 1, "groundStation": "test",
@@ -398,115 +445,3 @@ def test_a_click_on_the_map_sends_turns_and_fences(chromium: Any, it: Web, shots
         (shape,) = it.get("/vehicles/1/fence")["shapes"]
         assert shape["radius"] == 30
     it.send("DELETE", "/vehicles/1/fence", None)
-
-
-def test_a_task_has_a_permalink_with_journal_and_timing(chromium: Any, it: Web) -> None:
-    task = move(it, 0.4)
-    it.wait_for(task["id"], "completed")
-    with opened(chromium, it, path=f"/tasks/{task['id']}") as page:
-        says(page, "#panel-past h2", f"Task {task['id']}: move 0.4 m")
-        says(page, "#panel-past dd", "intervals at 20 Hz")
-        says(page, "#panel-past .log li", "completed")
-        judge(page, "one task")
-        page.click("text=← Back to the list")
-        assert page.url == f"{it.url}/"
-        page.go_back()
-        says(page, "#panel-past h2", f"Task {task['id']}")
-        page.click("#tab-texts")
-        page.fill("#panel-texts [type=search]", f"task {task['id']}")
-        says(page, "#panel-texts .log li", f"Task {task['id']}")
-        page.select_option("#panel-texts select >> nth=0", "journal")
-        says(page, "#panel-texts .log li", "completed")
-    with opened(chromium, it, path="/tasks/987654", may_fail=True) as page:
-        says(page, "#panel-past .failure", "No task 987654")
-
-
-def test_tabs_and_the_time_line_work_by_keyboard(chromium: Any, it: Web) -> None:
-    task = move(it, 0.3)
-    it.wait_for(task["id"], "completed")
-    with opened(chromium, it) as page:
-        page.focus("#tab-queue")
-        page.keyboard.press("ArrowRight")
-        assert page.evaluate("document.activeElement.id") == "tab-past"
-        page.keyboard.press("ArrowRight")
-        assert page.evaluate("document.activeElement.id") == "tab-texts"
-        page.keyboard.press("ArrowRight")
-        assert page.is_visible("#panel-queue")
-        page.focus(f"#timeline .bar[title^='Task {task['id']}:']")
-        page.keyboard.press("Enter")
-        says(page, "#panel-past h2", f"Task {task['id']}")
-
-
-def test_hostile_words_are_only_words(chromium: Any, it: Web) -> None:
-    it.post("/vehicles/1/pause", {})
-    task = move(it, 0.1, label=HOSTILE)
-    with opened(chromium, it, path=f"/tasks/{task['id']}") as page:
-        says(page, "#panel-past h2", HOSTILE)
-        page.click("#tab-queue")
-        says(page, "#panel-queue .task", HOSTILE)
-        assert page.query_selector("img[src=x]") is None
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1280, 800), PHONE])
-def test_axe_finds_nothing_serious(
-    chromium: Any, it: Web, shots: Path, size: tuple[int, int], scheme: str
-) -> None:
-    it.post("/vehicles/1/pause", {})
-    move(it, 0.1, label="first")
-    move(it, 0.1)
-    with opened(chromium, it, size=size, scheme=scheme) as page:
-        for view in ("rovers", "map", "side") if size == PHONE else ("",):
-            if view:
-                page.click(f"[data-show={view}]")
-            for tab in ("past", "texts", "queue") if view in ("", "side") else ("",):
-                if tab:
-                    page.click(f"#tab-{tab}")
-                judge(page, f"{view} {tab}")
-            page.screenshot(path=str(shots / f"{scheme} {size[0]} {view}.png"))
-        page.click("text=Add a task…")
-        judge(page, "dialogue")
-        page.screenshot(path=str(shots / f"{scheme} {size[0]} dialogue.png"))
-
-
-def test_the_whole_page_is_small_and_soon_there(chromium: Any, it: Web) -> None:
-    with opened(chromium, it) as page:
-        page.wait_for_function(f"() => {PAINTS}.length === 1")
-        urls = page.evaluate("performance.getEntriesByType('resource').map((each) => each.name)")
-    files = {url for url in urls if not url.endswith("/events")} | {f"{it.url}/"}
-    sizes = {url: len(gzip.compress(it.client.get(url).content)) for url in files}
-    assert len(sizes) > 20
-    assert sum(sizes.values()) < LARGEST, sizes
-
-
-PAINTS = "performance.getEntriesByName('first-contentful-paint')"
-
-
-def test_a_token_opens_the_page_and_its_revocation_closes_it(
-    chromium: Any, both: tuple[Stand, Web], tmp_path: Path, shots: Path
-) -> None:
-    command = ("-m", "mav_tasks.cli", "web", "tokens")
-    file = ("--tokens", str(tmp_path / "web-tokens.json"))
-    with web(tmp_path, both[0], "--role", "", name="closed") as it:
-        add_one = (*command, "add", "anna", "--role", "observer", *file)
-        with process(*add_one, folder=tmp_path, name="add") as adding:
-            assert adding.popen.wait(20) == 0
-            token = adding.text.strip()
-        with opened(chromium, it, waits=False, may_fail=True) as page:
-            page.fill(".box [name=token]", "wrong")
-            page.click(".box [type=submit]")
-            says(page, ".box .failure", "There is no such token")
-            judge(page, "log in")
-            page.screenshot(path=str(shots / "log in.png"))
-            page.fill(".box [name=token]", token)
-            page.click(".box [type=submit]")
-            page.wait_for_selector(".card")
-            says(page, "#link", "you: anna, observer")
-            assert page.is_visible("#stop-all")
-            assert not page.is_visible("text=Add a task…")  # an observer's page
-            revoke_one = (*command, "revoke", "anna", *file)
-            with process(*revoke_one, folder=tmp_path, name="revoke") as revoking:
-                assert revoking.popen.wait(20) == 0
-            says(page, ".box", "This page needs a token.")  # the stream of events has ended
-            page.click("#stop-all")
-            says(page, "#stop-outcome", "STOP not acknowledged: a token is required")

@@ -5,7 +5,7 @@ import { newKey, post, request } from "./api.js";
 import { ask } from "./dialogs.js";
 import { h } from "./dom.js";
 import { state } from "./store.js";
-import { taskName } from "./words.js";
+import { ACTIVE, taskName } from "./words.js";
 
 export const may = (what) => Boolean(state.session && state.session.may.includes(what));
 
@@ -35,10 +35,24 @@ export function clear(queue) {
   });
 }
 
+const ENDS = {
+  cancel: "The rover slows down and stops; the task ends once it stands. The next task of the queue then starts, unless the queue is paused.",
+  kill: "The task ends at once, without waiting until the rover stands. The rover gets zero velocity and HOLD, unless somebody else has taken over. The queue is not paused: the next task starts once the rover stands. STOP keeps it from starting.",
+};
+const DEPENDS = "Tasks that run after it will fail.";
+
 export function cancel(task) {
-  const isDriven = ["starting", "executing", "paused", "held"].includes(task.state);
-  const words = [isDriven ? "The rover stops. The next task of the queue then starts, unless the queue is paused." : "It will not run.", "Tasks that run after it will fail."];
-  ask({ title: `Cancel task ${task.id}?`, words: [taskName(task), ...words], word: "Cancel the task", act: () => post(`/tasks/${task.id}/cancel`, {}) });
+  const title = `Cancel task ${task.id}?`;
+  const act = (body) => post(`/tasks/${task.id}/cancel`, body);
+  if (!ACTIVE.has(task.state)) return ask({ title, words: [taskName(task), "It will not run.", DEPENDS], word: "Cancel the task", act: () => act({}) });
+  // one that is being cancelled can only be ended sooner
+  const isCancelling = task.state === "cancelling";
+  const how = choice(isCancelling ? { kill: ENDS.kill } : ENDS, isCancelling ? "kill" : "cancel");
+  const form = ask({
+    title: isCancelling ? `End task ${task.id} at once?` : title, word: isCancelling ? "Kill the task" : "Cancel the task", words: [taskName(task)],
+    fields: h("div", {}, how.label, how.consequence, h("p", {}, DEPENDS)), act: () => act({ kill: how.select.value === "kill" }),
+  });
+  how.select.addEventListener("change", () => (form.querySelector("[type=submit]").textContent = how.select.value === "kill" ? "Kill the task" : "Cancel the task"));
 }
 
 const RELEASES = {
@@ -48,15 +62,21 @@ const RELEASES = {
 };
 
 export function release(task, epoch, how = "remainder") {
-  const select = h("select", { name: "how" }, ...Object.keys(RELEASES).map((each) => h("option", { value: each, selected: each === how }, each)));
-  const consequence = h("p", { "aria-live": "polite" }, RELEASES[how]);
-  select.addEventListener("change", () => (consequence.textContent = RELEASES[select.value]));
+  const { select, label, consequence } = choice(RELEASES, how);
   ask({
     title: `Release task ${task.id}?`, word: "Release",
     words: [taskName(task), `It is held: ${task.why ?? task.reason}.`],
-    fields: h("div", {}, h("label", { class: "whole" }, "How: ", select), consequence),
+    fields: h("div", {}, label, consequence),
     act: () => post(`/tasks/${task.id}/release`, { how: select.value, epoch }),
   });
+}
+
+/** A choice of ways, each with its consequence in words: the present one's is shown. */
+function choice(ways, first) {
+  const select = h("select", { name: "how" }, ...Object.keys(ways).map((each) => h("option", { value: each, selected: each === first }, each)));
+  const consequence = h("p", { "aria-live": "polite" }, ways[first]);
+  select.addEventListener("change", () => (consequence.textContent = ways[select.value]));
+  return { select, consequence, label: h("label", { class: "whole" }, "How: ", select) };
 }
 
 export function setPriority(task, priority) {

@@ -1,6 +1,6 @@
 // Begins everything: who am I, then the stream; tabs and views.
 
-import { failureWords, get } from "./api.js";
+import { failureWords } from "./api.js";
 import { say, show } from "./dom.js";
 import { logIn } from "./login.js";
 import * as map from "./map.js";
@@ -9,6 +9,7 @@ import * as queue from "./queue.js";
 import * as records from "./records.js";
 import * as routes from "./routes.js";
 import * as rovers from "./rovers.js";
+import * as session from "./session.js";
 import * as stop from "./stop.js";
 import { change, now, onChange, state } from "./store.js";
 import * as stream from "./stream.js";
@@ -34,7 +35,7 @@ start();
 
 async function start() {
   try {
-    state.session = await get("/session");
+    await session.read();
   } catch (error) {
     if (error.status === 401) return logIn(start);
     say(link, failureWords(error));

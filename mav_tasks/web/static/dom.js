@@ -47,6 +47,11 @@ export function focusNear(element) {
   (place ?? document.getElementById("main")).focus({ preventScroll: true });
 }
 
+/** Let the next "reconcile" update all elements of a list: something else that they show has changed. */
+export function renew(list) {
+  for (const row of list._rows?.values() ?? []) row.item = undefined;
+}
+
 /**
  * Make a list show items: elements of unchanged items stay as they are, with their focus.
  * @param {HTMLElement} list
@@ -56,11 +61,17 @@ export function focusNear(element) {
  */
 export function reconcile(list, items, keyOf, make) {
   const known = list._rows ?? (list._rows = new Map());
-  const wanted = new Set();
+  const focused = list.contains(document.activeElement) ? document.activeElement : null;
+  const wanted = new Set(items.map(keyOf));
+  // first, so that what follows a row that is gone is not moved: an element that is moved loses its focus
+  for (const [key, row] of known) {
+    if (wanted.has(key)) continue;
+    row.element.remove();
+    known.delete(key);
+  }
   let before = null;
   for (const item of items) {
     const key = keyOf(item);
-    wanted.add(key);
     let row = known.get(key);
     if (!row) {
       row = make(item);
@@ -74,11 +85,7 @@ export function reconcile(list, items, keyOf, make) {
     if (place !== row.element) list.insertBefore(row.element, place);
     before = row.element;
   }
-  for (const [key, row] of known) {
-    if (wanted.has(key)) continue;
-    const hadFocus = row.element.contains(document.activeElement);
-    row.element.remove();
-    known.delete(key);
-    if (hadFocus) focusNear(list);
-  }
+  if (!focused || focused === document.activeElement) return;
+  if (!list.contains(focused)) focusNear(list);
+  else if (focused.checkVisibility()) focused.focus({ preventScroll: true });
 }

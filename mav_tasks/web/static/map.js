@@ -5,6 +5,7 @@ import { confirmGoal, may } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { h, say } from "./dom.js";
 import { change, choose, dataAge, onChange, state } from "./store.js";
+import * as tracks from "./tracks.js";
 import { taskColour } from "./words.js";
 
 /* global L: Leaflet, loaded before this module */
@@ -13,7 +14,6 @@ const hint = document.getElementById("map-hint");
 const METRES = 111318.845; // of a degree of latitude, as the server converts
 const OLD = 3; // s
 const FENCE_RADIUS = 20; // m
-const PIECE = 200; // points of a track in one line
 const REFRESH = 30000; // ms
 
 let map = null;
@@ -26,9 +26,9 @@ let previewLayer = null;
 let taskTrackLayer = null;
 let runLayer = null;
 let isFitted = false;
+let awaited = null; // what to look at once the map has a size
 let isPast = false; // a recorded run is shown
 const marks = new Map();
-const drawnTracks = new Map();
 
 export function begin() {
   const tiles = state.session.tiles;
@@ -48,19 +48,23 @@ export function begin() {
   }
   map.setView([0, 0], hasTiles ? 3 : 3);
   [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer, runLayer] = Array.from({ length: 6 }, () => L.layerGroup().addTo(map));
+  tracks.begin(trackLayer, goalLayer, { point, here, placed });
   map.on("click", (event) => clicked(event.latlng));
   map.getContainer().addEventListener("keydown", (event) => {
     if (event.key !== "Enter" || event.target !== map.getContainer()) return;
     event.preventDefault();
     clicked(map.getCenter());
   });
-  new ResizeObserver(() => map.invalidateSize()).observe(document.getElementById("map"));
+  new ResizeObserver(() => {
+    map.invalidateSize();
+    if (awaited) lookAt(...awaited);
+  }).observe(document.getElementById("map"));
   onChange((names) => {
     if (names.has("whole")) reset();
     if (names.has("vehicles") || names.has("clock")) drawRovers();
     if (names.has("chosen")) centre();
-    if (["vehicles", "chosen", "queues"].some((name) => names.has(name))) drawTracks();
-    if (["queues", "chosen", "tasks"].some((name) => names.has(name))) drawGoals();
+    if (["vehicles", "chosen", "queues"].some((name) => names.has(name))) tracks.drawTracks();
+    if (["vehicles", "queues", "chosen", "tasks"].some((name) => names.has(name))) tracks.drawGoals();
     if (names.has("chosen") || names.has("ground")) drawGround();
   });
   setInterval(loadGround, REFRESH);
@@ -94,6 +98,9 @@ function point(place, vehicle) {
   if (!reference) return place.north === undefined ? null : [place.north, place.east];
   return [(latitude - reference.latitude) * METRES, (longitude - reference.longitude) * METRES * Math.cos((reference.latitude * Math.PI) / 180)];
 }
+
+/** What the points of a rover's frame depend on: if it changes, they are drawn again. */
+const placed = ({ origin }) => `${origin?.latitude} ${origin?.longitude} ${reference?.latitude} ${reference?.longitude}`;
 
 /** The place of a point of the map, for a goal: on earth, or in the rover's frame. */
 function placeAt(latlng, vehicle) {
@@ -165,10 +172,14 @@ function makeMark(id, at, layer = map) {
 }
 
 function fit() {
-  const places = [...marks.values()].map((mark) => mark.getLatLng());
   isFitted = true;
-  if (places.length === 1) map.setView(places[0], hasTiles ? 19 : 4);
-  else map.fitBounds(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 19 : 4 });
+  lookAt(L.latLngBounds([...marks.values()].map((mark) => mark.getLatLng())).pad(0.4), { maxZoom: hasTiles ? 19 : 4 });
+}
+
+// on a phone the map may be hidden, and then has no size to fit anything into: it is done when it is shown
+function lookAt(bounds, options) {
+  awaited = map.getSize().x ? null : [bounds, options];
+  if (!awaited) map.fitBounds(bounds, options);
 }
 
 function centre() {
@@ -177,94 +188,6 @@ function centre() {
   const words = state.chosen === null ? "" : `Click the map, or press Enter on it, to send rover ${state.chosen} there or to turn it.${hasTiles ? "" : " Grid in metres, north is up."}`;
   say(hint, words);
   loadGround();
-}
-
-function drawTracks() {
-  const shown = new Set();
-  for (const [id, track] of state.tracks) {
-    if (state.vehicles.size > 5 && id !== state.chosen) continue;
-    shown.add(id);
-    const vehicle = state.vehicles.get(id);
-    if (!vehicle) continue;
-    let drawn = drawnTracks.get(id);
-    if (!drawn) drawnTracks.set(id, (drawn = { shown: "", count: 0, line: null, layer: L.layerGroup().addTo(trackLayer) }));
-    if (id === state.chosen && !track.isWhole) loadTrack(id, track);
-    extendTrack(drawn, track, vehicle);
-  }
-  for (const [id, drawn] of drawnTracks) {
-    if (shown.has(id)) continue;
-    drawn.layer.remove();
-    drawnTracks.delete(id);
-  }
-}
-
-// Only what is new is drawn: a track has thousands of points and grows ten times a second. Short pieces, because
-// Leaflet projects all points of a line again when one is added.
-function extendTrack(drawn, track, vehicle) {
-  const { latitude, longitude } = vehicle.origin ?? {};
-  const shown = `${track.revision} ${latitude} ${longitude}`;
-  if (drawn.shown !== shown) {
-    Object.assign(drawn, { shown, count: 0, line: null });
-    drawn.layer.clearLayers();
-  }
-  const { points } = track;
-  for (; drawn.count < points.length; drawn.count += 1) {
-    const [, north, east, , task] = points[drawn.count];
-    const at = point({ north, east }, vehicle);
-    if (!at) continue;
-    if (drawn.line && drawn.task === task && drawn.places.length < PIECE) {
-      drawn.places.push(at);
-      continue;
-    }
-    finishPiece(drawn);
-    const last = drawn.places ? drawn.places[drawn.places.length - 1] : null;
-    drawn.places = last && drawn.count ? [last, at] : [at];
-    drawn.task = task;
-    drawn.line = L.polyline([], { color: taskColour(task), weight: task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }).addTo(drawn.layer);
-  }
-  finishPiece(drawn);
-}
-
-function finishPiece(drawn) {
-  if (drawn.line && drawn.line._count !== drawn.places.length) {
-    drawn.line.setLatLngs(drawn.places);
-    drawn.line._count = drawn.places.length;
-  }
-}
-
-async function loadTrack(id, track) {
-  track.isWhole = true;
-  try {
-    const { points } = await get(`/vehicles/${id}/track`);
-    const first = track.points.length ? track.points[0][0] : Infinity;
-    track.points.unshift(...points.filter((each) => each[0] < first));
-    track.revision += 1;
-    change("vehicles");
-  } catch {
-    track.isWhole = false;
-  }
-}
-
-function drawGoals() {
-  goalLayer.clearLayers();
-  for (const queue of state.queues.values()) {
-    if (state.vehicles.size > 5 && queue.vehicle !== state.chosen) continue;
-    const vehicle = state.vehicles.get(queue.vehicle);
-    if (!vehicle) continue;
-    let from = here(vehicle);
-    for (const task of [queue.current, ...queue.waiting.slice(0, 50)]) {
-      if (!task || !task.goals) continue;
-      const isNow = task === queue.current;
-      const places = task.goals.map((place) => point(place, vehicle)).filter(Boolean);
-      const colour = taskColour(task.id);
-      if (isNow && from && places.length) L.polyline([from, ...places.slice(Math.max(0, task.item - 1))], { color: colour, weight: 2, dashArray: "6 6", interactive: false }).addTo(goalLayer);
-      for (const [at, place] of places.entries()) {
-        const isNext = isNow && at === Math.min(Math.max(task.item, 1), places.length) - 1;
-        L.circleMarker(place, { radius: isNext ? 7 : 5, color: colour, weight: 2, opacity: isNow ? 1 : 0.45, fillOpacity: isNext ? 0.6 : 0.1, interactive: false }).addTo(goalLayer);
-      }
-      from = places.length ? places[places.length - 1] : from;
-    }
-  }
 }
 
 function drawGround() {
@@ -316,7 +239,7 @@ export function preview(plan, beside) {
   }
   drawShapes(plan.fence, vehicle, previewLayer);
   const bounds = L.featureGroup(previewLayer.getLayers()).getBounds();
-  if (bounds.isValid()) map.fitBounds(bounds.pad(0.2), { maxZoom: hasTiles ? 20 : 4, paddingBottomRight: covered(beside) });
+  if (bounds.isValid()) lookAt(bounds.pad(0.2), { maxZoom: hasTiles ? 20 : 4, paddingBottomRight: covered(beside) });
 }
 
 // how much of the map a dialogue covers from the right, else from below
@@ -337,12 +260,12 @@ export function showTrack(track) {
   const places = track.points.map(([, north, east]) => point({ north, east }, vehicle)).filter(Boolean);
   if (places.length < 2) return;
   L.polyline(places, { color: taskColour(track.id), weight: 7, opacity: 0.5, interactive: false }).addTo(taskTrackLayer);
-  map.fitBounds(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 20 : 4 });
+  lookAt(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 21 : 4 });
 }
 
 /**
  * Show the ways of a recorded run instead of the present; null: the present again.
- * Return a function that shows the rovers at a place of their ways.
+ * Return a function that shows the rovers at a place of their ways; -1: before the first one.
  */
 export function showRun(run) {
   if (!runLayer) return () => {};
@@ -364,10 +287,11 @@ export function showRun(run) {
     if (places.length) shown.set(rover.vehicle, { mark: makeMark(rover.vehicle, places[0], runLayer), places });
     all.push(...places);
   }
-  if (all.length) map.fitBounds(L.latLngBounds(all).pad(0.3), { maxZoom: hasTiles ? 20 : 4 });
+  if (all.length) lookAt(L.latLngBounds(all).pad(0.3), { maxZoom: hasTiles ? 21 : 4 });
   return (vehicle, index, heading) => {
     const { mark, places } = shown.get(vehicle);
-    mark.setLatLng(places[index]);
+    mark.setLatLng(places[Math.max(index, 0)]);
+    mark.getElement().classList.toggle("old", index < 0); // it comes to be there
     mark._svg.style.transform = `rotate(${heading ?? 0}deg)`;
   };
 }

@@ -15,35 +15,66 @@ const detail = h("section", { hidden: true, "aria-label": "One task" });
 const past = h("div", {}, list, none);
 
 export let tasks = [];
+const LISTED = 100;
+let wanted = LISTED;
 let loadedFor = "";
+let whole = { vehicle: 0, wanted: 0 }; // what "tasks" has
 
 export function begin() {
   panel.append(detail, past);
   onChange((names) => {
     if (names.has("route")) open();
     if (names.has("tasks") && state.task !== null && state.tasks.has(state.task)) drawFacts(state.tasks.get(state.task));
+    if (names.has("session") && task && task.id === state.task) drawFacts(task);
     if (["chosen", "tasks", "queues", "whole"].some((name) => names.has(name))) refresh();
   });
 }
 
-// the list is fetched again when a task of the rover has ended
+/** Load more finished tasks than the list has at first. */
+export function loadMore(count) {
+  if (count <= wanted) return;
+  wanted = count;
+  loadedFor = "";
+  refresh();
+}
+
+/** Since when all finished tasks are known, seconds since 1970; null: since the beginning. */
+export const knownSince = () => (tasks.length < whole.wanted || !tasks.length ? null : tasks[tasks.length - 1].endedAt);
+
+// The latest are fetched again when a task of the rover has ended; all of them, if older ones would be missing.
 async function refresh() {
   const queue = state.queues.get(state.chosen);
   if (!queue) return;
   const over = ["completed", "failed", "cancelled", "killed", "expired"].map((name) => queue.counts[name] ?? 0);
   const mark = `${queue.vehicle} ${over.join(" ")}`;
   if (mark === loadedFor) return;
+  const isWhole = whole.vehicle === queue.vehicle && whole.wanted === wanted;
   loadedFor = mark;
   try {
-    tasks = (await get(`/vehicles/${queue.vehicle}/history?limit=100`)).tasks;
+    let latest = await load(queue.vehicle, isWhole ? LISTED : wanted);
+    let older = [];
+    if (isWhole && latest.length === LISTED) { // else those are all
+      const ids = new Set(latest.map((task) => task.id));
+      older = tasks.filter((task) => !ids.has(task.id));
+      if (older.length === tasks.length) [latest, older] = [await load(queue.vehicle, wanted), []];
+    }
+    if (mark !== loadedFor) return; // another rover was chosen meanwhile, or another task has ended
+    tasks = [...latest, ...older].slice(0, wanted);
+    whole = { vehicle: queue.vehicle, wanted };
     say(none, tasks.length ? "" : "No task has ended yet.");
   } catch (error) {
+    if (mark !== loadedFor) return;
     loadedFor = "";
     say(none, failureWords(error));
   }
-  for (const task of tasks) task.endedAt = task.ended_ago === null ? null : serverNow() - task.ended_ago;
   reconcile(list, tasks, (task) => task.id, make);
   document.dispatchEvent(new CustomEvent("past"));
+}
+
+async function load(vehicle, count) {
+  const { tasks: found } = await get(`/vehicles/${vehicle}/history?limit=${count}`);
+  for (const task of found) task.endedAt = task.ended_ago === null ? null : serverNow() - task.ended_ago;
+  return found;
 }
 
 function make(task) {
@@ -136,6 +167,7 @@ function drawFacts(found) {
   const kept = [...facts.children].filter((each) => each.dataset.kept);
   facts.replaceChildren(...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]), ...kept);
   show(release, task.state === "held" && acts.may("release"));
+  say(cancel, task.state === "cancelling" ? "Kill…" : "Cancel…");
   show(cancel, !OVER.has(task.state) && (acts.may("cancel") || acts.may("submit")));
 }
 

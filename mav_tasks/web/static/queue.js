@@ -2,7 +2,8 @@
 
 import { failureWords } from "./api.js";
 import * as acts from "./acts.js";
-import { h, reconcile, say, show } from "./dom.js";
+import { makeDraggable } from "./dragging.js";
+import { h, reconcile, renew, say, show } from "./dom.js";
 import { openTaskForm } from "./task_form.js";
 import { planDrop } from "./plans.js";
 import { chosenQueue, onChange, state } from "./store.js";
@@ -21,17 +22,18 @@ const remedy = h("span");
 const go = h("button", { class: "small main-word", type: "button", onclick: () => acts.resume(chosenQueue()) }, "Resume…");
 const notice = h("div", { class: "notice", role: "status", hidden: true }, h("div", {}, why, " ", remedy), go);
 const failure = h("p", { class: "failure", role: "alert", hidden: true });
+// at the end: it moves no row away below a finger
 const said = h("p", { class: "said", "aria-live": "polite" });
+const SAID = 8000; // ms for which it stays
 const current = h("ol", { "aria-label": "The task that runs" });
 const list = h("ol", { "aria-label": "Waiting tasks, in the order in which they run" });
 const more = h("p", { class: "empty" });
 
-let dragged = null;
-
 export function begin() {
-  panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure, said, current, list, more, planDrop());
+  panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure, current, list, more, planDrop(), said);
   onChange((names) => {
-    if (["queues", "chosen", "tasks", "clock", "whole"].some((name) => names.has(name))) draw();
+    if (names.has("session")) for (const each of [current, list]) renew(each);
+    if (["queues", "chosen", "tasks", "clock", "whole", "session"].some((name) => names.has(name))) draw();
   });
 }
 
@@ -74,10 +76,12 @@ function make(task, isCurrent) {
   const release = h("button", { class: "small main-word", type: "button", onclick: () => acts.release(now(), chosenQueue().halt_epoch) }, "Release…");
   const cancel = button("Cancel…", () => acts.cancel(now()), `Cancel task ${id}`);
   const pause = button("Pause", async () => guarded(() => acts.pause(now().vehicle)), `Pause task ${id}`);
+  // ▲ and ▼ do the same for a keyboard and a screen reader
+  const grip = h("span", { class: "grip", "aria-hidden": "true", title: "Drag to another place" }, "⠿");
   const element = h("li", { class: isCurrent ? "task now" : "task", "data-task": String(id) },
-    h("div", { class: "line" }, h("span", { class: "title" }, link), h("span", { class: "row" }, release, pause, higher, lower, cancel)),
+    h("div", { class: "line" }, grip, h("span", { class: "title" }, link), h("span", { class: "row" }, release, pause, higher, lower, cancel)),
     bar, h("div", { class: "whys" }, mark, info, reason));
-  if (!isCurrent) makeDraggable(element, id);
+  if (!isCurrent) makeMovable(element, grip, id);
   const update = (shown) => {
     say(link, taskName(shown));
     say(mark, stateWords(shown));
@@ -92,8 +96,13 @@ function make(task, isCurrent) {
     show(pause, isCurrent && ["starting", "executing"].includes(shown.state));
     show(higher, !isCurrent && shown.priority < state.session.priority.most && acts.may("modify"));
     show(lower, !isCurrent && shown.priority > state.session.priority.least && acts.may("modify"));
-    show(cancel, shown.state !== "cancelling" && (acts.may("cancel") || acts.may("submit")));
-    element.draggable = !isCurrent && acts.may("modify");
+    const isCancelling = shown.state === "cancelling";
+    say(cancel, isCancelling ? "Kill…" : "Cancel…");
+    cancel.setAttribute("aria-label", `${isCancelling ? "Kill" : "Cancel"} task ${id}`);
+    show(cancel, acts.may("cancel") || acts.may("submit"));
+    const isMovable = !isCurrent && acts.may("modify");
+    show(grip, isMovable);
+    element.classList.toggle("movable", isMovable);
   };
   return { element, update };
 }
@@ -110,6 +119,14 @@ function waitWords(task) {
   else if (begin !== null) parts.push(`starts in ${duration(begin)}`);
   else if (end !== null) parts.push(`ends in ${duration(end)}`);
   return parts.join(" · ");
+}
+
+let telling = 0;
+
+function tell(words) {
+  clearTimeout(telling);
+  say(said, words);
+  if (words) telling = setTimeout(() => say(said, ""), SAID);
 }
 
 async function guarded(act) {
@@ -129,7 +146,7 @@ async function change(task, by) {
 async function rank(task, priority) {
   await guarded(async () => {
     await acts.setPriority(task, priority);
-    say(said, `Task ${task.id} has priority ${priority} now.`);
+    tell(`Task ${task.id} has priority ${priority} now.`);
   });
 }
 
@@ -147,33 +164,33 @@ export function placeAt(task, other, order) {
 
 const order = () => chosenQueue().waiting.map((task) => task.id);
 
-function makeDraggable(element, id) {
-  element.addEventListener("dragstart", (event) => {
-    dragged = id;
-    event.dataTransfer.effectAllowed = "move";
-    event.dataTransfer.setData("text/plain", `task ${id}`);
-    element.classList.add("dragged");
-  });
-  element.addEventListener("dragend", () => {
-    dragged = null;
-    element.classList.remove("dragged");
-    say(said, "");
-    for (const each of list.querySelectorAll(".over-above")) each.classList.remove("over-above");
-  });
-  element.addEventListener("dragover", (event) => {
-    if (dragged === null || dragged === id) return;
-    event.preventDefault();
-    element.classList.add("over-above");
-    const { priority, where } = placeAt(find(dragged), find(id), order());
-    say(said, priority === null ? `No priority puts task ${dragged} ${where} task ${id}.` : `Task ${dragged} gets priority ${priority}: it then runs ${where} task ${id}.`);
-  });
-  element.addEventListener("dragleave", () => element.classList.remove("over-above"));
-  element.addEventListener("drop", (event) => {
-    event.preventDefault();
-    if (dragged === null || dragged === id) return;
-    const { priority, where } = placeAt(find(dragged), find(id), order());
-    if (priority !== null) return rank(find(dragged), priority);
-    say(failure, `No priority puts task ${dragged} ${where} task ${id}: change that one first.`);
-    show(failure, true);
+function makeMovable(element, grip, id) {
+  let other = null;
+  const places = () => placeAt(find(id), find(other), order());
+  const mark = () => {
+    for (const each of list.querySelectorAll(".over-above, .over-below")) each.classList.remove("over-above", "over-below");
+  };
+  makeDraggable(element, {
+    grip,
+    may: () => acts.may("modify"),
+    rowAt: (below) => {
+      const row = below.closest("[data-task]");
+      return row && list.contains(row) ? row : null;
+    },
+    over: (row) => {
+      mark();
+      if (!row) return;
+      other = Number(row.dataset.task);
+      const { priority, where } = places();
+      row.classList.add(where === "before" ? "over-above" : "over-below");
+      tell(priority === null ? `No priority puts task ${id} ${where} task ${other}.` : `Task ${id} gets priority ${priority}: it then runs ${where} task ${other}.`);
+    },
+    drop: () => {
+      const { priority, where } = places();
+      if (priority !== null) return rank(find(id), priority);
+      tell("");
+      say(failure, `No priority puts task ${id} ${where} task ${other}: change that one first.`);
+      show(failure, true);
+    },
   });
 }

@@ -32,7 +32,9 @@ export function begin() {
   panel.append(failure, one, all);
   scrub.addEventListener("input", () => go(run.begins + (Number(scrub.value) / 1000) * (run.ends - run.begins)));
   onChange((names) => {
-    if (names.has("session")) show(tab, Boolean(state.session && state.session.records));
+    if (!names.has("session")) return;
+    show(tab, Boolean(state.session && state.session.records));
+    if (tab.hidden && tab.ariaSelected === "true") document.getElementById("tab-queue").click();
   });
 }
 
@@ -101,9 +103,13 @@ function go(wanted) {
   const parts = [clock(at)];
   for (const rover of run.vehicles) {
     const index = lastBefore(rover.points, at);
-    if (index < 0) continue;
-    const [, , , heading, metres] = rover.points[index];
+    if (!rover.points.length) continue;
+    const [, , , heading, metres] = rover.points[Math.max(index, 0)];
     place(rover.vehicle, index, heading);
+    if (index < 0) {
+      parts.push(`rover ${rover.vehicle}: no position yet`);
+      continue;
+    }
     const mode = rover.modes[lastBefore(rover.modes, at)];
     parts.push(`rover ${rover.vehicle}: ${mode ? `${mode[1]}${mode[2] ? ", armed" : ""}, ` : ""}${(metres ?? 0).toFixed(1)} m/s`);
   }

@@ -15,7 +15,7 @@ const MANY = 6; // rovers; beyond that only the chosen one shows all its facts
 
 export function begin() {
   onChange((names) => {
-    if (["vehicles", "queues", "chosen", "clock", "server", "whole"].some((name) => names.has(name))) draw();
+    if (["vehicles", "queues", "chosen", "clock", "server", "whole", "session"].some((name) => names.has(name))) draw();
   });
 }
 

@@ -8,6 +8,7 @@ export const state = {
   /** @type {Map<number, any>} */ tracks: new Map(),
   /** @type {Map<number, any>} */ grounds: new Map(), // fence, rally points and mission by rover
   texts: [],
+  areTextsWhole: false, // the web process has no older ones
   stops: [],
   chosen: null,
   task: null, // the task of a permalink
@@ -93,6 +94,13 @@ export function takeTask(task) {
 export function takeTexts(texts) {
   state.texts.push(...texts);
   if (state.texts.length > MOST_TEXTS) state.texts.splice(0, state.texts.length - MOST_TEXTS);
+  change("texts");
+}
+
+/** Take texts that are older than all that are known; "areAll": there are no others. */
+export function takeOlderTexts(texts, areAll) {
+  state.texts.unshift(...texts);
+  state.areTextsWhole = areAll || state.texts.length >= MOST_TEXTS;
   change("texts");
 }
 

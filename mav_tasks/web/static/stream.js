@@ -1,6 +1,7 @@
 // The event stream: the browser reconnects by itself, and resumes where it was.
 
 import { get } from "./api.js";
+import * as session from "./session.js";
 import { change, now, state, takeClock, takeQueue, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
 
 const SILENT = 15; // s; the web process sends something every 10 s
@@ -8,11 +9,14 @@ const AGAIN = 3000; // ms
 
 let source = null;
 let timer = 0;
+let triedAt = 0; // when the stream was opened
+let isSessionOld = false; // the stream was lost: another web process may answer now
 
 /** Open the stream. "onRefused" is called if the web process wants a token. */
 export function open(onRefused) {
   clearTimeout(timer);
   if (source) source.close();
+  triedAt = now();
   source = new EventSource("/api/v1/events");
   const on = (kind, take) => source.addEventListener(kind, (event) => {
     heard();
@@ -23,6 +27,7 @@ export function open(onRefused) {
     state.queues.clear();
     state.tasks.clear();
     state.texts.length = 0;
+    state.areTextsWhole = false;
     takeClock(all.now);
     state.stops = [];
     for (const stop of all.stops) takeStop(stop, all.now - stop.at);
@@ -45,7 +50,10 @@ export function open(onRefused) {
     state.server = server;
     change("server");
   });
-  source.onopen = () => heard();
+  source.onopen = () => {
+    heard();
+    readSession(onRefused);
+  };
   source.onerror = () => {
     lose();
     if (source.readyState !== EventSource.CLOSED) return; // it tries again by itself
@@ -56,13 +64,15 @@ export function open(onRefused) {
   };
 }
 
-/** Look whether a stream that seems open still brings something. */
+/** Look whether the stream still brings something; one that never answers is opened again, too. */
 export function watch(onRefused) {
   setInterval(() => {
-    if (state.stream.isOpen && now() - state.stream.heardAt > SILENT) {
+    const isTrying = source.readyState !== EventSource.CLOSED; // else it waits for a token, or to try again
+    if (isTrying && now() - Math.max(state.stream.heardAt, triedAt) > SILENT) {
       lose();
       open(onRefused);
     }
+    if (state.stream.isOpen) readSession(onRefused); // if it could not be read before
     change("clock");
   }, 1000);
 }
@@ -70,6 +80,17 @@ export function watch(onRefused) {
 function retry(onRefused) {
   clearTimeout(timer);
   timer = setTimeout(() => open(onRefused), AGAIN);
+}
+
+async function readSession(onRefused) {
+  if (!isSessionOld) return;
+  isSessionOld = false;
+  try {
+    await session.read();
+  } catch (problem) {
+    isSessionOld = true;
+    if (problem.status === 401) onRefused();
+  }
 }
 
 function heard() {
@@ -85,5 +106,6 @@ function lose() {
   if (state.stream.isLost) return;
   state.stream.isOpen = false;
   state.stream.isLost = true;
+  isSessionOld = true;
   change("server");
 }

@@ -1,0 +1,152 @@
+// Tracks and goals of rovers on the map. Where there are many rovers, only those of the chosen one, unless all are
+// wanted: then each has a share of the points and goals that one page draws, so that the cost has a bound.
+
+import { get } from "./api.js";
+import { show } from "./dom.js";
+import { keep, kept } from "./kept.js";
+import { change, serverNow, state } from "./store.js";
+import { taskColour } from "./words.js";
+
+/* global L: Leaflet, loaded before this module */
+
+const MANY = 5; // rovers; beyond that somebody must want all of them
+const MOST_POINTS = 20000; // of one rover; of all together where there are many
+const MOST_TASKS = 50; // of one rover, with their goals
+const MOST_GOALS = 2000; // of one rover; of all together where there are many
+const LATELY = 600; // s of the track of each of many rovers
+const PIECE = 200; // points of a track in one line
+
+const choice = document.getElementById("map-choice");
+const all = choice.querySelector("input");
+
+let place = null; // of the map: point(place, vehicle), here(vehicle), placed(vehicle)
+let trackLayer = null;
+let goalLayer = null;
+let isLoading = false;
+const tracks = new Map();
+const goals = new Map();
+
+/** Draw into two layers of the map. "on": its "point", "here" and "placed". */
+export function begin(layerOfTracks, layerOfGoals, on) {
+  [trackLayer, goalLayer, place] = [layerOfTracks, layerOfGoals, on];
+  all.checked = kept("all tracks", "") === "yes";
+  all.addEventListener("change", () => {
+    keep("all tracks", all.checked ? "yes" : "");
+    change("vehicles", "queues");
+  });
+}
+
+const areMany = () => state.vehicles.size > MANY;
+const isShown = (rover) => !areMany() || all.checked || rover === state.chosen;
+const shareOf = (most) => Math.ceil(most / (areMany() && all.checked ? state.vehicles.size : 1));
+
+/** Draw what is new of the tracks. */
+export function drawTracks() {
+  show(choice, areMany());
+  const most = shareOf(MOST_POINTS);
+  for (const [id, track] of state.tracks) {
+    const vehicle = state.vehicles.get(id);
+    if (!vehicle || !isShown(id)) continue;
+    let drawn = tracks.get(id);
+    if (!drawn) tracks.set(id, (drawn = { shown: "", layer: L.layerGroup().addTo(trackLayer) }));
+    if (id === state.chosen && !track.isWhole) load(id, track, 0);
+    else if (!track.isWhole && !track.isLate && !isLoading) load(id, track, serverNow() - LATELY);
+    extend(drawn, track, vehicle, most);
+  }
+  removeOthers(tracks);
+}
+
+function removeOthers(drawn) {
+  for (const [id, each] of drawn) {
+    if (isShown(id) && state.vehicles.has(id)) continue;
+    each.layer.remove();
+    drawn.delete(id);
+  }
+}
+
+// Only what is new is drawn: a track has thousands of points and grows ten times a second. Short pieces, because
+// Leaflet projects all points of a line again when one is added; the oldest piece goes once there are too many points.
+function extend(drawn, track, vehicle, most) {
+  const { points } = track;
+  const shown = `${track.revision} ${most} ${place.placed(vehicle)}`;
+  if (drawn.shown !== shown) {
+    Object.assign(drawn, { shown, count: Math.max(0, points.length - most), pieces: [], total: 0, last: null });
+    drawn.layer.clearLayers();
+  }
+  for (; drawn.count < points.length; drawn.count += 1) {
+    const [, north, east, , task] = points[drawn.count];
+    const at = place.point({ north, east }, vehicle);
+    if (!at) continue;
+    let piece = drawn.pieces[drawn.pieces.length - 1];
+    if (!piece || piece.task !== task || piece.places.length >= PIECE) {
+      finish(piece);
+      const line = L.polyline([], { color: taskColour(task), weight: task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }).addTo(drawn.layer);
+      piece = { task, line, places: drawn.last ? [drawn.last] : [], finished: 0 };
+      drawn.pieces.push(piece);
+    }
+    piece.places.push(at);
+    drawn.last = at;
+    drawn.total += 1;
+  }
+  finish(drawn.pieces[drawn.pieces.length - 1]);
+  while (drawn.total > most + PIECE && drawn.pieces.length > 1) {
+    const oldest = drawn.pieces.shift();
+    oldest.line.remove();
+    drawn.total -= oldest.places.length - 1;
+  }
+}
+
+function finish(piece) {
+  if (!piece || piece.finished === piece.places.length) return;
+  piece.line.setLatLngs(piece.places);
+  piece.finished = piece.places.length;
+}
+
+async function load(id, track, since) {
+  track[since ? "isLate" : "isWhole"] = true;
+  isLoading = true; // those of many rovers one after another
+  try {
+    const { points } = await get(`/vehicles/${id}/track?since=${since}`);
+    const first = track.points.length ? track.points[0][0] : Infinity;
+    track.points.unshift(...points.filter((each) => each[0] < first));
+    track.revision += 1;
+  } catch {
+    track.isWhole = track.isLate = false;
+  }
+  isLoading = false;
+  change("vehicles");
+}
+
+/** Draw the goals of the tasks: those of queues that have changed. */
+export function drawGoals() {
+  const most = shareOf(MOST_GOALS);
+  for (const queue of state.queues.values()) {
+    const vehicle = state.vehicles.get(queue.vehicle);
+    if (!vehicle || !isShown(queue.vehicle)) continue;
+    let drawn = goals.get(queue.vehicle);
+    if (!drawn) goals.set(queue.vehicle, (drawn = { layer: L.layerGroup().addTo(goalLayer) }));
+    const where = place.placed(vehicle);
+    if (drawn.queue === queue && drawn.most === most && drawn.where === where) continue;
+    Object.assign(drawn, { queue, most, where });
+    drawn.layer.clearLayers();
+    drawQueue(drawn.layer, queue, vehicle, most);
+  }
+  removeOthers(goals);
+}
+
+function drawQueue(layer, queue, vehicle, most) {
+  const from = place.here(vehicle);
+  let left = most;
+  for (const task of [queue.current, ...queue.waiting.slice(0, MOST_TASKS)]) {
+    if (!task || !task.goals) continue;
+    const isNow = task === queue.current;
+    const places = task.goals.slice(0, left).map((each) => place.point(each, vehicle)).filter(Boolean);
+    left -= places.length;
+    const colour = taskColour(task.id);
+    if (isNow && from && places.length) L.polyline([from, ...places.slice(Math.max(0, task.item - 1))], { color: colour, weight: 2, dashArray: "6 6", interactive: false }).addTo(layer);
+    for (const [at, each] of places.entries()) {
+      const isNext = isNow && at === Math.min(Math.max(task.item, 1), places.length) - 1;
+      L.circleMarker(each, { radius: isNext ? 7 : 5, color: colour, weight: 2, opacity: isNow ? 1 : 0.45, fillOpacity: isNext ? 0.6 : 0.1, interactive: false }).addTo(layer);
+    }
+  }
+}

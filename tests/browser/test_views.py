@@ -1,0 +1,284 @@
+"""What the web page shows in a real Chromium: one task, the time line, its rights, its looks."""
+
+import gzip
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.browser.kit import HOSTILE, PHONE, judge, move, opened, says, text_of
+from tests.kit.processes import Stand, frozen, process
+from tests.kit.web import Web, web
+
+pytestmark = pytest.mark.slow
+
+LARGEST = 250_000  # bytes of the whole page, compressed
+
+
+def test_stop_says_what_came_of_it_without_the_event_stream(chromium: Any, it: Web) -> None:
+    task = move(it, 9.0)
+    it.wait_for(task["id"], "executing")
+    with opened(chromium, it, waits=False, may_fail=True, before=without_events) as page:
+        says(page, "#banner", "The connection to the web process is lost")
+        page.click("#stop-all")
+        says(page, "#stop-outcome", "STOP: acknowledged")
+    assert it.wait_for(task["id"], "killed")
+
+
+def test_a_stream_that_goes_quiet_is_lost_after_15_s(chromium: Any, it: Web, shots: Path) -> None:
+    with opened(chromium, it, before=lambda page: page.clock.install()) as page:
+        page.wait_for_selector(".card:not(.old)")
+        page.clock.pause_at(page.evaluate("Date.now() / 1000 + 1"))
+        with frozen(it.process):  # its connections stay open
+            page.clock.run_for(14_000)
+            assert not page.is_visible("#banner"), text_of(page, "#banner")
+            page.clock.run_for(4_000)
+            says(page, "#banner", "The connection to the web process is lost; trying again.")
+            says(page, "#banner", "What you see is 1")
+            says(page, "#link", "no connection")
+            says(page, ".card.old", "link unknown")
+            says(page, ".card.old", "position is 1")
+            assert page.query_selector(".rover-mark.old")
+            page.screenshot(path=str(shots / "quiet.png"))
+        page.clock.resume()
+        page.wait_for_selector("#banner", state="hidden")
+        page.wait_for_selector(".card:not(.old)")
+
+
+def without_events(page: Any) -> None:
+    page.route("**/api/v1/events", lambda route: route.abort())
+
+
+def test_the_clock_of_the_device_may_be_wrong(chromium: Any, it: Web) -> None:
+    task = move(it, 0.3)
+    it.wait_for(task["id"], "completed")
+    for hours in (-30, 30):
+        with opened(chromium, it, before=shifted_by(hours)) as page:
+            page.wait_for_selector(f"#timeline .bar[title^='Task {task['id']}:']")
+            page.click("#stop-all")
+            says(page, "#stop-outcome", "STOP: acknowledged")
+            says(page, "#stop-outcome", "standing")
+
+
+def shifted_by(hours: int) -> Callable[[Any], None]:
+    """Return what shifts a page's clock before it loads."""
+    shifted = f"const now = Date.now; Date.now = () => now() + {hours} * 3600e3;"
+    return lambda page: page.add_init_script(shifted)
+
+
+def test_a_task_has_a_permalink_with_journal_and_timing(chromium: Any, it: Web) -> None:
+    task = move(it, 0.4)
+    it.wait_for(task["id"], "completed")
+    with opened(chromium, it, path=f"/tasks/{task['id']}") as page:
+        says(page, "#panel-past h2", f"Task {task['id']}: move 0.4 m")
+        says(page, "#panel-past dd", "intervals at 20 Hz")
+        says(page, "#panel-past .log li", "completed")
+        judge(page, "one task")
+        page.click("text=← Back to the list")
+        assert page.url == f"{it.url}/"
+        page.go_back()
+        says(page, "#panel-past h2", f"Task {task['id']}")
+        page.click("#tab-texts")
+        page.fill("#panel-texts [type=search]", f"task {task['id']}")
+        says(page, "#panel-texts .log li", f"Task {task['id']}")
+        page.select_option("#panel-texts select >> nth=0", "journal")
+        says(page, "#panel-texts .log li", "completed")
+    with opened(chromium, it, path="/tasks/987654", may_fail=True) as page:
+        says(page, "#panel-past .failure", "No task 987654")
+
+
+def test_tabs_and_the_time_line_work_by_keyboard(chromium: Any, it: Web) -> None:
+    task = move(it, 0.3)
+    it.wait_for(task["id"], "completed")
+    with opened(chromium, it) as page:
+        page.focus("#tab-queue")
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("document.activeElement.id") == "tab-past"
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("document.activeElement.id") == "tab-texts"
+        page.keyboard.press("ArrowRight")
+        assert page.is_visible("#panel-queue")
+        page.focus("#timeline select")
+        page.keyboard.press("Tab")
+        page.keyboard.press("ArrowRight")  # from the buttons to the bars
+        assert page.evaluate("document.activeElement.title").startswith(f"Task {task['id']}:")
+        page.keyboard.press("Enter")
+        says(page, "#panel-past h2", f"Task {task['id']}")
+
+
+def test_the_time_line_is_lengthened_and_moved(chromium: Any, it: Web, shots: Path) -> None:
+    soon, late = (move(it, 0.1, delay=delay)["id"] for delay in (120, 2 * 3600))
+    bar = "#timeline .bar[title^='Task {}:']"
+    with opened(chromium, it) as page:
+        page.wait_for_selector(bar.format(soon))
+        assert page.query_selector(bar.format(late)) is None
+        page.select_option("#timeline select", label="6 h")
+        page.wait_for_selector(bar.format(late))
+        present, near, far, strip = (
+            page.locator(name).bounding_box()
+            for name in (
+                "#timeline .now-line",
+                bar.format(soon),
+                bar.format(late),
+                "#timeline .strip",
+            )
+        )
+        hour = strip["width"] / 6
+        assert 0 < near["x"] - present["x"] < hour / 10
+        assert far["x"] - present["x"] == pytest.approx(2 * hour, abs=3)
+        judge(page, "time line")
+        page.screenshot(path=str(shots / "6 hours.png"))
+        page.reload()  # it is kept
+        page.wait_for_selector(bar.format(late))
+        box = page.locator("#timeline .strip").bounding_box()
+        page.mouse.move(box["x"] + 20, box["y"] + 45)
+        page.mouse.wheel(0, -100)  # 1 h
+        page.wait_for_selector(bar.format(late), state="detached")
+        page.wait_for_selector(bar.format(soon))
+        page.focus(bar.format(soon))
+        page.keyboard.press("-")  # 6 h
+        page.wait_for_selector(bar.format(late))
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("document.activeElement.title").startswith(f"Task {late}:")
+        page.keyboard.press("ArrowLeft")
+        page.keyboard.press("+")  # 1 h
+        for _ in range(8):  # 2 h
+            page.keyboard.press("PageDown")
+        page.wait_for_selector(bar.format(late))
+        assert page.get_attribute("#timeline button:text-is('Now')", "aria-pressed") == "false"
+        assert not page.is_visible("#timeline .now-line")
+        page.click("#timeline button:text-is('Now')")
+        page.wait_for_selector("#timeline .now-line")
+        page.mouse.move(box["x"] + box["width"] - 20, box["y"] + 45)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 20, box["y"] + 45, steps=4)  # almost an hour
+        page.mouse.up()
+        page.wait_for_selector("#timeline .now-line", state="hidden")
+    with opened(chromium, it, size=PHONE, scheme="dark") as page:
+        page.click("[data-show=map]")
+        page.select_option("#timeline select", label="24 h")
+        page.wait_for_selector(bar.format(late))
+        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+        page.screenshot(path=str(shots / "24 hours 360.png"))
+
+
+def test_hostile_words_are_only_words(chromium: Any, it: Web) -> None:
+    it.post("/vehicles/1/pause", {})
+    task = move(it, 0.1, label=HOSTILE)
+    with opened(chromium, it, path=f"/tasks/{task['id']}") as page:
+        says(page, "#panel-past h2", HOSTILE)
+        page.click("#tab-queue")
+        says(page, "#panel-queue .task", HOSTILE)
+        assert page.query_selector("img[src=x]") is None
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1280, 800), PHONE])
+def test_axe_finds_nothing_serious(
+    chromium: Any, it: Web, shots: Path, size: tuple[int, int], scheme: str
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    move(it, 0.1, label="first")
+    move(it, 0.1)
+    with opened(chromium, it, size=size, scheme=scheme) as page:
+        for view in ("rovers", "map", "side") if size == PHONE else ("",):
+            if view:
+                page.click(f"[data-show={view}]")
+            for tab in ("past", "texts", "queue") if view in ("", "side") else ("",):
+                if tab:
+                    page.click(f"#tab-{tab}")
+                judge(page, f"{view} {tab}")
+            page.screenshot(path=str(shots / f"{scheme} {size[0]} {view}.png"))
+        page.click("text=Add a task…")
+        judge(page, "dialogue")
+        page.screenshot(path=str(shots / f"{scheme} {size[0]} dialogue.png"))
+
+
+def test_the_whole_page_is_small_and_soon_there(chromium: Any, it: Web) -> None:
+    with opened(chromium, it) as page:
+        page.wait_for_function(f"() => {PAINTS}.length === 1")
+        urls = page.evaluate("performance.getEntriesByType('resource').map((each) => each.name)")
+    files = {url for url in urls if not url.endswith("/events")} | {f"{it.url}/"}
+    sizes = {url: len(gzip.compress(it.client.get(url).content)) for url in files}
+    assert len(sizes) > 20
+    assert sum(sizes.values()) < LARGEST, sizes
+
+
+PAINTS = "performance.getEntriesByName('first-contentful-paint')"
+
+
+def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
+    chromium: Any, both: tuple[Stand, Web], it: Web, tmp_path: Path, shots: Path, other_version: str
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    task = move(it, 0.2)["id"]
+    with web(tmp_path, both[0], name="first") as first:
+        port = first.url.rpartition(":")[2]
+        with opened(chromium, first, path=f"/tasks/{task}", may_fail=True) as page:
+            says(page, "#link", "you: safety")
+            page.wait_for_selector("#panel-past >> text=Cancel…")
+            first.process.end(signal.SIGKILL)
+            says(page, "#banner", "The connection to the web process is lost")
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setenv("PYTHONPATH", other_version)
+                options = ("--role", "observer", "--listen", f"127.0.0.1:{port}")
+                with web(tmp_path, both[0], *options, name="second"):
+                    says(page, "#link", "you: observer")
+                    page.wait_for_selector("#panel-past >> text=Cancel…", state="hidden")
+                    page.click("#tab-queue")
+                    page.wait_for_selector(f"#panel-queue [data-task='{task}']")
+                    for button in ("Add a task…", "Cancel all…", "Resume…", "▲", "Cancel…"):
+                        assert not page.is_visible(f"button:text-is('{button}')"), button
+                    assert page.is_visible("#stop-all")
+                    says(page, "#news", "The web process has version 9.9.9 now, this page has")
+                    judge(page, "another version")
+                    page.screenshot(path=str(shots / "another version.png"))
+                    page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
+                    page.emulate_media(color_scheme="dark")
+                    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+                    page.screenshot(path=str(shots / "another version 360.png"))
+                    page.click("#news >> text=Load again")
+                    says(page, "#link", "you: observer")
+                    page.wait_for_selector("#news", state="hidden")
+
+
+@pytest.fixture
+def other_version(tmp_path: Path) -> str:
+    """PYTHONPATH of a process that takes itself for another version of mav-tasks."""
+    folder = tmp_path / "site" / "mav_tasks-9.9.9.dist-info"
+    folder.mkdir(parents=True)
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: mav-tasks\nVersion: 9.9.9\n")
+    return os.pathsep.join((str(folder.parent), os.environ.get("PYTHONPATH", "")))
+
+
+def test_a_token_opens_the_page_and_its_revocation_closes_it(
+    chromium: Any, both: tuple[Stand, Web], tmp_path: Path, shots: Path
+) -> None:
+    command = ("-m", "mav_tasks.cli", "web", "tokens")
+    file = ("--tokens", str(tmp_path / "web-tokens.json"))
+    with web(tmp_path, both[0], "--role", "", name="closed") as it:
+        add_one = (*command, "add", "anna", "--role", "observer", *file)
+        with process(*add_one, folder=tmp_path, name="add") as adding:
+            assert adding.popen.wait(20) == 0
+            token = adding.text.strip()
+        with opened(chromium, it, waits=False, may_fail=True) as page:
+            page.fill(".box [name=token]", "wrong")
+            page.click(".box [type=submit]")
+            says(page, ".box .failure", "There is no such token")
+            judge(page, "log in")
+            page.screenshot(path=str(shots / "log in.png"))
+            page.fill(".box [name=token]", token)
+            page.click(".box [type=submit]")
+            page.wait_for_selector(".card")
+            says(page, "#link", "you: anna, observer")
+            assert page.is_visible("#stop-all")
+            assert not page.is_visible("text=Add a task…")  # an observer's page
+            revoke_one = (*command, "revoke", "anna", *file)
+            with process(*revoke_one, folder=tmp_path, name="revoke") as revoking:
+                assert revoking.popen.wait(20) == 0
+            says(page, ".box", "This page needs a token.")  # the stream of events has ended
+            page.click("#stop-all")
+            says(page, "#stop-outcome", "STOP not acknowledged: a token is required")
