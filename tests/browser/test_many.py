@@ -123,8 +123,10 @@ def test_tracks_and_goals_of_all_are_shown_if_they_are_wanted(
         if rover < 5:
             resume(many, rover)
             driven.append(task["id"])
-    for each in driven:
-        many.wait_for(each, "completed")
+    for each in driven:  # where 20 rovers and a browser share two processors, a server is late
+        while many.wait_for(each, "completed", "held")["state"] == "held":
+            body = {"halt_epoch": many.task(each)["halt_epoch"]}
+            many.post(f"/tasks/{each}/release", body)
     with opened(chromium, many, size=LAPTOP) as page:
         page.wait_for_function(f"() => document.querySelectorAll('.card').length === {ROVERS}")
         says(page, ".card.chosen", "Rover 1")

@@ -18,6 +18,9 @@ from typing import Protocol
 PRELOADED = ("mav_tasks.cli.app", "mav_tasks.cli.serve", "mav_tasks.serve", "rover_sim.__main__")
 MODULES = ("mav_tasks.cli", "rover_sim")
 
+#: what Python itself reads when it starts; a process that is to have other ones is not forked
+_OWN = {name: value for name, value in os.environ.items() if name.startswith("PYTHON")}
+
 _server = multiprocessing.get_context("forkserver")
 _server.set_forkserver_preload(list(PRELOADED))
 
@@ -51,7 +54,10 @@ def started(
     arguments: tuple[str, ...], *, python: str, output: Path, folder: Path, env: dict[str, str]
 ) -> Popen:
     """Run ``python`` with these arguments: forked if that is possible, else from nothing."""
-    if python == sys.executable and arguments[0] == "-m" and arguments[1] in MODULES:
+    is_same = python == sys.executable and _OWN.items() == {
+        (name, value) for name, value in env.items() if name.startswith("PYTHON")
+    }
+    if is_same and arguments[0] == "-m" and arguments[1] in MODULES:
         return Forked(arguments[1:], output=output, folder=folder, env=env)
     with output.open("wb") as sink:
         return subprocess.Popen(
