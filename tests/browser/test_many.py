@@ -125,7 +125,7 @@ def test_tracks_and_goals_of_all_are_shown_if_they_are_wanted(
             driven.append(task["id"])
     for each in driven:  # where 20 rovers and a browser share two processors, a server is late
         while many.wait_for(each, "completed", "held")["state"] == "held":
-            body = {"halt_epoch": many.task(each)["halt_epoch"]}
+            body = {"how": "again", "epoch": many.task(each)["halt_epoch"]}
             many.post(f"/tasks/{each}/release", body)
     with opened(chromium, many, size=LAPTOP) as page:
         page.wait_for_function(f"() => document.querySelectorAll('.card').length === {ROVERS}")
