@@ -1,5 +1,6 @@
 """An operation of the API: declared once, for its route, its checks and the OpenAPI document."""
 
+import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
 from mav_tasks.web.fields import Field, read_body
 from mav_tasks.web.identity import Identity
@@ -97,9 +99,21 @@ async def _json_of(request: Request) -> object:
     if not data:
         return {}
     try:
-        return await request.json()
+        return json.loads(data, object_pairs_hook=_object_of)
+    except Problem:
+        raise
     except (ValueError, RecursionError) as error:
         raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
+
+
+def _object_of(parts: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object. Raise Problem if a name comes twice: readers differ in which counts."""
+    found: dict[str, Any] = {}
+    for name, value in parts:
+        if name in found:
+            raise invalid(f"{shortened(name)[1:-1]}: it comes twice")
+        found[name] = value
+    return found
 
 
 def _queried(field: Field, query: Mapping[str, str]) -> Any:

@@ -50,7 +50,7 @@ class Problem(MavTasksError):
             "type": "about:blank",
             "title": self.title,
             "status": self.status,
-            "detail": self.detail,
+            "detail": self.detail.encode(errors="backslashreplace").decode(),  # it quotes requests
             "reason": self.reason,
         }
         return JSONResponse(

@@ -1,0 +1,58 @@
+"""Attacks on a real web process, beside a real server and rover. Each was one that worked."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.kit.processes import Stand, stand
+from tests.kit.web import Web, has_rover, web
+
+pytestmark = pytest.mark.slow
+
+JSON = {"content-type": "application/json"}
+HUGE = "1" + "0" * 400  # a whole number that no float holds
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stand, Web]]:
+    """One server, rover and web process for all of them."""
+    folder = tmp_path_factory.mktemp("hostile")
+    with stand(folder) as it, web(folder, it) as page:
+        has_rover(page)
+        yield it, page
+
+
+@pytest.fixture
+def page(both: tuple[Stand, Web]) -> Web:
+    """The web process."""
+    return both[1]
+
+
+GOALS = '{"goals": [{"kind": "%s", %s}]}'
+CIRCLE = '{"circle": {"latitude": %s, "longitude": 1, "radius": 1}}'
+BODIES = [
+    ("POST", "/vehicles/1/tasks", f'{{"goals": [{{"kind": "home"}}], "delay": {HUGE}}}', "delay"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", f'"distance": {HUGE}'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", f'"distance": -{HUGE}'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"distance": 1e308'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"distance": NaN'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"distance": 1e400'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("goto", '"north": 1e308, "east": 0'), "north"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("goto", '"north": 1e38, "east": 0'), "north"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("home", '"\\ud800": 1'), "\\ud800"),
+    ("POST", "/vehicles/1/tasks", '{"goals": [{"kind": "home"}], "label": "\\ud800"}', "label"),
+    ("PUT", "/vehicles/1/fence", CIRCLE % HUGE, "circle.latitude"),
+    ("POST", "/vehicles/1/resume", '{"epoch": 1, "epoch": 2}', "epoch: it comes twice"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"kind": "home"'), "kind: it comes twice"),
+    ("POST", "/stop", '{"identity": {"role": "safety"}}', "identity"),
+]
+
+
+@pytest.mark.parametrize(("method", "path", "body", "name"), BODIES)
+def test_no_value_of_a_part_breaks_it(
+    page: Web, method: str, path: str, body: str, name: str
+) -> None:
+    answer = page.client.request(method, f"/api/v1{path}", content=body, headers=JSON)
+    assert answer.status_code == 422, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert name in answer.json()["detail"]
