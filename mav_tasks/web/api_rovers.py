@@ -4,6 +4,7 @@ from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
 from mav_tasks.errors import NoSuchVehicle
 from mav_tasks.plan_files import PlanFile, parse_plan
 from mav_tasks.web.fields import Field
+from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import invalid
@@ -41,6 +42,7 @@ RALLY = [
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
     client, live = services.client, services.live
+    pauses = Flights()
 
     def known(call: Call) -> int:
         """Return the rover; raise NoSuchVehicle if the server does not have it."""
@@ -62,7 +64,8 @@ def operations(services: Services) -> list[Operation]:
         return found.form()
 
     async def pause(call: Call) -> None:
-        await client.pause(vehicle=known(call))
+        rover = known(call)
+        await pauses.join(rover, lambda: client.pause(vehicle=rover))
         await live.refresh(call.vehicle)
 
     async def resume(call: Call) -> None:

@@ -1,7 +1,10 @@
 """Attacks on a real web process, beside a real server and rover. Each was one that worked."""
 
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
+import httpx
 import pytest
 
 from tests.kit.processes import Stand, stand
@@ -56,3 +59,37 @@ def test_no_value_of_a_part_breaks_it(
     assert answer.status_code == 422, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     assert name in answer.json()["detail"]
+
+
+@contextmanager
+def flood(page: Web, send: Callable[[httpx.Client], object], *, clients: int) -> Iterator[None]:
+    """Let so many clients send requests one after the other for a ``with`` block."""
+    is_over = threading.Event()
+
+    def run() -> None:
+        with httpx.Client(base_url=page.url, timeout=30) as client:
+            while not is_over.is_set():
+                send(client)
+
+    threads = [threading.Thread(target=run) for _ in range(clients)]
+    for thread in threads:
+        thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        for thread in threads:
+            thread.join(60)
+
+
+def test_who_floods_stop_keeps_nobody_from_an_answer_nor_a_rover_stopped(page: Web) -> None:
+    def stop(client: httpx.Client) -> None:
+        client.post("/api/v1/stop", json={})
+
+    with flood(page, stop, clients=12):
+        answers = [page.post("/stop", {}) for _ in range(3)]
+    assert {each["phase"] for each in answers} == {"acknowledged"}
+    epoch = page.get("/vehicles/1/queue")["halt_epoch"]
+    page.post("/vehicles/1/resume", {"epoch": epoch})
+    task = page.post("/vehicles/1/tasks", {"goals": [{"kind": "move", "distance": 0.3}]})
+    page.wait_for(task["id"], "completed")
