@@ -112,6 +112,8 @@ class Guard:
             raise Problem(421, "Wrong host", words)
         if scope["method"] not in METHODS:
             raise Problem(405, "Method not allowed", f"{scope['method'][:20]}: not used here")
+        if scope["method"] == "HEAD" and scope["path"].startswith(API):
+            raise Problem(405, "Method not allowed", "HEAD: the API does not take it")
         if scope["method"] not in SAFE:
             _check_origin(headers, host, scheme=scope.get("scheme", "http"))
         _check_length(headers, most=_most_bytes(scope["path"]))

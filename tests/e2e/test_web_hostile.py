@@ -1,5 +1,7 @@
 """Attacks on a real web process, beside a real server and rover. Each was one that worked."""
 
+import select
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -93,3 +95,23 @@ def test_who_floods_stop_keeps_nobody_from_an_answer_nor_a_rover_stopped(page: W
     page.post("/vehicles/1/resume", {"epoch": epoch})
     task = page.post("/vehicles/1/tasks", {"goals": [{"kind": "move", "distance": 0.3}]})
     page.wait_for(task["id"], "completed")
+
+
+def test_a_client_that_does_not_read_is_closed(
+    page: Web,
+) -> None:
+    port = int(page.url.rpartition(":")[2])
+    pages = f"GET /static/leaflet/leaflet.js HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n" * 40
+    with socket.socket() as slow:
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        slow.connect(("127.0.0.1", port))
+        slow.sendall(pages.encode())
+        poll = select.poll()
+        poll.register(slow, select.POLLRDHUP | select.POLLHUP | select.POLLERR)
+        assert poll.poll(45_000), "it is still open"
+
+
+def test_a_request_without_a_body_for_the_event_stream_is_not_a_stream(page: Web) -> None:
+    assert page.client.head("/api/v1/events", timeout=5).status_code == 405
+    assert page.client.head("/api/v1/session").status_code == 405
+    assert page.client.head("/").status_code == 200
