@@ -72,7 +72,9 @@ def application(
 
 
 def _route(operation: Operation) -> Route:
-    path = operation.path.replace("{vehicle}", "{vehicle:int}").replace("{task}", "{task:int}")
+    path = operation.path
+    for name in ("vehicle", "task"):
+        path = path.replace(f"{{{name}}}", f"{{{name}:number}}")
     return Route(f"{ROOT}{path}", operation.run, methods=[operation.method])
 
 

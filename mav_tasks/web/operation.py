@@ -5,16 +5,37 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
+from mav_tasks.tasks.task import MAX_TASK_ID
 from mav_tasks.web.fields import Field, read_body
 from mav_tasks.web.identity import Identity
-from mav_tasks.web.problems import Problem, invalid, problem_of
+from mav_tasks.web.problems import Problem, invalid, not_found, problem_of
 
 ROOT = "/api/v1"
+MAX_VEHICLE = 255  # system ids of MAVLink
+WORDS = {"vehicle": "rover", "task": "task"}
+
+
+class NumberConvertor(Convertor[int]):
+    """A number in a path, of at most ten digits: a longer one is no address here."""
+
+    regex = "[0-9]{1,10}"
+
+    def convert(self, value: str) -> int:
+        """Return the number."""
+        return int(value)
+
+    def to_string(self, value: int) -> str:
+        """Return the text of a number."""
+        return str(value)
+
+
+register_url_convertor("number", NumberConvertor())
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +102,10 @@ class Operation:
         if self.may and self.may != "own" and self.may not in identity.may:
             words = f"{identity.name} has the role {identity.role}, which may not {self.may}"
             raise Problem(403, "Not allowed", words, reason="not_allowed")
+        for name, most in (("vehicle", MAX_VEHICLE), ("task", MAX_TASK_ID)):
+            number = request.path_params.get(name)
+            if number is not None and not 1 <= number <= most:
+                raise not_found(f"there is no {WORDS[name]} {number}: ids are 1 to {most}")
         body: Mapping[str, Any] = {}
         if self.body is not None:
             body = read_body(self.body, await _json_of(request))

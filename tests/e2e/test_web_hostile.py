@@ -63,6 +63,22 @@ def test_no_value_of_a_part_breaks_it(
     assert name in answer.json()["detail"]
 
 
+NINES = "9" * 5000  # more digits than Python converts
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *(f"/api/v1/tasks/{number}" for number in (0, 1 << 30, 9_999_999_999, NINES)),
+        *(f"/api/v1/vehicles/{number}/queue" for number in (0, 256, 9_999_999_999, NINES)),
+        *(f"/tasks/{NINES}", f"/tiles/1/{NINES}/1", f"/tiles/1/1/{NINES}", f"/tiles/{NINES}/1/1"),
+    ],
+)
+def test_an_id_out_of_range_is_not_found_and_never_asked_for(page: Web, path: str) -> None:
+    answer = page.client.get(path, timeout=5)  # a request that nobody answers takes 10 s
+    assert answer.status_code == 404
+
+
 @contextmanager
 def flood(page: Web, send: Callable[[httpx.Client], object], *, clients: int) -> Iterator[None]:
     """Let so many clients send requests one after the other for a ``with`` block."""
