@@ -3,6 +3,7 @@
 from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
 from mav_tasks.errors import NoSuchVehicle
 from mav_tasks.plan_files import PlanFile, parse_plan
+from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
 from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
@@ -10,14 +11,6 @@ from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 
-EPOCH = Field(
-    "epoch",
-    "integer",
-    "halt_epoch of the queue that you have seen: if anything has halted the rover since then, the"
-    " request is refused (stale)",
-    True,
-    0,
-)
 LIMIT = Field("limit", "integer", "at most so many tasks", False, 0, 10_000)
 PLACE = {
     "type": "object",
@@ -69,7 +62,7 @@ def operations(services: Services) -> list[Operation]:
         await live.refresh(call.vehicle)
 
     async def resume(call: Call) -> None:
-        await client.resume(epoch=call.body["epoch"], vehicle=known(call))
+        await client.resume(epoch=seen_epoch(call.body), vehicle=known(call))
         await live.refresh(call.vehicle)
 
     async def clear(call: Call) -> None:

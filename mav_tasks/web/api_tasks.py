@@ -8,6 +8,7 @@ from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import NoSuchVehicle
 from mav_tasks.plan_files import parse_plan
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
+from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
@@ -54,7 +55,7 @@ RELEASE = (
         True,
         choices=("again", "remainder", "skip"),
     ),
-    Field("epoch", "integer", "halt_epoch that you have seen", True, 0),
+    EPOCH,
 )
 
 
@@ -122,8 +123,8 @@ def operations(services: Services) -> list[Operation]:
 
     async def release(call: Call) -> None:
         services.check_may("release", call.task, call.identity)
+        epoch, how = seen_epoch(call.body), call.body["how"]
         status = await status_of(call)
-        epoch, how = call.body["epoch"], call.body["how"]
         await client.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
         live.hurry(status.vehicle)
 

@@ -210,9 +210,9 @@ def test_a_stop_says_what_came_of_it(page: Web) -> None:
 def test_a_held_task_is_released_with_the_epoch_that_was_seen(page: Web) -> None:
     task = move(page, 3.0)
     page.wait_for(task["id"], "executing")
-    refused = page.send("POST", f"/tasks/{task['id']}/release", {"how": "again", "epoch": 0})
+    refused = page.send("POST", f"/tasks/{task['id']}/release", {"how": "again", "epoch": 1})
     assert refused.status_code == 409
-    wrong = page.send("POST", f"/tasks/{task['id']}/release", {"how": "maybe", "epoch": 0})
+    wrong = page.send("POST", f"/tasks/{task['id']}/release", {"how": "maybe", "epoch": 1})
     assert wrong.status_code == 422
     assert "expected one of again, remainder, skip" in wrong.json()["detail"]
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import httpx
 import pytest
 
-from tests.kit.processes import Stand, stand
+from tests.kit.processes import Stand, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
 pytestmark = pytest.mark.slow
@@ -131,3 +131,66 @@ def test_a_request_without_a_body_for_the_event_stream_is_not_a_stream(page: Web
     assert page.client.head("/api/v1/events", timeout=5).status_code == 405
     assert page.client.head("/api/v1/session").status_code == 405
     assert page.client.head("/").status_code == 200
+
+
+@pytest.mark.parametrize("epoch", [0, 1 << 24, 1 << 25, -1, 1 << 32, 1.0, True])
+def test_an_epoch_that_names_no_halt_does_not_release_a_stop(page: Web, epoch: object) -> None:
+    page.post("/stop", {})
+    for path, more in (("/vehicles/1/resume", {}), ("/tasks/1/release", {"how": "again"})):
+        refused = page.send("POST", path, {"epoch": epoch} | more)
+        assert refused.status_code == 422
+        assert refused.json()["detail"].startswith("epoch")
+    assert page.get("/vehicles/1/queue")["paused"] == "stopped"
+
+
+def test_nothing_but_a_resume_that_has_seen_it_ends_a_stop(both: tuple[Stand, Web]) -> None:
+    """Each operation that may set a rover in motion, by a page that shows an older STOP."""
+    it, page = both
+    page.post("/stop", {"clear": True})
+    seen = page.get("/vehicles/1/queue")["halt_epoch"]
+    page.post("/vehicles/1/resume", {"epoch": seen})
+    move = {"goals": [{"kind": "move", "distance": 5}]}
+    task = page.post("/vehicles/1/tasks", move)["id"]
+    later = page.post("/vehicles/1/tasks", move | {"delay": 1000})["id"]
+    page.wait_for(task, "executing")
+    newer = page.post("/stop", {})
+    assert newer["phase"] == "acknowledged"
+    wait_until(lambda: it.speed() < 0.01, within=15, what="a rover that stands")
+    where = it.truth()[-1]
+    rover = page.get("/vehicles/1")
+    item = "1\t0\t3\t16\t0\t0\t0\t0\t{}\t{}\t0\t1\n".format(*_near(rover))
+    plan = "QGC WPL 110\n0" + item[1:] + item
+    tries: list[tuple[str, str, object]] = [
+        ("POST", "/vehicles/1/resume", {"epoch": seen}),
+        ("POST", f"/tasks/{task}/release", {"how": "again", "epoch": seen}),
+        ("POST", f"/tasks/{later}/release", {"how": "remainder", "epoch": seen}),
+        ("POST", "/vehicles/1/tasks", move | {"priority": 10}),
+        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "rotate", "angle": 90}]}),
+        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "home"}], "priority": 10}),
+        ("POST", "/vehicles/1/missions", {"text": plan, "priority": 10}),
+        ("PATCH", f"/tasks/{later}", {"delay": 0, "priority": 10, "preemptive": True}),
+        ("POST", "/vehicles/1/pause", {}),
+        ("PUT", "/vehicles/1/fence", {"circle": _circle(rover)}),
+        ("DELETE", "/vehicles/1/fence", None),
+        ("POST", f"/tasks/{task}/cancel", {}),
+        ("POST", f"/tasks/{later}/cancel", {"kill": True}),
+        ("POST", "/vehicles/1/clear", {"running_too": True}),
+        ("POST", "/vehicles/1/tasks", move | {"priority": 10}),
+    ]
+    codes = {path: page.send(method, path, body).status_code for method, path, body in tries}
+    assert codes["/vehicles/1/resume"] == 409
+    assert codes["/vehicles/1/missions"] == 201
+    queue = page.get("/vehicles/1/queue")
+    assert (queue["paused"], queue["running"]) == ("stopped", None)
+    assert queue["halt_epoch"] > seen
+    now = it.truth()[-1]
+    assert abs(now["north"] - where["north"]) + abs(now["east"] - where["east"]) < 0.05
+    page.post("/stop", {"clear": True})
+
+
+def _near(rover: dict[str, float]) -> tuple[float, float]:
+    return rover["latitude"] + 3e-5, rover["longitude"]
+
+
+def _circle(rover: dict[str, float]) -> dict[str, float]:
+    return {"latitude": rover["latitude"], "longitude": rover["longitude"], "radius": 50.0}
