@@ -63,6 +63,8 @@ def operations(services: Services) -> list[Operation]:
         token = services.tokens.of_text(call.body["token"])
         if token is None:
             raise Problem(401, "Unknown token", "there is no such token, or it was revoked")
+        if call.session is not None:
+            services.sessions.end(call.session)
         response = Response(status_code=204)
         number = services.sessions.begin(token)
         response.set_cookie(

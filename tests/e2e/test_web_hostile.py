@@ -5,10 +5,13 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import httpx
 import pytest
 
+from mav_tasks.web import tokens
+from mav_tasks.web.sessions import COOKIE
 from tests.kit.processes import Stand, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
@@ -194,3 +197,30 @@ def _near(rover: dict[str, float]) -> tuple[float, float]:
 
 def _circle(rover: dict[str, float]) -> dict[str, float]:
     return {"latitude": rover["latitude"], "longitude": rover["longitude"], "radius": 50.0}
+
+
+def test_who_logs_in_again_and_again_ends_nobody_elses_session(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    kept = tmp_path / "web-tokens.json"
+    anna, eve = (tokens.add(kept, *each) for each in (("anna", "operator"), ("eve", "observer")))
+    with web(tmp_path, both[0], "--role", "", name="closed") as page:
+        page.client.cookies.clear()
+        assert page.send("POST", "/session", {"token": anna}).status_code == 204
+        anna_s = page.client.cookies[COOKIE]
+        with httpx.Client(base_url=page.url) as other:
+            number = 0
+            while number < 1010:  # more than all sessions that there may be
+                other.cookies.clear()
+                status = other.post("/api/v1/session", json={"token": eve}).status_code
+                assert status in (204, 429)
+                number += status == 204
+                if status == 204 and number == 1:
+                    eves_first = other.cookies[COOKIE]
+        assert page.client.cookies[COOKIE] == anna_s
+        assert page.post("/stop", {})["phase"] == "acknowledged"
+        fixed = page.client.get("/api/v1/session", headers={"cookie": f"{COOKIE}={eves_first}"})
+        assert fixed.status_code == 401
+        assert page.send("POST", "/session", {"token": anna}).status_code == 204
+        old = httpx.get(f"{page.url}/api/v1/session", headers={"cookie": f"{COOKIE}={anna_s}"})
+        assert old.status_code == 401  # a login ends the session before it
