@@ -15,8 +15,10 @@ import uvicorn
 
 from mav_tasks.client.aio import Client
 from mav_tasks.errors import UsageError
+from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.settings import Log
 from mav_tasks.web.application import application
 from mav_tasks.web.connections import PatientProtocol
 from mav_tasks.web.identity import Identity
@@ -31,6 +33,7 @@ from mav_tasks.web.tokens import Tokens
 #: not the address of a script, nor of a ground station
 PAGE = Address(243, 190)
 TELEMETRY = 10  # Hz
+BACKLOG = 1024  # connections that are not accepted yet
 GRACE = 1  # s for open requests at the end
 FILES = 4096  # descriptors
 
@@ -58,6 +61,7 @@ def listening(options: WebOptions) -> socket.socket:
     try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind((options.host, options.port))
+        bound.listen(BACKLOG)  # before the page's address is shown
     except OSError as error:
         bound.close()
         where = f"{options.host}:{options.port}"
@@ -77,7 +81,8 @@ def is_loopback(host: str) -> bool:
 
 def run(options: WebOptions, bound: socket.socket, *, started: Callable[[str], None]) -> None:
     """Serve until SIGINT or SIGTERM. ``started`` gets the page's address."""
-    asyncio.run(_run(options, bound, started))
+    with log_to_stderr(Log()):  # a reader of the log that has stopped must not keep a STOP back
+        asyncio.run(_run(options, bound, started))
 
 
 async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str], None]) -> None:

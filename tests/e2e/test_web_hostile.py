@@ -2,6 +2,8 @@
 
 import select
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,7 +14,7 @@ import pytest
 
 from mav_tasks.web import tokens
 from mav_tasks.web.sessions import COOKIE
-from tests.kit.processes import Stand, stand, wait_until
+from tests.kit.processes import Stand, environment_with, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
 pytestmark = pytest.mark.slow
@@ -224,3 +226,26 @@ def test_who_logs_in_again_and_again_ends_nobody_elses_session(
         assert page.send("POST", "/session", {"token": anna}).status_code == 204
         old = httpx.get(f"{page.url}/api/v1/session", headers={"cookie": f"{COOKIE}={anna_s}"})
         assert old.status_code == 401  # a login ends the session before it
+
+
+def test_a_log_that_nobody_reads_keeps_no_stop_back(both: tuple[Stand, Web]) -> None:
+    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", ""]
+    command += ["--server", f"udpout:127.0.0.1:{both[0].client_port}"]
+    with subprocess.Popen(
+        [sys.executable, *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,  # of which nobody reads anything
+        env=environment_with(XDG_CONFIG_HOME="/nonexistent"),
+    ) as popen:
+        try:
+            assert popen.stdout is not None
+            url = popen.stdout.readline().decode().split()[-1].rstrip("/")
+            port = int(url.rpartition(":")[2])
+            for _ in range(3000):  # each is a line of the log
+                with socket.create_connection(("127.0.0.1", port), 10) as each:
+                    each.sendall(b"\0\r\n\r\n")
+                    assert each.recv(20).startswith(b"HTTP/1.1 400")
+            stop = httpx.post(f"{url}/api/v1/stop", json={}, timeout=15)
+            assert stop.json()["phase"] == "acknowledged"
+        finally:
+            popen.kill()
