@@ -29,8 +29,13 @@ METRICS = "/metrics"
 SMALL_BODY = 64 * 1024  # bytes
 PLAN_BODY = 24 * 1024 * 1024  # bytes: a plan file of 10 MB, escaped
 WITH_PLANS = ("/plans", "/missions", "/fence", "/rally")
+SLOWED = 0.5  # s until a refusal is sent to who gets too many of them
 BODY_WITHIN = 15.0  # s for the whole body
 
+#: headers that decide; programs differ in which of two counts
+ONCE = frozenset(
+    {"host", "origin", "sec-fetch-site", "authorization", "content-type", "content-length"}
+)
 HEADERS = {
     "content-security-policy": (
         "default-src 'self'; img-src 'self' data: blob:; connect-src 'self'; object-src 'none'; "
@@ -87,10 +92,14 @@ class Guard:
                 message["headers"] = [*message.get("headers", ()), *self._headers()]
             await send(message)
 
+        # nothing here needs parts of files, and thousands of parts cost much
+        scope["headers"] = [each for each in scope["headers"] if each[0].lower() != b"range"]
         try:
             self._check(scope)
             body = _limited(receive, most=_most_bytes(scope["path"]))
         except Problem as problem:
+            if self._rates.wait_of(f"refused {scope['client'][0]}"):
+                await asyncio.sleep(SLOWED)  # a flood waits, and others are answered
             await problem.response()(scope, receive, guarded)
             return
         await self._app(scope, body, guarded)
@@ -155,9 +164,13 @@ def _headers_of(scope: Scope) -> dict[str, str]:
     headers: dict[str, str] = {}
     for name, value in scope["headers"]:
         key = name.decode("latin-1").lower()
-        if key in headers and key in ("host", "origin", "authorization", "content-length"):
+        if key in headers and key in ONCE:
             raise Problem(400, "Invalid request", f"two headers {key!r}")
         headers[key] = value.decode("latin-1")
+    if "content-length" in headers and "transfer-encoding" in headers:
+        # a proxy may believe the other one: what it takes for one request may be two here
+        words = "send Content-Length or Transfer-Encoding, not both"
+        raise Problem(400, "Invalid request", words, headers={"connection": "close"})
     return headers
 
 

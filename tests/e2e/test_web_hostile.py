@@ -249,3 +249,41 @@ def test_a_log_that_nobody_reads_keeps_no_stop_back(both: tuple[Stand, Web]) -> 
             assert stop.json()["phase"] == "acknowledged"
         finally:
             popen.kill()
+
+
+def _raw(page: Web, request: str) -> bytes:
+    """Return all that is answered to some bytes."""
+    port = int(page.url.rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port), 15) as connection:
+        connection.sendall(request.format(host=f"Host: 127.0.0.1:{port}\r\n").encode())
+        answer = b""
+        while data := connection.recv(65536):
+            answer += data
+        return answer
+
+
+def test_a_request_is_not_hidden_in_another_ones_body(page: Web) -> None:
+    answer = _raw(
+        page,
+        "POST /api/v1/vehicles/1/pause HTTP/1.1\r\n{host}Content-Type: application/json\r\n"
+        "Content-Length: 6\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n"
+        "GET /api/v1/session HTTP/1.1\r\n{host}Connection: close\r\n\r\n",
+    )
+    assert answer.count(b"HTTP/1.1 ") == 1
+    assert answer.startswith(b"HTTP/1.1 400")
+
+
+def test_thousands_of_parts_of_a_file_are_one_whole_file(page: Web) -> None:
+    parts = ",".join(f"{at}-{at}" for at in range(0, 12_000, 2))
+    answer = page.client.get("/static/app.js", headers={"range": f"bytes={parts}"})
+    assert answer.status_code == 200
+    assert "content-range" not in answer.headers
+
+
+def test_a_flood_of_refusals_keeps_no_stop_back(page: Web) -> None:
+    def ask(client: httpx.Client) -> None:
+        client.get("/api/v1/vehicles", headers={"authorization": "Bearer x"})
+
+    with flood(page, ask, clients=20):
+        answers = [page.post("/stop", {}) for _ in range(3)]
+    assert {each["phase"] for each in answers} == {"acknowledged"}
