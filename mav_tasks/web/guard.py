@@ -27,7 +27,8 @@ STOP = "/api/v1/stop"
 METRICS = "/metrics"
 
 SMALL_BODY = 64 * 1024  # bytes
-PLAN_BODY = 24 * 1024 * 1024  # bytes: a plan file of 10 MB, escaped
+PLAN_BODY = 12 * 1024 * 1024  # bytes: a plan file of 6 MB, escaped
+LARGE_ONES = 4  # larger bodies than SMALL_BODY that are held at a time
 WITH_PLANS = ("/plans", "/missions", "/fence", "/rally")
 SLOWED = 0.5  # s until a refusal is sent to who gets too many of them
 BODY_WITHIN = 15.0  # s for the whole body
@@ -78,6 +79,7 @@ class Guard:
         self._tile_origins = tile_origins
         self._note_answer = note_answer
         self._rates = Rates()
+        self._large = asyncio.Semaphore(LARGE_ONES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or pass it on."""
@@ -95,14 +97,26 @@ class Guard:
         # nothing here needs parts of files, and thousands of parts cost much
         scope["headers"] = [each for each in scope["headers"] if each[0].lower() != b"range"]
         try:
-            self._check(scope)
-            body = _limited(receive, most=_most_bytes(scope["path"]))
+            length = self._check(scope)
         except Problem as problem:
             if self._rates.wait_of(f"refused {scope['client'][0]}"):
                 await asyncio.sleep(SLOWED)  # a flood waits, and others are answered
             await problem.response()(scope, receive, guarded)
             return
-        await self._app(scope, body, guarded)
+        if length <= SMALL_BODY:  # also one that does not say how long it is
+            await self._app(scope, _limited(receive, most=SMALL_BODY), guarded)
+            return
+        try:
+            async with asyncio.timeout(BODY_WITHIN):
+                await self._large.acquire()
+        except TimeoutError:
+            busy = Problem(503, "Busy", "too many files at a time: try again")
+            await busy.response()(scope, receive, guarded)
+            return
+        try:
+            await self._app(scope, _limited(receive, most=length), guarded)
+        finally:
+            self._large.release()
 
     def _headers(self) -> list[tuple[bytes, bytes]]:
         if not self._tile_origins:
@@ -112,8 +126,11 @@ class Guard:
         )
         return [(b"content-security-policy", policy.encode()), *RAW_HEADERS[1:]]
 
-    def _check(self, scope: Scope) -> None:
-        """Raise Problem if a request must not pass; else note whose it is in its state."""
+    def _check(self, scope: Scope) -> int:
+        """Raise Problem if a request must not pass; else note whose it is in its state.
+
+        Return the length of its body, 0 if it does not say.
+        """
         headers = _headers_of(scope)
         host = headers.get("host", "").lower()
         if host not in self._hosts:
@@ -125,22 +142,24 @@ class Guard:
             raise Problem(405, "Method not allowed", "HEAD: the API does not take it")
         if scope["method"] not in SAFE:
             _check_origin(headers, host, scheme=scope.get("scheme", "http"))
-        _check_length(headers, most=_most_bytes(scope["path"]))
+        length = _length_of(headers, most=_most_bytes(scope["path"]))
         identity, session = self._identity(headers)
         scope.setdefault("state", {})
         scope["state"]["identity"], scope["state"]["session"] = identity, session
         if not scope["path"].startswith((API, METRICS)):
-            return
+            return length
         is_login = scope["path"] == SESSION and scope["method"] == "POST"
         if identity is None and not is_login:
             words = "a token is required: log in, or send 'Authorization: Bearer TOKEN'"
             raise Problem(401, "Who are you?", words, headers={"www-authenticate": "Bearer"})
-        if scope["path"] != STOP:  # STOP is never rate-limited
+        is_stop = scope["path"] == STOP and scope["method"] == "POST"
+        if not is_stop:  # STOP is never rate-limited
             who = scope["client"][0] if identity is None else identity.name
             wait = self._rates.wait_of(who)
             if wait:
                 words = f"too many requests: try again in {wait} s"
                 raise Problem(429, "Too many requests", words, headers={"retry-after": str(wait)})
+        return length
 
     def _identity(self, headers: dict[str, str]) -> tuple[Identity | None, str | None]:
         """Return whose request it is, and the session that says so."""
@@ -187,10 +206,12 @@ def _check_origin(headers: dict[str, str], host: str, *, scheme: str) -> None:
         raise Problem(415, "Wrong media type", "expected Content-Type: application/json")
 
 
-def _check_length(headers: dict[str, str], *, most: int) -> None:
+def _length_of(headers: dict[str, str], *, most: int) -> int:
+    """Return the length that a request says; raise Problem if it is more than ``most`` bytes."""
     text = headers.get("content-length", "0")
-    if not text.isdigit() or int(text[:20]) > most:
+    if not text.isdecimal() or int(text[:20]) > most:
         raise _too_large(most)
+    return int(text)
 
 
 def _limited(receive: Receive, *, most: int) -> Receive:

@@ -1,5 +1,6 @@
 """An operation of the API: declared once, for its route, its checks and the OpenAPI document."""
 
+import asyncio
 import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
 from mav_tasks.tasks.task import MAX_TASK_ID
 from mav_tasks.web.fields import Field, read_body
+from mav_tasks.web.guard import SMALL_BODY
 from mav_tasks.web.identity import Identity
 from mav_tasks.web.problems import Problem, invalid, not_found, problem_of
 
@@ -124,11 +126,21 @@ async def _json_of(request: Request) -> object:
     if not data:
         return {}
     try:
-        return json.loads(data, object_pairs_hook=_object_of)
+        if len(data) <= SMALL_BODY:
+            return _parsed(data)
+        async with _parsing:  # one at a time: a STOP waits for one of them at most
+            return await asyncio.to_thread(_parsed, data)
     except Problem:
         raise
     except (ValueError, RecursionError) as error:
         raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
+
+
+_parsing = asyncio.Lock()
+
+
+def _parsed(data: bytes) -> object:
+    return json.loads(data, object_pairs_hook=_object_of)
 
 
 def _object_of(parts: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -287,3 +287,27 @@ def test_a_flood_of_refusals_keeps_no_stop_back(page: Web) -> None:
     with flood(page, ask, clients=20):
         answers = [page.post("/stop", {}) for _ in range(3)]
     assert {each["phase"] for each in answers} == {"acknowledged"}
+
+
+def test_large_files_keep_no_stop_back(page: Web) -> None:
+    line = "{}\t0\t3\t16\t0\t0\t0\t0\t-35.3\t149.1\t0\t1\n"
+    files = [
+        "QGC WPL 110\n" + "".join(line.format(at) for at in range(60_000)),
+        "QGC WPL 110\n" + "1\n" * 2_900_000,
+        '{"fileType": "Plan", "mission": [' + "[]," * 1_900_000 + "1]}",
+    ]
+    for text in files:
+        refused = page.client.post("/api/v1/plans", json={"name": "a.plan", "text": text})
+        assert refused.status_code == 422
+        assert refused.json()["detail"].startswith("a.plan: ")
+
+    def send(client: httpx.Client) -> None:
+        client.post("/api/v1/plans", json={"text": files[2]})
+
+    with flood(page, send, clients=6):
+        answers = [page.post("/stop", {}) for _ in range(3)]
+    assert {each["phase"] for each in answers} == {"acknowledged"}
+    body = {"text": "x" * 6_000_001}
+    refused = page.client.post("/api/v1/plans", json=body)
+    assert refused.status_code == 422
+    assert "text" in refused.json()["detail"]
