@@ -20,6 +20,7 @@ from mav_tasks.web.forms import queue_form, task_form, text_form, vehicle_form
 from mav_tasks.web.goal_places import Place, places_of_words
 from mav_tasks.web.hub import Hub
 from mav_tasks.web.origins import Origins
+from mav_tasks.web.queue_rows import QueueRows
 from mav_tasks.web.stops import Stop, Stops
 from mav_tasks.web.tracks import Tracks
 
@@ -49,6 +50,7 @@ class Live:
         self.stops = Stops(client, self._publish_stop)
         self.queues: dict[int, QueueStatus] = {}
         self.places: dict[int, list[Place]] = {}
+        self._rows = QueueRows()
         self._server = server
         self._origins = Origins()
         self._texts: deque[dict[str, Any]] = deque(maxlen=TEXTS)
@@ -78,7 +80,7 @@ class Live:
             "reachable": self.is_reachable,
             "detail": self.why_not_ready(),
             "vehicles": self.vehicle_forms(),
-            "queues": [self.queue_form(each) for each in self.queues.values()],
+            "queues": self._rows.forms(),
             "texts": list(self._texts)[-TEXTS_AT_FIRST:],
             "stops": self.stops.forms(),
         }
@@ -127,7 +129,7 @@ class Live:
         for queue in self.queues.values():
             current = () if queue.current is None else (queue.current,)
             if any(each.id == task_id for each in (*current, *queue.waiting)):
-                self.hub.publish("queue", self.queue_form(queue))
+                self._publish_queue(queue)
 
     def texts(self, *, before: int | None, limit: int) -> list[dict[str, Any]]:
         """Return texts, the newest last."""
@@ -179,8 +181,11 @@ class Live:
         if before is None or _essence(before) != _essence(queue):
             queue = await self.client.queue(vehicle=vehicle, limit=LISTED)
             self.queues[vehicle] = queue
-            self.hub.publish("queue", self.queue_form(queue))
+            self._publish_queue(queue)
             self._mark(vehicle)
+
+    def _publish_queue(self, queue: QueueStatus) -> None:
+        self.hub.publish("queue", self._rows.change(self.queue_form(queue)))
 
     # news
 

@@ -114,7 +114,9 @@ TASK = whole(
         "nonce": or_null(INTEGER),
         "submitter": said(TEXT, "system and component id of who submitted it"),
         "version": INTEGER,
-        "halt_epoch": INTEGER,
+        "halt_epoch": said(
+            INTEGER, "the present one of its rover, to be sent with a release; 0: not known"
+        ),
         "ended_ago": or_null(NUMBER, "s"),
         "ended_at": or_null(TEXT, "ISO 8601"),
         "goals": {
@@ -138,6 +140,23 @@ QUEUE = whole(
         "current": or_null(ref("Task")),
         "waiting": said(listed(ref("Task")), "in the order in which they run"),
         "more": said(INTEGER, "waiting tasks that are not listed"),
+    }
+)
+QUEUE_CHANGE = whole(
+    {name: part for name, part in QUEUE["properties"].items() if name != "waiting"}
+    | {
+        "order": {
+            "type": "array",
+            "description": "all listed waiting tasks in the order in which they run: id, position,"
+            " time_to_start and time_to_finish (s; null: not known); a task that is not here does"
+            " not wait any more",
+            "items": {"type": "array", "items": MAYBE, "minItems": 4, "maxItems": 4},
+        },
+        "rows": said(
+            listed(ref("Task")),
+            "the waiting tasks that are new here, or changed in anything but the numbers of the"
+            " order and halt_epoch; the others are as they were",
+        ),
     }
 )
 SHAPE = whole(
@@ -216,6 +235,7 @@ SCHEMAS: dict[str, Schema] = {
     "Task": TASK,
     "Tasks": whole({"tasks": listed(ref("Task"))}),
     "Queue": QUEUE,
+    "QueueChange": QUEUE_CHANGE,
     "Stop": STOP,
     "Text": TEXT_FORM,
     "Texts": whole({"texts": listed(ref("Text"))}),

@@ -1,7 +1,7 @@
 // The event stream: the browser reconnects by itself, and resumes where it was.
 
 import { get } from "./api.js";
-import { change, now, state, takeClock, takeQueue, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
+import { change, now, state, takeClock, takeQueue, takeQueueChange, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
 
 const SILENT = 15; // s; the web process sends something every 10 s
 const AGAIN = 3000; // ms
@@ -36,7 +36,7 @@ export function open(onRefused) {
     takeClock(news.now);
     takeVehicles(news.vehicles);
   });
-  on("queue", takeQueue);
+  on("queue", takeQueueChange);
   on("task", takeTask);
   on("text", (text) => takeTexts([text]));
   on("stop", takeStop);
