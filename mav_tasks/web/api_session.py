@@ -10,6 +10,7 @@ from starlette.responses import Response, StreamingResponse
 from mav_tasks.client.goal_form import KINDS
 from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
+from mav_tasks.web.events import description
 from mav_tasks.web.fields import Field
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import Problem
@@ -102,6 +103,7 @@ def operations(services: Services) -> list[Operation]:
             events,
             answer="Events",
             headers=[Field("Last-Event-ID", "string", "id of the last event that you got")],
+            description=description(),
         ),
     ]
 

@@ -236,11 +236,12 @@ class Live:
             self._flush = loop.call_later(FRAME, self._publish_vehicles)
 
     def _publish_vehicles(self) -> None:
+        now = since = time.time()
         if self._flush is not None:
             self._flush.cancel()
             self._flush = None
+            since = self._since
         changed, self._changed = self._changed, set()
-        now = time.time()
         for each in self.client.some_vehicles(changed):
             running = self._running.get(each.id)
             self.tracks.add(each, task=None if running is None else running.id, at=now)
@@ -248,8 +249,7 @@ class Live:
         if self.hub.readers:
             vehicles = self.vehicle_forms(changed)
             if vehicles:
-                since = round(self._since, 3)
-                form = {"now": round(now, 3), "since": since, "vehicles": vehicles}
+                form = {"now": round(now, 3), "since": round(since, 3), "vehicles": vehicles}
                 self.hub.publish_vehicles(form)
 
     def _all_vehicles(self) -> dict[str, Any]:

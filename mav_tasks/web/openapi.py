@@ -65,6 +65,8 @@ def _described(operation: Operation) -> dict[str, Any]:
         "parameters": parameters,
         "responses": _answers(operation),
     }
+    if operation.description:
+        described["description"] = operation.description
     if operation.body is not None:
         schema = body_schema(operation.body)
         described["requestBody"] = {

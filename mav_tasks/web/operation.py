@@ -85,6 +85,7 @@ class Operation:
     answer: str = ""
     status: int = 200
     headers: Sequence[Field] = ()
+    description: str = ""
 
     async def run(self, request: Request) -> Response:
         """Answer a request."""

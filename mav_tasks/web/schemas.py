@@ -70,12 +70,12 @@ VEHICLE = whole(
         "heard": said(FLAG, "its heartbeats arrive"),
         "heartbeat_age": or_null(NUMBER, "s"),
         "data_age": or_null(NUMBER, "s since its position arrived"),
-        "north": MAYBE,
-        "east": MAYBE,
+        "north": or_null(NUMBER, "m north of its local origin"),
+        "east": or_null(NUMBER, "m east of it"),
         "heading": or_null(NUMBER, "deg clockwise from north"),
         "speed": or_null(NUMBER, "m/s"),
-        "latitude": MAYBE,
-        "longitude": MAYBE,
+        "latitude": or_null(NUMBER, "deg"),
+        "longitude": or_null(NUMBER, "deg"),
         "battery": or_null(ref("Battery")),
         "ready": or_null(FLAG, "its checks before arming pass"),
         "prearm": said(listed(TEXT), "what those checks reported lately"),
@@ -104,8 +104,8 @@ TASK = whole(
         "after": or_null(INTEGER),
         "position": or_null(INTEGER, "number of tasks that run before it"),
         "progress": or_null(NUMBER, "0 to 1"),
-        "left": MAYBE,
-        "left_unit": or_null(TEXT),
+        "left": or_null(NUMBER, "what is left of it"),
+        "left_unit": or_null(TEXT, "unit of that: m, deg, s or items"),
         "item": INTEGER,
         "items": INTEGER,
         "time_to_start": or_null(NUMBER, "s"),
@@ -128,15 +128,19 @@ TASK = whole(
 QUEUE = whole(
     {
         "vehicle": INTEGER,
-        "running": or_null(INTEGER),
-        "next": or_null(INTEGER),
-        "paused": or_null(REASON),
+        "running": or_null(INTEGER, "id of the running task"),
+        "next": or_null(INTEGER, "id of the task that runs next"),
+        "paused": or_null(REASON, "why it is paused; null: it is not"),
         "paused_words": or_null(TEXT),
         "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
-        "heartbeat_age": MAYBE,
-        "waiting_count": INTEGER,
-        "capacity": INTEGER,
-        "counts": {"type": "object", "additionalProperties": INTEGER},
+        "heartbeat_age": or_null(NUMBER, "s since the rover's heartbeat"),
+        "waiting_count": said(INTEGER, "number of waiting tasks"),
+        "capacity": said(INTEGER, "number of waiting tasks that there may be"),
+        "counts": {
+            "type": "object",
+            "description": "number of tasks in each state",
+            "additionalProperties": INTEGER,
+        },
         "current": or_null(ref("Task")),
         "waiting": said(listed(ref("Task")), "in the order in which they run"),
         "more": said(INTEGER, "waiting tasks that are not listed"),
@@ -236,6 +240,35 @@ SCHEMAS: dict[str, Schema] = {
     "Tasks": whole({"tasks": listed(ref("Task"))}),
     "Queue": QUEUE,
     "QueueChange": QUEUE_CHANGE,
+    "Snapshot": whole(
+        {
+            "now": said(NUMBER, "time of the web process, seconds since 1970"),
+            "reachable": said(FLAG, "the task server is heard"),
+            "detail": or_null(TEXT, "why not"),
+            "vehicles": listed(ref("Vehicle")),
+            "queues": said(listed(ref("Queue")), "with up to 200 waiting tasks each"),
+            "texts": said(listed(ref("Text")), "the latest 200, the newest last"),
+            "stops": said(listed(ref("Stop")), "the latest 50 that were sent here"),
+        }
+    ),
+    "VehicleStates": whole(
+        {
+            "now": said(NUMBER, "when this was made, seconds since 1970"),
+            "since": said(
+                NUMBER,
+                "when the first change in it arrived, seconds since 1970; now - since is how long"
+                " the web process held it back",
+            ),
+            "vehicles": listed(ref("Vehicle")),
+        }
+    ),
+    "ServerState": whole(
+        {
+            "reachable": said(FLAG, "the task server is heard"),
+            "detail": or_null(TEXT, "why not"),
+        }
+    ),
+    "Alive": whole({}),
     "Stop": STOP,
     "Text": TEXT_FORM,
     "Texts": whole({"texts": listed(ref("Text"))}),

@@ -21,6 +21,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from mav_tasks import GoTo, LocalPlace, SyncClient, Wait
 from mav_tasks.cli.web import DEFAULT_LISTEN
 from mav_tasks.client.wire import Goal
+from mav_tasks.web.events import EVENTS
 from mav_tasks.web.schemas import SCHEMAS
 from tests.kit.awaited import awaited
 from tests.kit.processes import Stand, process, stand, wait_until
@@ -363,6 +364,21 @@ def test_a_task_carries_the_halt_epoch_that_releases_it(page: Web) -> None:
         epoch = page.get("/vehicles/1/queue")["halt_epoch"]
         assert page.task(task)["halt_epoch"] == epoch > 0
         resume(page)
+
+
+def test_events_are_as_the_document_says(page: Web) -> None:
+    schemas = {event.name: event.schema for event in EVENTS}
+    wanted = set(schemas) - {"server", "alive"}
+    stream = page.events()
+    check("Snapshot", next(stream)[2])
+    move(page, 0.3)
+    page.post("/stop", {})
+    seen = {"snapshot"}
+    while seen != wanted:
+        kind, number, data = next(stream)
+        check(schemas[kind], data)
+        assert bool(number) == next(each.has_id for each in EVENTS if each.name == kind)
+        seen.add(kind)
 
 
 def test_role_and_token(tmp_path: Path, both: tuple[Stand, Web]) -> None:
