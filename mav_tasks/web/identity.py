@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from mav_tasks.settings import ROLES
+
 #: what each role may do; a halt is permitted to everybody
 MAY = {
     "observer": frozenset({"stop", "pause"}),
@@ -11,6 +13,7 @@ MAY = {
     ),
 }
 MAY["safety"] = MAY["operator"] | {"fence"}
+assert tuple(MAY) == ROLES, "each role of the server has its line"
 
 
 @dataclass(frozen=True, slots=True)
