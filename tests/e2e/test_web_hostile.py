@@ -1,16 +1,22 @@
 """Attacks on a real web process, beside a real server and rover. Each was one that worked."""
 
+import os
 import select
 import socket
+import struct
 import subprocess
 import sys
 import threading
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
 import httpx
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mav_tasks.web import tokens
 from mav_tasks.web.sessions import COOKIE
@@ -313,3 +319,50 @@ def test_large_files_keep_no_stop_back(page: Web) -> None:
     refused = page.client.post("/api/v1/plans", json=body)
     assert refused.status_code == 422
     assert "text" in refused.json()["detail"]
+
+
+NAN = float("nan")
+
+
+def _log(path: Path, *messages: Any) -> None:
+    """Write a telemetry log of a rover: one message each 0.3 s, by pymavlink."""
+    sender = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    with path.open("wb") as file:
+        for at, message in enumerate(messages):
+            file.write(struct.pack(">Q", 1_700_000_000_000_000 + at * 300_000))
+            file.write(message.pack(sender))
+
+
+def test_strange_recordings_are_shown_as_far_as_they_go(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    def place(x: float) -> Any:
+        return mavlink.MAVLink_local_position_ned_message(0, x, 2.0, 0, 0, 0, 0)
+
+    folder = tmp_path / "records"
+    folder.mkdir()
+    turn = mavlink.MAVLink_attitude_message(0, 0, 0, NAN, 0, 0, 0)
+    _log(folder / "no numbers.tlog", turn, *(place(x) for x in (1.0, NAN, float("inf"), 3.0)))
+    modes = (mavlink.MAVLink_heartbeat_message(10, 3, 0, at % 7, 4, 3) for at in range(12_000))
+    _log(folder / "modes.tlog", place(0.0), *modes)
+    for name in (b"\xff\xfe.tlog", b"new\nline\r\nSet-Cookie: x=1.tlog", b"<script>.tlog"):
+        Path(os.fsdecode(bytes(folder) + b"/" + name)).write_bytes(b"x" * 100)
+    os.mkfifo(folder / "pipe.tlog")
+    (folder / "link.tlog").symlink_to("/dev/zero")
+    with (folder / "zeros.decisions.gz").open("wb") as file:
+        packer = zlib.compressobj(9, zlib.DEFLATED, 31)
+        for _ in range(200):
+            file.write(packer.compress(bytes(1 << 20)))
+        file.write(packer.flush())
+    with web(tmp_path, both[0], "--records", str(folder), name="records") as page:
+        names = {each["name"] for each in page.get("/records")["records"]}
+        assert {"no numbers", "modes", "??", "zeros", "<script>"} < names
+        assert not names & {"pipe", "link"}
+        run = page.get("/records/no numbers")
+        assert [point[1] for point in run["vehicles"][0]["points"]] == [1.0, 3.0]
+        assert len(page.get("/records/modes")["vehicles"][0]["modes"]) == 5000
+        for name in names - {"no numbers", "modes"}:
+            answer = page.client.get(f"/api/v1/records/{quote(name, safe='')}")
+            assert answer.status_code == 422, (name, answer.text)
+            assert "set-cookie" not in answer.headers
+            assert str(folder) not in answer.text
