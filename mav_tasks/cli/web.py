@@ -39,7 +39,8 @@ def web(
     name: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="HOST", help="A name or address by which browsers reach it; repeatable."
+            metavar="HOST[:PORT]",
+            help="A name or address by which browsers reach it, or its proxy; repeatable.",
         ),
     ] = None,
     role: Annotated[

@@ -68,8 +68,15 @@ def operations(services: Services) -> list[Operation]:
             services.sessions.end(call.session)
         response = Response(status_code=204)
         number = services.sessions.begin(token)
+        is_tls = call.headers.get("origin", "").startswith("https://")  # of a proxy
         response.set_cookie(
-            COOKIE, number, max_age=int(LASTS), httponly=True, samesite="strict", path="/"
+            COOKIE,
+            number,
+            max_age=int(LASTS),
+            httponly=True,
+            samesite="strict",
+            path="/",
+            secure=is_tls,
         )
         return response
 

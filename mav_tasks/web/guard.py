@@ -55,8 +55,10 @@ RAW_HEADERS = [(name.encode(), value.encode()) for name, value in HEADERS.items(
 class Guard:
     """The layer around an application.
 
-    ``hosts`` are the values of Host that are accepted, in lower case. ``open_identity`` is that of
-    requests without a token; None: a token is required. ``tile_origins`` are the sites of tiles.
+    ``hosts`` are the values of Host that are accepted, in lower case; ``behind_tls`` are those of
+    them that a proxy serves with TLS, so that its pages have an https origin. ``open_identity`` is
+    that of requests without a token; None: a token is required. ``tile_origins`` are the sites of
+    tiles.
     ``note_answer`` gets the status of each answer.
     """
 
@@ -68,11 +70,13 @@ class Guard:
         tokens: Tokens,
         sessions: Sessions,
         open_identity: Identity | None,
+        behind_tls: Iterable[str] = (),
         tile_origins: tuple[str, ...] = (),
         note_answer: Callable[[int], None] = lambda _status: None,
     ) -> None:
         self._app = app
         self._hosts = frozenset(hosts)
+        self._behind_tls = frozenset(behind_tls)
         self._tokens = tokens
         self._sessions = sessions
         self._open_identity = open_identity
@@ -141,7 +145,8 @@ class Guard:
         if scope["method"] == "HEAD" and scope["path"].startswith(API):
             raise Problem(405, "Method not allowed", "HEAD: the API does not take it")
         if scope["method"] not in SAFE:
-            _check_origin(headers, host, scheme=scope.get("scheme", "http"))
+            schemes = ("http", "https") if host in self._behind_tls else ("http",)
+            _check_origin(headers, {f"{scheme}://{host}" for scheme in schemes})
         length = _length_of(headers, most=_most_bytes(scope["path"]))
         identity, session = self._identity(headers)
         scope.setdefault("state", {})
@@ -193,11 +198,11 @@ def _headers_of(scope: Scope) -> dict[str, str]:
     return headers
 
 
-def _check_origin(headers: dict[str, str], host: str, *, scheme: str) -> None:
-    """Raise Problem if a page of another site sent a request that changes something."""
+def _check_origin(headers: dict[str, str], own: set[str]) -> None:
+    """Raise Problem if a page of another origin than ours sent a request that changes something."""
     origin = headers.get("origin")
     site = headers.get("sec-fetch-site", "same-origin")
-    if site not in ("same-origin", "none") or origin not in (None, f"{scheme}://{host}"):
+    if site not in ("same-origin", "none") or origin not in (None, *own):
         words = f"a page of {(origin or 'another site')[:80]} may not do this"
         raise Problem(403, "Cross-site request", words)
     kind = headers.get("content-type", "").partition(";")[0].strip().lower()

@@ -111,7 +111,8 @@ async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str
             options.records,
         )
         identity = Identity("local", options.role) if options.role else None
-        app = application(services, hosts=_hosts(options, port), open_identity=identity)
+        hosts, behind_tls = _hosts(options, port)
+        app = application(services, hosts=hosts, behind_tls=behind_tls, open_identity=identity)
         server = _Server(app, live)
         async with asyncio.TaskGroup() as group:
             viewing = group.create_task(live.run())
@@ -162,17 +163,28 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _hosts(options: WebOptions, port: int) -> set[str]:
-    """Return the values of Host by which the page can be asked for."""
-    names = {options.host.lower(), *(name.lower() for name in options.names)}
+def _hosts(options: WebOptions, port: int) -> tuple[set[str], set[str]]:
+    """Return the values of Host by which the page can be asked for, and those of TLS proxies.
+
+    A name with a port is a proxy's. One without a port is that of this process, or of a proxy at
+    the usual port, which a browser leaves out.
+    """
+    own = {options.host.lower()}
+    proxies = {_shown(name.lower()) for name in options.names}
+    own |= {name.lower() for name in options.names if not _has_port(name)}
     if is_loopback(options.host) or options.host in ("0.0.0.0", "::"):
-        names |= {"localhost", "127.0.0.1", "::1"}
-    shown = {_shown(name) for name in names}
-    return {f"{name}:{port}" for name in shown} | (shown if port == 80 else set())
+        own |= {"localhost", "127.0.0.1", "::1"}
+    shown = {_shown(name) for name in own}
+    hosts = {f"{name}:{port}" for name in shown} | (shown if port == 80 else set())
+    return hosts | proxies, proxies
+
+
+def _has_port(name: str) -> bool:
+    return name.count(":") == 1 or "]:" in name
 
 
 def _shown(host: str) -> str:
-    return f"[{host}]" if ":" in host else host
+    return f"[{host}]" if ":" in host and "[" not in host and not _has_port(host) else host
 
 
 def _allow_files() -> None:

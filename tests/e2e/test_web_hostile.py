@@ -20,7 +20,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from mav_tasks.web import tokens
 from mav_tasks.web.sessions import COOKIE
-from tests.kit.processes import Stand, environment_with, stand, wait_until
+from tests.kit.processes import Stand, environment_with, process, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
 pytestmark = pytest.mark.slow
@@ -366,3 +366,45 @@ def test_strange_recordings_are_shown_as_far_as_they_go(
             assert answer.status_code == 422, (name, answer.text)
             assert "set-cookie" not in answer.headers
             assert str(folder) not in answer.text
+
+
+def test_behind_a_proxy_with_tls_only_its_own_pages_may_change_something(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    names = ("--name", "rover.example", "--name", "rover.example:8443")
+    token = tokens.add(tmp_path / "web-tokens.json", "anna", "observer")
+    with web(tmp_path, both[0], *names, name="proxied") as page:
+        port = page.url.rpartition(":")[2]
+
+        def stop(host: str, origin: str) -> int:
+            return page.send("POST", "/stop", {}, host=host, origin=origin).status_code
+
+        for host in ("rover.example", "rover.example:8443", f"rover.example:{port}"):
+            assert page.client.get("/", headers={"host": host}).status_code == 200
+            assert stop(host, f"http://{host}") == 200
+            assert stop(host, "https://evil.example") == 403
+        assert stop("rover.example", "https://rover.example") == 200
+        assert stop("rover.example:8443", "https://rover.example:8443") == 200
+        assert stop("rover.example", "https://rover.example:8443") == 403
+        assert stop(f"rover.example:{port}", f"https://rover.example:{port}") == 403
+        assert stop("evil.example", "https://evil.example") == 421
+        assert stop("127.0.0.1", "http://127.0.0.1") == 421
+        for origin, is_secure in (("https", True), ("http", False)):
+            login = page.send(
+                *("POST", "/session", {"token": token}),
+                host="rover.example",
+                origin=f"{origin}://rover.example",
+            )
+            assert ("; Secure" in login.headers["set-cookie"]) == is_secure
+
+
+def test_who_has_no_token_learns_nothing_of_the_server(tmp_path: Path) -> None:
+    tokens.add(tmp_path / "web-tokens.json", "anna", "observer")
+    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", "", "--role", ""]
+    command += ["--server", "udpout:127.0.0.1:9", "--tokens", str(tmp_path / "web-tokens.json")]
+    with process(*command, folder=tmp_path, name="alone") as alone:
+        url = alone.wait_for(r"web page: (http://\S+)/\n")[1]
+        ready = httpx.get(f"{url}/readyz")
+        assert (ready.status_code, ready.text) == (503, "no answer from the task server\n")
+        for path in ("/metrics", "/api/v1/openapi.json", "/api/v1/session"):
+            assert httpx.get(f"{url}{path}").status_code == 401
