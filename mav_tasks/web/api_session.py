@@ -12,12 +12,14 @@ from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
 from mav_tasks.web.events import description
 from mav_tasks.web.fields import Field
+from mav_tasks.web.identity import OPEN_NAME
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import Problem
 from mav_tasks.web.services import Services
 from mav_tasks.web.sessions import COOKIE, LASTS
 
 MOST_STREAMS = 200
+MOST_OF_A_TOKEN = 100  # streams, so that nobody takes those of all others
 CHECKED = 1.0  # s between looks at the token of an open stream
 TOKEN = Field(
     "token", "string", "the token, as 'mav-tasks web tokens add' printed it", True, 1, 200
@@ -88,11 +90,10 @@ def operations(services: Services) -> list[Operation]:
         return response
 
     async def events(call: Call) -> Response:
-        hub = services.live.hub
-        if hub.readers >= MOST_STREAMS:
-            words = f"{MOST_STREAMS} event streams are open already: close a page"
+        if not _is_place(call, services):
+            words = "too many event streams are open already: close a page"
             raise Problem(503, "Too many streams", words, headers={"retry-after": "5"})
-        reader = hub.open(call.headers.get("last-event-id"))
+        reader = services.live.hub.open(call.headers.get("last-event-id"))
         return StreamingResponse(
             _while_it_may(call, reader.frames(), services),
             media_type="text/event-stream",
@@ -119,11 +120,24 @@ async def _while_it_may(
     call: Call, frames: AsyncGenerator[bytes], services: Services
 ) -> AsyncIterator[bytes]:
     """Yield the frames of a stream until its token is revoked, or its session ends."""
+    if not _is_place(call, services):  # others have begun since the request came
+        return
     checked_at = time.monotonic()
-    async with aclosing(frames):
-        async for frame in frames:
-            if time.monotonic() - checked_at > CHECKED:
-                checked_at = time.monotonic()
-                if not services.is_still_known(call.session, call.headers):
-                    return
-            yield frame
+    services.streams[call.identity.name] += 1
+    try:
+        async with aclosing(frames):
+            async for frame in frames:
+                if time.monotonic() - checked_at > CHECKED:
+                    checked_at = time.monotonic()
+                    if not services.is_still_known(call.session, call.headers):
+                        return
+                yield frame
+    finally:
+        services.streams[call.identity.name] -= 1
+
+
+def _is_place(call: Call, services: Services) -> bool:
+    """Return whether there may be one more stream."""
+    streams = services.streams
+    of_it = 0 if call.identity.name == OPEN_NAME else streams[call.identity.name]
+    return streams.total() < MOST_STREAMS and of_it < MOST_OF_A_TOKEN

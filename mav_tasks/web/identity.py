@@ -15,10 +15,12 @@ MAY = {
 MAY["safety"] = MAY["operator"] | {"fence"}
 assert tuple(MAY) == ROLES, "each role of the server has its line"
 
+OPEN_NAME = "local"  # of whoever needs no token
+
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A person or program: the name of its token, "local" without one, and its role."""
+    """A person or program: the name of its token, OPEN_NAME without one, and its role."""
 
     name: str
     role: str

@@ -1,6 +1,7 @@
 """What the operations of the API work on."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -38,6 +39,8 @@ class Services:
     tiles: Tiles | None = None
     records: Records | None = None
     owners: dict[int, str] = field(default_factory=dict)
+    #: open event streams by the names of their users
+    streams: Counter[str] = field(default_factory=Counter)
     _looking: set[asyncio.Task[None]] = field(default_factory=set)
 
     def __post_init__(self) -> None:

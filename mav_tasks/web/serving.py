@@ -21,7 +21,7 @@ from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Log
 from mav_tasks.web.application import application
 from mav_tasks.web.connections import PatientProtocol
-from mav_tasks.web.identity import Identity
+from mav_tasks.web.identity import OPEN_NAME, Identity
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live
 from mav_tasks.web.records import Records
@@ -110,7 +110,7 @@ async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str
             options.tiles,
             options.records,
         )
-        identity = Identity("local", options.role) if options.role else None
+        identity = Identity(OPEN_NAME, options.role) if options.role else None
         hosts, behind_tls = _hosts(options, port)
         app = application(services, hosts=hosts, behind_tls=behind_tls, open_identity=identity)
         server = _Server(app, live)

@@ -19,10 +19,11 @@ from platformdirs import user_config_path
 from mav_tasks.errors import UsageError
 from mav_tasks.folders import make_private
 from mav_tasks.settings import ROLES
+from mav_tasks.web.identity import OPEN_NAME
 from mav_tasks.whole_file import replace_whole
 
 FILE_NAME = "web-tokens.json"
-RESERVED = ("local", "nobody")  # who has no token: their tasks are not this token's
+RESERVED = (OPEN_NAME, "nobody")  # who has no token: their tasks are not this token's
 BYTES = 32
 LONGEST_NAME = 32
 

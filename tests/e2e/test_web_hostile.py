@@ -1,6 +1,7 @@
 """Attacks on a real web process, beside a real server and rover. Each was one that worked."""
 
 import os
+import re
 import select
 import socket
 import struct
@@ -408,3 +409,28 @@ def test_who_has_no_token_learns_nothing_of_the_server(tmp_path: Path) -> None:
         assert (ready.status_code, ready.text) == (503, "no answer from the task server\n")
         for path in ("/metrics", "/api/v1/openapi.json", "/api/v1/session"):
             assert httpx.get(f"{url}{path}").status_code == 401
+
+
+def test_many_streams_of_one_token_leave_some_to_others(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    kept = tmp_path / "web-tokens.json"
+    anna, eve = (tokens.add(kept, *each) for each in (("anna", "operator"), ("eve", "observer")))
+    with web(tmp_path, both[0], "--role", "", name="streams") as page:
+        port = int(page.url.rpartition(":")[2])
+        head = f"GET /api/v1/events HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+        held = [socket.create_connection(("127.0.0.1", port), 10) for _ in range(250)]
+        try:
+            for each in held:  # all before most of them are answered
+                each.sendall(f"{head}Authorization: Bearer {eve}\r\n\r\n".encode())
+            bearer = {"authorization": f"Bearer {anna}"}
+            with page.client.stream("GET", "/api/v1/events", headers=bearer) as stream:
+                assert stream.status_code == 200
+                assert next(stream.iter_lines()).startswith("id: ")
+                figures = page.client.get("/metrics", headers=bearer).text
+            count = re.search(r"^mav_tasks_web_event_streams (\d+)", figures, re.MULTILINE)
+            assert count is not None
+            assert 90 <= int(count[1]) <= 101
+        finally:
+            for each in held:
+                each.close()
