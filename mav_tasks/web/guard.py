@@ -1,8 +1,8 @@
 """Decides which requests reach the API: the outermost layer of the web process. ASGI.
 
-A page of another site can make a browser send requests to 127.0.0.1. They are refused by their
-Host header (DNS rebinding), by Origin and Sec-Fetch-Site (cross-site requests), and because a body
-must be JSON, for which a browser would ask first. Every answer has the headers that keep a browser
+A page of another site can make a browser send requests to 127.0.0.1. The guard refuses them by Host
+(DNS rebinding), and by Origin and Sec-Fetch-Site (cross-site requests). A body must be JSON, which
+a browser sends to another site only after a preflight. The headers of every answer keep a browser
 from running or framing anything else.
 """
 
@@ -104,6 +104,7 @@ class Guard:
             length = self._check(scope)
         except Problem as problem:
             if self._rates.wait_of(f"refused {scope['client'][0]}"):
+                problem.headers["connection"] = "close"  # with all that is pipelined behind it
                 await asyncio.sleep(SLOWED)  # a flood waits, and others are answered
             await problem.response()(scope, receive, guarded)
             return
@@ -131,9 +132,9 @@ class Guard:
         return [(b"content-security-policy", policy.encode()), *RAW_HEADERS[1:]]
 
     def _check(self, scope: Scope) -> int:
-        """Raise Problem if a request must not pass; else note whose it is in its state.
+        """Raise Problem if a request must not pass; else store its identity in its state.
 
-        Return the length of its body, 0 if it does not say.
+        Return the announced length of its body, 0 without one.
         """
         headers = _headers_of(scope)
         host = headers.get("host", "").lower()
@@ -156,7 +157,7 @@ class Guard:
         is_login = scope["path"] == SESSION and scope["method"] == "POST"
         if identity is None and not is_login:
             words = "a token is required: log in, or send 'Authorization: Bearer TOKEN'"
-            raise Problem(401, "Who are you?", words, headers={"www-authenticate": "Bearer"})
+            raise Problem(401, "Not logged in", words, headers={"www-authenticate": "Bearer"})
         is_stop = scope["path"] == STOP and scope["method"] == "POST"
         if not is_stop:  # STOP is never rate-limited
             who = scope["client"][0] if identity is None else identity.name
@@ -167,7 +168,7 @@ class Guard:
         return length
 
     def _identity(self, headers: dict[str, str]) -> tuple[Identity | None, str | None]:
-        """Return whose request it is, and the session that says so."""
+        """Return the identity of a request, and its session."""
         kind, _, text = headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer" and text:
             token = self._tokens.of_text(text.strip())
@@ -184,7 +185,7 @@ class Guard:
 
 
 def _headers_of(scope: Scope) -> dict[str, str]:
-    """Return the headers of a request; raise Problem if one that decides comes twice."""
+    """Return the headers of a request. Raise Problem if one of ONCE comes twice."""
     headers: dict[str, str] = {}
     for name, value in scope["headers"]:
         key = name.decode("latin-1").lower()
@@ -212,7 +213,7 @@ def _check_origin(headers: dict[str, str], own: set[str]) -> None:
 
 
 def _length_of(headers: dict[str, str], *, most: int) -> int:
-    """Return the length that a request says; raise Problem if it is more than ``most`` bytes."""
+    """Return the announced length of a body. Raise Problem if it is more than ``most`` bytes."""
     text = headers.get("content-length", "0")
     if not text.isdecimal() or int(text[:20]) > most:
         raise _too_large(most)
