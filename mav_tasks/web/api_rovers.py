@@ -12,7 +12,7 @@ from mav_tasks.web.plan_text import NAME, plan_of, text_field
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 
-LIMIT = Field("limit", "integer", "at most so many tasks", False, 0, 10_000)
+LIMIT = Field("limit", "integer", "at most this many tasks", False, 0, 10_000)
 PLACE = {
     "type": "object",
     "properties": {

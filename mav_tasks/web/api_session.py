@@ -1,4 +1,4 @@
-"""Operations of the session: who am I, log in, log out; and the event stream."""
+"""Operations of the session: show it, log in, log out; and the event stream."""
 
 import time
 from collections.abc import AsyncGenerator, AsyncIterator
@@ -137,7 +137,7 @@ async def _while_it_may(
 
 
 def _is_place(call: Call, services: Services) -> bool:
-    """Return whether there may be one more stream."""
+    """Return whether another stream may open."""
     streams = services.streams
     of_it = 0 if call.identity.name == OPEN_NAME else streams[call.identity.name]
     return streams.total() < MOST_STREAMS and of_it < MOST_OF_A_TOKEN

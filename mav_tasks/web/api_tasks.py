@@ -86,7 +86,7 @@ def operations(services: Services) -> list[Operation]:
         return await preview_response(call.body)
 
     async def status_of(call: Call) -> TaskStatus:
-        """Return a task's status: any rover's server knows the tasks of all."""
+        """Return a task's status. The server of any rover knows the tasks of all rovers."""
         rovers = client.vehicles()
         if not rovers:
             raise NoSuchVehicle("the server has no rover")

@@ -1,4 +1,4 @@
-"""HTTP connections that cannot be held open for nothing: uvicorn's protocol with time-outs.
+"""HTTP connections that end if their client stalls: uvicorn's protocol with time-outs.
 
 uvicorn waits without limit for the first byte, for the end of a request's headers, and for a client
 that does not read the answer.
@@ -13,7 +13,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 REQUEST_WITHIN = 10.0  # s without a request that is being answered
 READ_WITHIN = 15.0  # s in which a client must read something of what waits for it
-MOST = 800  # connections; beyond that one that waits for its client makes room
+MOST = 800  # connections; a new one beyond that closes a stalled one
 
 
 class PatientProtocol(H11Protocol):
@@ -22,7 +22,7 @@ class PatientProtocol(H11Protocol):
     open_ones: ClassVar[dict["PatientProtocol", float]] = {}
 
     def connection_made(self, transport: Any) -> None:
-        """Begin; close a connection that waits for its client if there are too many."""
+        """Start the time-outs. If there are too many connections, close one that stalls."""
         super().connection_made(transport)
         self._full_since: float | None = None
         self._watch: asyncio.TimerHandle = self.loop.call_later(REQUEST_WITHIN, self._look)
@@ -35,7 +35,7 @@ class PatientProtocol(H11Protocol):
         self.open_ones[self] = self.loop.time()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End."""
+        """Forget the connection."""
         self._watch.cancel()
         self.open_ones.pop(self, None)
         super().connection_lost(exc)
@@ -61,13 +61,13 @@ class PatientProtocol(H11Protocol):
         super().resume_writing()
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes; a request whose headers are whole is being answered from then on."""
+        """Receive bytes. Once the headers of a request are complete, the connection is not idle."""
         super().data_received(data)
         if not self.is_idle:
             self.open_ones[self] = self.loop.time()
 
     def on_response_complete(self) -> None:
-        """Count from the end of an answer."""
+        """Start the time-out for the next request."""
         if self in self.open_ones:
             self.open_ones[self] = self.loop.time()
         super().on_response_complete()

@@ -54,7 +54,7 @@ class Field:
         return schema
 
     def read(self, body: Mapping[str, Any]) -> Any:
-        """Return the part of a body, None if it is not given; raise Problem if it is wrong."""
+        """Return the part of a body, None if it is not given. Raise Problem if it is invalid."""
         value = body.get(self.name)
         if value is None:
             if self.is_required:
@@ -109,7 +109,7 @@ def body_schema(fields: Sequence[Field]) -> dict[str, Any]:
 
 
 def read_body(fields: Sequence[Field], body: object) -> dict[str, Any]:
-    """Return all parts of a body, None for those not given; raise Problem if it is wrong."""
+    """Return each declared part, None if it is not given. Raise Problem if one is invalid."""
     if not isinstance(body, dict):
         raise invalid("the request's body: expected a JSON object")
     known = {field.name for field in fields}

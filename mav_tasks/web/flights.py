@@ -1,11 +1,11 @@
-"""Halts that are requested again before they are answered share an answer.
+"""Halts of one kind share an answer if clients repeat them before it arrives.
 
-The client library has one request of a kind in flight. So without this a key that is held down, or
-a program that sends one STOP after another, would fill a queue in which another person's STOP is
-acknowledged minutes later, and which stops the rover again long after a resume.
+The client library has one request of a kind in flight and queues the others. A program that repeats
+STOP would fill that queue: another person's STOP would be acknowledged minutes later, and the
+queued ones would stop the rover again after a resume.
 
-A request may only share the answer of one that has not left yet: an answer on its way may be older
-than a resume in between.
+A request shares only the answer of one that is still queued: an answer to a request in flight may
+be older than a resume.
 """
 
 import asyncio

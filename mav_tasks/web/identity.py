@@ -1,10 +1,10 @@
-"""Who sends a request, and what the role of that permits. Roles are those of signing keys. Pure."""
+"""The sender of a request, and what its role permits. Roles are those of signing keys. Pure."""
 
 from dataclasses import dataclass
 
 from mav_tasks.settings import ROLES
 
-#: what each role may do; a halt is permitted to everybody
+#: what each role may do; every role may stop and pause
 MAY = {
     "observer": frozenset({"stop", "pause"}),
     "submitter": frozenset({"stop", "pause", "submit", "mission"}),
@@ -15,7 +15,7 @@ MAY = {
 MAY["safety"] = MAY["operator"] | {"fence"}
 assert tuple(MAY) == ROLES, "each role of the server has its line"
 
-OPEN_NAME = "local"  # of whoever needs no token
+OPEN_NAME = "local"  # the name of users without a token
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,5 +27,5 @@ class Identity:
 
     @property
     def may(self) -> frozenset[str]:
-        """What it may do."""
+        """The actions that its role permits."""
         return MAY[self.role]

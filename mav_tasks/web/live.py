@@ -1,8 +1,8 @@
 """One live view of the task server for all browsers: rovers, queues, texts, tracks, STOPs.
 
-The server reports each change of a task. A queue is requested again after such a change, and else
-every two seconds, because nobody reports a pause. All of it is one client on one link, however many
-browsers look.
+The task server reports each change of a task. The view requests a queue after such a change, and
+every two seconds, because a pause is not reported. It is one client on one link for any number of
+browsers.
 """
 
 import asyncio
@@ -74,7 +74,7 @@ class Live:
     # requests
 
     def snapshot(self) -> dict[str, Any]:
-        """Return everything that the page shows at first."""
+        """Return the data of the page's first event."""
         return {
             "now": round(time.time(), 3),
             "reachable": self.is_reachable,
@@ -137,12 +137,12 @@ class Live:
         return found[-limit:]
 
     def hurry(self, vehicle: int) -> None:
-        """Request a rover's queue soon: something was asked of it."""
+        """Request a rover's queue soon, after a request that may have changed it."""
         if vehicle in self._dirty:
             self._dirty[vehicle].set()
 
     async def refresh(self, vehicle: int) -> None:
-        """Request a rover's queue now, so that the next answer shows what has been asked of it."""
+        """Request a rover's queue now, so that the next answer shows the change."""
         with suppress(ClientError):  # the page shows how old its data are
             await self._fetch(vehicle)
 
@@ -267,7 +267,7 @@ class Live:
             self.hub.publish("server", {"reachable": is_reachable, "detail": detail})
 
     def why_not_ready(self) -> str | None:
-        """Return why the page cannot show what is; None: the task server is heard."""
+        """Return why the view is out of date; None if the task server is heard."""
         if self.is_reachable:
             return None
         return f"no answer from the task server at {self._server}: is it running?"

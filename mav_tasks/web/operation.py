@@ -25,7 +25,7 @@ WORDS = {"vehicle": "rover", "task": "task"}
 
 
 class NumberConvertor(Convertor[int]):
-    """A number in a path, of at most ten digits: a longer one is no address here."""
+    """A number in a path, of at most ten digits. A longer one is not found."""
 
     regex = "[0-9]{1,10}"
 
@@ -148,7 +148,7 @@ def _parsed(data: bytes) -> object:
 
 
 def _object_of(parts: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object. Raise Problem if a name comes twice: readers differ in which counts."""
+    """Return a JSON object. Raise Problem if a name comes twice: parsers differ in which counts."""
     found: dict[str, Any] = {}
     for name, value in parts:
         if name in found:

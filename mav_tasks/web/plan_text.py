@@ -1,4 +1,4 @@
-"""Reads mission files of requests beside the event loop, so that a STOP does not wait for them."""
+"""Parses the mission files of requests in a thread, so that a STOP does not wait for them."""
 
 import asyncio
 from typing import Any

@@ -1,7 +1,7 @@
 """Queues as the event stream sends them: whole at first, later only the rows that changed. Pure.
 
-A halt, or a task that ends, changes the numbers of every row. So those that move with the queue are
-sent beside the order, and count as no change of a row.
+A halt, or the end of a task, changes numbers in every row. So the order carries these numbers, and
+a row counts as changed only if something else in it changed.
 """
 
 from typing import Any
@@ -15,7 +15,7 @@ OF_THE_QUEUE = "halt_epoch"
 
 
 class QueueRows:
-    """The queues as the readers of the stream know them, by rover."""
+    """The queues that the readers of the stream have, by rover."""
 
     def __init__(self) -> None:
         self._known: dict[int, Form] = {}
@@ -28,7 +28,7 @@ class QueueRows:
         return list(self._known.values())
 
     def change(self, queue: Form) -> Form:
-        """Return what a queue has become for who knows it as it was: see QueueChange."""
+        """Store a queue. Return its QueueChange for readers that have the one before."""
         rover = queue["vehicle"]
         before = self._known.get(rover)
         known = {} if before is None else {row["id"]: _content(row) for row in before["waiting"]}

@@ -1,7 +1,7 @@
 """``python -m mav_tasks.web.recorded FILE...``: one run's recordings, as JSON for the map.
 
-A process of its own: to read a log of an hour takes seconds, in which the web process must still
-pass a STOP on at once. Prints one JSON object, or an error on standard error.
+It is a process of its own: it needs seconds for a log of an hour, and the web process must pass on
+a STOP at once. It prints one JSON object, or an error on standard error.
 """
 
 import json

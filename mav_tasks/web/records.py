@@ -1,4 +1,4 @@
-"""The recordings in a folder, for the page: which runs there are, and one run's way on the map."""
+"""The recordings in a folder, for the page: which runs there are, and one run's path on the map."""
 
 import asyncio
 import os

@@ -81,7 +81,7 @@ VEHICLE = whole(
         "prearm": said(listed(TEXT), "what those checks reported lately"),
         "control": said(
             {"type": "string", "enum": ["tasks", "paused", "taken over", "stopped", "silent"]},
-            "who or what controls it",
+            "what controls it",
         ),
         "control_words": TEXT,
         "goal": or_null(ref("Place")),
@@ -99,7 +99,7 @@ TASK = whole(
         "state": {"type": "string", "enum": [state.name.lower() for state in TaskState]},
         "reason": or_null(REASON),
         "why": or_null(TEXT, "why it is in its state, in words"),
-        "remedy": or_null(ref("Remedy"), "what a person can do about it"),
+        "remedy": or_null(ref("Remedy"), "what the user can do about it"),
         "priority": INTEGER,
         "after": or_null(INTEGER),
         "position": or_null(INTEGER, "number of tasks that run before it"),

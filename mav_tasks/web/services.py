@@ -1,4 +1,4 @@
-"""What the operations of the API work on."""
+"""The objects that the operations of the API share."""
 
 import asyncio
 from collections import Counter
@@ -64,7 +64,7 @@ class Services:
                 self.live.show_again(task)
 
     def own(self, task: int, identity: Identity) -> None:
-        """Note who submitted a task."""
+        """Record the user who submitted a task."""
         self.owners[task] = identity.name
         while len(self.owners) > MOST_OWNERS:
             del self.owners[next(iter(self.owners))]
@@ -91,7 +91,7 @@ class Services:
         return self.tokens.of_text(text.strip()) is not None
 
     def check_may(self, what: str, task: int, identity: Identity) -> None:
-        """Raise Problem unless somebody may do this to a task."""
+        """Raise Problem unless the user may do this to a task."""
         is_own = self.owners.get(task) == identity.name
         if what in identity.may:
             return

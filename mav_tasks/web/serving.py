@@ -164,10 +164,10 @@ class _Server(uvicorn.Server):
 
 
 def _hosts(options: WebOptions, port: int) -> tuple[set[str], set[str]]:
-    """Return the values of Host by which the page can be asked for, and those of TLS proxies.
+    """Return the accepted values of Host, and those of them that a TLS proxy may serve.
 
-    A name with a port is a proxy's. One without a port is that of this process, or of a proxy at
-    the usual port, which a browser leaves out.
+    A name with a port is a proxy's. A name without one is this process's, or that of a proxy at
+    the default port, which browsers leave out.
     """
     own = {options.host.lower()}
     proxies = {_shown(name.lower()) for name in options.names}

@@ -24,7 +24,7 @@ class Sessions:
         return f"Sessions({len(self._open)})"
 
     def begin(self, token: Token) -> str:
-        """Return the id of a new session. The oldest ones of a token make room."""
+        """Return the id of a new session. End the token's oldest ones if it has too many."""
         its_own = [number for number, (other, _) in self._open.items() if other == token]
         for number in its_own[: len(its_own) + 1 - MOST_OF_A_TOKEN]:
             del self._open[number]

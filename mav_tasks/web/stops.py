@@ -1,4 +1,4 @@
-"""STOPs that the page sent, and what came of each: acknowledged, then standing."""
+"""The STOPs sent from here, and the outcome of each: acknowledged, then standing."""
 
 import asyncio
 import time
@@ -79,7 +79,7 @@ class Stops:
     async def stop(self, vehicle: int | None, *, clear: bool, by: str) -> Stop:
         """Send a STOP. Return it once it is acknowledged; raise NoAnswer or Refused.
 
-        A person who requests it again while it waits for its answer gets the same one.
+        If the user repeats it while it is queued, both share one Stop.
         """
         kind = vehicle, clear
         shared = self._flights.waiting(kind)
@@ -153,7 +153,7 @@ class Stops:
         following.add_done_callback(self._following.discard)
 
     def on_task(self, status: TaskStatus) -> None:
-        """Note a task that a STOP has ended: the latest one that may have."""
+        """Add a task to the latest STOP that can have ended it."""
         if status.state is not TaskState.KILLED or status.reason is not TaskReason.STOP:
             return
         # its end is reported once it is durable, perhaps after the rover stands; and when asked for
@@ -167,7 +167,7 @@ class Stops:
                 return
 
     def on_vehicles(self) -> None:
-        """Look whether the rovers of open STOPs stand now."""
+        """Check whether the rovers of open STOPs stand now."""
         for stop in [each for each in self._open if each.phase == "acknowledged"]:
             if self._stand(stop.vehicle, since=stop.begun):
                 stop.standing_after = time.monotonic() - stop.begun

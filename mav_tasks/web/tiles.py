@@ -1,4 +1,4 @@
-"""Map tiles: from an MBTiles file, read with sqlite3, or from a URL that the browser asks."""
+"""Map tiles: from an MBTiles file, read with sqlite3, or from a URL that the browser requests."""
 
 import sqlite3
 import time
@@ -19,7 +19,7 @@ STEPS = 10_000  # of SQLite's machine between two looks at the time
 
 @dataclass(frozen=True, slots=True)
 class Tiles:
-    """The tiles of the map. ``path``: None: the browser asks ``url`` itself."""
+    """The tiles of the map. ``path``: None: the browser requests ``url`` itself."""
 
     url: str
     attribution: str

@@ -23,7 +23,7 @@ from mav_tasks.web.identity import OPEN_NAME
 from mav_tasks.whole_file import replace_whole
 
 FILE_NAME = "web-tokens.json"
-RESERVED = (OPEN_NAME, "nobody")  # who has no token: their tasks are not this token's
+RESERVED = (OPEN_NAME, "nobody")  # names of users without a token
 BYTES = 32
 LONGEST_NAME = 32
 
@@ -97,7 +97,7 @@ def add(path: Path, name: str, role: str) -> str:
 
 
 def revoke(path: Path, name: str) -> None:
-    """Remove a token; a running web process refuses it at once. Raise TokenError if not there."""
+    """Remove a token. A running web process refuses it at once. Raise TokenError without it."""
 
     def without_it(tokens: tuple[Token, ...]) -> tuple[Token, ...]:
         left = tuple(each for each in tokens if each.name != name)
