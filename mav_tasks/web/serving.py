@@ -1,6 +1,7 @@
 """Runs the web process: the client, its live view and the HTTP server on one event loop."""
 
 import asyncio
+import gc
 import logging
 import resource
 import secrets
@@ -36,6 +37,10 @@ TELEMETRY = 10  # Hz
 BACKLOG = 1024  # connections that are not accepted yet
 GRACE = 1  # s for open requests at the end
 FILES = 4096  # descriptors
+LONGEST_HEAD = 16 * 1024  # bytes
+#: objects until garbage is collected: each request leaves some, which hold its headers; the command
+#: line collects so seldom that a flood of requests would take gigabytes
+GARBAGE = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +86,7 @@ def is_loopback(host: str) -> bool:
 
 def run(options: WebOptions, bound: socket.socket, *, started: Callable[[str], None]) -> None:
     """Serve until SIGINT or SIGTERM. ``started`` gets the page's address."""
+    gc.set_threshold(GARBAGE)
     with log_to_stderr(Log()):  # a reader of the log that has stopped must not keep a STOP back
         asyncio.run(_run(options, bound, started))
 
@@ -137,7 +143,7 @@ class _Server(uvicorn.Server):
                 proxy_headers=False,
                 timeout_keep_alive=30,
                 timeout_graceful_shutdown=GRACE,
-                h11_max_incomplete_event_size=64 * 1024,
+                h11_max_incomplete_event_size=LONGEST_HEAD,
             )
         )
         self._live = live
