@@ -41,6 +41,8 @@ class Services:
     owners: dict[int, str] = field(default_factory=dict)
     #: open event streams by the names of their users
     streams: Counter[str] = field(default_factory=Counter)
+    #: one reader of the journal at a time: several would take the interpreter from the event loop
+    _reading: asyncio.Lock = field(default_factory=asyncio.Lock)
     _looking: set[asyncio.Task[None]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -56,7 +58,8 @@ class Services:
 
     async def _remember_places(self, journal: Journal, task: int) -> None:
         with suppress(StoreError):  # the map lacks the places; nothing else does
-            goal = await asyncio.to_thread(journal.goal_of, task)
+            async with self._reading:
+                goal = await asyncio.to_thread(journal.goal_of, task)
             steps = goal.steps if isinstance(goal, Plan) else ()
             places = places_of_goals([step for step in steps if isinstance(step, GoTo)])
             if places:
@@ -75,9 +78,10 @@ class Services:
         """Return events of the journal; raise Problem if it cannot be read."""
         assert self.journal is not None, "the operation has looked"
         try:
-            return await asyncio.to_thread(
-                self.journal.entries, task=task, vehicle=vehicle, after=after, limit=limit
-            )
+            async with self._reading:
+                return await asyncio.to_thread(
+                    self.journal.entries, task=task, vehicle=vehicle, after=after, limit=limit
+                )
         except StoreError as error:
             raise Problem(503, "The journal cannot be read", str(error)) from error
 

@@ -434,3 +434,16 @@ def test_many_streams_of_one_token_leave_some_to_others(
         finally:
             for each in held:
                 each.close()
+
+
+def test_a_flood_of_requests_for_the_journal_keeps_no_stop_back(tmp_path: Path) -> None:
+    store = str(tmp_path / "tasks.sqlite3")
+    with stand(tmp_path, serve_store=store) as it, web(tmp_path, it, "--store", store) as page:
+        has_rover(page)
+
+        def read(client: httpx.Client) -> None:
+            client.get("/api/v1/journal?limit=2000")
+
+        with flood(page, read, clients=12):
+            answers = [page.post("/stop", {}) for _ in range(3)]
+        assert {each["phase"] for each in answers} == {"acknowledged"}
