@@ -9,7 +9,7 @@ import os
 import resource
 import sys
 from collections.abc import Sequence
-from math import degrees, hypot, isfinite
+from math import ceil, degrees, floor, hypot, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -68,8 +68,8 @@ class Run:
     def form(self) -> dict[str, Any]:
         """Return the run as JSON: rovers with points, modes, and events."""
         return {
-            "begins": self._begins or 0.0,
-            "ends": self._ends,
+            "begins": floor((self._begins or 0.0) * 100) / 100,  # all that is in it is rounded
+            "ends": ceil(self._ends * 100) / 100,
             "vehicles": [
                 {"vehicle": rover, "points": points, "modes": self._modes.get(rover, [])}
                 for rover, points in sorted(self._points.items())
