@@ -205,6 +205,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.services",
             "mav_tasks.tasks",
             "mav_tasks.mavlink",
+            "mav_tasks.settings",
             "mav_tasks.folders",
             "mav_tasks.whole_file",
             "mav_tasks.errors",

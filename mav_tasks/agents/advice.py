@@ -1,4 +1,4 @@
-"""What an agent can do now about a task, in words that name its tools. Pure."""
+"""Advice to an agent about a task, which names the tools to call. Pure."""
 
 from mav_tasks.client.descriptions import UNTIL_RESUMED, why_of
 from mav_tasks.client.values import QueueStatus, TaskStatus
@@ -21,7 +21,7 @@ def needs_decision(status: TaskStatus) -> bool:
 
 
 def advice_of(status: TaskStatus) -> str:
-    """Return what to do now about a task; "" if nothing is to be done."""
+    """Return what to do now about a task; "" if nothing."""
     epoch = status.halt_epoch
     if needs_decision(status):
         return (
@@ -42,11 +42,11 @@ def advice_of(status: TaskStatus) -> str:
     if status.reason is TaskReason.HELD_AHEAD:
         return "A held task of this rover blocks it: look at queue, and release that task."
     waits = BY_A_PERSON.get(status.reason)
-    return waits or "Nothing is to be done: call wait until it has ended."
+    return waits or "No action is needed: call wait until it has ended."
 
 
 def advice_on_queue(queue: QueueStatus) -> str:
-    """Return what to do now about a rover's queue; "" if nothing is to be done."""
+    """Return what to do now about a rover's queue; "" if nothing."""
     if queue.current is not None and needs_decision(queue.current):
         return advice_of(queue.current)
     if queue.paused is not None:

@@ -1,4 +1,4 @@
-"""The arguments of a tool: declared once, as the schema that agents read and the check. Pure."""
+"""The arguments of a tool: each declared once, for its schema and its check. Pure."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Argument:
     is_required: bool = False
 
     def read(self, value: Any) -> Any:
-        """Return a valid value. Raise UsageError, with the argument's name, otherwise."""
+        """Return the value. Raise UsageError, with the argument's name, if it is invalid."""
         kinds, what = KINDS[self.schema["type"]]
         if kinds == (int,) and isinstance(value, float) and value.is_integer():
             value = int(value)  # JSON has one kind of number

@@ -49,7 +49,7 @@ class Durable:
         return {"resultType": "task", **self._task(status, "working")}
 
     async def get(self, task_id: str) -> dict[str, Any]:
-        """Return a task with its result, or with its question. Raise Refused if it is unknown."""
+        """Return a task with its result or its question. Raise Refused if it is unknown."""
         status = await self._status(task_id)
         if needs_decision(status):
             return self._task(status, "input_required") | {"inputRequests": _question(status)}
@@ -116,7 +116,7 @@ class Durable:
         }
 
     def _note(self, task_id: str, status: TaskStatus) -> _Seen:
-        """Return when a task was first seen, and when its last change was.
+        """Return when this process first saw a task, and when it last changed.
 
         The server does not say when a task was submitted: after a restart of this process a task
         counts from when it is asked about.

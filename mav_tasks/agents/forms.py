@@ -1,4 +1,4 @@
-"""What the tools return, and its JSON schemas. Pure."""
+"""The answers of the tools, and their JSON schemas. Pure."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -122,7 +122,7 @@ def result(form: Mapping[str, Any], *, is_error: bool = False) -> dict[str, Any]
 
 
 def refusal(why: str) -> dict[str, Any]:
-    """Return the result of a call that was refused, or had no answer."""
+    """Return the result of a refused or unanswered call."""
     return _of_call(why, is_error=True)
 
 

@@ -53,7 +53,7 @@ class Limits:
                 raise UsageError(f"{limit}: a goal asks for {speed:g} m/s")
 
     def check_queue(self, queued: int) -> None:
-        """Raise UsageError if a rover has so many tasks that no other one may be added."""
+        """Raise UsageError if a rover has ``max_queued`` tasks already."""
         if self.max_queued is not None and queued >= self.max_queued:
             words = f"--max-queued {self.max_queued}: the rover has {queued} tasks; wait for one"
             raise UsageError(words)
@@ -70,7 +70,7 @@ class Limits:
 
 
 def _farthest(goals: Sequence[Goal], rover: VehicleStatus) -> float:
-    """Return how far the goals drive at most, m. Raise UsageError if that cannot be known."""
+    """Return how far the goals can drive, m. Raise UsageError if that is unknown."""
     driven, place, off = 0.0, _place_of(rover), 0.0  # off: how far it may be from the place
     for goal in goals:
         match goal:

@@ -89,7 +89,7 @@ async def _wait(rovers: Rovers, values: Values, report: Report) -> dict[str, Any
 
 
 async def _until_over(task: Task, report: Report) -> None:
-    """Report progress until a task is over, or held: then it goes on only if it is released.
+    """Report progress until a task is over or held. A held task needs a release.
 
     The protocol wants each report to be above the one before; a task's progress may also fall.
     """
@@ -155,7 +155,7 @@ READING = (
     Tool(
         "wait",
         "Wait for a task",
-        "Wait until a task has ended, or until it is held, or for so many seconds. Then show the "
+        "Wait until a task has ended, or until it is held, or for this many seconds. Then show the "
         "task as it is: if is_over is false, do what 'advice' says, or call wait again. "
         "A task that is held does not continue by itself: it needs release.",
         (TASK_ID, SECONDS),

@@ -1,7 +1,7 @@
 """The task server as agents use it: one connection for the life of the process.
 
-The server may be away at the start, or later: each call looks for it, and raises NoAnswer if it is
-not there.
+The server may be down at the start or later. Each call looks for it, and raises NoAnswer if it does
+not answer.
 """
 
 import asyncio
@@ -25,23 +25,23 @@ class Rovers:
         self.submitting = asyncio.Lock()
 
     async def client(self) -> Client:
-        """Return the client once it has found the server. Raise NoAnswer if it does not."""
+        """Return the client once it has found the server. Raise NoAnswer if it finds none."""
         await self._client.found()
         return self._client
 
     @property
     def unfound(self) -> Client:
-        """The client, for a STOP: that must not wait until the server is found."""
+        """The client, for a STOP, which must not wait until the server is found."""
         return self._client
 
     def named(self, vehicle: int | None) -> int | None:
-        """Return the rover that an agent names; None: no one. Raise UsageError if it may not."""
+        """Return the named rover, None if none is named. Raise UsageError if it is not offered."""
         if self._only is not None and vehicle not in (None, self._only):
             raise UsageError(f"vehicle {vehicle}: only rover {self._only} is offered here")
         return self._only if vehicle is None else vehicle
 
     async def vehicle(self, vehicle: int | None) -> int:
-        """Return the rover that an agent means; None: the only one. Raise NoSuchVehicle if none."""
+        """Return the named rover, or else the only one. Raise NoSuchVehicle if there is none."""
         client = await self.client()
         named = self.named(vehicle)
         return client.vehicle if named is None else named
@@ -53,12 +53,12 @@ class Rovers:
         return [each for each in client.vehicles() if self._only in (None, each.id)]
 
     async def task(self, task_id: int) -> Task:
-        """Return a task of a rover that is offered. Raise Refused if there is none."""
+        """Return a task of an offered rover. Raise Refused if there is no such task."""
         status = await self.status(task_id)
         return await self._client.task(task_id, vehicle=status.vehicle)
 
     async def status(self, task_id: int) -> TaskStatus:
-        """Return the status of a task; each rover's server knows those of all its rovers."""
+        """Return the status of a task. The server of one rover knows the tasks of all."""
         rovers = (await self.client()).vehicles()
         anyone = self._only if self._only is not None or not rovers else rovers[0].id
         status = await self._client.status(task_id, vehicle=anyone)

@@ -1,7 +1,7 @@
 """The MCP server: its tools, and the errors that agents read instead of a broken call.
 
-Whatever the task server refuses, and every wrong argument, is the result of a call, with its
-reason. An error of the protocol is left for what only a program can correct.
+A refusal of the task server, or a wrong argument, becomes the result of the call, with its reason.
+Errors of the protocol are only for faults that a program must correct.
 """
 
 from importlib.metadata import version

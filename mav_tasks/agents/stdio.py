@@ -8,10 +8,10 @@ from mcp.server.stdio import stdio_server
 
 
 async def serve_stdio(server: Server[Any]) -> None:
-    """Serve the program that has started this process.
+    """Serve the program that started this process.
 
-    Only the protocol is written to standard output: whatever else would go there goes to standard
-    error. Ctrl-C ends the process at once, because a thread may be reading standard input.
+    Standard output carries only the protocol: all other output goes to standard error. Ctrl-C ends
+    the process at once, because a thread may be reading standard input.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     async with stdio_server() as (received, sent):

@@ -2,7 +2,7 @@
 
 HTTP here has neither keys nor encryption. So it listens on loopback, and answers only requests
 that name this address as their host, from pages of this address if a browser sends them: a page
-from elsewhere cannot use a rover through the browser of somebody at this machine.
+from elsewhere cannot use a rover through a browser on this machine.
 """
 
 import socket

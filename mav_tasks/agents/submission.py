@@ -1,7 +1,7 @@
 """Submits an agent's task: once for each idempotency key, within the limits.
 
-A task is submitted as a plan, also a single goal: a plan carries its goals and all its terms at
-once, so that the server compares all of them with those of an earlier submission of the key.
+A single goal is submitted as a plan, too. A plan carries its goals and all its options at once, so
+the server compares all of them with an earlier submission of the same key.
 """
 
 from collections.abc import Sequence
@@ -94,7 +94,7 @@ def _of(wish: Wish) -> str:
 
 
 async def _looked_up(client: Client, rover: int, numbers: Numbers) -> tuple[TaskStatus | None, int]:
-    """Return the task that the key has at a rover, if it has one, and how many are not over.
+    """Return the rover's task with this key, if any, and how many of its tasks are not over.
 
     The server does not compare the keys of tasks that ended long ago, but it still lists them.
     Raise NoAnswer if some of them are lost on the way: one may be the key's.

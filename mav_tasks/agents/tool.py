@@ -18,7 +18,7 @@ class Tool:
     """A tool. ``returns`` is the schema of what ``run`` returns.
 
     ``is_reading``: it changes nothing. ``is_destructive``: it moves a rover, or ends or drops
-    something. ``makes_a_task``: what it returns is a new task.
+    something. ``makes_a_task``: it returns a new task.
     """
 
     name: str

@@ -37,6 +37,25 @@ Wait = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, one object per line.")]
+Server = Annotated[
+    str,
+    typer.Option(
+        "--server",
+        "-s",
+        metavar="URL",
+        envvar="MAV_TASKS_SERVER",
+        help="URL of the task server: udpout:host:port, tcp:host:port, serial:device:baud.",
+    ),
+]
+SignWith = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME",
+        envvar="MAV_TASKS_SIGN",
+        autocompletion=completing("mav_tasks.cli.ring:key_names"),
+        help="Sign with this key of the key ring.",
+    ),
+]
 RingFile = Annotated[
     str,
     typer.Option(
@@ -50,16 +69,7 @@ TaskId = Annotated[int, typer.Argument(metavar="ID", min=1, help="Id of the task
 class Reach:
     """Options for reaching the server."""
 
-    server: Annotated[
-        str,
-        typer.Option(
-            "--server",
-            "-s",
-            metavar="URL",
-            envvar="MAV_TASKS_SERVER",
-            help="URL of the task server: udpout:host:port, tcp:host:port, serial:device:baud.",
-        ),
-    ] = DEFAULT_SERVER
+    server: Server = DEFAULT_SERVER
     vehicle: Annotated[
         int | None,
         typer.Option(
@@ -70,15 +80,7 @@ class Reach:
         float,
         typer.Option(min=0.1, metavar="SECONDS", help="How long to look for the server."),
     ] = 5.0
-    sign: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            envvar="MAV_TASKS_SIGN",
-            autocompletion=completing("mav_tasks.cli.ring:key_names"),
-            help="Sign with this key of the key ring.",
-        ),
-    ] = ""
+    sign: SignWith = ""
     keys: RingFile = ""
 
 

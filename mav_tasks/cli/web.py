@@ -8,10 +8,10 @@ import typer
 
 from mav_tasks.cli import output
 from mav_tasks.cli.lazy import completing, group
-from mav_tasks.cli.options import DEFAULT_SERVER, Json, RingFile
+from mav_tasks.cli.options import DEFAULT_SERVER, Json, RingFile, Server, SignWith
 from mav_tasks.errors import UsageError
+from mav_tasks.settings import ROLES
 
-ROLES = ("observer", "submitter", "operator", "safety")
 DEFAULT_LISTEN = "127.0.0.1:8560"
 
 app = typer.Typer(rich_markup_mode=None)  # without a command it serves
@@ -31,16 +31,7 @@ TokenFile = Annotated[
 @app.callback(invoke_without_command=True)
 def web(
     ctx: typer.Context,
-    server: Annotated[
-        str,
-        typer.Option(
-            "--server",
-            "-s",
-            metavar="URL",
-            envvar="MAV_TASKS_SERVER",
-            help="URL of the task server: udpout:host:port, tcp:host:port, serial:device:baud.",
-        ),
-    ] = DEFAULT_SERVER,
+    server: Server = DEFAULT_SERVER,
     listen: Annotated[
         str,
         typer.Option(metavar="HOST:PORT", help="Address; beyond loopback, tokens are needed."),
@@ -48,14 +39,15 @@ def web(
     name: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="HOST", help="A name or address by which browsers reach it; repeatable."
+            metavar="HOST[:PORT]",
+            help="A name or address by which browsers reach it, or its proxy; repeatable.",
         ),
     ] = None,
     role: Annotated[
         str,
         typer.Option(
             metavar="ROLE",
-            autocompletion=completing("mav_tasks.cli.web:ROLES"),
+            autocompletion=completing("mav_tasks.settings:ROLES"),
             help="Role without a token, on loopback: observer, submitter, operator or safety; "
             '"": a token is required.',
         ),
@@ -83,15 +75,7 @@ def web(
         ),
     ] = "",
     token_file: TokenFile = "",
-    sign: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            envvar="MAV_TASKS_SIGN",
-            autocompletion=completing("mav_tasks.cli.ring:key_names"),
-            help="Sign with this key of the key ring.",
-        ),
-    ] = "",
+    sign: SignWith = "",
     keys: RingFile = "",
 ) -> None:
     """Show and steer the rovers in a browser.
@@ -140,7 +124,7 @@ def add(
         str,
         typer.Option(
             metavar="ROLE",
-            autocompletion=completing("mav_tasks.cli.web:ROLES"),
+            autocompletion=completing("mav_tasks.settings:ROLES"),
             help="observer, submitter, operator or safety.",
         ),
     ],

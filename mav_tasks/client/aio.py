@@ -355,10 +355,17 @@ class Client:
         waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds.
         After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard.
         """
+        command = self._stop_command(vehicle, clear=clear)
+        await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
+
+    def stop_again(self, *, clear: bool = False, vehicle: int | None = None) -> None:
+        """Send one STOP and wait for no answer: an equal ``stop`` that is not sent yet gets it."""
+        self._open.session.send(self._stop_command(vehicle, clear=clear))
+        self._open.turn()
+
+    def _stop_command(self, vehicle: int | None, *, clear: bool) -> m.CommandLong:
+        """Return a STOP; what it has overtaken is not sent any more."""
         self._halts += 1
-        command = m.CommandLong(
-            vehicle or 0, 0, MavCmd.TASK_STOP, 0, float(clear), 0, 0, 0, 0, 0, 0
-        )
         self._ask.call_off(
             lambda other: (
                 other.command == MavCmd.DO_PAUSE_CONTINUE
@@ -367,7 +374,8 @@ class Client:
             ),
             OVERTAKEN,
         )
-        await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
+        params = float(clear), 0, 0, 0, 0, 0, 0
+        return m.CommandLong(vehicle or 0, 0, MavCmd.TASK_STOP, 0, *params)
 
     async def pause(self, *, vehicle: int | None = None) -> None:
         """Stop the rover; its task can continue from there."""

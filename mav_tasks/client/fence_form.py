@@ -1,9 +1,9 @@
 """Fences as JSON, for the HTTP API: places in degrees, lengths in metres. Pure."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import Any
 
+from mav_tasks.client.goal_form import shortened
 from mav_tasks.plan_files import FenceCircle, FencePolygon, PlanFile
 
 DEGREE = 1e7  # of MAVLink's integers
@@ -53,6 +53,7 @@ def _place_of(value: Any, name: str) -> tuple[int, int]:
 def _number(value: Any, name: str, part: str, *, least: float, most: float) -> float:
     found: Any = value.get(part) if isinstance(value, Mapping) else None
     is_number = isinstance(found, int | float) and not isinstance(found, bool)
-    if not is_number or not isfinite(found) or not least <= found <= most:
-        raise ValueError(f"{name}.{part} {found!r}: expected a number from {least:g} to {most:g}")
+    if not is_number or not least <= found <= most:  # false for NaN, and right for any int
+        words = f"expected a number from {least:g} to {most:g}"
+        raise ValueError(f"{name}.{part} {shortened(found)}: {words}")
     return float(found)

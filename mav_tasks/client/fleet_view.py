@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from math import hypot
 from typing import Any
 
-from mav_tasks.client.values import VehicleStatus
+from mav_tasks.client.values import VehicleStatus, known
 from mav_tasks.errors import NoSuchVehicle
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -88,10 +88,10 @@ class VehicleView:
             is_heard=monitor is not None and monitor.is_heard(now=now),
             server_component=self.server_component or 0,
             heartbeat_age=self.heartbeat_age(now=now),
-            north=None if place is None else place.x,
-            east=None if place is None else place.y,
-            yaw=None if attitude is None else attitude.yaw,
-            speed=None if place is None else hypot(place.vx, place.vy),
+            north=None if place is None else known(place.x),
+            east=None if place is None else known(place.y),
+            yaw=None if attitude is None else known(attitude.yaw),
+            speed=None if place is None else known(hypot(place.vx, place.vy)),
             latitude=None if on_earth is None else on_earth.lat / DEGREE,
             longitude=None if on_earth is None else on_earth.lon / DEGREE,
             position_age=None if self._placed_at is None else now - self._placed_at,

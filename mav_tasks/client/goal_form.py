@@ -6,13 +6,14 @@ Distances are in metres, angles in degrees clockwise, times in seconds:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, radians
+from math import radians
 from typing import Any
 
 from mav_tasks.client.wire import Goal
 from mav_tasks.tasks.goal import Drive, Face, GlobalPlace, GoTo, LocalPlace, Move, Rotate, Wait
 
 DEGREE = 1e7  # of MAVLink's integers
+LARGEST = 3.4e38  # what a float32 of MAVLink holds
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,12 +141,20 @@ def goal_of(form: object, name: str = "goal") -> Goal:
         raise ValueError(f"{name}: expected an object, such as {{'kind': 'move', 'distance': 2}}")
     kind = BY_NAME.get(form["kind"]) if isinstance(form.get("kind"), str) else None
     if kind is None:
-        raise ValueError(f"{name}.kind {form.get('kind')!r}: expected one of {', '.join(BY_NAME)}")
+        words = f"expected one of {', '.join(BY_NAME)}"
+        raise ValueError(f"{name}.kind {shortened(form.get('kind'))}: {words}")
     known = {number.name for number in kind.numbers} | {"kind"}
     for each in form:
         if each not in known:
-            raise ValueError(f"{name}.{each}: a goal '{kind.name}' has no such part")
+            words = f"a goal '{kind.name}' has no such part"
+            raise ValueError(f"{name}.{shortened(each)[1:-1]}: {words}")
     return _made(kind.name, {each.name: _read(each, form, name) for each in kind.numbers})
+
+
+def shortened(value: object) -> str:
+    """Return a wrong value for a message: printable, at most 60 characters."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _read(number: Number, form: Mapping[str, Any], name: str) -> float | None:
@@ -155,8 +164,9 @@ def _read(number: Number, form: Mapping[str, Any], name: str) -> float | None:
         if number.is_required:
             raise ValueError(f"{where}: missing; expected {number.meaning} ({number.unit})")
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-        raise ValueError(f"{where} {value!r}: expected a number ({number.unit})")
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not -LARGEST <= value <= LARGEST:  # false for NaN, and right for any int
+        raise ValueError(f"{where} {shortened(value)}: expected a number ({number.unit})")
     if number.least is not None and value < number.least:
         raise ValueError(f"{where} {value:g}: expected at least {number.least:g} {number.unit}")
     if number.most is not None and value > number.most:

@@ -1,4 +1,4 @@
-"""The names in an MCAP file: what this version writes, and what it looks for when it reads one.
+"""The names in an MCAP file, for writing and reading it.
 
 dialects/README.md, "Recordings as MCAP", describes them. A change that a reader of older files
 would notice needs a new VERSION.

@@ -1,4 +1,4 @@
-"""What is kept of a telemetry log, so that one that is made again can be compared with it."""
+"""Length and digest of a telemetry log, to check a restored log against."""
 
 from hashlib import blake2b
 from typing import Any

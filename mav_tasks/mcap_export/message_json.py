@@ -1,6 +1,6 @@
 """MAVLink messages as JSON, with the names of their definitions.
 
-A float has the nine digits from which its bits can be told. JSON has no NaN and no infinity: they
+A float has nine digits, which determine its bits. JSON has no NaN and no infinity: they
 are null. Each kind of message has a format string, which takes a fifth of the time of ``json``.
 """
 

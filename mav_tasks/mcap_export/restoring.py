@@ -1,4 +1,4 @@
-"""Makes the telemetry logs of an MCAP file again, byte by byte. The file is untrusted input.
+"""Restores the telemetry logs of an MCAP file, byte by byte. The file is untrusted input.
 
 The file may have been copied, filtered or compressed by other programs, as long as the raw channel
 is complete and in its order: each log's length and digest are checked.
@@ -27,7 +27,7 @@ MOST_OF_A_RECORD = 1 << 30  # bytes
 
 
 class Log(NamedTuple):
-    """A telemetry log that was made again."""
+    """A restored telemetry log."""
 
     name: str
     size: int  # bytes
@@ -65,7 +65,7 @@ def restore(path: Path, opened: Callable[[str], BinaryIO]) -> list[Log]:
 
 
 def _records(path: Path) -> Iterator[Any]:
-    """Yield the records of a file after the one that says that it follows our convention."""
+    """Yield the records of a file after the one that names our convention."""
     is_ours = is_mcap = False
     try:
         with path.open("rb") as file:
@@ -100,7 +100,7 @@ def _check_version(path: Path, version: str) -> None:
 
 
 class _Bounded:
-    """A file of which no more can be read than it has, however long a damaged record claims to be.
+    """A file that refuses to read beyond its end, whatever length a damaged record claims.
 
     The mcap package takes a short read for a whole one.
     """

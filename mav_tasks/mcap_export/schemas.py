@@ -1,7 +1,7 @@
 """JSON schemas of the channels: MAVLink messages, Foxglove's well-known ones, and ours.
 
-Viewers (Foxglove, Lichtblick) read one type for each field, and refuse a list of types. So the
-schema of a number that may be null, because MAVLink has NaN there, says "number" all the same.
+Viewers (Foxglove, Lichtblick) read one type for each field, and refuse a list of types. So a
+number that may be null, for MAVLink's NaN, has the type "number" in its schema.
 """
 
 import json

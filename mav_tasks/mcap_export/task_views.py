@@ -1,4 +1,4 @@
-"""What viewers can show of the server's events: changes of tasks, and all events as texts."""
+"""Events of the server for viewers: changes of tasks, and all events as texts."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -90,7 +90,7 @@ class TaskViews:
         }
 
     def _known(self, task_id: int, vehicle: int) -> dict[str, Any]:
-        """Return what is known of a task; of one that the record begins after, what is not told."""
+        """Return the known facts of a task; null where the record began after them."""
         return self._tasks.setdefault(
             task_id,
             {

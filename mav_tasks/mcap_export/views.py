@@ -1,4 +1,4 @@
-"""What viewers can draw of the messages: poses, places, setpoints and texts.
+"""Views of the messages for viewers: poses, places, setpoints and texts.
 
 Rovers are drawn as the autopilot (component 1) reports them. MAVLink's axes are north, east, down,
 and for the rover itself forward, right, down; a viewer's are east, north, up, and forward, left,

@@ -88,7 +88,7 @@ class McapWriter:
         self._writer.add_message(channel, seen.time, data, seen.time)
 
     def add_log(self, log: LogFacts) -> None:
-        """Add what is needed to check a telemetry log that is made of this file."""
+        """Add the facts that check a telemetry log restored from this file."""
         self._writer.add_metadata(TLOG, log.metadata())
 
     def finish(self) -> None:

@@ -62,7 +62,7 @@ class Recorder(Protocol):
 
     @property
     def lost(self) -> int:
-        """How many packets it has lost."""
+        """Number of lost packets."""
 
 
 class LinkCounts:
@@ -192,7 +192,7 @@ class Collector:
                 note(event)
 
     def close(self) -> None:
-        """Nothing is kept."""
+        """Do nothing: there is nothing to close."""
 
     # for the thread that shows it, called in the loop
 
@@ -207,7 +207,7 @@ class Collector:
         return ""
 
     def totals(self) -> tuple[Part, tuple[int, ...]]:
-        """Return the figures that belong to no vehicle's state, and the vehicles to ask about."""
+        """Return the figures of the whole server, and the ids of the vehicles."""
         figures = self._figures.all()
         part: dict[Family, Sequence[Raw]] = {
             f.BUILD: [((self._version, platform.python_version()), 1)],

@@ -1,12 +1,12 @@
 """A small HTTP server for metrics and health checks, in a thread of its own.
 
-It answers GET and HEAD, one request per connection. Nobody can make it busy: it accepts one
-connection every ACCEPT_EVERY, serves at most CONNECTIONS at a time, and closes one that sends its
-request or takes its answer too slowly. The others wait in the kernel, or are refused there.
+It answers GET and HEAD, one request per connection. A flood cannot make it busy: it accepts one
+connection every ACCEPT_EVERY, serves at most CONNECTIONS at a time, and closes a connection that
+sends its request or takes its answer too slowly. The kernel keeps or refuses the others.
 
-A web page must not read what only this machine may. It could use a name of its own that resolves to
-a loopback address (DNS rebinding); the browser then sends that name in the Host header. So on a
-loopback address the Host must be one, too.
+Only this machine may read the pages, but not a web page in its browser. That page could use a name
+of its own that resolves to a loopback address (DNS rebinding); the browser then sends that name in
+the Host header. So on a loopback address the Host must be one, too.
 """
 
 import asyncio
@@ -216,7 +216,7 @@ async def _send(writer: asyncio.StreamWriter, answer: Answer, *, with_body: bool
 
 
 def checked(head: bytes, *, is_local: bool) -> tuple[str, str]:
-    """Return the method and the path of a request's head; raise BadRequest if it is none for us."""
+    """Return the method and the path of a request's head; raise BadRequest if it is invalid."""
     first, *fields = head.decode("latin-1").removesuffix("\r\n\r\n").split("\r\n")
     words = first.split(" ")
     if len(words) != 3 or words[2] not in ("HTTP/1.0", "HTTP/1.1"):

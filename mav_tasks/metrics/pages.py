@@ -144,7 +144,7 @@ def dashboard() -> bytes:
 
 
 def _note_failure(making: asyncio.Task[bytes]) -> None:
-    """Retrieve an exception, as those who asked may have left; asyncio would log it otherwise."""
+    """Retrieve an exception that no request waits for any more; asyncio would log it."""
     if not making.cancelled():
         making.exception()
 

@@ -1,6 +1,6 @@
 """Figures of this process, under the names that all Prometheus clients use.
 
-A figure that the system does not tell is left out: there is no /proc outside Linux.
+Figures that the system does not have are left out: only Linux has /proc.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Operations on what has happened: texts and the journal."""
+"""Operations on the past: texts, the journal and recordings."""
 
 import asyncio
 from typing import Any
@@ -12,7 +12,7 @@ from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 
 NO_RECORDS = "the web process shows no recordings: start it with --records FOLDER"
-LIMIT = Field("limit", "integer", "at most so many, the latest", False, 1, 2000)
+LIMIT = Field("limit", "integer", "at most this many, the latest", False, 1, 2000)
 
 
 def operations(services: Services) -> list[Operation]:

@@ -2,22 +2,17 @@
 
 from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
 from mav_tasks.errors import NoSuchVehicle
-from mav_tasks.plan_files import PlanFile, parse_plan
+from mav_tasks.plan_files import PlanFile
+from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
+from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation
+from mav_tasks.web.plan_text import NAME, plan_of, text_field
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 
-EPOCH = Field(
-    "epoch",
-    "integer",
-    "halt_epoch of the queue that you have seen: if anything has halted the rover since then, the"
-    " request is refused (stale)",
-    True,
-    0,
-)
-LIMIT = Field("limit", "integer", "at most so many tasks", False, 0, 10_000)
+LIMIT = Field("limit", "integer", "at most this many tasks", False, 0, 10_000)
 PLACE = {
     "type": "object",
     "properties": {
@@ -27,20 +22,18 @@ PLACE = {
     "required": ["latitude", "longitude"],
 }
 FENCE = [
-    Field("name", "string", "name of the file", False, 0, 255),
-    Field("text", "string", "contents of a .plan file with a fence", False, 1),
+    NAME,
+    text_field("contents of a .plan file with a fence", is_required=False),
     Field("circle", "object", "stay inside: latitude and longitude (deg) and radius (m)"),
     Field("polygon", "array", "stay inside: three or more places", False, 3, 500, items=PLACE),
 ]
-RALLY = [
-    Field("name", "string", "name of the file", False, 0, 255),
-    Field("text", "string", "contents of a .plan file with rally points", True, 1),
-]
+RALLY = [NAME, text_field("contents of a .plan file with rally points")]
 
 
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
     client, live = services.client, services.live
+    pauses = Flights()
 
     def known(call: Call) -> int:
         """Return the rover; raise NoSuchVehicle if the server does not have it."""
@@ -62,11 +55,12 @@ def operations(services: Services) -> list[Operation]:
         return found.form()
 
     async def pause(call: Call) -> None:
-        await client.pause(vehicle=known(call))
+        rover = known(call)
+        await pauses.join(rover, lambda: client.pause(vehicle=rover))
         await live.refresh(call.vehicle)
 
     async def resume(call: Call) -> None:
-        await client.resume(epoch=call.body["epoch"], vehicle=known(call))
+        await client.resume(epoch=seen_epoch(call.body), vehicle=known(call))
         await live.refresh(call.vehicle)
 
     async def clear(call: Call) -> None:
@@ -95,7 +89,7 @@ def operations(services: Services) -> list[Operation]:
         return {"shapes": shapes_of(await client.fence_file(vehicle=known(call)))}
 
     async def set_fence(call: Call) -> object:
-        plan = _fence_of(call)
+        plan = await _fence_of(call)
         return {"items": await client.set_fence(plan, vehicle=known(call))}
 
     async def clear_fence(call: Call) -> None:
@@ -107,7 +101,7 @@ def operations(services: Services) -> list[Operation]:
         return {"places": places}
 
     async def set_rally(call: Call) -> object:
-        plan = parse_plan(call.body["text"])
+        plan = await plan_of(call.body)
         return {"items": await client.set_rally_points(plan, vehicle=known(call))}
 
     one = "/vehicles/{vehicle}"
@@ -174,12 +168,12 @@ def operations(services: Services) -> list[Operation]:
     ]
 
 
-def _fence_of(call: Call) -> PlanFile:
+async def _fence_of(call: Call) -> PlanFile:
     """Return the fence of a request. Raise Problem unless it has exactly one form of it."""
     given = [name for name in ("text", "circle", "polygon") if call.body[name] is not None]
     if len(given) != 1:
         raise invalid("expected one of text, circle, polygon")
     if given == ["text"]:
-        return parse_plan(call.body["text"])
+        return await plan_of(call.body)
     value = call.body[given[0]]
     return circle_of(value) if given == ["circle"] else polygon_of(value)

@@ -1,4 +1,4 @@
-"""Operations of the session: who am I, log in, log out; and the event stream."""
+"""Operations of the session: show it, log in, log out; and the event stream."""
 
 import time
 from collections.abc import AsyncGenerator, AsyncIterator
@@ -10,13 +10,16 @@ from starlette.responses import Response, StreamingResponse
 from mav_tasks.client.goal_form import KINDS
 from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
+from mav_tasks.web.events import description
 from mav_tasks.web.fields import Field
+from mav_tasks.web.identity import OPEN_NAME
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import Problem
 from mav_tasks.web.services import Services
 from mav_tasks.web.sessions import COOKIE, LASTS
 
 MOST_STREAMS = 200
+MOST_OF_A_TOKEN = 100  # streams, so that nobody takes those of all others
 CHECKED = 1.0  # s between looks at the token of an open stream
 TOKEN = Field(
     "token", "string", "the token, as 'mav-tasks web tokens add' printed it", True, 1, 200
@@ -63,10 +66,19 @@ def operations(services: Services) -> list[Operation]:
         token = services.tokens.of_text(call.body["token"])
         if token is None:
             raise Problem(401, "Unknown token", "there is no such token, or it was revoked")
+        if call.session is not None:
+            services.sessions.end(call.session)
         response = Response(status_code=204)
         number = services.sessions.begin(token)
+        is_tls = call.headers.get("origin", "").startswith("https://")  # of a proxy
         response.set_cookie(
-            COOKIE, number, max_age=int(LASTS), httponly=True, samesite="strict", path="/"
+            COOKIE,
+            number,
+            max_age=int(LASTS),
+            httponly=True,
+            samesite="strict",
+            path="/",
+            secure=is_tls,
         )
         return response
 
@@ -78,11 +90,10 @@ def operations(services: Services) -> list[Operation]:
         return response
 
     async def events(call: Call) -> Response:
-        hub = services.live.hub
-        if hub.readers >= MOST_STREAMS:
-            words = f"{MOST_STREAMS} event streams are open already: close a page"
+        if not _is_place(call, services):
+            words = "too many event streams are open already: close a page"
             raise Problem(503, "Too many streams", words, headers={"retry-after": "5"})
-        reader = hub.open(call.headers.get("last-event-id"))
+        reader = services.live.hub.open(call.headers.get("last-event-id"))
         return StreamingResponse(
             _while_it_may(call, reader.frames(), services),
             media_type="text/event-stream",
@@ -100,6 +111,7 @@ def operations(services: Services) -> list[Operation]:
             events,
             answer="Events",
             headers=[Field("Last-Event-ID", "string", "id of the last event that you got")],
+            description=description(),
         ),
     ]
 
@@ -108,11 +120,24 @@ async def _while_it_may(
     call: Call, frames: AsyncGenerator[bytes], services: Services
 ) -> AsyncIterator[bytes]:
     """Yield the frames of a stream until its token is revoked, or its session ends."""
+    if not _is_place(call, services):  # others have begun since the request came
+        return
     checked_at = time.monotonic()
-    async with aclosing(frames):
-        async for frame in frames:
-            if time.monotonic() - checked_at > CHECKED:
-                checked_at = time.monotonic()
-                if not services.is_still_known(call.session, call.headers):
-                    return
-            yield frame
+    services.streams[call.identity.name] += 1
+    try:
+        async with aclosing(frames):
+            async for frame in frames:
+                if time.monotonic() - checked_at > CHECKED:
+                    checked_at = time.monotonic()
+                    if not services.is_still_known(call.session, call.headers):
+                        return
+                yield frame
+    finally:
+        services.streams[call.identity.name] -= 1
+
+
+def _is_place(call: Call, services: Services) -> bool:
+    """Return whether another stream may open."""
+    streams = services.streams
+    of_it = 0 if call.identity.name == OPEN_NAME else streams[call.identity.name]
+    return streams.total() < MOST_STREAMS and of_it < MOST_OF_A_TOKEN

@@ -6,12 +6,12 @@ from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import NoSuchVehicle
-from mav_tasks.plan_files import parse_plan
 from mav_tasks.tasks.task import DEFAULT_PRIORITY
+from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_preview import preview_of
+from mav_tasks.web.plan_text import NAME, plan_of, preview_response, text_field
 from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 from mav_tasks.web.submissions import (
@@ -31,10 +31,7 @@ from mav_tasks.web.submissions import (
 
 assert DEFAULT_PRIORITY == 5, "the API's document says so"
 
-FILE = (
-    Field("name", "string", "name of the file", False, 0, 255),
-    Field("text", "string", "contents of a .plan or QGC WPL 110 file", True, 1),
-)
+FILE = (NAME, text_field("contents of a .plan or QGC WPL 110 file"))
 KEYED = (Field(KEY, "string", "a text of yours: the same key makes no second task", False, 1, 200),)
 CHANGES = (
     PRIORITY,
@@ -54,7 +51,7 @@ RELEASE = (
         True,
         choices=("again", "remainder", "skip"),
     ),
-    Field("epoch", "integer", "halt_epoch that you have seen", True, 0),
+    EPOCH,
 )
 
 
@@ -82,14 +79,14 @@ def operations(services: Services) -> list[Operation]:
         return await add(call, goals, places_of_goals(goals))
 
     async def submit_mission(call: Call) -> Any:
-        plan = parse_plan(call.body["text"])
+        plan = await plan_of(call.body)
         return await add(call, plan, places_of_items(plan.items))
 
     async def preview(call: Call) -> Any:
-        return preview_of(parse_plan(call.body["text"]))
+        return await preview_response(call.body)
 
     async def status_of(call: Call) -> TaskStatus:
-        """Return a task's status: any rover's server knows the tasks of all."""
+        """Return a task's status. The server of any rover knows the tasks of all rovers."""
         rovers = client.vehicles()
         if not rovers:
             raise NoSuchVehicle("the server has no rover")
@@ -122,8 +119,8 @@ def operations(services: Services) -> list[Operation]:
 
     async def release(call: Call) -> None:
         services.check_may("release", call.task, call.identity)
+        epoch, how = seen_epoch(call.body), call.body["how"]
         status = await status_of(call)
-        epoch, how = call.body["epoch"], call.body["how"]
         await client.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
         live.hurry(status.vehicle)
 

@@ -28,9 +28,13 @@ def operations_of(services: Services) -> list[Operation]:
 
 
 def application(
-    services: Services, *, hosts: Iterable[str], open_identity: Identity | None
+    services: Services,
+    *,
+    hosts: Iterable[str],
+    behind_tls: Iterable[str],
+    open_identity: Identity | None,
 ) -> ASGIApp:
-    """Return the application. ``hosts`` and ``open_identity`` as in Guard."""
+    """Return the application. The other arguments are as in Guard."""
     operations = operations_of(services)
     document = document_of(operations)
 
@@ -46,8 +50,9 @@ def application(
         return PlainTextResponse("ok\n")
 
     async def readyz(_request: Request) -> Response:
-        why = services.live.why_not_ready()
-        return PlainTextResponse(f"{why or 'ready'}\n", status_code=503 if why else 200)
+        is_ready = services.live.is_reachable  # where the server is, only users may know
+        words = "ready\n" if is_ready else "no answer from the task server\n"
+        return PlainTextResponse(words, status_code=200 if is_ready else 503)
 
     app = Starlette(
         routes=[
@@ -63,6 +68,7 @@ def application(
     return Guard(
         app,
         hosts=hosts,
+        behind_tls=behind_tls,
         tokens=services.tokens,
         sessions=services.sessions,
         open_identity=open_identity,
@@ -72,7 +78,9 @@ def application(
 
 
 def _route(operation: Operation) -> Route:
-    path = operation.path.replace("{vehicle}", "{vehicle:int}").replace("{task}", "{task:int}")
+    path = operation.path
+    for name in ("vehicle", "task"):
+        path = path.replace(f"{{{name}}}", f"{{{name}:number}}")
     return Route(f"{ROOT}{path}", operation.run, methods=[operation.method])
 
 

@@ -5,9 +5,9 @@ Pure.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
 
+from mav_tasks.client.goal_form import LARGEST, shortened
 from mav_tasks.web.problems import invalid
 
 EXPECTED = {
@@ -54,24 +54,28 @@ class Field:
         return schema
 
     def read(self, body: Mapping[str, Any]) -> Any:
-        """Return the part of a body, None if it is not given; raise Problem if it is wrong."""
+        """Return the part of a body, None if it is not given. Raise Problem if it is invalid."""
         value = body.get(self.name)
         if value is None:
             if self.is_required:
                 raise invalid(f"{self.name}: missing; expected {self.meaning}")
             return None
         if not self._is_of_type(value):
-            raise invalid(f"{self.name} {_shown(value)}: expected {EXPECTED[self.type]}")
+            raise invalid(f"{self.name} {shortened(value)}: expected {EXPECTED[self.type]}")
+        if isinstance(value, str) and not _is_unicode(value):
+            raise invalid(f"{self.name} {shortened(value)}: half of a UTF-16 pair is no character")
         if self.choices and value not in self.choices:
             words = ", ".join(self.choices)
-            raise invalid(f"{self.name} {_shown(value)}: expected one of {words}")
+            raise invalid(f"{self.name} {shortened(value)}: expected one of {words}")
         size = len(value) if isinstance(value, str | list) else value
         if self.least is not None and size < self.least:
             raise invalid(
-                f"{self.name} {_shown(value)}: expected at least {self.least:g}{self._of}"
+                f"{self.name} {shortened(value)}: expected at least {self.least:g}{self._of}"
             )
         if self.most is not None and size > self.most:
-            raise invalid(f"{self.name} {_shown(value)}: expected at most {self.most:g}{self._of}")
+            raise invalid(
+                f"{self.name} {shortened(value)}: expected at most {self.most:g}{self._of}"
+            )
         return value
 
     @property
@@ -105,21 +109,26 @@ def body_schema(fields: Sequence[Field]) -> dict[str, Any]:
 
 
 def read_body(fields: Sequence[Field], body: object) -> dict[str, Any]:
-    """Return all parts of a body, None for those not given; raise Problem if it is wrong."""
+    """Return each declared part, None if it is not given. Raise Problem if one is invalid."""
     if not isinstance(body, dict):
         raise invalid("the request's body: expected a JSON object")
     known = {field.name for field in fields}
     for name in body:
         if name not in known:
             words = ", ".join(sorted(known)) or "nothing"
-            raise invalid(f"{_shown(name)}: no such part; expected {words}")
+            raise invalid(f"{shortened(name)}: no such part; expected {words}")
     return {field.name: field.read(body) for field in fields}
 
 
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return -LARGEST <= value <= LARGEST  # false for NaN, and right for any int

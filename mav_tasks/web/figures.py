@@ -1,7 +1,7 @@
 """The metrics of the web process: what it sees of the rovers, and how it serves browsers.
 
-The server's own (setpoints, store, links) are those of ``serve --metrics``, with the same names
-where they say the same.
+``serve --metrics`` has the task server's own metrics (setpoints, store, links). A metric with the
+same meaning has the same name there.
 """
 
 from collections import Counter

@@ -27,7 +27,7 @@ WHY_PAUSED = {
     TaskReason.OPERATOR: "somebody paused it",
     TaskReason.QUEUE_PAUSED: "somebody paused it",
     TaskReason.STOPPED: "STOP is in force",
-    TaskReason.TAKEOVER: "somebody else has taken over the rover",
+    TaskReason.TAKEOVER: "a person or another program took over the rover",
     TaskReason.FAILSAFE: "the rover's own failsafe took over",
     TaskReason.RESTARTED: "the server or the rover was restarted",
 }

@@ -1,8 +1,8 @@
 """Decides which requests reach the API: the outermost layer of the web process. ASGI.
 
-A page of another site can make a browser send requests to 127.0.0.1. They are refused by their
-Host header (DNS rebinding), by Origin and Sec-Fetch-Site (cross-site requests), and because a body
-must be JSON, for which a browser would ask first. Every answer has the headers that keep a browser
+A page of another site can make a browser send requests to 127.0.0.1. The guard refuses them by Host
+(DNS rebinding), and by Origin and Sec-Fetch-Site (cross-site requests). A body must be JSON, which
+a browser sends to another site only after a preflight. The headers of every answer keep a browser
 from running or framing anything else.
 """
 
@@ -27,10 +27,16 @@ STOP = "/api/v1/stop"
 METRICS = "/metrics"
 
 SMALL_BODY = 64 * 1024  # bytes
-PLAN_BODY = 24 * 1024 * 1024  # bytes: a plan file of 10 MB, escaped
+PLAN_BODY = 12 * 1024 * 1024  # bytes: a plan file of 6 MB, escaped
+LARGE_ONES = 4  # larger bodies than SMALL_BODY that are held at a time
 WITH_PLANS = ("/plans", "/missions", "/fence", "/rally")
+SLOWED = 0.5  # s until a refusal is sent to who gets too many of them
 BODY_WITHIN = 15.0  # s for the whole body
 
+#: headers that decide; programs differ in which of two counts
+ONCE = frozenset(
+    {"host", "origin", "sec-fetch-site", "authorization", "content-type", "content-length"}
+)
 HEADERS = {
     "content-security-policy": (
         "default-src 'self'; img-src 'self' data: blob:; connect-src 'self'; object-src 'none'; "
@@ -49,8 +55,10 @@ RAW_HEADERS = [(name.encode(), value.encode()) for name, value in HEADERS.items(
 class Guard:
     """The layer around an application.
 
-    ``hosts`` are the values of Host that are accepted, in lower case. ``open_identity`` is that of
-    requests without a token; None: a token is required. ``tile_origins`` are the sites of tiles.
+    ``hosts`` are the values of Host that are accepted, in lower case; ``behind_tls`` are those of
+    them that a proxy serves with TLS, so that its pages have an https origin. ``open_identity`` is
+    that of requests without a token; None: a token is required. ``tile_origins`` are the sites of
+    tiles.
     ``note_answer`` gets the status of each answer.
     """
 
@@ -62,17 +70,20 @@ class Guard:
         tokens: Tokens,
         sessions: Sessions,
         open_identity: Identity | None,
+        behind_tls: Iterable[str] = (),
         tile_origins: tuple[str, ...] = (),
         note_answer: Callable[[int], None] = lambda _status: None,
     ) -> None:
         self._app = app
         self._hosts = frozenset(hosts)
+        self._behind_tls = frozenset(behind_tls)
         self._tokens = tokens
         self._sessions = sessions
         self._open_identity = open_identity
         self._tile_origins = tile_origins
         self._note_answer = note_answer
         self._rates = Rates()
+        self._large = asyncio.Semaphore(LARGE_ONES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or pass it on."""
@@ -87,13 +98,30 @@ class Guard:
                 message["headers"] = [*message.get("headers", ()), *self._headers()]
             await send(message)
 
+        # nothing here needs parts of files, and thousands of parts cost much
+        scope["headers"] = [each for each in scope["headers"] if each[0].lower() != b"range"]
         try:
-            self._check(scope)
-            body = _limited(receive, most=_most_bytes(scope["path"]))
+            length = self._check(scope)
         except Problem as problem:
+            if self._rates.wait_of(f"refused {scope['client'][0]}"):
+                problem.headers["connection"] = "close"  # with all that is pipelined behind it
+                await asyncio.sleep(SLOWED)  # a flood waits, and others are answered
             await problem.response()(scope, receive, guarded)
             return
-        await self._app(scope, body, guarded)
+        if length <= SMALL_BODY:  # also one that does not say how long it is
+            await self._app(scope, _limited(receive, most=SMALL_BODY), guarded)
+            return
+        try:
+            async with asyncio.timeout(BODY_WITHIN):
+                await self._large.acquire()
+        except TimeoutError:
+            busy = Problem(503, "Busy", "too many files at a time: try again")
+            await busy.response()(scope, receive, guarded)
+            return
+        try:
+            await self._app(scope, _limited(receive, most=length), guarded)
+        finally:
+            self._large.release()
 
     def _headers(self) -> list[tuple[bytes, bytes]]:
         if not self._tile_origins:
@@ -103,8 +131,11 @@ class Guard:
         )
         return [(b"content-security-policy", policy.encode()), *RAW_HEADERS[1:]]
 
-    def _check(self, scope: Scope) -> None:
-        """Raise Problem if a request must not pass; else note whose it is in its state."""
+    def _check(self, scope: Scope) -> int:
+        """Raise Problem if a request must not pass; else store its identity in its state.
+
+        Return the announced length of its body, 0 without one.
+        """
         headers = _headers_of(scope)
         host = headers.get("host", "").lower()
         if host not in self._hosts:
@@ -112,27 +143,32 @@ class Guard:
             raise Problem(421, "Wrong host", words)
         if scope["method"] not in METHODS:
             raise Problem(405, "Method not allowed", f"{scope['method'][:20]}: not used here")
+        if scope["method"] == "HEAD" and scope["path"].startswith(API):
+            raise Problem(405, "Method not allowed", "HEAD: the API does not take it")
         if scope["method"] not in SAFE:
-            _check_origin(headers, host, scheme=scope.get("scheme", "http"))
-        _check_length(headers, most=_most_bytes(scope["path"]))
+            schemes = ("http", "https") if host in self._behind_tls else ("http",)
+            _check_origin(headers, {f"{scheme}://{host}" for scheme in schemes})
+        length = _length_of(headers, most=_most_bytes(scope["path"]))
         identity, session = self._identity(headers)
         scope.setdefault("state", {})
         scope["state"]["identity"], scope["state"]["session"] = identity, session
         if not scope["path"].startswith((API, METRICS)):
-            return
+            return length
         is_login = scope["path"] == SESSION and scope["method"] == "POST"
         if identity is None and not is_login:
             words = "a token is required: log in, or send 'Authorization: Bearer TOKEN'"
-            raise Problem(401, "Who are you?", words, headers={"www-authenticate": "Bearer"})
-        if scope["path"] != STOP:  # STOP is never rate-limited
+            raise Problem(401, "Not logged in", words, headers={"www-authenticate": "Bearer"})
+        is_stop = scope["path"] == STOP and scope["method"] == "POST"
+        if not is_stop:  # STOP is never rate-limited
             who = scope["client"][0] if identity is None else identity.name
             wait = self._rates.wait_of(who)
             if wait:
                 words = f"too many requests: try again in {wait} s"
                 raise Problem(429, "Too many requests", words, headers={"retry-after": str(wait)})
+        return length
 
     def _identity(self, headers: dict[str, str]) -> tuple[Identity | None, str | None]:
-        """Return whose request it is, and the session that says so."""
+        """Return the identity of a request, and its session."""
         kind, _, text = headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer" and text:
             token = self._tokens.of_text(text.strip())
@@ -149,21 +185,25 @@ class Guard:
 
 
 def _headers_of(scope: Scope) -> dict[str, str]:
-    """Return the headers of a request; raise Problem if one that decides comes twice."""
+    """Return the headers of a request. Raise Problem if one of ONCE comes twice."""
     headers: dict[str, str] = {}
     for name, value in scope["headers"]:
         key = name.decode("latin-1").lower()
-        if key in headers and key in ("host", "origin", "authorization", "content-length"):
+        if key in headers and key in ONCE:
             raise Problem(400, "Invalid request", f"two headers {key!r}")
         headers[key] = value.decode("latin-1")
+    if "content-length" in headers and "transfer-encoding" in headers:
+        # a proxy may believe the other one: what it takes for one request may be two here
+        words = "send Content-Length or Transfer-Encoding, not both"
+        raise Problem(400, "Invalid request", words, headers={"connection": "close"})
     return headers
 
 
-def _check_origin(headers: dict[str, str], host: str, *, scheme: str) -> None:
-    """Raise Problem if a page of another site sent a request that changes something."""
+def _check_origin(headers: dict[str, str], own: set[str]) -> None:
+    """Raise Problem if a page of another origin than ours sent a request that changes something."""
     origin = headers.get("origin")
     site = headers.get("sec-fetch-site", "same-origin")
-    if site not in ("same-origin", "none") or origin not in (None, f"{scheme}://{host}"):
+    if site not in ("same-origin", "none") or origin not in (None, *own):
         words = f"a page of {(origin or 'another site')[:80]} may not do this"
         raise Problem(403, "Cross-site request", words)
     kind = headers.get("content-type", "").partition(";")[0].strip().lower()
@@ -172,10 +212,12 @@ def _check_origin(headers: dict[str, str], host: str, *, scheme: str) -> None:
         raise Problem(415, "Wrong media type", "expected Content-Type: application/json")
 
 
-def _check_length(headers: dict[str, str], *, most: int) -> None:
+def _length_of(headers: dict[str, str], *, most: int) -> int:
+    """Return the announced length of a body. Raise Problem if it is more than ``most`` bytes."""
     text = headers.get("content-length", "0")
-    if not text.isdigit() or int(text[:20]) > most:
+    if not text.isdecimal() or int(text[:20]) > most:
         raise _too_large(most)
+    return int(text)
 
 
 def _limited(receive: Receive, *, most: int) -> Receive:

@@ -1,8 +1,8 @@
 """Server-sent events for any number of readers. Each event is encoded once. WHATWG HTML, 9.2.
 
-An event has a number, by which a reader that reconnects gets what it missed. States of rovers come
-many times a second and have none: a reader that is too slow skips them, and later gets the latest.
-A reader that is slower still gets a new snapshot. No reader can hold up another one.
+Events have numbers, so a reader that reconnects gets the events that it missed. States of rovers
+come many times a second and have no number: a slow reader skips some and gets the latest. A reader
+that misses other events gets a new snapshot. No reader delays another one.
 """
 
 import asyncio
@@ -64,14 +64,14 @@ class Hub:
             reader.put_vehicles(frame)
 
     def open(self, last: str | None) -> "Reader":
-        """Return a new reader. ``last`` is the id of the last event that it got, None: none.
+        """Return a new reader. ``last`` is the id of the last event that it got, if any.
 
-        It counts from its first event on: one whose browser is gone before that never does.
+        It counts as a reader once it takes its first event: its browser may have left before.
         """
         return Reader(self, last)
 
     def begin(self, reader: "Reader", last: str | None) -> None:
-        """Count a reader, and let it begin where it was."""
+        """Add a reader. It continues after the event ``last``."""
         missed = None if last is None else self._since(last)
         if missed is None:
             reader.is_behind = True
@@ -174,7 +174,7 @@ class Reader:
         return self._take() or ALIVE
 
     def _take(self) -> bytes:
-        """Return all that is unread; b"" if there is nothing."""
+        """Return the unread events; b"" if there are none."""
         if self.is_behind:
             self.is_behind = self.are_vehicles_behind = False
             self._unread.clear()

@@ -35,7 +35,7 @@ class Journal:
     def entries(
         self, *, task: int | None, vehicle: int | None, after: int, limit: int
     ) -> list[dict[str, Any]]:
-        """Return the latest events after a number, the oldest first; without a task: of a day."""
+        """Return the latest events after a number, oldest first. Without a task: of a day."""
         since = None if task is not None else time.time() - DAY
         which = Which(task=task, vehicle=vehicle, since=since)
         with closing(kind_of(self._place).open_journal(self._place, which)) as reader:

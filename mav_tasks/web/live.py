@@ -1,8 +1,8 @@
 """One live view of the task server for all browsers: rovers, queues, texts, tracks, STOPs.
 
-The server reports each change of a task. A queue is requested again after such a change, and else
-every two seconds, because nobody reports a pause. All of it is one client on one link, however many
-browsers look.
+The task server reports each change of a task. The view requests a queue after such a change, and
+every two seconds, because a pause is not reported. It is one client on one link for any number of
+browsers.
 """
 
 import asyncio
@@ -20,6 +20,7 @@ from mav_tasks.web.forms import queue_form, task_form, text_form, vehicle_form
 from mav_tasks.web.goal_places import Place, places_of_words
 from mav_tasks.web.hub import Hub
 from mav_tasks.web.origins import Origins
+from mav_tasks.web.queue_rows import QueueRows
 from mav_tasks.web.stops import Stop, Stops
 from mav_tasks.web.tracks import Tracks
 
@@ -49,6 +50,7 @@ class Live:
         self.stops = Stops(client, self._publish_stop)
         self.queues: dict[int, QueueStatus] = {}
         self.places: dict[int, list[Place]] = {}
+        self._rows = QueueRows()
         self._server = server
         self._origins = Origins()
         self._texts: deque[dict[str, Any]] = deque(maxlen=TEXTS)
@@ -72,13 +74,13 @@ class Live:
     # requests
 
     def snapshot(self) -> dict[str, Any]:
-        """Return everything that the page shows at first."""
+        """Return the data of the page's first event."""
         return {
             "now": round(time.time(), 3),
             "reachable": self.is_reachable,
             "detail": self.why_not_ready(),
             "vehicles": self.vehicle_forms(),
-            "queues": [self.queue_form(each) for each in self.queues.values()],
+            "queues": self._rows.forms(),
             "texts": list(self._texts)[-TEXTS_AT_FIRST:],
             "stops": self.stops.forms(),
         }
@@ -127,7 +129,7 @@ class Live:
         for queue in self.queues.values():
             current = () if queue.current is None else (queue.current,)
             if any(each.id == task_id for each in (*current, *queue.waiting)):
-                self.hub.publish("queue", self.queue_form(queue))
+                self._publish_queue(queue)
 
     def texts(self, *, before: int | None, limit: int) -> list[dict[str, Any]]:
         """Return texts, the newest last."""
@@ -135,12 +137,12 @@ class Live:
         return found[-limit:]
 
     def hurry(self, vehicle: int) -> None:
-        """Request a rover's queue soon: something was asked of it."""
+        """Request a rover's queue soon, after a request that may have changed it."""
         if vehicle in self._dirty:
             self._dirty[vehicle].set()
 
     async def refresh(self, vehicle: int) -> None:
-        """Request a rover's queue now, so that the next answer shows what has been asked of it."""
+        """Request a rover's queue now, so that the next answer shows the change."""
         with suppress(ClientError):  # the page shows how old its data are
             await self._fetch(vehicle)
 
@@ -179,8 +181,11 @@ class Live:
         if before is None or _essence(before) != _essence(queue):
             queue = await self.client.queue(vehicle=vehicle, limit=LISTED)
             self.queues[vehicle] = queue
-            self.hub.publish("queue", self.queue_form(queue))
+            self._publish_queue(queue)
             self._mark(vehicle)
+
+    def _publish_queue(self, queue: QueueStatus) -> None:
+        self.hub.publish("queue", self._rows.change(self.queue_form(queue)))
 
     # news
 
@@ -231,11 +236,12 @@ class Live:
             self._flush = loop.call_later(FRAME, self._publish_vehicles)
 
     def _publish_vehicles(self) -> None:
+        now = since = time.time()
         if self._flush is not None:
             self._flush.cancel()
             self._flush = None
+            since = self._since
         changed, self._changed = self._changed, set()
-        now = time.time()
         for each in self.client.some_vehicles(changed):
             running = self._running.get(each.id)
             self.tracks.add(each, task=None if running is None else running.id, at=now)
@@ -243,8 +249,7 @@ class Live:
         if self.hub.readers:
             vehicles = self.vehicle_forms(changed)
             if vehicles:
-                since = round(self._since, 3)
-                form = {"now": round(now, 3), "since": since, "vehicles": vehicles}
+                form = {"now": round(now, 3), "since": round(since, 3), "vehicles": vehicles}
                 self.hub.publish_vehicles(form)
 
     def _all_vehicles(self) -> dict[str, Any]:
@@ -262,7 +267,7 @@ class Live:
             self.hub.publish("server", {"reachable": is_reachable, "detail": detail})
 
     def why_not_ready(self) -> str | None:
-        """Return why the page cannot show what is; None: the task server is heard."""
+        """Return why the view is out of date; None if the task server is heard."""
         if self.is_reachable:
             return None
         return f"no answer from the task server at {self._server}: is it running?"

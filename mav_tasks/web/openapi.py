@@ -12,8 +12,8 @@ from mav_tasks.web.schemas import SCHEMAS, ref
 
 INTRODUCTION = (
     "Tasks of MAVLink rovers. SI units, angles in degrees clockwise, times in seconds. Requests"
-    " that let a rover move name the halt_epoch that you have seen; after a newer halt they are"
-    " refused."
+    " that let a rover move carry the halt_epoch that you have read; the server refuses them after"
+    " a newer halt."
 )
 EVENTS = "text/event-stream"
 PATH_NAMES = {
@@ -65,6 +65,8 @@ def _described(operation: Operation) -> dict[str, Any]:
         "parameters": parameters,
         "responses": _answers(operation),
     }
+    if operation.description:
+        described["description"] = operation.description
     if operation.body is not None:
         schema = body_schema(operation.body)
         described["requestBody"] = {

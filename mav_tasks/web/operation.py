@@ -1,18 +1,44 @@
 """An operation of the API: declared once, for its route, its checks and the OpenAPI document."""
 
+import asyncio
+import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
+from mav_tasks.tasks.task import MAX_TASK_ID
 from mav_tasks.web.fields import Field, read_body
+from mav_tasks.web.guard import SMALL_BODY
 from mav_tasks.web.identity import Identity
-from mav_tasks.web.problems import Problem, invalid, problem_of
+from mav_tasks.web.problems import Problem, invalid, not_found, problem_of
 
 ROOT = "/api/v1"
+MOST_PARTS = 300_000  # lists and objects of a body: a plan file of 6,000 items has some 20,000
+MAX_VEHICLE = 255  # system ids of MAVLink
+WORDS = {"vehicle": "rover", "task": "task"}
+
+
+class NumberConvertor(Convertor[int]):
+    """A number in a path, of at most ten digits. A longer one is not found."""
+
+    regex = "[0-9]{1,10}"
+
+    def convert(self, value: str) -> int:
+        """Return the number."""
+        return int(value)
+
+    def to_string(self, value: int) -> str:
+        """Return the text of a number."""
+        return str(value)
+
+
+register_url_convertor("number", NumberConvertor())
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +85,7 @@ class Operation:
     answer: str = ""
     status: int = 200
     headers: Sequence[Field] = ()
+    description: str = ""
 
     async def run(self, request: Request) -> Response:
         """Answer a request."""
@@ -79,6 +106,10 @@ class Operation:
         if self.may and self.may != "own" and self.may not in identity.may:
             words = f"{identity.name} has the role {identity.role}, which may not {self.may}"
             raise Problem(403, "Not allowed", words, reason="not_allowed")
+        for name, most in (("vehicle", MAX_VEHICLE), ("task", MAX_TASK_ID)):
+            number = request.path_params.get(name)
+            if number is not None and not 1 <= number <= most:
+                raise not_found(f"there is no {WORDS[name]} {number}: ids are 1 to {most}")
         body: Mapping[str, Any] = {}
         if self.body is not None:
             body = read_body(self.body, await _json_of(request))
@@ -97,9 +128,33 @@ async def _json_of(request: Request) -> object:
     if not data:
         return {}
     try:
-        return await request.json()
+        if len(data) <= SMALL_BODY:
+            return _parsed(data)
+        if data.count(b"[") + data.count(b"{") > MOST_PARTS:  # nothing here has so many
+            raise Problem(413, "Too large", f"the body has more than {MOST_PARTS} parts")
+        async with _parsing:  # one at a time: a STOP waits for one of them at most
+            return await asyncio.to_thread(_parsed, data)
+    except Problem:
+        raise
     except (ValueError, RecursionError) as error:
         raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
+
+
+_parsing = asyncio.Lock()
+
+
+def _parsed(data: bytes) -> object:
+    return json.loads(data, object_pairs_hook=_object_of)
+
+
+def _object_of(parts: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object. Raise Problem if a name comes twice: parsers differ in which counts."""
+    found: dict[str, Any] = {}
+    for name, value in parts:
+        if name in found:
+            raise invalid(f"{shortened(name)[1:-1]}: it comes twice")
+        found[name] = value
+    return found
 
 
 def _queried(field: Field, query: Mapping[str, str]) -> Any:

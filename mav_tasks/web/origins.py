@@ -1,7 +1,7 @@
-"""Where the local frame of each rover begins on earth, for the map. Pure.
+"""The origin of each rover's local frame on earth, for the map. Pure.
 
-Computed from the two positions that a rover sends, while it stands: while it drives, they are of
-different moments.
+It is computed from the local and the global position of a rover that stands. While it drives, the
+two are of different moments.
 """
 
 from math import cos, hypot, radians

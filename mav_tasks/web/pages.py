@@ -46,8 +46,8 @@ def routes(tiles: Tiles | None) -> list[Route | Mount]:
 
     return [
         Route("/", index),
-        Route("/tasks/{task:int}", index),
-        Route("/tiles/{zoom:int}/{column:int}/{row:int}", tile),
+        Route("/tasks/{task:number}", index),
+        Route("/tiles/{zoom:number}/{column:number}/{row:number}", tile),
         Mount("/static/leaflet", Files(directory=_leaflet())),
         Mount("/static", Files(directory=STATIC)),
     ]

@@ -1,4 +1,4 @@
-"""What a mission file would do, for the map: before anything is sent. Pure."""
+"""The path of a mission file for the map, before it is submitted. Pure."""
 
 from itertools import pairwise
 from math import cos, hypot, radians
@@ -23,7 +23,7 @@ def preview_of(plan: PlanFile) -> dict[str, Any]:
 
 
 def _length_of(path: list[Place]) -> float | None:
-    """Return the length of a path, m; None if its places are not of one kind."""
+    """Return the length of a path, m; None if it has local and global places."""
     kinds = {frozenset(place) for place in path}
     if len(kinds) > 1:
         return None

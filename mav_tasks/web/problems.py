@@ -28,7 +28,7 @@ _STATUS = {
 
 
 class Problem(MavTasksError):
-    """A request that is not answered as it was asked; ``detail`` says what to change."""
+    """A refused or failed request; ``detail`` says what to change."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class Problem(MavTasksError):
             "type": "about:blank",
             "title": self.title,
             "status": self.status,
-            "detail": self.detail,
+            "detail": self.detail.encode(errors="backslashreplace").decode(),  # it quotes requests
             "reason": self.reason,
         }
         return JSONResponse(
@@ -59,17 +59,17 @@ class Problem(MavTasksError):
 
 
 def invalid(detail: str) -> Problem:
-    """Return the problem of a request whose contents are wrong."""
+    """Return the problem of an invalid request."""
     return Problem(422, "Invalid request", detail)
 
 
 def not_found(detail: str) -> Problem:
-    """Return the problem of a request for what does not exist."""
+    """Return the problem of a request for something that does not exist."""
     return Problem(404, "Not found", detail, reason="not_found")
 
 
 def problem_of(error: Exception) -> Problem:
-    """Return the problem that tells of an error of the client library."""
+    """Return an error of the client library as a problem."""
     match error:
         case Problem():
             return error

@@ -19,7 +19,7 @@ class Rates:
         return f"Rates({len(self._left)})"
 
     def wait_of(self, who: str) -> int:
-        """Count a request. Return 0, or in how many seconds to try again if it is too many."""
+        """Count a request. Return 0, or the seconds to wait if there were too many."""
         now = time.monotonic()
         left, at = self._left.pop(who, (AT_ONCE, now))
         left = min(AT_ONCE, left + (now - at) * PER_SECOND)

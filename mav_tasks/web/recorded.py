@@ -1,13 +1,15 @@
 """``python -m mav_tasks.web.recorded FILE...``: one run's recordings, as JSON for the map.
 
-A process of its own: to read a log of an hour takes seconds, in which the web process must still
-pass a STOP on at once. Prints one JSON object, or an error on standard error.
+It is a process of its own: it needs seconds for a log of an hour, and the web process must pass on
+a STOP at once. It prints one JSON object, or an error on standard error.
 """
 
 import json
+import os
+import resource
 import sys
 from collections.abc import Sequence
-from math import ceil, degrees, floor, hypot
+from math import ceil, degrees, floor, hypot, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,8 @@ APART = 0.05  # m; closer points of a slow rover are left out,
 AT_LEAST = 5.0  # s, but one in so many seconds is kept
 MOST_POINTS = 20_000  # of a rover
 MOST_EVENTS = 5_000
+MOST_MODES = 5_000  # of a rover
+MEMORY = 2 << 30  # bytes
 NS = 1e9
 
 
@@ -80,7 +84,8 @@ class Run:
             case m.LocalPositionNed() if source.component_id == AUTOPILOT:
                 self._place(rover, message, at)
             case m.Attitude() if source.component_id == AUTOPILOT:
-                self._yaw[rover] = round(degrees(message.yaw) % 360.0, 1)
+                if isfinite(message.yaw):
+                    self._yaw[rover] = round(degrees(message.yaw) % 360.0, 1)
             case m.Heartbeat(autopilot=autopilot) if autopilot != MavAutopilot.INVALID:
                 if source.component_id == AUTOPILOT:
                     self._mode(rover, message, at)
@@ -89,6 +94,8 @@ class Run:
                     self._event(at, clean(text.words), kind="text", vehicle=rover, task=None)
 
     def _place(self, rover: int, message: m.LocalPositionNed, at: float) -> None:
+        if not all(map(isfinite, (message.x, message.y, message.vx, message.vy))):
+            return
         points = self._points.setdefault(rover, [])
         speed = hypot(message.vx, message.vy)
         point = [
@@ -114,7 +121,7 @@ class Run:
         name = f"mode {mode}" if persona is None else persona.mode_name(mode)
         armed = bool(message.base_mode & 128)
         modes = self._modes.setdefault(rover, [])
-        if not modes or modes[-1][1:] != [name, armed]:
+        if len(modes) < MOST_MODES and (not modes or modes[-1][1:] != [name, armed]):
             modes.append([round(at, 2), name, armed])
 
     def _event(self, at: float, words: str, *, kind: str, vehicle: Any, task: Any) -> None:
@@ -125,11 +132,16 @@ class Run:
 
 def main() -> int:
     """Print the run of the files that are named; return the exit status."""
+    os.nice(10)  # the server and the web process come first
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     run = Run()
     try:
         run.add([Path(name) for name in sys.argv[1:]])
     except (RecordError, UsageError) as error:
         sys.stderr.write(f"{error}\n")
+        return 2
+    except MemoryError:
+        sys.stderr.write(f"{Path(sys.argv[1]).name}: it needs too much memory\n")
         return 2
     json.dump(run.form(), sys.stdout, separators=(",", ":"), allow_nan=False)
     return 0

@@ -1,4 +1,4 @@
-"""The recordings in a folder, for the page: which runs there are, and one run's way on the map."""
+"""The recordings in a folder, for the page: which runs there are, and one run's path on the map."""
 
 import asyncio
 import os
@@ -13,6 +13,8 @@ from mav_tasks.web.problems import Problem, not_found
 
 TLOG = ".tlog"
 WITHIN = 120.0  # s to read a run
+MOST_BYTES = 64 << 20  # of a run as JSON
+MOST_WAITING = 5  # requests for a run at a time; more are refused
 MOST = 500  # runs that are listed, the newest
 
 
@@ -31,7 +33,7 @@ class Files:
             "name": self.name,
             "bytes": sum(each.st_size for each in found),
             "changed": max(each.st_mtime for each in found),
-            "files": [path.name for path in self.paths],
+            "files": [_shown(path.name) for path in self.paths],
         }
 
 
@@ -43,6 +45,7 @@ class Records:
             raise UsageError(f"--records {folder}: no such folder")
         self._folder = folder
         self._reading = asyncio.Lock()
+        self._waiting = 0
 
     def __repr__(self) -> str:
         return f"Records({self._folder})"
@@ -61,16 +64,28 @@ class Records:
         files = (await asyncio.to_thread(self._runs)).get(name)
         if files is None:
             raise not_found(f"there is no recording {name[:80]!r}")
-        async with self._reading:
-            return await _read(files)
+        if self._waiting >= MOST_WAITING:
+            words = "other recordings are being read: try again"
+            raise Problem(503, "Busy", words, headers={"retry-after": "5"})
+        self._waiting += 1
+        try:
+            async with self._reading:
+                return await _read(files)
+        finally:
+            self._waiting -= 1
 
     def _runs(self) -> dict[str, Files]:
         found: dict[str, list[Path]] = {}
         for path in sorted(self._folder.iterdir()):
             for suffix in (TLOG, SUFFIX):
                 if path.name.endswith(suffix) and path.is_file():
-                    found.setdefault(path.name.removesuffix(suffix), []).append(path)
+                    found.setdefault(_shown(path.name.removesuffix(suffix)), []).append(path)
         return {name: Files(name, tuple(paths)) for name, paths in found.items()}
+
+
+def _shown(name: str) -> str:
+    """Return the name of a file as text: the disk may have any bytes."""
+    return name.encode(errors="replace").decode()
 
 
 async def _read(files: Files) -> bytes:
@@ -78,9 +93,18 @@ async def _read(files: Files) -> bytes:
     reading = await asyncio.create_subprocess_exec(
         *command, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
     )
+    assert reading.stdout is not None, "it is a pipe"
+    assert reading.stderr is not None, "so is it"
+    data = bytearray()
     try:
         async with asyncio.timeout(WITHIN):
-            data, words = await reading.communicate()
+            while piece := await reading.stdout.read(1 << 20):
+                data += piece
+                if len(data) > MOST_BYTES:
+                    words = f"{files.name}: more than {MOST_BYTES >> 20} MB to show"
+                    raise Problem(422, "Recording is too large", words)
+            words = (await reading.stderr.read()).decode(errors="replace")
+            await reading.wait()
     except TimeoutError:
         raise Problem(504, "Too long", f"{files.name}: not read within {WITHIN:g} s") from None
     finally:
@@ -88,8 +112,8 @@ async def _read(files: Files) -> bytes:
             reading.kill()
             await reading.wait()
     if reading.returncode:
-        detail = words.decode(errors="replace").strip().rpartition("\n")[2]
+        detail = words.strip().rpartition("\n")[2]
         # the folder is the server's own affair
         detail = detail.replace(f"{files.paths[0].parent}{os.sep}", "")
         raise Problem(422, "Recording cannot be read", detail[:500])
-    return data
+    return bytes(data)

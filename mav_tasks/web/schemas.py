@@ -70,18 +70,18 @@ VEHICLE = whole(
         "heard": said(FLAG, "its heartbeats arrive"),
         "heartbeat_age": or_null(NUMBER, "s"),
         "data_age": or_null(NUMBER, "s since its position arrived"),
-        "north": MAYBE,
-        "east": MAYBE,
+        "north": or_null(NUMBER, "m north of its local origin"),
+        "east": or_null(NUMBER, "m east of it"),
         "heading": or_null(NUMBER, "deg clockwise from north"),
         "speed": or_null(NUMBER, "m/s"),
-        "latitude": MAYBE,
-        "longitude": MAYBE,
+        "latitude": or_null(NUMBER, "deg"),
+        "longitude": or_null(NUMBER, "deg"),
         "battery": or_null(ref("Battery")),
         "ready": or_null(FLAG, "its checks before arming pass"),
         "prearm": said(listed(TEXT), "what those checks reported lately"),
         "control": said(
             {"type": "string", "enum": ["tasks", "paused", "taken over", "stopped", "silent"]},
-            "who or what controls it",
+            "what controls it",
         ),
         "control_words": TEXT,
         "goal": or_null(ref("Place")),
@@ -99,13 +99,13 @@ TASK = whole(
         "state": {"type": "string", "enum": [state.name.lower() for state in TaskState]},
         "reason": or_null(REASON),
         "why": or_null(TEXT, "why it is in its state, in words"),
-        "remedy": or_null(ref("Remedy"), "what a person can do about it"),
+        "remedy": or_null(ref("Remedy"), "what the user can do about it"),
         "priority": INTEGER,
         "after": or_null(INTEGER),
         "position": or_null(INTEGER, "number of tasks that run before it"),
         "progress": or_null(NUMBER, "0 to 1"),
-        "left": MAYBE,
-        "left_unit": or_null(TEXT),
+        "left": or_null(NUMBER, "what is left of it"),
+        "left_unit": or_null(TEXT, "unit of that: m, deg, s or items"),
         "item": INTEGER,
         "items": INTEGER,
         "time_to_start": or_null(NUMBER, "s"),
@@ -114,7 +114,9 @@ TASK = whole(
         "nonce": or_null(INTEGER),
         "submitter": said(TEXT, "system and component id of who submitted it"),
         "version": INTEGER,
-        "halt_epoch": INTEGER,
+        "halt_epoch": said(
+            INTEGER, "the present one of its rover, to be sent with a release; 0: not known"
+        ),
         "ended_ago": or_null(NUMBER, "s"),
         "ended_at": or_null(TEXT, "ISO 8601"),
         "goals": {
@@ -126,18 +128,39 @@ TASK = whole(
 QUEUE = whole(
     {
         "vehicle": INTEGER,
-        "running": or_null(INTEGER),
-        "next": or_null(INTEGER),
-        "paused": or_null(REASON),
+        "running": or_null(INTEGER, "id of the running task"),
+        "next": or_null(INTEGER, "id of the task that runs next"),
+        "paused": or_null(REASON, "why it is paused; null: it is not"),
         "paused_words": or_null(TEXT),
         "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
-        "heartbeat_age": MAYBE,
-        "waiting_count": INTEGER,
-        "capacity": INTEGER,
-        "counts": {"type": "object", "additionalProperties": INTEGER},
+        "heartbeat_age": or_null(NUMBER, "s since the rover's heartbeat"),
+        "waiting_count": said(INTEGER, "number of waiting tasks"),
+        "capacity": said(INTEGER, "number of waiting tasks that there may be"),
+        "counts": {
+            "type": "object",
+            "description": "number of tasks in each state",
+            "additionalProperties": INTEGER,
+        },
         "current": or_null(ref("Task")),
         "waiting": said(listed(ref("Task")), "in the order in which they run"),
         "more": said(INTEGER, "waiting tasks that are not listed"),
+    }
+)
+QUEUE_CHANGE = whole(
+    {name: part for name, part in QUEUE["properties"].items() if name != "waiting"}
+    | {
+        "order": {
+            "type": "array",
+            "description": "all listed waiting tasks in the order in which they run: id, position,"
+            " time_to_start and time_to_finish (s; null: not known); a task that is not here does"
+            " not wait any more",
+            "items": {"type": "array", "items": MAYBE, "minItems": 4, "maxItems": 4},
+        },
+        "rows": said(
+            listed(ref("Task")),
+            "the waiting tasks that are new here, or changed in anything but the numbers of the"
+            " order and halt_epoch; the others are as they were",
+        ),
     }
 )
 SHAPE = whole(
@@ -216,6 +239,36 @@ SCHEMAS: dict[str, Schema] = {
     "Task": TASK,
     "Tasks": whole({"tasks": listed(ref("Task"))}),
     "Queue": QUEUE,
+    "QueueChange": QUEUE_CHANGE,
+    "Snapshot": whole(
+        {
+            "now": said(NUMBER, "time of the web process, seconds since 1970"),
+            "reachable": said(FLAG, "the task server is heard"),
+            "detail": or_null(TEXT, "why not"),
+            "vehicles": listed(ref("Vehicle")),
+            "queues": said(listed(ref("Queue")), "with up to 200 waiting tasks each"),
+            "texts": said(listed(ref("Text")), "the latest 200, the newest last"),
+            "stops": said(listed(ref("Stop")), "the latest 50 that were sent here"),
+        }
+    ),
+    "VehicleStates": whole(
+        {
+            "now": said(NUMBER, "when this was made, seconds since 1970"),
+            "since": said(
+                NUMBER,
+                "when the first change in it arrived, seconds since 1970; now - since is how long"
+                " the web process held it back",
+            ),
+            "vehicles": listed(ref("Vehicle")),
+        }
+    ),
+    "ServerState": whole(
+        {
+            "reachable": said(FLAG, "the task server is heard"),
+            "detail": or_null(TEXT, "why not"),
+        }
+    ),
+    "Alive": whole({}),
     "Stop": STOP,
     "Text": TEXT_FORM,
     "Texts": whole({"texts": listed(ref("Text"))}),

@@ -1,6 +1,7 @@
-"""What the operations of the API work on."""
+"""The objects that the operations of the API share."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -38,6 +39,10 @@ class Services:
     tiles: Tiles | None = None
     records: Records | None = None
     owners: dict[int, str] = field(default_factory=dict)
+    #: open event streams by the names of their users
+    streams: Counter[str] = field(default_factory=Counter)
+    #: one reader of the journal at a time: several would take the interpreter from the event loop
+    _reading: asyncio.Lock = field(default_factory=asyncio.Lock)
     _looking: set[asyncio.Task[None]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -53,7 +58,8 @@ class Services:
 
     async def _remember_places(self, journal: Journal, task: int) -> None:
         with suppress(StoreError):  # the map lacks the places; nothing else does
-            goal = await asyncio.to_thread(journal.goal_of, task)
+            async with self._reading:
+                goal = await asyncio.to_thread(journal.goal_of, task)
             steps = goal.steps if isinstance(goal, Plan) else ()
             places = places_of_goals([step for step in steps if isinstance(step, GoTo)])
             if places:
@@ -61,7 +67,7 @@ class Services:
                 self.live.show_again(task)
 
     def own(self, task: int, identity: Identity) -> None:
-        """Note who submitted a task."""
+        """Record the user who submitted a task."""
         self.owners[task] = identity.name
         while len(self.owners) > MOST_OWNERS:
             del self.owners[next(iter(self.owners))]
@@ -72,9 +78,10 @@ class Services:
         """Return events of the journal; raise Problem if it cannot be read."""
         assert self.journal is not None, "the operation has looked"
         try:
-            return await asyncio.to_thread(
-                self.journal.entries, task=task, vehicle=vehicle, after=after, limit=limit
-            )
+            async with self._reading:
+                return await asyncio.to_thread(
+                    self.journal.entries, task=task, vehicle=vehicle, after=after, limit=limit
+                )
         except StoreError as error:
             raise Problem(503, "The journal cannot be read", str(error)) from error
 
@@ -88,7 +95,7 @@ class Services:
         return self.tokens.of_text(text.strip()) is not None
 
     def check_may(self, what: str, task: int, identity: Identity) -> None:
-        """Raise Problem unless somebody may do this to a task."""
+        """Raise Problem unless the user may do this to a task."""
         is_own = self.owners.get(task) == identity.name
         if what in identity.may:
             return

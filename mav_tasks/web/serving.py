@@ -1,6 +1,7 @@
 """Runs the web process: the client, its live view and the HTTP server on one event loop."""
 
 import asyncio
+import gc
 import logging
 import resource
 import secrets
@@ -15,11 +16,13 @@ import uvicorn
 
 from mav_tasks.client.aio import Client
 from mav_tasks.errors import UsageError
+from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.settings import Log
 from mav_tasks.web.application import application
 from mav_tasks.web.connections import PatientProtocol
-from mav_tasks.web.identity import Identity
+from mav_tasks.web.identity import OPEN_NAME, Identity
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live
 from mav_tasks.web.records import Records
@@ -31,8 +34,13 @@ from mav_tasks.web.tokens import Tokens
 #: not the address of a script, nor of a ground station
 PAGE = Address(243, 190)
 TELEMETRY = 10  # Hz
+BACKLOG = 1024  # connections that are not accepted yet
 GRACE = 1  # s for open requests at the end
 FILES = 4096  # descriptors
+LONGEST_HEAD = 16 * 1024  # bytes
+#: objects until garbage is collected: each request leaves some, which hold its headers; the command
+#: line collects so seldom that a flood of requests would take gigabytes
+GARBAGE = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +66,7 @@ def listening(options: WebOptions) -> socket.socket:
     try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind((options.host, options.port))
+        bound.listen(BACKLOG)  # before the page's address is shown
     except OSError as error:
         bound.close()
         where = f"{options.host}:{options.port}"
@@ -77,7 +86,9 @@ def is_loopback(host: str) -> bool:
 
 def run(options: WebOptions, bound: socket.socket, *, started: Callable[[str], None]) -> None:
     """Serve until SIGINT or SIGTERM. ``started`` gets the page's address."""
-    asyncio.run(_run(options, bound, started))
+    gc.set_threshold(GARBAGE)
+    with log_to_stderr(Log()):  # a reader of the log that has stopped must not keep a STOP back
+        asyncio.run(_run(options, bound, started))
 
 
 async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str], None]) -> None:
@@ -105,8 +116,9 @@ async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str
             options.tiles,
             options.records,
         )
-        identity = Identity("local", options.role) if options.role else None
-        app = application(services, hosts=_hosts(options, port), open_identity=identity)
+        identity = Identity(OPEN_NAME, options.role) if options.role else None
+        hosts, behind_tls = _hosts(options, port)
+        app = application(services, hosts=hosts, behind_tls=behind_tls, open_identity=identity)
         server = _Server(app, live)
         async with asyncio.TaskGroup() as group:
             viewing = group.create_task(live.run())
@@ -131,7 +143,7 @@ class _Server(uvicorn.Server):
                 proxy_headers=False,
                 timeout_keep_alive=30,
                 timeout_graceful_shutdown=GRACE,
-                h11_max_incomplete_event_size=64 * 1024,
+                h11_max_incomplete_event_size=LONGEST_HEAD,
             )
         )
         self._live = live
@@ -157,17 +169,28 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _hosts(options: WebOptions, port: int) -> set[str]:
-    """Return the values of Host by which the page can be asked for."""
-    names = {options.host.lower(), *(name.lower() for name in options.names)}
+def _hosts(options: WebOptions, port: int) -> tuple[set[str], set[str]]:
+    """Return the accepted values of Host, and those of them that a TLS proxy may serve.
+
+    A name with a port is a proxy's. A name without one is this process's, or that of a proxy at
+    the default port, which browsers leave out.
+    """
+    own = {options.host.lower()}
+    proxies = {_shown(name.lower()) for name in options.names}
+    own |= {name.lower() for name in options.names if not _has_port(name)}
     if is_loopback(options.host) or options.host in ("0.0.0.0", "::"):
-        names |= {"localhost", "127.0.0.1", "::1"}
-    shown = {_shown(name) for name in names}
-    return {f"{name}:{port}" for name in shown} | (shown if port == 80 else set())
+        own |= {"localhost", "127.0.0.1", "::1"}
+    shown = {_shown(name) for name in own}
+    hosts = {f"{name}:{port}" for name in shown} | (shown if port == 80 else set())
+    return hosts | proxies, proxies
+
+
+def _has_port(name: str) -> bool:
+    return name.count(":") == 1 or "]:" in name
 
 
 def _shown(host: str) -> str:
-    return f"[{host}]" if ":" in host else host
+    return f"[{host}]" if ":" in host and "[" not in host and not _has_port(host) else host
 
 
 def _allow_files() -> None:

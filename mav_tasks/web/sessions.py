@@ -9,6 +9,7 @@ from mav_tasks.web.tokens import Token, Tokens
 COOKIE = "mav_tasks_session"
 LASTS = 12 * 3600.0  # s
 MOST = 1000
+MOST_OF_A_TOKEN = 20  # so that nobody's logins end those of others
 BYTES = 32
 
 
@@ -23,7 +24,10 @@ class Sessions:
         return f"Sessions({len(self._open)})"
 
     def begin(self, token: Token) -> str:
-        """Return the id of a new session."""
+        """Return the id of a new session. End the token's oldest ones if it has too many."""
+        its_own = [number for number, (other, _) in self._open.items() if other == token]
+        for number in its_own[: len(its_own) + 1 - MOST_OF_A_TOKEN]:
+            del self._open[number]
         while len(self._open) >= MOST:
             self._open.popitem(last=False)
         number = secrets.token_urlsafe(BYTES)

@@ -1,22 +1,29 @@
-"""STOPs that the page sent, and what came of each: acknowledged, then standing."""
+"""The STOPs sent from here, and the outcome of each: acknowledged, then standing."""
 
 import asyncio
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from mav_tasks.client.aio import Client
 from mav_tasks.client.values import TaskStatus
-from mav_tasks.errors import NoAnswer, Refused
+from mav_tasks.errors import MavTasksError, NoAnswer, Refused
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.web.flights import Flights
 
 KEPT = 50
 STANDS = 0.1  # m/s; below this a rover counts as standing: measured speeds are noisy
 STANDS_WITHIN = 30.0  # s
 TASKS_WITHIN = 5.0  # s
 CLOCKS = 0.01  # s by which a time of the server may be early, rounded as it is
+COPIES = 0.02  # s between copies of STOPs that share an answer
 FRESH = 1.5  # s; an older position says nothing about now
+
+
+#: which rover, None: all; and whether the waiting tasks are cancelled
+Kind = tuple[int | None, bool]
 
 
 class Stop:
@@ -55,6 +62,11 @@ class Stops:
         self._publish = publish
         self._kept: deque[Stop] = deque(maxlen=KEPT)
         self._open: set[Stop] = set()
+        self._flights = Flights()
+        #: STOPs that share the answer of a waiting one, by what and who
+        self._sharing: dict[tuple[Kind, str], tuple[object, Stop]] = {}
+        self._copied_at: dict[Kind, float] = {}
+        self._copies: set[Kind] = set()
         self._following: set[asyncio.Task[None]] = set()
         self._count = 0
         #: called with the outcome of each STOP, and after how long it was acknowledged
@@ -65,22 +77,73 @@ class Stops:
         return [stop.form() for stop in self._kept]
 
     async def stop(self, vehicle: int | None, *, clear: bool, by: str) -> Stop:
-        """Send a STOP. Return it once it is acknowledged; raise NoAnswer or Refused."""
+        """Send a STOP. Return it once it is acknowledged; raise NoAnswer or Refused.
+
+        If the user repeats it while it is queued, both share one Stop.
+        """
+        kind = vehicle, clear
+        shared = self._flights.waiting(kind)
+        if shared is not None:
+            self._copy(kind)
+        whose, stop = self._sharing.get((kind, by), (None, None))
+        if stop is None or shared is None or whose is not shared:
+            stop = self._begun(vehicle, by)
+
+        async def send() -> None:
+            self._sharing[kind, by] = self._flights.waiting(kind), stop
+            await self._client.stop(clear=clear, vehicle=vehicle)
+
+        if shared is not None:
+            self._sharing[kind, by] = shared, stop
+        try:
+            await self._flights.join(kind, send)
+        except (NoAnswer, Refused) as error:
+            self._failed(stop, error)
+            raise
+        finally:
+            if self._sharing.get((kind, by), (None, None))[1] is stop:
+                del self._sharing[kind, by]
+        self._acknowledged(stop)
+        return stop
+
+    def _begun(self, vehicle: int | None, by: str) -> Stop:
         self._count += 1
         stop = Stop(self._count, vehicle, by)
         self._kept.append(stop)
         self._open.add(stop)
         # the packet leaves in this step of the loop, the event in the next one
         asyncio.get_running_loop().call_soon(self._publish, stop)
-        try:
-            await self._client.stop(clear=clear, vehicle=vehicle)
-        except (NoAnswer, Refused) as error:
+        return stop
+
+    def _copy(self, kind: Kind) -> None:
+        """Send a copy of a STOP that shares an answer at once, or within COPIES seconds."""
+        if kind in self._copies:
+            return
+        loop = asyncio.get_running_loop()
+        wait = self._copied_at.get(kind, 0.0) + COPIES - loop.time()
+        if wait > 0:
+            self._copies.add(kind)
+            loop.call_later(wait, self._send_copy, kind)
+        else:
+            self._send_copy(kind)
+
+    def _send_copy(self, kind: Kind) -> None:
+        self._copies.discard(kind)
+        self._copied_at[kind] = asyncio.get_running_loop().time()
+        with suppress(MavTasksError):  # the client was closed
+            self._client.stop_again(clear=kind[1], vehicle=kind[0])
+
+    def _failed(self, stop: Stop, error: NoAnswer | Refused) -> None:
+        if stop.phase == "sent":
             stop.phase = "refused" if isinstance(error, Refused) else "unanswered"
             stop.detail = str(error)
             self._open.discard(stop)
             self._publish(stop)
             self.on_outcome(stop.phase, None)
-            raise
+
+    def _acknowledged(self, stop: Stop) -> None:
+        if stop.phase != "sent":
+            return
         stop.acknowledged_after = time.monotonic() - stop.begun
         stop.phase = "acknowledged"
         self._publish(stop)
@@ -88,10 +151,9 @@ class Stops:
         following = asyncio.create_task(self._follow(stop))
         self._following.add(following)
         following.add_done_callback(self._following.discard)
-        return stop
 
     def on_task(self, status: TaskStatus) -> None:
-        """Note a task that a STOP has ended: the latest one that may have."""
+        """Add a task to the latest STOP that can have ended it."""
         if status.state is not TaskState.KILLED or status.reason is not TaskReason.STOP:
             return
         # its end is reported once it is durable, perhaps after the rover stands; and when asked for
@@ -105,7 +167,7 @@ class Stops:
                 return
 
     def on_vehicles(self) -> None:
-        """Look whether the rovers of open STOPs stand now."""
+        """Check whether the rovers of open STOPs stand now."""
         for stop in [each for each in self._open if each.phase == "acknowledged"]:
             if self._stand(stop.vehicle, since=stop.begun):
                 stop.standing_after = time.monotonic() - stop.begun

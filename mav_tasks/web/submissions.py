@@ -1,7 +1,7 @@
 """Submits tasks for the API: each idempotency key once, however often the request is repeated.
 
-A task is sent as a plan, also a single goal: the server compares all of a plan with an earlier one
-of the same key.
+A single goal is sent as a plan, too: the server compares a whole plan with the earlier one of the
+same key.
 """
 
 from collections.abc import Mapping, Sequence

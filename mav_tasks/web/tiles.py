@@ -1,6 +1,7 @@
-"""Map tiles: from an MBTiles file, read with sqlite3, or from a URL that the browser asks."""
+"""Map tiles: from an MBTiles file, read with sqlite3, or from a URL that the browser requests."""
 
 import sqlite3
+import time
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +12,14 @@ from mav_tasks.errors import UsageError
 
 KINDS = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
 DEEPEST = 22
+WITHIN = 2.0  # s for a tile
+BEGIN_WITHIN = 60.0  # s to look through all of a large file at the start
+STEPS = 10_000  # of SQLite's machine between two looks at the time
 
 
 @dataclass(frozen=True, slots=True)
 class Tiles:
-    """The tiles of the map. ``path``: None: the browser asks ``url`` itself."""
+    """The tiles of the map. ``path``: None: the browser requests ``url`` itself."""
 
     url: str
     attribution: str
@@ -48,9 +52,14 @@ class Tiles:
         query = (
             "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?"
         )
-        with _opened(self.path) as connection:  # MBTiles counts rows from the south
-            south = (1 << zoom) - 1 - row
-            found = connection.execute(query, (zoom, column, south)).fetchone()
+        try:
+            with _opened(
+                self.path, within=WITHIN
+            ) as connection:  # MBTiles counts rows from the south
+                south = (1 << zoom) - 1 - row
+                found = connection.execute(query, (zoom, column, south)).fetchone()
+        except sqlite3.Error:  # the file was damaged, replaced or removed
+            return None
         if found is None or not isinstance(found[0], bytes):
             return None
         data = found[0]
@@ -68,7 +77,7 @@ def tiles_of(text: str) -> Tiles:
     if not path.is_file():
         raise UsageError(f"--tiles {text}: no such file; expected an MBTiles file or a URL")
     try:
-        with _opened(path) as connection:
+        with _opened(path, within=BEGIN_WITHIN) as connection:
             named = dict(connection.execute("SELECT name, value FROM metadata").fetchall())
             zooms = connection.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles")
             least, most = zooms.fetchone()
@@ -82,5 +91,9 @@ def tiles_of(text: str) -> Tiles:
     return Tiles("/tiles/{z}/{x}/{y}", attribution, int(least), int(most), path)
 
 
-def _opened(path: Path) -> AbstractContextManager[sqlite3.Connection]:
-    return closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True))
+def _opened(path: Path, *, within: float) -> AbstractContextManager[sqlite3.Connection]:
+    """Open a file for reading for ``within`` seconds: a view in it may compute for ever."""
+    connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
+    until = time.monotonic() + within
+    connection.set_progress_handler(lambda: time.monotonic() > until, STEPS)
+    return closing(connection)

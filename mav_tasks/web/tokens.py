@@ -18,10 +18,12 @@ from platformdirs import user_config_path
 
 from mav_tasks.errors import UsageError
 from mav_tasks.folders import make_private
+from mav_tasks.settings import ROLES
+from mav_tasks.web.identity import OPEN_NAME
 from mav_tasks.whole_file import replace_whole
 
 FILE_NAME = "web-tokens.json"
-ROLES = ("observer", "submitter", "operator", "safety")
+RESERVED = (OPEN_NAME, "nobody")  # names of users without a token
 BYTES = 32
 LONGEST_NAME = 32
 
@@ -57,6 +59,10 @@ def load(path: Path) -> tuple[Token, ...]:
                 )
             tokens = json.load(file)["tokens"]
         found = tuple(Token(**each) for each in tokens)
+        for each in found:
+            if not all(isinstance(part, str) for part in asdict(each).values()):
+                raise ValueError("a part of a token is not a text")
+            bytes.fromhex(each.digest)
     except FileNotFoundError:
         return ()
     except OSError as error:
@@ -73,6 +79,8 @@ def add(path: Path, name: str, role: str) -> str:
     """Store a new token. Return its text, which is shown once. Raise TokenError if that fails."""
     if not name or len(name) > LONGEST_NAME or not name.replace("-", "").isalnum():
         raise TokenError(f"token name {name!r}: expected letters, digits and -, at most 32")
+    if name in RESERVED:
+        raise TokenError(f"token name {name!r}: it is that of a user without a token")
     if role not in ROLES:
         raise TokenError(f"role {role!r}: expected one of {', '.join(ROLES)}")
     text = secrets.token_urlsafe(BYTES)
@@ -89,7 +97,7 @@ def add(path: Path, name: str, role: str) -> str:
 
 
 def revoke(path: Path, name: str) -> None:
-    """Remove a token; a running web process refuses it at once. Raise TokenError if not there."""
+    """Remove a token. A running web process refuses it at once. Raise TokenError without it."""
 
     def without_it(tokens: tuple[Token, ...]) -> tuple[Token, ...]:
         left = tuple(each for each in tokens if each.name != name)

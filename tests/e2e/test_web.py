@@ -21,6 +21,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from mav_tasks import GoTo, LocalPlace, SyncClient, Wait
 from mav_tasks.cli.web import DEFAULT_LISTEN
 from mav_tasks.client.wire import Goal
+from mav_tasks.web.events import EVENTS
 from mav_tasks.web.schemas import SCHEMAS
 from tests.kit.awaited import awaited
 from tests.kit.processes import Stand, process, stand, wait_until
@@ -210,9 +211,9 @@ def test_a_stop_says_what_came_of_it(page: Web) -> None:
 def test_a_held_task_is_released_with_the_epoch_that_was_seen(page: Web) -> None:
     task = move(page, 3.0)
     page.wait_for(task["id"], "executing")
-    refused = page.send("POST", f"/tasks/{task['id']}/release", {"how": "again", "epoch": 0})
+    refused = page.send("POST", f"/tasks/{task['id']}/release", {"how": "again", "epoch": 1})
     assert refused.status_code == 409
-    wrong = page.send("POST", f"/tasks/{task['id']}/release", {"how": "maybe", "epoch": 0})
+    wrong = page.send("POST", f"/tasks/{task['id']}/release", {"how": "maybe", "epoch": 1})
     assert wrong.status_code == 422
     assert "expected one of again, remainder, skip" in wrong.json()["detail"]
 
@@ -314,6 +315,70 @@ def test_a_stream_goes_on_where_it_ended(page: Web) -> None:
         if kind == "task" and data["id"] == task["id"]:
             break
     assert ids == sorted(ids)
+
+
+def test_a_queue_travels_row_by_row_also_to_who_reconnects(page: Web) -> None:
+    tasks = [move(page, 1.0, delay=900 + at)["id"] for at in range(30)]
+
+    def until(stream: Any, known: dict[str, Any], ids: list[int]) -> tuple[str, int]:
+        """Apply changes until the queue has these tasks; return the last id and the rows sent."""
+        last, sent = "", 0
+        for kind, number, data in stream:
+            last = number or last
+            if kind != "queue":
+                assert kind != "snapshot"
+                continue
+            check("QueueChange", data)
+            sent += len(data["rows"])
+            rows = {each["id"]: each for each in (*known["waiting"], *data["rows"])}
+            known["waiting"] = [rows[each[0]] for each in data["order"]]
+            if [each["id"] for each in known["waiting"]] == ids:
+                return last, sent
+        raise AssertionError("the stream has ended")
+
+    def begun() -> Any:
+        stream = page.events()
+        known = next(stream)[2]["queues"][0]
+        return (stream, known) if len(known["waiting"]) == len(tasks) else None
+
+    stream, known = wait_until(begun, within=10, what="30 rows")
+    page.post(f"/tasks/{tasks[3]}/cancel", {})
+    left = [each for each in tasks if each != tasks[3]]
+    last, sent = until(stream, known, left)
+    assert sent == 0
+    stream.close()
+    page.send("PATCH", f"/tasks/{tasks[5]}", {"label": "other"})
+    page.post(f"/tasks/{tasks[7]}/cancel", {})
+    left.remove(tasks[7])
+    _, sent = until(page.events(last=last), known, left)
+    assert sent <= 2
+    labels = {each["id"]: each["label"] for each in page.get("/vehicles/1/queue")["waiting"]}
+    assert {each["id"]: each["label"] for each in known["waiting"]} == labels
+    assert labels[tasks[5]] == "other"
+
+
+def test_a_task_carries_the_halt_epoch_that_releases_it(page: Web) -> None:
+    task = move(page, 1.0, delay=900)["id"]
+    for _ in range(2):
+        page.post("/vehicles/1/pause", {})
+        epoch = page.get("/vehicles/1/queue")["halt_epoch"]
+        assert page.task(task)["halt_epoch"] == epoch > 0
+        resume(page)
+
+
+def test_events_are_as_the_document_says(page: Web) -> None:
+    schemas = {event.name: event.schema for event in EVENTS}
+    wanted = set(schemas) - {"server", "alive"}
+    stream = page.events()
+    check("Snapshot", next(stream)[2])
+    move(page, 0.3)
+    page.post("/stop", {})
+    seen = {"snapshot"}
+    while seen != wanted:
+        kind, number, data = next(stream)
+        check(schemas[kind], data)
+        assert bool(number) == next(each.has_id for each in EVENTS if each.name == kind)
+        seen.add(kind)
 
 
 def test_role_and_token(tmp_path: Path, both: tuple[Stand, Web]) -> None:

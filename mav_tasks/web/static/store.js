@@ -73,8 +73,20 @@ export function takeVehicles(vehicles) {
 export function takeQueue(queue) {
   queue.takenAt = now();
   state.queues.set(queue.vehicle, queue);
-  for (const task of [queue.current, ...queue.waiting]) if (task) state.tasks.set(task.id, task);
+  for (const task of [queue.current, ...queue.waiting]) {
+    if (task && !(state.tasks.get(task.id)?.version > task.version)) state.tasks.set(task.id, task);
+  }
   change("queues");
+}
+
+/** Take what has changed in a queue: the order of all of it, and the rows that are new or other. */
+export function takeQueueChange({ order, rows, ...head }) {
+  const before = state.queues.get(head.vehicle);
+  const known = new Map([...(before ? before.waiting : []), ...rows].map((row) => [row.id, row]));
+  const waiting = order.filter(([id]) => known.has(id)).map(([id, position, begin, end]) => (
+    { ...known.get(id), position, time_to_start: begin, time_to_finish: end, halt_epoch: head.halt_epoch }
+  ));
+  takeQueue({ ...head, waiting });
 }
 
 /** Take a task; in the queue it replaces the line that it had. */

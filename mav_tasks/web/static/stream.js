@@ -2,7 +2,7 @@
 
 import { get } from "./api.js";
 import * as session from "./session.js";
-import { change, now, state, takeClock, takeQueue, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
+import { change, now, state, takeClock, takeQueue, takeQueueChange, takeStop, takeTask, takeTexts, takeVehicles } from "./store.js";
 
 const SILENT = 15; // s; the web process sends something every 10 s
 const AGAIN = 3000; // ms
@@ -41,7 +41,7 @@ export function open(onRefused) {
     takeClock(news.now);
     takeVehicles(news.vehicles);
   });
-  on("queue", takeQueue);
+  on("queue", takeQueueChange);
   on("task", takeTask);
   on("text", (text) => takeTexts([text]));
   on("stop", takeStop);

@@ -1,8 +1,12 @@
 """A client's view of a rover: each figure of its telemetry, and None for what it does not say."""
 
+import json
+from math import inf, nan
+
 import pytest
 
 from mav_tasks.client.fleet_view import FleetView
+from mav_tasks.client.json_form import vehicle_json
 from mav_tasks.client.values import VehicleStatus
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -64,3 +68,11 @@ def test_packets_of_rovers_that_no_server_has_are_not_kept() -> None:
     fleet = FleetView()
     (packet,) = split_datagram(Encoder(ROVER).encode(system()))
     assert not fleet.telemetry(packet, now=1.0)
+
+
+def test_a_number_that_is_none_is_unknown() -> None:
+    """An estimator that has failed sends NaN; JSON has none, so it would end the web process."""
+    place = m.LocalPositionNed(0, nan, inf, 0, nan, 1.0, 0)
+    rover = shown(place, m.Attitude(0, 0.0, 0.0, nan, 0.0, 0.0, 0.0))
+    assert (rover.north, rover.east, rover.speed, rover.yaw) == (None,) * 4
+    json.dumps(vehicle_json(rover), allow_nan=False)

@@ -226,7 +226,12 @@ async def test_too_many_requests_are_refused_but_a_stop_never_is(
 @awaited
 async def test_headers_that_come_twice_and_strange_methods_are_refused(tmp_path: Path) -> None:
     rig = Rig(tmp_path)
-    twice = [("host", HOST), ("host", "evil.example")]
-    assert (await rig.client.get("/", headers=twice)).status_code == 400
+    for name, one, two in (
+        ("host", HOST, "evil.example"),
+        ("sec-fetch-site", "cross-site", "same-origin"),
+        ("content-type", "text/plain", "application/json"),
+    ):
+        twice = [(name, one), (name, two)]
+        assert (await rig.client.get("/", headers=twice)).status_code == 400
     assert (await rig.client.request("TRACE", "/")).status_code == 405
     assert (await rig.client.request("CONNECT", "/")).status_code == 405

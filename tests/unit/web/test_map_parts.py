@@ -121,6 +121,30 @@ def test_a_tile_that_is_no_picture_is_not_sent(tmp_path: Path) -> None:
     assert tiles.tile(2, 1, 0) is None
 
 
+def test_a_file_of_tiles_that_computes_for_ever_or_is_damaged_later_has_no_tile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("WITHIN", "BEGIN_WITHIN"):
+        monkeypatch.setattr(f"mav_tasks.web.tiles.{name}", 0.1)
+    path = mbtiles(tmp_path / "x.mbtiles")
+    tiles = tiles_of(str(path))
+    with sqlite3.connect(path) as connection:
+        connection.execute("DROP TABLE tiles")
+        connection.execute(
+            "CREATE VIEW tiles AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+            " SELECT i AS zoom_level, i AS tile_column, i AS tile_row, 'x' AS tile_data FROM n"
+            " WHERE i < 0"
+        )
+    connection.close()
+    assert tiles.tile(2, 1, 0) is None
+    with pytest.raises(UsageError, match="interrupted"):
+        tiles_of(str(path))
+    path.write_bytes(b"x" * 4096)
+    assert tiles.tile(2, 1, 0) is None
+    path.unlink()
+    assert tiles.tile(2, 1, 0) is None
+
+
 def test_tiles_of_a_site_name_the_site(tmp_path: Path) -> None:
     tiles = tiles_of("https://{s}.tiles.example/{z}/{x}/{y}.png")
     assert tiles.origins == ("https://*.tiles.example",)

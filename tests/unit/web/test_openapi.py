@@ -1,12 +1,15 @@
 """The API's own description, by an independent validator."""
 
+import ast
 from pathlib import Path
 from typing import Any, cast
 
 from openapi_spec_validator import validate
 
 from mav_tasks.client.aio import Client
+from mav_tasks.web import hub
 from mav_tasks.web.application import operations_of
+from mav_tasks.web.events import EVENTS
 from mav_tasks.web.identity import MAY
 from mav_tasks.web.live import Live
 from mav_tasks.web.openapi import document_of
@@ -50,3 +53,23 @@ def test_words_that_let_a_rover_move_carry_the_epoch() -> None:
         if operation.path.endswith(("/resume", "/release")):
             (epoch,) = (field for field in operation.body or () if field.name == "epoch")
             assert epoch.is_required
+
+
+def test_each_event_of_the_stream_is_documented() -> None:
+    """Those that the sources can send are those that the document describes."""
+    sent = {hub.SNAPSHOT, hub.VEHICLES, hub.ALIVE.split()[1].decode()}
+    for path in Path(hub.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "publish":
+                kind = node.args[0]
+                assert isinstance(kind, ast.Constant), f"{path.name}: {ast.unparse(node)}"
+                sent.add(str(kind.value))
+    assert {event.name for event in EVENTS} == sent
+    events = document_of(operations())["paths"]["/events"]["get"]
+    for event in EVENTS:
+        start = f"**{event.name}** ({event.schema}, "
+        assert start in events["description"]
+        about = events["description"].partition(start)[2].partition("\n\n")[0]
+        for name in SCHEMAS[event.schema]["properties"]:
+            assert f"\n- `{name}`: " in about, (event.name, name)
+    assert "- `since`: number; when the first change in it arrived" in events["description"]

@@ -47,6 +47,8 @@ def test_names_roles_and_copies_are_refused(tmp_path: Path) -> None:
             tokens.add(path, name, "operator")
     with pytest.raises(TokenError, match="role 'root': expected one of observer"):
         tokens.add(path, "anna", "root")
+    with pytest.raises(TokenError, match="a user without a token"):
+        tokens.add(path, "local", "operator")
     tokens.add(path, "anna", "operator")
     with pytest.raises(TokenError, match="there is a token anna already"):
         tokens.add(path, "anna", "observer")
@@ -54,7 +56,14 @@ def test_names_roles_and_copies_are_refused(tmp_path: Path) -> None:
         tokens.revoke(path, "ben")
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"tokens": [1]}', '{"tokens": [{"name": 1}]}'])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "[]", "{}", '{"tokens": [1]}', '{"tokens": [{"name": 1}]}'),
+        '{"tokens": [{"name": "a", "role": "operator", "digest": 1, "added": ""}]}',
+        '{"tokens": [{"name": "a", "role": "operator", "digest": "\u00e4", "added": ""}]}',
+    ],
+)
 def test_a_damaged_file_is_named_and_lets_nobody_in(tmp_path: Path, text: str) -> None:
     path = tmp_path / "tokens.json"
     path.touch(mode=0o600)

@@ -1,0 +1,449 @@
+"""Attacks on a real web process, beside a real server and rover. Each was one that worked."""
+
+import os
+import re
+import select
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import httpx
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from mav_tasks.web import tokens
+from mav_tasks.web.sessions import COOKIE
+from tests.kit.processes import Stand, environment_with, process, stand, wait_until
+from tests.kit.web import Web, has_rover, web
+
+pytestmark = pytest.mark.slow
+
+JSON = {"content-type": "application/json"}
+HUGE = "1" + "0" * 400  # a whole number that no float holds
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stand, Web]]:
+    """One server, rover and web process for all of them."""
+    folder = tmp_path_factory.mktemp("hostile")
+    with stand(folder) as it, web(folder, it) as page:
+        has_rover(page)
+        yield it, page
+
+
+@pytest.fixture
+def page(both: tuple[Stand, Web]) -> Web:
+    """The web process."""
+    return both[1]
+
+
+GOALS = '{"goals": [{"kind": "%s", %s}]}'
+CIRCLE = '{"circle": {"latitude": %s, "longitude": 1, "radius": 1}}'
+BODIES = [
+    ("POST", "/vehicles/1/tasks", f'{{"goals": [{{"kind": "home"}}], "delay": {HUGE}}}', "delay"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", f'"distance": {HUGE}'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", f'"distance": -{HUGE}'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"distance": 1e308'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"distance": NaN'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"distance": 1e400'), "goals[0].distance"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("goto", '"north": 1e308, "east": 0'), "north"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("goto", '"north": 1e38, "east": 0'), "north"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("home", '"\\ud800": 1'), "\\ud800"),
+    ("POST", "/vehicles/1/tasks", '{"goals": [{"kind": "home"}], "label": "\\ud800"}', "label"),
+    ("PUT", "/vehicles/1/fence", CIRCLE % HUGE, "circle.latitude"),
+    ("POST", "/vehicles/1/resume", '{"epoch": 1, "epoch": 2}', "epoch: it comes twice"),
+    ("POST", "/vehicles/1/tasks", GOALS % ("move", '"kind": "home"'), "kind: it comes twice"),
+    ("POST", "/stop", '{"identity": {"role": "safety"}}', "identity"),
+]
+
+
+@pytest.mark.parametrize(("method", "path", "body", "name"), BODIES)
+def test_no_value_of_a_part_breaks_it(
+    page: Web, method: str, path: str, body: str, name: str
+) -> None:
+    answer = page.client.request(method, f"/api/v1{path}", content=body, headers=JSON)
+    assert answer.status_code == 422, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert name in answer.json()["detail"]
+
+
+NINES = "9" * 5000  # more digits than Python converts
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *(f"/api/v1/tasks/{number}" for number in (0, 1 << 30, 9_999_999_999, NINES)),
+        *(f"/api/v1/vehicles/{number}/queue" for number in (0, 256, 9_999_999_999, NINES)),
+        *(f"/tasks/{NINES}", f"/tiles/1/{NINES}/1", f"/tiles/1/1/{NINES}", f"/tiles/{NINES}/1/1"),
+    ],
+)
+def test_an_id_out_of_range_is_not_found_and_never_asked_for(page: Web, path: str) -> None:
+    answer = page.client.get(path, timeout=5)  # a request that nobody answers takes 10 s
+    assert answer.status_code == 404
+
+
+@contextmanager
+def flood(page: Web, send: Callable[[httpx.Client], object], *, clients: int) -> Iterator[None]:
+    """Let so many clients send requests one after the other for a ``with`` block."""
+    is_over = threading.Event()
+
+    def run() -> None:
+        with httpx.Client(base_url=page.url, timeout=30) as client:
+            while not is_over.is_set():
+                send(client)
+
+    threads = [threading.Thread(target=run) for _ in range(clients)]
+    for thread in threads:
+        thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        for thread in threads:
+            thread.join(60)
+
+
+def test_who_floods_stop_keeps_nobody_from_an_answer_nor_a_rover_stopped(page: Web) -> None:
+    def stop(client: httpx.Client) -> None:
+        client.post("/api/v1/stop", json={})
+
+    with flood(page, stop, clients=12):
+        answers = [page.post("/stop", {}) for _ in range(3)]
+    assert {each["phase"] for each in answers} == {"acknowledged"}
+    epoch = page.get("/vehicles/1/queue")["halt_epoch"]
+    page.post("/vehicles/1/resume", {"epoch": epoch})
+    task = page.post("/vehicles/1/tasks", {"goals": [{"kind": "move", "distance": 0.3}]})
+    page.wait_for(task["id"], "completed")
+
+
+def test_a_client_that_does_not_read_is_closed(
+    page: Web,
+) -> None:
+    port = int(page.url.rpartition(":")[2])
+    pages = f"GET /static/leaflet/leaflet.js HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n" * 40
+    with socket.socket() as slow:
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        slow.connect(("127.0.0.1", port))
+        slow.sendall(pages.encode())
+        poll = select.poll()
+        poll.register(slow, select.POLLRDHUP | select.POLLHUP | select.POLLERR)
+        assert poll.poll(45_000), "it is still open"
+
+
+def test_a_request_without_a_body_for_the_event_stream_is_not_a_stream(page: Web) -> None:
+    assert page.client.head("/api/v1/events", timeout=5).status_code == 405
+    assert page.client.head("/api/v1/session").status_code == 405
+    assert page.client.head("/").status_code == 200
+
+
+@pytest.mark.parametrize("epoch", [0, 1 << 24, 1 << 25, -1, 1 << 32, 1.0, True])
+def test_an_epoch_that_names_no_halt_does_not_release_a_stop(page: Web, epoch: object) -> None:
+    page.post("/stop", {})
+    for path, more in (("/vehicles/1/resume", {}), ("/tasks/1/release", {"how": "again"})):
+        refused = page.send("POST", path, {"epoch": epoch} | more)
+        assert refused.status_code == 422
+        assert refused.json()["detail"].startswith("epoch")
+    assert page.get("/vehicles/1/queue")["paused"] == "stopped"
+
+
+def test_nothing_but_a_resume_that_has_seen_it_ends_a_stop(both: tuple[Stand, Web]) -> None:
+    """Each operation that may set a rover in motion, by a page that shows an older STOP."""
+    it, page = both
+    page.post("/stop", {"clear": True})
+    seen = page.get("/vehicles/1/queue")["halt_epoch"]
+    page.post("/vehicles/1/resume", {"epoch": seen})
+    move = {"goals": [{"kind": "move", "distance": 5}]}
+    task = page.post("/vehicles/1/tasks", move)["id"]
+    later = page.post("/vehicles/1/tasks", move | {"delay": 1000})["id"]
+    page.wait_for(task, "executing")
+    newer = page.post("/stop", {})
+    assert newer["phase"] == "acknowledged"
+    wait_until(lambda: it.speed() < 0.01, within=15, what="a rover that stands")
+    where = it.truth()[-1]
+    rover = page.get("/vehicles/1")
+    item = "1\t0\t3\t16\t0\t0\t0\t0\t{}\t{}\t0\t1\n".format(*_near(rover))
+    plan = "QGC WPL 110\n0" + item[1:] + item
+    tries: list[tuple[str, str, object]] = [
+        ("POST", "/vehicles/1/resume", {"epoch": seen}),
+        ("POST", f"/tasks/{task}/release", {"how": "again", "epoch": seen}),
+        ("POST", f"/tasks/{later}/release", {"how": "remainder", "epoch": seen}),
+        ("POST", "/vehicles/1/tasks", move | {"priority": 10}),
+        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "rotate", "angle": 90}]}),
+        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "home"}], "priority": 10}),
+        ("POST", "/vehicles/1/missions", {"text": plan, "priority": 10}),
+        ("PATCH", f"/tasks/{later}", {"delay": 0, "priority": 10, "preemptive": True}),
+        ("POST", "/vehicles/1/pause", {}),
+        ("PUT", "/vehicles/1/fence", {"circle": _circle(rover)}),
+        ("DELETE", "/vehicles/1/fence", None),
+        ("POST", f"/tasks/{task}/cancel", {}),
+        ("POST", f"/tasks/{later}/cancel", {"kill": True}),
+        ("POST", "/vehicles/1/clear", {"running_too": True}),
+        ("POST", "/vehicles/1/tasks", move | {"priority": 10}),
+    ]
+    codes = {path: page.send(method, path, body).status_code for method, path, body in tries}
+    assert codes["/vehicles/1/resume"] == 409
+    assert codes["/vehicles/1/missions"] == 201
+    queue = page.get("/vehicles/1/queue")
+    assert (queue["paused"], queue["running"]) == ("stopped", None)
+    assert queue["halt_epoch"] > seen
+    now = it.truth()[-1]
+    assert abs(now["north"] - where["north"]) + abs(now["east"] - where["east"]) < 0.05
+    page.post("/stop", {"clear": True})
+
+
+def _near(rover: dict[str, float]) -> tuple[float, float]:
+    return rover["latitude"] + 3e-5, rover["longitude"]
+
+
+def _circle(rover: dict[str, float]) -> dict[str, float]:
+    return {"latitude": rover["latitude"], "longitude": rover["longitude"], "radius": 50.0}
+
+
+def test_who_logs_in_again_and_again_ends_nobody_elses_session(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    kept = tmp_path / "web-tokens.json"
+    anna, eve = (tokens.add(kept, *each) for each in (("anna", "operator"), ("eve", "observer")))
+    with web(tmp_path, both[0], "--role", "", name="closed") as page:
+        page.client.cookies.clear()
+        assert page.send("POST", "/session", {"token": anna}).status_code == 204
+        anna_s = page.client.cookies[COOKIE]
+        with httpx.Client(base_url=page.url) as other:
+            number = 0
+            while number < 1010:  # more than all sessions that there may be
+                other.cookies.clear()
+                status = other.post("/api/v1/session", json={"token": eve}).status_code
+                assert status in (204, 429)
+                number += status == 204
+                if status == 204 and number == 1:
+                    eves_first = other.cookies[COOKIE]
+        assert page.client.cookies[COOKIE] == anna_s
+        assert page.post("/stop", {})["phase"] == "acknowledged"
+        fixed = page.client.get("/api/v1/session", headers={"cookie": f"{COOKIE}={eves_first}"})
+        assert fixed.status_code == 401
+        assert page.send("POST", "/session", {"token": anna}).status_code == 204
+        old = httpx.get(f"{page.url}/api/v1/session", headers={"cookie": f"{COOKIE}={anna_s}"})
+        assert old.status_code == 401  # a login ends the session before it
+
+
+def test_a_log_that_nobody_reads_keeps_no_stop_back(both: tuple[Stand, Web]) -> None:
+    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", ""]
+    command += ["--server", f"udpout:127.0.0.1:{both[0].client_port}"]
+    with subprocess.Popen(
+        [sys.executable, *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,  # of which nobody reads anything
+        env=environment_with(XDG_CONFIG_HOME="/nonexistent"),
+    ) as popen:
+        try:
+            assert popen.stdout is not None
+            url = popen.stdout.readline().decode().split()[-1].rstrip("/")
+            port = int(url.rpartition(":")[2])
+            for _ in range(3000):  # each is a line of the log
+                with socket.create_connection(("127.0.0.1", port), 10) as each:
+                    each.sendall(b"\0\r\n\r\n")
+                    assert each.recv(20).startswith(b"HTTP/1.1 400")
+            stop = httpx.post(f"{url}/api/v1/stop", json={}, timeout=15)
+            assert stop.json()["phase"] == "acknowledged"
+        finally:
+            popen.kill()
+
+
+def _raw(page: Web, request: str) -> bytes:
+    """Return all that is answered to some bytes."""
+    port = int(page.url.rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port), 15) as connection:
+        connection.sendall(request.format(host=f"Host: 127.0.0.1:{port}\r\n").encode())
+        answer = b""
+        while data := connection.recv(65536):
+            answer += data
+        return answer
+
+
+def test_a_request_is_not_hidden_in_another_ones_body(page: Web) -> None:
+    answer = _raw(
+        page,
+        "POST /api/v1/vehicles/1/pause HTTP/1.1\r\n{host}Content-Type: application/json\r\n"
+        "Content-Length: 6\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n"
+        "GET /api/v1/session HTTP/1.1\r\n{host}Connection: close\r\n\r\n",
+    )
+    assert answer.count(b"HTTP/1.1 ") == 1
+    assert answer.startswith(b"HTTP/1.1 400")
+
+
+def test_thousands_of_parts_of_a_file_are_one_whole_file(page: Web) -> None:
+    parts = ",".join(f"{at}-{at}" for at in range(0, 12_000, 2))
+    answer = page.client.get("/static/app.js", headers={"range": f"bytes={parts}"})
+    assert answer.status_code == 200
+    assert "content-range" not in answer.headers
+
+
+def test_a_flood_of_refusals_keeps_no_stop_back(page: Web) -> None:
+    def ask(client: httpx.Client) -> None:
+        client.get("/api/v1/vehicles", headers={"authorization": "Bearer x"})
+
+    with flood(page, ask, clients=20):
+        answers = [page.post("/stop", {}) for _ in range(3)]
+    assert {each["phase"] for each in answers} == {"acknowledged"}
+
+
+def test_large_files_keep_no_stop_back(page: Web) -> None:
+    line = "{}\t0\t3\t16\t0\t0\t0\t0\t-35.3\t149.1\t0\t1\n"
+    files = [
+        "QGC WPL 110\n" + "".join(line.format(at) for at in range(60_000)),
+        "QGC WPL 110\n" + "1\n" * 2_900_000,
+        '{"fileType": "Plan", "mission": [' + "[]," * 250_000 + "1]}",
+    ]
+    for text in files:
+        refused = page.client.post("/api/v1/plans", json={"name": "a.plan", "text": text})
+        assert refused.status_code == 422
+        assert refused.json()["detail"].startswith("a.plan: ")
+
+    def send(client: httpx.Client) -> None:
+        client.post("/api/v1/plans", json={"text": files[2]})
+
+    with flood(page, send, clients=6):
+        answers = [page.post("/stop", {}) for _ in range(3)]
+    assert {each["phase"] for each in answers} == {"acknowledged"}
+    parts = page.client.post("/api/v1/plans", json={"text": "[]," * 1_900_000})
+    assert parts.status_code == 413
+    body = {"text": "x" * 6_000_001}
+    refused = page.client.post("/api/v1/plans", json=body)
+    assert refused.status_code == 422
+    assert "text" in refused.json()["detail"]
+
+
+NAN = float("nan")
+
+
+def _log(path: Path, *messages: Any) -> None:
+    """Write a telemetry log of a rover: one message each 0.3 s, by pymavlink."""
+    sender = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    with path.open("wb") as file:
+        for at, message in enumerate(messages):
+            file.write(struct.pack(">Q", 1_700_000_000_000_000 + at * 300_000))
+            file.write(message.pack(sender))
+
+
+def test_strange_recordings_are_shown_as_far_as_they_go(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    def place(x: float) -> Any:
+        return mavlink.MAVLink_local_position_ned_message(0, x, 2.0, 0, 0, 0, 0)
+
+    folder = tmp_path / "records"
+    folder.mkdir()
+    turn = mavlink.MAVLink_attitude_message(0, 0, 0, NAN, 0, 0, 0)
+    _log(folder / "no numbers.tlog", turn, *(place(x) for x in (1.0, NAN, float("inf"), 3.0)))
+    modes = (mavlink.MAVLink_heartbeat_message(10, 3, 0, at % 7, 4, 3) for at in range(12_000))
+    _log(folder / "modes.tlog", place(0.0), *modes)
+    for name in (b"\xff\xfe.tlog", b"new\nline\r\nSet-Cookie: x=1.tlog", b"<script>.tlog"):
+        Path(os.fsdecode(bytes(folder) + b"/" + name)).write_bytes(b"x" * 100)
+    os.mkfifo(folder / "pipe.tlog")
+    (folder / "link.tlog").symlink_to("/dev/zero")
+    with (folder / "zeros.decisions.gz").open("wb") as file:
+        packer = zlib.compressobj(9, zlib.DEFLATED, 31)
+        for _ in range(200):
+            file.write(packer.compress(bytes(1 << 20)))
+        file.write(packer.flush())
+    with web(tmp_path, both[0], "--records", str(folder), name="records") as page:
+        names = {each["name"] for each in page.get("/records")["records"]}
+        assert {"no numbers", "modes", "??", "zeros", "<script>"} < names
+        assert not names & {"pipe", "link"}
+        run = page.get("/records/no numbers")
+        assert [point[1] for point in run["vehicles"][0]["points"]] == [1.0, 3.0]
+        assert len(page.get("/records/modes")["vehicles"][0]["modes"]) == 5000
+        for name in names - {"no numbers", "modes"}:
+            answer = page.client.get(f"/api/v1/records/{quote(name, safe='')}")
+            assert answer.status_code == 422, (name, answer.text)
+            assert "set-cookie" not in answer.headers
+            assert str(folder) not in answer.text
+
+
+def test_behind_a_proxy_with_tls_only_its_own_pages_may_change_something(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    names = ("--name", "rover.example", "--name", "rover.example:8443")
+    token = tokens.add(tmp_path / "web-tokens.json", "anna", "observer")
+    with web(tmp_path, both[0], *names, name="proxied") as page:
+        port = page.url.rpartition(":")[2]
+
+        def stop(host: str, origin: str) -> int:
+            return page.send("POST", "/stop", {}, host=host, origin=origin).status_code
+
+        for host in ("rover.example", "rover.example:8443", f"rover.example:{port}"):
+            assert page.client.get("/", headers={"host": host}).status_code == 200
+            assert stop(host, f"http://{host}") == 200
+            assert stop(host, "https://evil.example") == 403
+        assert stop("rover.example", "https://rover.example") == 200
+        assert stop("rover.example:8443", "https://rover.example:8443") == 200
+        assert stop("rover.example", "https://rover.example:8443") == 403
+        assert stop(f"rover.example:{port}", f"https://rover.example:{port}") == 403
+        assert stop("evil.example", "https://evil.example") == 421
+        assert stop("127.0.0.1", "http://127.0.0.1") == 421
+        for origin, is_secure in (("https", True), ("http", False)):
+            login = page.send(
+                *("POST", "/session", {"token": token}),
+                host="rover.example",
+                origin=f"{origin}://rover.example",
+            )
+            assert ("; Secure" in login.headers["set-cookie"]) == is_secure
+
+
+def test_who_has_no_token_learns_nothing_of_the_server(tmp_path: Path) -> None:
+    tokens.add(tmp_path / "web-tokens.json", "anna", "observer")
+    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", "", "--role", ""]
+    command += ["--server", "udpout:127.0.0.1:9", "--tokens", str(tmp_path / "web-tokens.json")]
+    with process(*command, folder=tmp_path, name="alone") as alone:
+        url = alone.wait_for(r"web page: (http://\S+)/\n")[1]
+        ready = httpx.get(f"{url}/readyz")
+        assert (ready.status_code, ready.text) == (503, "no answer from the task server\n")
+        for path in ("/metrics", "/api/v1/openapi.json", "/api/v1/session"):
+            assert httpx.get(f"{url}{path}").status_code == 401
+
+
+def test_many_streams_of_one_token_leave_some_to_others(
+    tmp_path: Path, both: tuple[Stand, Web]
+) -> None:
+    kept = tmp_path / "web-tokens.json"
+    anna, eve = (tokens.add(kept, *each) for each in (("anna", "operator"), ("eve", "observer")))
+    with web(tmp_path, both[0], "--role", "", name="streams") as page:
+        port = int(page.url.rpartition(":")[2])
+        head = f"GET /api/v1/events HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+        held = [socket.create_connection(("127.0.0.1", port), 10) for _ in range(250)]
+        try:
+            for each in held:  # all before most of them are answered
+                each.sendall(f"{head}Authorization: Bearer {eve}\r\n\r\n".encode())
+            bearer = {"authorization": f"Bearer {anna}"}
+            with page.client.stream("GET", "/api/v1/events", headers=bearer) as stream:
+                assert stream.status_code == 200
+                assert next(stream.iter_lines()).startswith("id: ")
+                figures = page.client.get("/metrics", headers=bearer).text
+            count = re.search(r"^mav_tasks_web_event_streams (\d+)", figures, re.MULTILINE)
+            assert count is not None
+            assert 90 <= int(count[1]) <= 101
+        finally:
+            for each in held:
+                each.close()
+
+
+def test_a_flood_of_requests_for_the_journal_keeps_no_stop_back(tmp_path: Path) -> None:
+    store = str(tmp_path / "tasks.sqlite3")
+    with stand(tmp_path, serve_store=store) as it, web(tmp_path, it, "--store", store) as page:
+        has_rover(page)
+
+        def read(client: httpx.Client) -> None:
+            client.get("/api/v1/journal?limit=2000")
+
+        with flood(page, read, clients=12):
+            answers = [page.post("/stop", {}) for _ in range(3)]
+        assert {each["phase"] for each in answers} == {"acknowledged"}
