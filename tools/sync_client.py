@@ -75,7 +75,8 @@ def _call(call: ast.FunctionDef | ast.AsyncFunctionDef, kind: str) -> str:
     elif call.decorator_list:
         decorator, body = "    @property\n", f"return self._aio.{call.name}"
     elif isinstance(call, ast.FunctionDef):
-        body = f"return self._call(called(self._aio.{call.name}))"
+        function = f"lambda: {asked}" if _arguments(call) else f"self._aio.{call.name}"
+        body = f"{'' if returns == 'None' else 'return '}self._call(called({function}))"
     elif returns.startswith("Iterator"):
         body = f"return self._each({asked})"
     elif returns == "SyncTask":

@@ -291,6 +291,10 @@ class SyncClient(BlockingClient):
         """
         self._call(self._aio.stop(clear=clear, vehicle=vehicle, within=within))
 
+    def stop_again(self, *, clear: bool = False, vehicle: int | None = None) -> None:
+        """Send one STOP and wait for no answer: an equal ``stop`` that is not sent yet gets it."""
+        self._call(called(lambda: self._aio.stop_again(clear=clear, vehicle=vehicle)))
+
     def pause(self, *, vehicle: int | None = None) -> None:
         """Stop the rover; its task can continue from there."""
         self._call(self._aio.pause(vehicle=vehicle))
