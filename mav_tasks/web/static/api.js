@@ -30,11 +30,11 @@ export async function request(method, path, body, { key, within = WITHIN } = {})
       body: body === undefined ? undefined : JSON.stringify(body),
       signal: AbortSignal.timeout(within),
     });
+    if (answer.ok) return answer.status === 204 ? null : await answer.json(); // its end may be missing, too
   } catch (error) {
     const words = error.name === "TimeoutError" ? `no answer within ${within / 1000} s` : "the web process cannot be reached";
     throw new Problem(0, words, null);
   }
-  if (answer.ok) return answer.status === 204 ? null : answer.json();
   let problem = {};
   try {
     problem = await answer.json();
