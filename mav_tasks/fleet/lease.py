@@ -36,6 +36,7 @@ class Permit:
     trusted_until: float = 0.0
     term_end: float = 0.0
     vehicles: frozenset[int] = frozenset()
+    epoch: int = 0
 
     def may_move(self, vehicle: int, now: float) -> bool:
         """Return whether a packet that moves this vehicle may leave now."""
@@ -111,8 +112,13 @@ class Lease:
 
     def permit(self) -> Permit:
         """Return what it permits."""
-        term_end = self._renewed + self.terms.term
-        return Permit(self.standing, self.trusted_until, term_end, frozenset(self.vehicles))
+        return Permit(
+            self.standing,
+            self.trusted_until,
+            self._renewed + self.terms.term,
+            frozenset(self.vehicles),
+            self.epoch,
+        )
 
     def may_move(self, vehicle: int, now: float) -> bool:
         """Return whether a packet that moves this vehicle may leave now."""

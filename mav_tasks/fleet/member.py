@@ -90,7 +90,7 @@ class Member:
     heard: set[int] = field(default_factory=set)  # vehicles with heartbeats on its own links
     lease: Lease = field(init=False)
     rivals: Rivals = field(init=False)
-    _next: float = 0.0  # when the next renewal is due
+    next_turn: float = 0.0  # when the next renewal, or attempt to join, is due
     _is_others_turn: bool = False  # of other requests, though a renewal is due: answers take long
 
     def __post_init__(self) -> None:
@@ -98,7 +98,7 @@ class Member:
 
     def request(self, now: float) -> Request | None:
         """Return what to ask the database now, or None; one request at a time."""
-        standing, is_due = self.lease.standing, now >= self._next
+        standing, is_due = self.lease.standing, now >= self.next_turn
         if standing in (Standing.OUT, Standing.EVICTED):
             return self._timed(Join(self.name, self._predecessor(now)), now) if is_due else None
         me = Renew(self.name, self.lease.epoch)
@@ -140,7 +140,7 @@ class Member:
     def peer_refused(self, name: str, *, now: float) -> None:
         """Another gateway's host says that nobody listens there: read its row at once."""
         if self.rivals.refused(name, now=now):
-            self._next = now
+            self.next_turn = now
 
     def _predecessor(self, now: float) -> Eviction | None:
         """Return the row of its own name, if it may be evicted."""
@@ -155,5 +155,5 @@ class Member:
 
     def _timed(self, request: Request, now: float) -> Request:
         """Return a request that shows the others' rows, and set when the next one is due."""
-        self._next = now + (RECHECK if self.rivals.is_one_ending() else self.terms.renewal)
+        self.next_turn = now + (RECHECK if self.rivals.is_one_ending() else self.terms.renewal)
         return request

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Evict, Free, Join, Renew, Request, Row, Take
 from mav_tasks.fleet.rivals import Rival
+from mav_tasks.fleet_io.endpoint import Endpoint
 from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, failure
@@ -30,15 +31,6 @@ NAME_LOCK = 0x4D565454  # "MVTT"; above the gateway's number
 
 #: well below the time for which a renewal is trusted (``Terms``): two may fail
 LIMITS = Limits(answer=0.3, statement=0.25, lock=0.2, in_transaction=0.5, sending=0.4)
-
-
-@dataclass(frozen=True, slots=True)
-class Endpoint:
-    """Where a gateway of this epoch answers pings: an IP address and a UDP port."""
-
-    epoch: int
-    host: str
-    port: int
 
 
 @dataclass(frozen=True, slots=True)
