@@ -7,6 +7,7 @@ waiting. They judge by the clock at that moment, so that also a process that was
 nothing too late. That clock goes on while the machine is suspended.
 """
 
+import re
 import selectors
 from contextlib import closing
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from mav_tasks.store.postgres.address import Address
 PING = 0.1  # s from one ping to the next
 RETRY = 0.2  # s from a failure to connect to the next attempt
 CLOSE_LIMIT = 0.5  # s for the database's answer at the end
+
+_NAME = re.compile(r"[A-Za-z0-9._-]{1,40}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +59,8 @@ class Keeper:
 
         Raise StoreError if the database cannot be used, or another process has the name.
         """
+        if not _NAME.fullmatch(name):
+            raise StoreError(f"gateway {name!r}: a name has up to 40 letters, digits, dots, - or _")
         self._member = Member(name, terms or Terms())
         self._permit = Permit()
         self._heard: frozenset[int] = frozenset()
@@ -185,8 +190,9 @@ class Keeper:
             case Connected():
                 self._is_connected = True
             case Lost(words):
+                # at once after a session: the trust in the last renewal outlasts one lost answer
+                self._connect_at = now if self._is_connected else now + RETRY
                 self._is_connected, self._asked = False, None
-                self._connect_at = now + RETRY
                 self._tell(self._member.unanswered(now))
                 if not self._is_troubled:
                     self._is_troubled = True

@@ -125,6 +125,8 @@ class LeaseDatabase:
         except PostgresError as error:
             if error.sqlstate != LOCK_NOT_AVAILABLE:
                 raise
+            if (machine, pid) == (socket.gethostname(), os.getpid()):
+                raise PostgresError("the database has not ended the lost session yet") from error
             when = time.strftime("%Y-%m-%d %H:%M:%SZ", time.gmtime(since))
             words = f"on {machine}, pid {pid}, since {when}" if pid else "which has just begun"
             raise PostgresError(

@@ -92,7 +92,9 @@ class Peers:
                 self._forget(name)
         for name, endpoint in endpoints.items():
             if name not in self._peers:
-                with suppress(OSError, ValueError):  # an address of no use from here: no pings
+                with suppress(
+                    OSError, ValueError, OverflowError
+                ):  # an address of no use from here: no pings
                     self._peers[name] = _Peer(endpoint, self._connected(endpoint))
 
     def ask(self, now: float) -> None:

@@ -105,8 +105,7 @@ class Faults:
                 self._end_session(holder)
             passed(0.02)
         passed(self.chance.uniform(0.0, 1.5))
-        if second.is_running():
-            second.kill()
+        second.kill()
 
     def disturbed(self) -> None:
         """Several things at once, for a while."""
