@@ -13,8 +13,8 @@ from tests.kit.postgres import PostgresServer
 
 pytestmark = pytest.mark.slow
 
-FEW = 12
-#: 1,000 take an hour: FLEET_FAULTS=1000 ./tools/test tests/e2e/test_fleet_leases.py
+FEW = 8
+#: 1,000 take half an hour: FLEET_FAULTS=1000 ./tools/test tests/e2e/test_fleet_leases.py
 MANY = int(os.environ.get("FLEET_FAULTS", "30"))
 VEHICLES = range(1, 7)
 

@@ -29,6 +29,7 @@ class Faults:
     after_kill: list[float] = field(default_factory=list)
     after_silence: list[float] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
+    _is_frozen: bool = False  # the database
 
     def one(self) -> str:
         """Cause a fault, wait until all is well again, and return its name."""
@@ -120,7 +121,7 @@ class Faults:
                 case 0:
                     gateway.kill()
                     ended.append(gateway)
-                case 1:
+                case 1 if not self._is_frozen:  # its operator could not log in
                     self._end_session(gateway)
                 case 2:
                     self.fleet.proxies[gateway.name].close_far_side()
@@ -159,8 +160,14 @@ class Faults:
     def _refusing(self, gateway: Gateway) -> AbstractContextManager[None]:
         return self.fleet.proxies[gateway.name].refusing()
 
-    def _frozen_database(self, _gateway: Gateway) -> AbstractContextManager[None]:
-        return self.fleet.server.frozen()
+    @contextmanager
+    def _frozen_database(self, _gateway: Gateway) -> Iterator[None]:
+        was_frozen, self._is_frozen = self._is_frozen, True
+        try:
+            with nullcontext() if was_frozen else self.fleet.server.frozen():
+                yield
+        finally:
+            self._is_frozen = was_frozen
 
     def _restart(self) -> None:
         if self.chance.random() < 0.5:

@@ -135,6 +135,16 @@ def test_two_that_evict_each_other_do_not_wait_for_each_other(postgres: Postgres
                 it.execute("UPDATE gateways SET epoch = 0")  # all leave
 
 
+def test_gateways_that_begin_at_one_time_make_the_tables_once(postgres: PostgresServer) -> None:
+    url = postgres.new_database()
+    with ThreadPoolExecutor() as threads:
+        begun = list(threads.map(lambda name: opened(url, name), "abcdef"))
+    assert {each.secret for each in begun} == {begun[0].secret}
+    for each in begun:
+        assert each.execute(Join(each.name)).row.epoch
+        each.close()
+
+
 CHILD = """
 import sys
 from mav_tasks.fleet.member import Join
