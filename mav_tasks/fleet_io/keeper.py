@@ -4,7 +4,8 @@ The thread drives ``Member`` with the answers of the database and the pings of t
 and never waits for either: when the trust in the last renewal ends, it says so in time. Whoever is
 about to send a packet to a vehicle asks ``may_move`` or ``may_stop``, from any thread, without
 waiting. They judge by the clock at that moment, so that also a process that was suspended sends
-nothing too late. That clock goes on while the machine is suspended.
+nothing too late. That clock goes on while the machine is suspended. What is left is a suspension
+between the question and its packet: only a fence at the vehicle itself can be against that.
 """
 
 import re
@@ -64,12 +65,10 @@ class Keeper:
         self._member = Member(name, terms or Terms())
         self._permit = Permit()
         self._heard: frozenset[int] = frozenset()
-        self._news: Mailbox[News] = Mailbox()
-        self._results: Mailbox[Result] = Mailbox()
         self._selector = selectors.DefaultSelector()
         try:
             self._peers = Peers(self._selector, host, port)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, OverflowError) as error:
             self._selector.close()
             raise StoreError(f"gateway {name}: UDP port {port} of {host}: {error}") from error
         try:
@@ -79,6 +78,8 @@ class Keeper:
             self._selector.close()
             raise
         self._peers.begin(database.secret)
+        self._news: Mailbox[News] = Mailbox()
+        self._results: Mailbox[Result] = Mailbox()
         self._asker = Asker(database, self._results)
         self._asked: tuple[Request, float] | None = None  # and when
         self._is_busy = False  # the asker
