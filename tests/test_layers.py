@@ -12,7 +12,17 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.errors": frozenset(),
     "mav_tasks.clock": frozenset(),
     "mav_tasks.fleet": frozenset(),
+    "mav_tasks.fleet_io": frozenset(
+        {
+            "mav_tasks.clock",
+            "mav_tasks.fleet",
+            "mav_tasks.mailbox",
+            "mav_tasks.store",
+            "mav_tasks.errors",
+        }
+    ),
     "mav_tasks.histogram": frozenset(),
+    "mav_tasks.mailbox": frozenset(),
     "mav_tasks.link_reader": frozenset({"mav_tasks.engine", "mav_tasks.links"}),
     "mav_tasks.setting_keys": frozenset({"mav_tasks.errors"}),
     "mav_tasks.settings": frozenset({"mav_tasks.setting_keys", "mav_tasks.errors"}),
@@ -40,6 +50,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.store": frozenset(
         {
             "mav_tasks.clock",
+            "mav_tasks.mailbox",
             "mav_tasks.tasks",
             "mav_tasks.settings",
             "mav_tasks.folders",

@@ -25,6 +25,30 @@ class Terms:
             raise ValueError(f"renewal < term - margin < term is needed, not {self}")
 
 
+@dataclass(frozen=True, slots=True)
+class Permit:
+    """What a lease permits from now on: a value, so that any thread may ask it without waiting.
+
+    It grants nothing that the lease does not: it ends by itself, at times in monotonic seconds.
+    """
+
+    standing: Standing = Standing.OUT
+    trusted_until: float = 0.0
+    term_end: float = 0.0
+    vehicles: frozenset[int] = frozenset()
+    epoch: int = 0
+
+    def may_move(self, vehicle: int, now: float) -> bool:
+        """Return whether a packet that moves this vehicle may leave now."""
+        holder = self.standing is Standing.HOLDER and now < self.trusted_until
+        return holder and vehicle in self.vehicles
+
+    def may_stop(self, vehicle: int, now: float) -> bool:
+        """Return whether a packet that stops this vehicle may leave now."""
+        in_term = self.standing in MAY_STOP and now < self.term_end
+        return in_term and vehicle in self.vehicles
+
+
 @dataclass
 class Lease:
     """A gateway's view of its own lease. ``now`` is in monotonic seconds everywhere."""
@@ -86,15 +110,23 @@ class Lease:
             return self._renewed + self.terms.term
         return None
 
+    def permit(self) -> Permit:
+        """Return what it permits."""
+        return Permit(
+            self.standing,
+            self.trusted_until,
+            self._renewed + self.terms.term,
+            frozenset(self.vehicles),
+            self.epoch,
+        )
+
     def may_move(self, vehicle: int, now: float) -> bool:
         """Return whether a packet that moves this vehicle may leave now."""
-        holder = self.standing is Standing.HOLDER and now < self.trusted_until
-        return holder and vehicle in self.vehicles
+        return self.permit().may_move(vehicle, now)
 
     def may_stop(self, vehicle: int, now: float) -> bool:
         """Return whether a packet that stops this vehicle may leave now."""
-        in_term = self.standing in MAY_STOP and now < self._renewed + self.terms.term
-        return in_term and vehicle in self.vehicles
+        return self.permit().may_stop(vehicle, now)
 
     def _on(self, event: LeaseEvent) -> list[Effect]:
         self.standing, effects = standing_after(self.standing, event)

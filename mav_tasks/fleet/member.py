@@ -10,12 +10,19 @@ from mav_tasks.fleet.lease import Lease, Terms
 from mav_tasks.fleet.rivals import Eviction, Rival, Rivals
 from mav_tasks.fleet.standing import Effect, Standing
 
+RECHECK = 0.03  # s; how soon to look whether the session of a process that has ended is gone
+
 
 @dataclass(frozen=True, slots=True)
 class Join:
-    """Give this gateway a new epoch. The database refuses while another session has its name."""
+    """Give this gateway a new epoch, unless another process has its name.
+
+    A process that lost its session may still move vehicles under this name: a row of an unknown
+    epoch ends as that of any other gateway does, by an eviction.
+    """
 
     name: str
+    replaced: Eviction | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +43,10 @@ class Evict:
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """Give this gateway a vehicle that nobody holds."""
+    """Give this gateway those of the vehicles that nobody holds."""
 
     by: Renew
-    vehicle: int
+    vehicles: frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +62,12 @@ Request = Join | Renew | Evict | Take | Free
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The database's answer to each request: what this gateway has, and the rows of the others."""
+    """The database's answer to each request: what this gateway has, and all other rows.
 
-    epoch: int  # of this gateway, 0 if it is not in the fleet (any more)
+    One of these may have its name: that of another process, or of a Join without an answer.
+    """
+
+    epoch: int  # of this gateway, 0 if the request was refused
     holds: frozenset[int]
     rivals: tuple[Rival, ...]
 
@@ -80,23 +90,24 @@ class Member:
     heard: set[int] = field(default_factory=set)  # vehicles with heartbeats on its own links
     lease: Lease = field(init=False)
     rivals: Rivals = field(init=False)
-    _next: float = 0.0  # when the next renewal is due
+    next_turn: float = 0.0  # when the next renewal, or attempt to join, is due
+    _is_others_turn: bool = False  # of other requests, though a renewal is due: answers take long
 
     def __post_init__(self) -> None:
         self.lease, self.rivals = Lease(self.terms), Rivals(self.terms)
 
     def request(self, now: float) -> Request | None:
         """Return what to ask the database now, or None; one request at a time."""
-        if self.lease.standing in (Standing.OUT, Standing.EVICTED):
-            return self._at_its_time(Join(self.name), now)
+        standing, is_due = self.lease.standing, now >= self.next_turn
+        if standing in (Standing.OUT, Standing.EVICTED):
+            return self._timed(Join(self.name, self._predecessor(now)), now) if is_due else None
         me = Renew(self.name, self.lease.epoch)
-        renewal = self._at_its_time(me, now)
-        if renewal is not None or self.lease.standing is not Standing.HOLDER:
-            return renewal
-        if evictions := self.rivals.evictions(now):
-            return Evict(me, evictions[0])
-        free = self.heard - self.lease.vehicles - self.rivals.held()
-        return Take(me, min(free)) if free else None
+        other = self._change(me, now) if standing is Standing.HOLDER else None
+        if is_due and not (other and self._is_others_turn):
+            self._is_others_turn = True
+            return self._timed(me, now)
+        self._is_others_turn = False
+        return other
 
     def answered(self, request: Request, row: Row, *, sent: float, now: float) -> Change:
         """Take an answer to a request that had been sent at ``sent``."""
@@ -129,10 +140,20 @@ class Member:
     def peer_refused(self, name: str, *, now: float) -> None:
         """Another gateway's host says that nobody listens there: read its row at once."""
         if self.rivals.refused(name, now=now):
-            self._next = now
+            self.next_turn = now
 
-    def _at_its_time(self, request: Request, now: float) -> Request | None:
-        if now < self._next:
-            return None
-        self._next = now + self.terms.renewal
+    def _predecessor(self, now: float) -> Eviction | None:
+        """Return the row of its own name, if it may be evicted."""
+        return next((each for each in self.rivals.evictions(now) if each.name == self.name), None)
+
+    def _change(self, me: Renew, now: float) -> Request | None:
+        """Return what to change in the database, if anything."""
+        if evictions := self.rivals.evictions(now):
+            return Evict(me, evictions[0])
+        free = self.heard - self.lease.vehicles - self.rivals.held()
+        return Take(me, frozenset(free)) if free else None
+
+    def _timed(self, request: Request, now: float) -> Request:
+        """Return a request that shows the others' rows, and set when the next one is due."""
+        self.next_turn = now + (RECHECK if self.rivals.is_one_ending() else self.terms.renewal)
         return request

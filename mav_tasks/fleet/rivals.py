@@ -107,6 +107,14 @@ class Rivals:
         """Return the vehicles that they hold."""
         return {vehicle for seen in self._seen.values() for vehicle in seen.row.holds}
 
+    def epochs(self) -> dict[str, int]:
+        """Return the epoch of each row, by name."""
+        return {name: seen.row.epoch for name, seen in self._seen.items()}
+
+    def is_one_ending(self) -> bool:
+        """Return whether one's process has ended, as it seems, and its session is not gone yet."""
+        return any(seen.is_refused and seen.row.in_session for seen in self._seen.values())
+
     def _is_dead(self, seen: Seen, now: float) -> bool:
         if seen.is_refused and not seen.row.in_session:
             return True

@@ -5,16 +5,16 @@ from contextlib import closing
 
 from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
+from mav_tasks.mailbox import Mailbox
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
-from mav_tasks.store.base import Outcome, Which
+from mav_tasks.store.base import Kept, Outcome, Which
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
 from mav_tasks.store.halt_keeper import HaltKeeper
 from mav_tasks.store.halt_record import HaltRecord, event_of, word_of
 from mav_tasks.store.journal import Journal
-from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.writer import Writer
 from mav_tasks.tasks.events import Event
@@ -23,6 +23,10 @@ from mav_tasks.tasks.restored import Restored
 HALTS_LIMIT = 1.0  # s at shutdown for writing the last halts
 CLOSE_LIMIT = 3.0  # s at shutdown for writing the remaining events
 TRIM_AT_OPEN = 0.5  # s of deleting expired rows at start; the rest is done while serving
+
+
+def _both_kept(earlier: Outcome, later: Outcome) -> bool:
+    return isinstance(earlier, Kept) and isinstance(later, Kept)
 
 
 class DurableStore:
@@ -53,7 +57,7 @@ class DurableStore:
         utc = boot_time() + wall_offset()
         self._ended_well = database.ended_well and was_complete
         self._idle = 0.0 if database.last_write is None else max(0.0, utc - database.last_write)
-        self._mail = Mailbox()
+        self._mail: Mailbox[Outcome] = Mailbox(replaces=_both_kept)
         trimmer = Trimmer(retention or Retention())
         self._writer = Writer(
             database,

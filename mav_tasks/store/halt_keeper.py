@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 from threading import Thread
 
-from mav_tasks.store.base import HaltNotKept
+from mav_tasks.mailbox import Mailbox
+from mav_tasks.store.base import HaltNotKept, Outcome
 from mav_tasks.store.failures import words_for
 from mav_tasks.store.halt_record import HaltRecord, Word
-from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.tasks.events import QueuePaused
 
 RETRY = 0.25  # s between two attempts
@@ -26,7 +26,7 @@ class HaltKeeper:
     def __init__(
         self,
         record: HaltRecord,
-        mail: Mailbox,
+        mail: Mailbox[Outcome],
         *,
         name: str,
         kept_through: Callable[[], int],

@@ -10,12 +10,12 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 
 from mav_tasks.clock import boot_time
-from mav_tasks.store.base import Kept, NotKept
+from mav_tasks.mailbox import Mailbox
+from mav_tasks.store.base import Kept, NotKept, Outcome
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
 from mav_tasks.store.halt_record import HaltRecord
-from mav_tasks.store.mailbox import Mailbox
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.tasks.events import Event
 
@@ -33,7 +33,7 @@ class Writer:
     def __init__(
         self,
         database: EventDatabase,
-        mail: Mailbox,
+        mail: Mailbox[Outcome],
         trimmer: Trimmer,
         *,
         name: str,

@@ -78,9 +78,13 @@ class PostgresServer:
     def kill(self) -> None:
         """End all of it at once, as a crash would."""
         assert self._process is not None
-        for pid in self.pids():
+        _signal(self._process.pid, signal.SIGSTOP)  # it forks no more for clients that come back
+        pids = self.pids()
+        for pid in pids:
             _signal(pid, signal.SIGKILL)
         self._process.wait(START_LIMIT)
+        # the next server refuses to start while one of them has the shared memory
+        wait_until(lambda: not any(map(_is_alive, pids)), within=START_LIMIT)
 
     @contextmanager
     def frozen(self) -> Iterator[None]:
@@ -188,6 +192,14 @@ def _ordinary() -> dict[str, Any]:
     if os.geteuid() != 0:
         return {}
     return {"user": NOBODY, "group": NOBODY, "extra_groups": []}
+
+
+def _is_alive(pid: int) -> bool:
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return status.rpartition(")")[2].split()[0] not in "ZX"
 
 
 def _signal(pid: int, number: signal.Signals) -> None:

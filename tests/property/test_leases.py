@@ -4,8 +4,11 @@ from random import Random
 
 import pytest
 
-from mav_tasks.fleet.lease import Lease
+from mav_tasks.fleet.lease import Lease, Terms
+from mav_tasks.fleet.member import Member
+from mav_tasks.fleet.rivals import Eviction
 from mav_tasks.fleet.standing import MAY_STOP, TABLE, Effect, LeaseEvent, Standing, standing_after
+from tests.kit.gateways.database import Database
 from tests.kit.gateways.world import Process, World
 
 GATEWAYS = {"a": {1, 2}, "b": {1, 2, 3}, "c": {2, 3}}
@@ -17,7 +20,7 @@ def disturb(world: World, it: Process) -> None:
     """Do something bad to one gateway, for a while."""
     random, name = world.random, it.member.name
     last = random.uniform(0.05, 4.0)
-    match random.randrange(8):
+    match random.randrange(10):
         case 0:
             world.end(it)
             world.at(last, lambda: again(world, name))
@@ -36,6 +39,11 @@ def disturb(world: World, it: Process) -> None:
             world.database.restart()
             world.database.is_up = False
             world.at(last, lambda: setattr(world.database, "is_up", True))
+        case 7 | 8:  # somebody starts a second process of its name; its own session may be lost
+            twin = world.add(name, set(GATEWAYS[name]), label=f"{name} again")
+            if random.random() < 0.7:
+                world.end_session(it)
+            world.at(last, lambda: world.end(twin))
         case _:
             heard = it.member.heard
             heard.discard(random.choice(sorted(heard or {0})))
@@ -136,3 +144,49 @@ def test_another_gateway_has_the_vehicle_in_time(is_killed: bool, limit: float) 
     """Of 100 takeovers 99 within the limit of virtual time, without PostgreSQL's own time."""
     took = sorted(taken_after(seed, is_killed=is_killed) for seed in range(100))
     assert took[98] <= limit, took[-5:]
+
+
+def test_a_second_process_of_one_name_waits_for_the_first_ones_term() -> None:
+    """The first may have lost its session without noticing, and be driving."""
+    for seed in range(20):
+        world = World(Random(seed), vehicles=1)
+        first = world.add("a", {1})
+        world.run(2.0)
+        world.end_session(first)
+        world.add("a", {1}, label="second")
+        world.run(SETTLED)
+        assert not world.wrong, f"seed {seed}: {world.wrong[:3]}"
+        assert world.database.holder(1) == "a"
+
+
+def test_a_second_process_that_does_not_wait_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that nothing found means something."""
+
+    is_as_read = Database._is_as_read
+
+    def is_granted(database: Database, rival: Eviction | None) -> bool:
+        return rival is None or is_as_read(database, rival)
+
+    monkeypatch.setattr(Database, "_is_as_read", is_granted)
+    assert any(life(seed).wrong for seed in range(30))
+
+
+def test_many_vehicles_are_taken_at_once() -> None:
+    world = World(Random(1), vehicles=100, slow=0.0)
+    world.add("a", set(range(1, 101)))
+    world.run(0.5)
+    assert len(world.database.rows["a"].holds) == 100
+
+
+def test_a_slow_database_still_gives_vehicles() -> None:
+    """A renewal is then due after each answer; it must not take all turns."""
+    member = Member("a", Terms(), {1})
+    now, database = 0.0, Database()
+    database.connect("a")
+    for _ in range(10):
+        request = member.request(now)
+        if request is not None:
+            sent, now = now, now + 0.3
+            member.answered(request, database.execute("a", request), sent=sent, now=now)
+            assert now < member.lease.trusted_until
+    assert member.lease.may_move(1, now)

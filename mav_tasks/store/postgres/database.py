@@ -19,15 +19,11 @@ from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
 from mav_tasks.store.postgres.ownership import Ownership
 from mav_tasks.store.postgres.reader import PostgresReader
 from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.postgres.writable import check_writable
 from mav_tasks.store.retention import Trimmer
 
 LOOK_PERIOD = 1.0  # s between two checks that the session still exists
 
-REPLICA = (
-    "it is a replica, or the server is in recovery: use the primary server"
-    " (several hosts: postgresql://USER@HOST1,HOST2/DATABASE)"
-)
-READ_ONLY = "it is read-only for this role: ALTER ROLE … RESET default_transaction_read_only"
 LACKS_EVENTS = (
     "it lacks events that it had stored (it has {found}, this server stored {stored}):"
     " restore the right one, or end the server and check"
@@ -71,7 +67,7 @@ class PostgresDatabase:
         with self._at_start():
             self._session = Session(address, purpose="serve")
             try:
-                _check_writable(self._session)
+                check_writable(self._session)
                 self._ownership.lock(self._session)
                 schema.migrate(self._session)
                 #: names the fleet, over copies and moves of its database
@@ -110,7 +106,7 @@ class PostgresDatabase:
         if self._session.is_lost:
             self._session = Session(self._address, purpose="serve")
             try:
-                _check_writable(self._session)
+                check_writable(self._session)
                 self._ownership.lock(self._session)
                 self._ownership.resume(self._session)
             except BaseException as error:
@@ -197,11 +193,3 @@ class PostgresDatabase:
         if row is None:
             raise PostgresError("its table meta is empty")
         return row
-
-
-def _check_writable(session: Session) -> None:
-    ((is_replica, is_read_only),) = session.execute(
-        "SELECT pg_is_in_recovery(), current_setting('transaction_read_only') = 'on'"
-    ).fetchall()
-    if is_replica or is_read_only:
-        raise PostgresError(REPLICA if is_replica else READ_ONLY)

@@ -16,10 +16,11 @@ from dataclasses import dataclass
 
 from mav_tasks.store.postgres.failures import PostgresError, Replaced
 from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.postgres.session_lock import LOCK_NOT_AVAILABLE, SessionLock
 
 LOCK = 0x4D565453_00000001  # "MVTS", and the first purpose
 
-_NOT_NULL_VIOLATION, _LOCK_NOT_AVAILABLE, _UNDEFINED_TABLE = "23502", "55P03", "42P01"
+_NOT_NULL_VIOLATION, _UNDEFINED_TABLE = "23502", "42P01"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class Ownership:
 
     def __init__(self) -> None:
         self.epoch = 0
-        self._backend: tuple[int, str] | None = None  # of the session that had the lock last
+        self._lock = SessionLock(LOCK)
 
     def __repr__(self) -> str:
         return f"Ownership(epoch {self.epoch})"
@@ -50,16 +51,11 @@ class Ownership:
         """Take the lock; raise an error that names the server which has it.
 
         It is Replaced if that server has begun to write since this one did.
-
-        An earlier session of this server may have it: the database does not notice the loss of a
-        connection at once. That session is ended.
         """
-        if self._backend is not None:
-            session.execute(_END_OWN_SESSION, (LOCK >> 32, LOCK & 0xFFFFFFFF, *self._backend))
         try:
-            session.execute("SELECT pg_advisory_lock(?)", (LOCK,))
+            self._lock.take(session)
         except PostgresError as error:
-            if error.sqlstate != _LOCK_NOT_AVAILABLE:
+            if error.sqlstate != LOCK_NOT_AVAILABLE:
                 raise
             holder = _holder_if_any(session)
             if self.epoch and holder is not None and holder.epoch > self.epoch:
@@ -68,9 +64,6 @@ class Ownership:
                 raise PostgresError("the database has not ended the lost session yet") from error
             words = str(holder) if holder is not None and holder.epoch else "another server"
             raise PostgresError(f"in use by {words}") from error
-        found = session.execute(_OWN_BACKEND).fetchone()
-        assert found is not None
-        self._backend = found[0], found[1]
 
     def begin(self, session: Session) -> None:
         """Make this server the writer, by a new epoch."""
@@ -119,18 +112,6 @@ class Ownership:
                 " or end the server and check"
             )
         return _replaced_by(holder)
-
-
-_OWN_BACKEND = (
-    "SELECT pid, extract(epoch FROM backend_start)::text FROM pg_stat_activity"
-    " WHERE pid = pg_backend_pid()"
-)
-_END_OWN_SESSION = (
-    "SELECT pg_terminate_backend(pid) FROM pg_locks JOIN pg_stat_activity USING (pid)"
-    " WHERE locktype = 'advisory' AND granted AND classid = ? AND objid = ? AND objsubid = 1"
-    " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
-    " AND pid = ? AND extract(epoch FROM backend_start)::text = ?"
-)
 
 
 def _holder(session: Session) -> Holder | None:

@@ -6,7 +6,7 @@ from mav_tasks.errors import StoreError
 from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import failure
-from mav_tasks.store.postgres.session import READ_LIMIT, Session
+from mav_tasks.store.postgres.session import READING, Session
 from mav_tasks.store.reading import in_one_line
 
 
@@ -16,7 +16,7 @@ class PostgresReader:
     def __init__(self, address: Address) -> None:
         self.name = address.shown
         with in_one_line(self):
-            self.connection = Session(address, purpose="read", limit=READ_LIMIT)
+            self.connection = Session(address, purpose="read", limits=READING)
             try:
                 self.is_empty = not schema.version_of(self.connection)
             except BaseException:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.session import SCHEMA, Session
 
+LOCK = 0x4D565453_00000002  # of whoever migrates: gateways may begin at the same time
 #: the comment of the table ``versions``; keeps us from writing to another program's tables
 MARK = "mav-tasks store"
 
@@ -67,6 +68,31 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
             " PRIMARY KEY (key, link_id, system_id, component_id))"
         ),
     ),
+    (  # gateways that share a fleet: fleet_io/lease_database.py
+        (  # epoch 0: not in the fleet; backend: of the session that asked last
+            "CREATE TABLE gateways (number INTEGER GENERATED ALWAYS AS IDENTITY PRIMARY KEY,"
+            " name TEXT NOT NULL UNIQUE, epoch BIGINT NOT NULL DEFAULT 0,"
+            " renewals BIGINT NOT NULL DEFAULT 0, backend INTEGER NOT NULL DEFAULT 0,"
+            " host TEXT NOT NULL DEFAULT '', port INTEGER NOT NULL DEFAULT 0,"
+            " machine TEXT NOT NULL DEFAULT '', pid BIGINT NOT NULL DEFAULT 0,"
+            " since DOUBLE PRECISION NOT NULL DEFAULT 0)"
+        ),
+        "CREATE SEQUENCE gateway_epochs AS BIGINT",
+        (  # gateway NULL: free; number: of the takeover, a fence that only rises
+            "CREATE TABLE holdings (vehicle BIGINT PRIMARY KEY,"
+            " gateway INTEGER REFERENCES gateways, number BIGINT NOT NULL,"
+            " signing_time BIGINT NOT NULL DEFAULT 0)"
+        ),
+        "CREATE INDEX held_by ON holdings (gateway) WHERE gateway IS NOT NULL",
+        (  # authenticates the pings between gateways
+            "CREATE TABLE gateway_secret (one INTEGER PRIMARY KEY CHECK (one = 1),"
+            " secret TEXT NOT NULL)"
+        ),
+        (
+            "INSERT INTO gateway_secret"
+            " VALUES (1, gen_random_uuid()::text || gen_random_uuid()::text)"
+        ),
+    ),
 )
 
 
@@ -99,6 +125,9 @@ def migrate(session: Session, *, migrations: Sequence[Sequence[str]] = MIGRATION
     """Create the schema, or apply the missing migrations."""
     for number in range(version_of(session), len(migrations)):
         with session.transaction():
+            session.execute("SELECT pg_advisory_xact_lock(?)", (LOCK,))
+            if version_of(session) > number:  # another process was quicker
+                continue
             if number == 0:
                 _create(session)
             for statement in migrations[number]:

@@ -10,6 +10,7 @@ import logging
 import select
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from itertools import count
 from typing import Any
@@ -22,23 +23,27 @@ from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import LOST, PostgresError, connecting
 
 OLDEST = 140_000  # PostgreSQL 14; older ones get no corrections any more
-CONNECT_LIMIT = 2  # s, libpq's least
-ANSWER_LIMIT = 3.0  # s without a byte from the server, after which the connection counts as lost
-STATEMENT_LIMIT = 2.0  # s, after which the server gives a statement up
-LOCK_LIMIT = 1.0  # s, after which the server gives up waiting for a lock of another program
-IN_TRANSACTION_LIMIT = 5.0  # s, after which the server ends the transaction of a suspended process
-READ_LIMIT = 30.0  # s, for readers: a query may sort many rows
-
 SCHEMA = "mav_tasks"
 
+_CONNECT_LIMIT = 2  # s for each host, libpq's least
 #: of TCP, so that both sides notice a dead machine or a cut cable within some seconds
-_LIVELINESS = {
-    "keepalives_idle": "3",
-    "keepalives_interval": "1",
-    "keepalives_count": "3",
-    "tcp_user_timeout": str(int(ANSWER_LIMIT * 1000)),
-}
-_OK = (pq.ExecStatus.COMMAND_OK, pq.ExecStatus.TUPLES_OK, pq.ExecStatus.EMPTY_QUERY)
+_KEEPALIVES = {"keepalives_idle": "3", "keepalives_interval": "1", "keepalives_count": "3"}
+_ROWS = pq.ExecStatus.TUPLES_OK
+_OK = (pq.ExecStatus.COMMAND_OK, _ROWS, pq.ExecStatus.EMPTY_QUERY)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How long a session waits for what, in seconds; the defaults are those of a server."""
+
+    answer: float = 3.0  # without a byte from the server: then the connection counts as lost
+    statement: float = 2.0  # after which the server gives a statement up
+    lock: float = 1.0  # after which the server gives up waiting for a lock of another program
+    in_transaction: float = 5.0  # after which it ends the transaction of a suspended process
+    sending: float = 3.0  # in which the other machine must acknowledge what was sent
+
+
+READING = Limits(answer=30.0, statement=30.0)  # a query may sort many rows
 
 
 class Found:
@@ -73,17 +78,19 @@ class Session:
     Outside ``batch`` and ``transaction`` each statement is a transaction of its own.
     """
 
-    def __init__(self, address: Address, *, purpose: str, limit: float = ANSWER_LIMIT) -> None:
+    def __init__(self, address: Address, *, purpose: str, limits: Limits | None = None) -> None:
         """Connect. ``purpose`` tells the server's operator what the session is for."""
+        limits = limits or Limits()
         logging.getLogger("psycopg").disabled = True  # errors are raised, and told by the store
         parameters: dict[str, Any] = {
             "application_name": f"mav-tasks {purpose}",
-            **_LIVELINESS,
-            "connect_timeout": CONNECT_LIMIT,
+            **_KEEPALIVES,
+            "tcp_user_timeout": _milliseconds(limits.sending),
+            "connect_timeout": _CONNECT_LIMIT,
             **address.parameters,
             "client_encoding": "UTF8",
         }
-        if "," in parameters.get("host", "") and purpose == "serve":
+        if "," in parameters.get("host", "") and purpose != "read":
             parameters.setdefault("target_session_attrs", "read-write")
         try:
             self._connection = psycopg.connect(**parameters, autocommit=True)
@@ -92,7 +99,7 @@ class Session:
         except psycopg.Error as error:
             raise PostgresError(connecting(str(error)), sqlstate=LOST) from None
         self._pg = self._connection.pgconn
-        self._limit = limit
+        self._limit = limits.answer
         self._poll = select.poll()
         self._poll.register(self._pg.socket)
         self._names: dict[str, bytes] = {}  # of prepared statements, by their SQL
@@ -105,7 +112,7 @@ class Session:
         try:
             self._pg.enter_pipeline_mode()
             self._check_version()
-            self._set_up(_settings(limit))
+            self._set_up(_settings(limits))
         except BaseException:
             self.close()
             raise
@@ -136,23 +143,26 @@ class Session:
             self._sync()
 
     @contextmanager
-    def batch(self) -> Iterator[None]:
+    def batch(self) -> Iterator[list[Found]]:
         """Execute the block's statements in one transaction and one round trip.
 
         In libpq's pipeline mode all statements up to a sync are one transaction, which the sync
-        commits. Raise PostgresError if the block is not durable, on every server that must have it:
-        a warning says that a standby has not confirmed it.
+        commits. After the block the list has what each query in it has found. Raise PostgresError
+        if the block is not durable, on every server that must have it: a warning says that a
+        standby has not confirmed it.
         """
         self._warnings.clear()
         self._is_batch = True
+        found: list[Found] = []
         try:
-            yield
+            yield found
         except BaseException:
             self.close()  # what was queued must not be committed by a later sync
             raise
         finally:
             self._is_batch = False
-        self._sync()
+        results = self._sync()
+        found += [Found(self._rows(each)) for each in results if each.status == _ROWS]
         if self._warnings:
             raise PostgresError(f"not confirmed by the database: {self._warnings[0]}")
 
@@ -279,21 +289,22 @@ class Session:
             self._warnings.append(_field(notice, pq.DiagnosticField.MESSAGE_PRIMARY))
 
 
-def _settings(limit: float) -> dict[str, str]:
-    """Return the parameters of a session in which an answer comes within ``limit`` seconds."""
-    statement = STATEMENT_LIMIT if limit == ANSWER_LIMIT else limit
+def _settings(limits: Limits) -> dict[str, str]:
+    """Return the parameters of a session."""
     return {
         "search_path": SCHEMA,
-        "statement_timeout": f"{statement * 1000:.0f}",
-        "lock_timeout": f"{LOCK_LIMIT * 1000:.0f}",
-        "idle_in_transaction_session_timeout": f"{IN_TRANSACTION_LIMIT * 1000:.0f}",
+        "statement_timeout": _milliseconds(limits.statement),
+        "lock_timeout": _milliseconds(limits.lock),
+        "idle_in_transaction_session_timeout": _milliseconds(limits.in_transaction),
         "idle_session_timeout": "0",
         "client_min_messages": "warning",
-        "tcp_keepalives_idle": _LIVELINESS["keepalives_idle"],
-        "tcp_keepalives_interval": _LIVELINESS["keepalives_interval"],
-        "tcp_keepalives_count": _LIVELINESS["keepalives_count"],
-        "tcp_user_timeout": _LIVELINESS["tcp_user_timeout"],
+        **{f"tcp_{name}": value for name, value in _KEEPALIVES.items()},
+        "tcp_user_timeout": _milliseconds(limits.sending),
     }
+
+
+def _milliseconds(seconds: float) -> str:
+    return f"{seconds * 1000:.0f}"
 
 
 @cache

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from mav_tasks.fleet.member import Evict, Free, Join, Request, Row, Take
-from mav_tasks.fleet.rivals import Rival
+from mav_tasks.fleet.member import Evict, Free, Join, Renew, Request, Row, Take
+from mav_tasks.fleet.rivals import Eviction, Rival
 
 
 @dataclass
@@ -11,6 +11,7 @@ class Gateway:
     """A gateway's row."""
 
     epoch: int
+    session: int  # that joined, or has asked since
     renewals: int = 0
     holds: set[int] = field(default_factory=set)
 
@@ -26,8 +27,13 @@ class Database:
     _numbers: int = 0
     _epochs: int = 0
 
-    def connect(self, name: str) -> int:
-        """Begin a session; the gateway's earlier one has ended, with what it still asked."""
+    def connect(self, name: str, earlier: int | None = None) -> int | None:
+        """Begin a session; None: another process has one under this name.
+
+        The process's own ``earlier`` one ends, with what it still asked.
+        """
+        if self.sessions.get(name) not in (None, earlier):
+            return None
         self._numbers += 1
         self.sessions[name] = self._numbers
         return self._numbers
@@ -46,35 +52,45 @@ class Database:
         """Carry out a request of a gateway in its session; return the answer."""
         mine = self.rows.get(name)
         if isinstance(request, Join):
+            if mine is not None and not self._is_as_read(request.replaced):
+                return self._row(None)
             self._epochs += 1
-            mine = self.rows[name] = Gateway(self._epochs)
-        else:
-            by = request.by if isinstance(request, Evict | Take | Free) else request
-            if mine is None or mine.epoch != by.epoch:
-                return self._row(name, None)
-            match request:
-                case Evict(_, rival):
-                    row = self.rows.get(rival.name)
-                    if row is not None and (row.epoch, row.renewals) == (
-                        rival.epoch,
-                        rival.renewals,
-                    ):
-                        del self.rows[rival.name]
-                        self.takeovers += 1
-                case Take(_, vehicle):
-                    if self.holder(vehicle) is None:
-                        mine.holds.add(vehicle)
-                case Free(_, vehicle):
-                    mine.holds.discard(vehicle)
-                case _:
-                    mine.renewals += 1
-        return self._row(name, mine)
+            mine = self.rows[name] = Gateway(self._epochs, self.sessions[name])
+            return self._row(mine)
+        by = request if isinstance(request, Renew) else request.by
+        if mine is None or mine.epoch != by.epoch:
+            return self._row(None)
+        mine.session = self.sessions[name]
+        match request:
+            case Renew():
+                mine.renewals += 1
+            case Evict(_, rival):
+                if self._is_as_read(rival):
+                    del self.rows[rival.name]
+                    self.takeovers += 1
+            case Take(_, vehicles):
+                mine.holds |= {each for each in vehicles if self.holder(each) is None}
+            case Free(_, vehicle):
+                mine.holds.discard(vehicle)
+        return self._row(mine)
 
-    def _row(self, name: str, mine: Gateway | None) -> Row:
+    def _is_as_read(self, rival: Eviction | None) -> bool:
+        row = self.rows.get(rival.name) if rival else None
+        if row is None or rival is None:
+            return False
+        return (row.epoch, row.renewals) == (rival.epoch, rival.renewals)
+
+    def _row(self, mine: Gateway | None) -> Row:
         rivals = tuple(
-            Rival(each, row.epoch, row.renewals, each in self.sessions, frozenset(row.holds))
-            for each, row in self.rows.items()
-            if each != name
+            Rival(
+                name,
+                row.epoch,
+                row.renewals,
+                self.sessions.get(name) == row.session,
+                frozenset(row.holds),
+            )
+            for name, row in self.rows.items()
+            if row is not mine
         )
         if mine is None:
             return Row(0, frozenset(), rivals)

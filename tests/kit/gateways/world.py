@@ -7,7 +7,7 @@ from itertools import count
 from random import Random
 
 from mav_tasks.fleet.lease import Terms
-from mav_tasks.fleet.member import Change, Member, Request
+from mav_tasks.fleet.member import Change, Join, Member, Request
 from mav_tasks.fleet.standing import Effect
 from tests.kit.gateways.database import Database
 
@@ -25,6 +25,7 @@ class Process:
     rate: float  # of its monotonic clock, beside true time
     offset: float
     session: int | None = None
+    latest_session: int | None = None  # it may be over
     asked: tuple[int, Request, float] | None = None  # its number, and when by its own clock
     is_dead: bool = False
     frozen_until: float = 0.0
@@ -43,18 +44,19 @@ class World:
     terms: Terms = field(default_factory=Terms)
     now: float = 0.0
     database: Database = field(default_factory=Database)
-    processes: dict[str, Process] = field(default_factory=dict)
+    processes: dict[str, Process] = field(default_factory=dict)  # by name, or as ``add`` says
+    by_epoch: dict[int, Process] = field(default_factory=dict)  # whose address is in the row
     wrong: list[str] = field(default_factory=list)
     motions: int = 0
     slow: float = 0.01  # share of messages that take far too long
     _events: list[tuple[float, int, Callable[[], None]]] = field(default_factory=list)
     _count: "count[int]" = field(default_factory=count)
 
-    def add(self, name: str, heard: set[int]) -> Process:
-        """Start a gateway."""
+    def add(self, name: str, heard: set[int], *, label: str = "") -> Process:
+        """Start a gateway's process; a ``label`` keeps it apart from another of its name."""
         member = Member(name, self.terms, heard)
         rate = 1.0 + self.random.uniform(-0.005, 0.005)  # fifty times a bad crystal
-        it = self.processes[name] = Process(member, rate, self.random.uniform(0.0, 1e6))
+        it = self.processes[label or name] = Process(member, rate, self.random.uniform(0.0, 1e6))
         self.at(self.random.uniform(0.0, TICK), lambda: self._loop(it))
         self.at(self.random.uniform(0.0, PING), lambda: self._ping(it))
         return it
@@ -118,7 +120,8 @@ class World:
         self.at(TICK * self.random.uniform(0.9, 1.1), lambda: self._loop(it))
 
     def _judge(self, it: Process, vehicle: int, does: str) -> None:
-        if self.database.holder(vehicle) != it.member.name:
+        row = self.database.rows.get(it.member.name)
+        if row is None or row.epoch != it.member.lease.epoch or vehicle not in row.holds:
             holder = self.database.holder(vehicle)
             self.wrong.append(f"{self.now:.3f}: {it.member.name} {does} {vehicle}, of {holder}")
 
@@ -130,7 +133,8 @@ class World:
             return
         if it.session is None:
             if it.hears_database and it.reaches_database and self.database.is_up:
-                it.session = self.database.connect(it.member.name)
+                it.session = self.database.connect(it.member.name, it.latest_session)
+                it.latest_session = it.session or it.latest_session
             return
         request = it.member.request(now)
         if request is not None:
@@ -147,6 +151,8 @@ class World:
                 self.at(self._delay(), lambda: self._closed(it, number))
             return
         row = self.database.execute(it.member.name, request)
+        if isinstance(request, Join) and row.epoch:
+            self.by_epoch[row.epoch] = it
 
         def answer() -> None:
             if it.is_dead or not it.hears_database:
@@ -174,12 +180,13 @@ class World:
         if it.is_dead:
             return
         if it.frozen_until <= self.now and it.is_reached_by_peers:
-            for name, other in self.processes.items():
+            for name, epoch in it.member.rivals.epochs().items():
+                other = self.by_epoch[epoch]
                 if other is it or not other.is_reached_by_peers:
                     continue
                 if other.is_dead:
                     it.member.peer_refused(name, now=self.local(it))
-                elif other.frozen_until <= self.now:
+                elif other.frozen_until <= self.now and other.member.lease.epoch == epoch:
                     it.member.peer_answered(name, now=self.local(it))
         self.at(PING, lambda: self._ping(it))
 

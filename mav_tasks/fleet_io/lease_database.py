@@ -1,0 +1,255 @@
+"""Leases in PostgreSQL: carries out each request of a gateway in one transaction and round trip.
+
+``Member`` says what to ask; each answer equals that of ``tests/kit/gateways/database.py``.
+
+The first statement of a change locks the rows of the gateways that it is about, in one order for
+all. What follows sees what was committed until then, so that a renewal and an eviction of one
+gateway exclude each other, and two gateways that evict each other do not wait for each other.
+
+A session has the advisory lock of its gateway's name. So a second process of that name is refused;
+and what an earlier session of this process has asked is over before a new one can ask anything.
+"""
+
+import os
+import socket
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mav_tasks.errors import StoreError
+from mav_tasks.fleet.member import Evict, Free, Join, Renew, Request, Row, Take
+from mav_tasks.fleet.rivals import Rival
+from mav_tasks.fleet_io.endpoint import Endpoint
+from mav_tasks.store.postgres import schema
+from mav_tasks.store.postgres.address import Address
+from mav_tasks.store.postgres.failures import PostgresError, failure
+from mav_tasks.store.postgres.session import Found, Limits, Session
+from mav_tasks.store.postgres.session_lock import LOCK_NOT_AVAILABLE, SessionLock
+from mav_tasks.store.postgres.writable import check_writable
+
+NAME_LOCK = 0x4D565454  # "MVTT"; above the gateway's number
+
+#: well below the time for which a renewal is trusted (``Terms``): two may fail
+LIMITS = Limits(answer=0.3, statement=0.25, lock=0.2, in_transaction=0.5, sending=0.4)
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to a request, and where the gateways in it answer pings, by name."""
+
+    row: Row
+    endpoints: Mapping[str, Endpoint]
+
+
+class LeaseDatabase:
+    """The sessions of one gateway; used by one thread at a time. Methods raise PostgresError.
+
+    After any error the session is over, and ``connect`` begins a new one.
+    """
+
+    def __init__(self, address: Address, name: str, *, host: str, port: int) -> None:
+        """Make the tables if they are missing, and take the name.
+
+        ``host`` and ``port`` are where this process answers pings. Raise StoreError, with a line
+        that names the process which has the name.
+        """
+        self._address = address
+        self.name = name
+        self._host, self._port = host, port
+        self._session: Session | None = None
+        self._lock: SessionLock | None = None
+        self._number = 0
+        try:
+            self.secret = self._prepare()
+            self.connect()
+        except PostgresError as error:
+            words = failure(error) or str(error)
+            raise StoreError(f"store {address.shown}: {words}") from error
+
+    def __repr__(self) -> str:
+        return f"LeaseDatabase({self.name}, {self._session})"
+
+    def connect(self) -> None:
+        """Begin a session, which has the lock of the name; end the earlier one."""
+        self.close()
+        session = Session(self._address, purpose=f"gateway {self.name}", limits=LIMITS)
+        try:
+            check_writable(session)
+            self._take_name(session)
+        except BaseException:
+            session.close()
+            raise
+        self._session = session
+
+    def execute(self, request: Request) -> Answer:
+        """Carry out a request, as a whole or not at all."""
+        assert self._session is not None
+        try:
+            with self._session.batch() as found:
+                self._queue(self._session, request)
+        except PostgresError:
+            self.close()
+            raise
+        granted, rows = found[-2].fetchone(), found[-1]
+        return self._answer(granted[0] if granted else 0, rows)
+
+    def close(self) -> None:
+        """End the session; may be called again."""
+        if self._session is not None:
+            self._session.close()
+            self._session = None
+
+    def _prepare(self) -> bytes:
+        """Make the tables and this gateway's row; return the fleet's secret."""
+        session = Session(self._address, purpose=f"gateway {self.name}")
+        try:
+            check_writable(session)
+            schema.migrate(session)
+            ((secret,),) = session.execute("SELECT secret FROM gateway_secret").fetchall()
+            return str(secret).encode()
+        finally:
+            session.close()
+
+    def _take_name(self, session: Session) -> None:
+        session.execute(
+            "INSERT INTO gateways (name) SELECT ?::text"
+            " WHERE NOT EXISTS (SELECT 1 FROM gateways WHERE name = ?) ON CONFLICT DO NOTHING",
+            (self.name, self.name),
+        )
+        query = "SELECT number, machine, pid, since FROM gateways WHERE name = ?"
+        ((number, machine, pid, since),) = session.execute(query, (self.name,)).fetchall()
+        if self._lock is None or number != self._number:
+            self._number, self._lock = number, SessionLock(NAME_LOCK << 32 | number)
+        try:
+            self._lock.take(session)
+        except PostgresError as error:
+            if error.sqlstate != LOCK_NOT_AVAILABLE:
+                raise
+            if (machine, pid) == (socket.gethostname(), os.getpid()):
+                raise PostgresError("the database has not ended the lost session yet") from error
+            when = time.strftime("%Y-%m-%d %H:%M:%SZ", time.gmtime(since))
+            words = f"on {machine}, pid {pid}, since {when}" if pid else "which has just begun"
+            raise PostgresError(
+                f"the gateway name {self.name} is in use by a process {words}:"
+                " end that one, or choose another name"
+            ) from error
+
+    def _queue(self, session: Session, request: Request) -> None:
+        """Queue the statements of a request.
+
+        The last two find the epoch that was granted, if any, and all gateways in the fleet.
+        """
+        if isinstance(request, Join):
+            self._queue_join(session, request)
+        else:
+            by = request if isinstance(request, Renew) else request.by
+            self._queue_change(session, request, by.epoch)
+        session.execute(_READ, (NAME_LOCK,))
+
+    def _queue_join(self, session: Session, request: Join) -> None:
+        replaced = request.replaced
+        session.execute(_LOCK, (self.name, self.name))
+        session.execute(
+            _JOIN,
+            (
+                self._host,
+                self._port,
+                socket.gethostname(),
+                os.getpid(),
+                time.time(),
+                self._number,
+                replaced.epoch if replaced else 0,
+                replaced.renewals if replaced else 0,
+            ),
+        )
+
+    def _queue_change(
+        self, session: Session, request: Renew | Evict | Take | Free, epoch: int
+    ) -> None:
+        me = (self._number, epoch)
+        match request:
+            case Renew():
+                # a crash of the database may forget it, and then all others count a whole term anew
+                session.execute("SELECT set_config('synchronous_commit', 'off', true)")
+                session.execute(_RENEW, me)
+                return
+            case Evict(_, rival):
+                session.execute(_LOCK, (self.name, rival.name))
+                session.execute(_EVICT, (rival.name, rival.epoch, rival.renewals, *me))
+            case Take(_, vehicles):
+                session.execute(_LOCK, (self.name, self.name))
+                listed = ",".join(map(str, sorted(vehicles)))
+                session.execute(_TAKE, (f"{{{listed}}}", *me))
+            case Free(_, vehicle):
+                session.execute(_LOCK, (self.name, self.name))
+                session.execute(_FREE, (vehicle, *me))
+        session.execute(_ASK, me)
+
+    def _answer(self, granted: int, rows: Found) -> Answer:
+        holds: frozenset[int] = frozenset()
+        rivals: list[Rival] = []
+        endpoints: dict[str, Endpoint] = {}
+        for row in rows:
+            name, epoch, renewals, in_session, vehicles, host, port = row
+            if epoch == granted:
+                holds = frozenset(vehicles)
+            else:
+                rivals.append(Rival(name, epoch, renewals, in_session, frozenset(vehicles)))
+                endpoints[name] = Endpoint(epoch, host, port)
+        return Answer(Row(granted, holds, tuple(rivals)), endpoints)
+
+
+_LOCK = "SELECT 1 FROM gateways WHERE name IN (?, ?) ORDER BY number FOR UPDATE"
+
+#: free the vehicles of a gateway in ``ended``; in the order in which _TAKE locks them, too
+_FREE_ALL = """
+theirs AS (
+  SELECT vehicle FROM holdings JOIN ended ON gateway = ended.number ORDER BY vehicle
+  FOR UPDATE OF holdings
+), freed AS (
+  UPDATE holdings SET gateway = NULL FROM theirs WHERE holdings.vehicle = theirs.vehicle
+)
+SELECT epoch FROM ended
+"""
+#: epoch 0 is nobody's: a row that was evicted, or never joined
+_JOIN = f"""
+WITH ended AS (
+  UPDATE gateways SET epoch = nextval('gateway_epochs'), renewals = 0, backend = pg_backend_pid(),
+    host = ?, port = ?, machine = ?, pid = ?, since = ?
+  WHERE number = ? AND (epoch = 0 OR (epoch, renewals) = (?, ?))
+  RETURNING number, epoch
+), {_FREE_ALL}"""
+_EVICT = f"""
+WITH ended AS (
+  UPDATE gateways SET epoch = 0 WHERE name = ? AND epoch = ? AND renewals = ?
+    AND EXISTS (SELECT FROM gateways WHERE number = ? AND epoch = ?)
+  RETURNING number, epoch
+), {_FREE_ALL}"""
+_RENEW = (
+    "UPDATE gateways SET renewals = renewals + 1, backend = pg_backend_pid()"
+    " WHERE number = ? AND epoch = ? RETURNING epoch"
+)
+_ASK = (
+    "UPDATE gateways SET backend = pg_backend_pid() WHERE number = ? AND epoch = ? RETURNING epoch"
+)
+_TAKE = """
+INSERT INTO holdings (vehicle, gateway, number)
+SELECT vehicle, gateways.number, 1 FROM gateways, unnest(?::bigint[]) AS vehicle
+WHERE gateways.number = ? AND epoch = ? ORDER BY vehicle
+ON CONFLICT (vehicle) DO UPDATE SET gateway = excluded.gateway, number = holdings.number + 1
+WHERE holdings.gateway IS NULL
+"""
+_FREE = """
+UPDATE holdings SET gateway = NULL FROM gateways
+WHERE vehicle = ? AND gateway = gateways.number AND gateways.number = ? AND epoch = ?
+"""
+_READ = """
+SELECT name, epoch, renewals, pid_of_lock IS NOT NULL,
+  ARRAY(SELECT vehicle FROM holdings WHERE gateway = gateways.number), host, port
+FROM gateways LEFT JOIN (
+  SELECT objid, pid AS pid_of_lock FROM pg_locks
+  WHERE locktype = 'advisory' AND granted AND objsubid = 1 AND classid = ?
+    AND database = (SELECT oid FROM pg_database WHERE datname = current_database())
+) AS locks ON objid = gateways.number::oid AND pid_of_lock = backend
+WHERE epoch <> 0 ORDER BY gateways.number
+"""
