@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 FEW = 8
 #: 1,000 take half an hour: FLEET_FAULTS=1000 ./tools/test tests/e2e/test_fleet_leases.py
-MANY = int(os.environ.get("FLEET_FAULTS", "30"))
+MANY = int(os.environ.get("FLEET_FAULTS", "16"))
 VEHICLES = range(1, 7)
 
 

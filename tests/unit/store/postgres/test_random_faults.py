@@ -1,5 +1,6 @@
 """Servers that are killed, and a database that fails in every way, at random; seeds are printed."""
 
+import os
 import random
 import signal
 from collections.abc import Callable, Iterator
@@ -12,6 +13,8 @@ from tests.kit.postgres import PostgresServer, connected
 from tests.kit.tcp_proxy import TcpProxy
 from tests.unit.store.test_failures import child, line
 
+#: more, half a minute each: POSTGRES_SEEDS=10 ./tools/test tests/unit/store/postgres
+SEEDS = int(os.environ.get("POSTGRES_SEEDS", "2"))
 LIVES = 4
 MOST_FAULTS = 5  # in a life
 MOST_LINES = 60  # that a server says between two faults
@@ -131,7 +134,7 @@ def proxied(server: PostgresServer, url: str) -> Iterator[tuple[TcpProxy, str]]:
 @pytest.mark.slow
 @pytest.mark.volume
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(SEEDS))
 def test_nothing_that_was_kept_is_lost_and_nothing_is_there_twice(
     postgres: PostgresServer, seed: int
 ) -> None:
