@@ -20,8 +20,8 @@ from tests.kit.processes import environment_with, stand, wait_until
 pytestmark = pytest.mark.slow
 
 FEW = 15
-#: 1,000 take 14 minutes: MAV_TASKS_CRASHES=1000 ./tools/test tests/e2e/test_agent_crashes.py
-MANY = int(os.environ.get("MAV_TASKS_CRASHES", "60"))
+#: 1,000 take 14 minutes: AGENT_CRASHES=1000 ./tools/test tests/e2e/test_agent_crashes.py
+MANY = int(os.environ.get("AGENT_CRASHES", "60"))
 SEED = 20_261_125
 INACCURACY = 0.3  # of a step: the rover rolls on for some millimetres
 LAST_TASKS = 120.0  # s for those that still wait at the end

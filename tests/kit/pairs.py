@@ -1,6 +1,6 @@
 """Of the product of several parameters, those in which every two or three values meet.
 
-``MAV_TASKS_PRODUCTS=1`` adds the rest of each product.
+``WHOLE_PRODUCTS=1`` adds the rest of each product.
 """
 
 import os
@@ -24,7 +24,7 @@ def every_pair(**values: Sequence[Any] | Mapping[str, Any]) -> pytest.MarkDecora
     volume = covering(sizes, together=3) if len(sizes) > 2 else set()
     cases = []
     for chosen in product(*map(range, sizes)):
-        if chosen not in pairs | volume and "MAV_TASKS_PRODUCTS" not in os.environ:
+        if chosen not in pairs | volume and "WHOLE_PRODUCTS" not in os.environ:
             continue
         names, picked = zip(*(axis[i] for axis, i in zip(axes, chosen, strict=True)), strict=True)
         marks = () if chosen in pairs else (pytest.mark.volume,)

@@ -36,7 +36,7 @@ def test_the_rest_of_the_product_is_there_on_request(monkeypatch: pytest.MonkeyP
     few = cases()
     assert few[0].id == "a-one-False-False"
     assert 4 <= sum(not case.marks for case in few) < len(few) < 16
-    monkeypatch.setenv("MAV_TASKS_PRODUCTS", "1")
+    monkeypatch.setenv("WHOLE_PRODUCTS", "1")
     every = {case.values for case in cases()}
     assert every == set(product("ab", (1, 2), BOTH, BOTH))
     assert {case.values for case in few} < every
