@@ -4,6 +4,7 @@ Each is a process of its own, with its own id, signals, files and memory. A thir
 processor time is saved each time, which is half of what most tests with processes need.
 """
 
+import gc
 import multiprocessing
 import os
 import runpy
@@ -128,4 +129,5 @@ class Run:
         os.environ.clear()
         os.environ.update(self.env)
         sys.argv = list(self.arguments)
+        gc.freeze()  # what was imported: to collect that would copy its pages, which takes long
         runpy.run_module(self.arguments[0], run_name="__main__", alter_sys=True)
