@@ -1,6 +1,6 @@
 """A gateway in its fleet: what it asks the database for, and what follows from the answers.
 
-No I/O: ``requests`` returns what to ask, one at a time; the caller passes each answer, or its
+No I/O: ``request`` returns what to ask, one at a time; the caller passes each answer, or its
 absence, to ``answered`` or ``unanswered``.
 """
 
@@ -43,7 +43,7 @@ class Evict:
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """Give this gateway those of the vehicles that nobody holds."""
+    """Give this gateway those of these vehicles that no gateway holds."""
 
     by: Renew
     vehicles: frozenset[int]

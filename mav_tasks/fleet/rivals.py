@@ -2,7 +2,7 @@
 
 A gateway may be evicted if its renewals were seen to stand still for a whole term, counted from
 the answer that showed the last one. An observer that cannot read the database for a while counts
-anew: then nobody can renew, perhaps, and nobody is to be evicted for that.
+anew: perhaps no gateway could renew meanwhile, and that must evict none.
 
 Quicker, if its process has certainly ended: its session at the database is gone, and its host
 says that nobody listens at its port any more, though there were answers from there just before.
