@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks import SyncClient
 from tests.kit.commands import mav_tasks
-from tests.kit.processes import stand
+from tests.kit.processes import stand, wait_until
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "tools" / "examples"
 
@@ -33,6 +34,12 @@ def run(name: str, *arguments: str, folder: Path, typed: str = "") -> Sequence[s
 def test_each_example_does_what_it_says(tmp_path: Path) -> None:
     with stand(tmp_path) as it:
         url = f"udpout:127.0.0.1:{it.client_port}"
+        with SyncClient(url) as tasks:  # only on a rover that is ready a task starts at once
+            wait_until(
+                lambda: any(v.is_ready and v.position_age is not None for v in tasks.vehicles()),
+                within=30,
+                what="a rover that is ready",
+            )
 
         added, status, queue, took, cleared = run("tutorial_services.py", url, folder=tmp_path)
         assert added == "added tasks 1 2 3"
