@@ -6,7 +6,15 @@ It uses the same engine, store and pump as the runner, without sockets, clock an
 from collections.abc import Mapping, Sequence
 
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import KeysChanged, LinkSide, Outgoing, Packets, Shutdown, WallClock
+from mav_tasks.engine.inputs import (
+    Input,
+    KeysChanged,
+    LinkSide,
+    Outgoing,
+    Packets,
+    Shutdown,
+    WallClock,
+)
 from mav_tasks.links.memory import MemoryLink, MemoryNet
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
@@ -36,14 +44,19 @@ class InMemoryServer:
         wall_offset: float | None = None,  # UTC minus the caller's time, s; None: unknown
         policies: Mapping[str, LinkPolicy] | None = None,
         keys: tuple[Key, ...] | None = None,
+        name: str = "server",
         now: float = 0.0,
     ) -> None:
-        """``policies``: by CLIENT_LINK and VEHICLE_LINK. ``keys``: None if there is no key ring."""
+        """``policies``: by the name of a link. ``keys``: None if there is no key ring.
+
+        The links of a server with another ``name`` begin with that.
+        """
         self.engine = Engine(settings or Settings(), now=now, restored=restored)
         self.store = store or MemoryStore()
         self.pump = Pump(self.engine, self.store, self._send, observers=observers)
-        clients = net.link(CLIENT_LINK)
-        towards = net.link(VEHICLE_LINK, peers=vehicles)
+        clients = net.link(CLIENT_LINK.replace("server", name))
+        towards = net.link(VEHICLE_LINK.replace("server", name), peers=vehicles)
+        self._now = now
         self._links: dict[str, MemoryLink] = {link.name: link for link in (clients, towards)}
         if wall_offset is not None:
             self.pump.handle(WallClock(wall_offset), now=now)
@@ -62,6 +75,7 @@ class InMemoryServer:
         """Read the links, handle a due deadline, and send and store the results."""
         if self.pump.is_over:
             return
+        self._now = now
         for link in self._links.values():
             datagrams = link.receive(len(link.arrived))
             if datagrams:
@@ -73,8 +87,15 @@ class InMemoryServer:
 
     def shut_down(self, *, now: float) -> None:
         """Begin the orderly shutdown; ``pump.is_over`` is set within ``watch.shutdown`` seconds."""
-        self.pump.handle(Shutdown(), now=now)
+        self.take_in(Shutdown(), now=now)
+
+    def take_in(self, item: Input, *, now: float) -> None:
+        """Handle an input that does not come from a link."""
+        self._now = now
+        self.pump.handle(item, now=now)
         self.pump.turn(now=now)
 
     def _send(self, outgoing: Outgoing) -> None:
+        if self._now > outgoing.until:
+            return
         self._links[outgoing.link].send(outgoing.peer, outgoing.data)

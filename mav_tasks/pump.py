@@ -8,11 +8,21 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
+from mav_tasks.engine import inputs
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Committed, HaltNotStored, Input, Outgoing, StoreFailed
 from mav_tasks.logs.rendering import level_of
 from mav_tasks.observer import EngineObserver, EngineObservers
-from mav_tasks.store import HaltNotKept, Kept, NotKept, Outcome, Store
+from mav_tasks.store import (
+    Evicted,
+    HaltNotKept,
+    IdsGranted,
+    Kept,
+    NotKept,
+    Outcome,
+    Store,
+    VehiclesLoaded,
+)
 from mav_tasks.tasks.events import Event, ServerStopped
 
 log = logging.getLogger("mav_tasks")
@@ -35,6 +45,8 @@ class Pump:
         self._observers = EngineObservers(observers)
         self._store_is_away = False
         self.is_over = False
+        #: whether another gateway may have the vehicles: nothing may be sent any more
+        self.is_evicted = False
 
     def handle(self, item: Input, *, now: float) -> None:
         """Give the engine one input; ``turn`` sends and stores the results."""
@@ -63,7 +75,9 @@ class Pump:
             if not outcomes:
                 break
             for outcome in outcomes:
-                self.handle(self._input_of(outcome), now=now)
+                item = self._input_of(outcome)
+                if item is not None:
+                    self.handle(item, now=now)
         self._note(noted)  # last, so that no answer waits for the log
 
     def close(self) -> None:
@@ -76,11 +90,19 @@ class Pump:
             with suppress(Exception):  # a rover without signing takes it unsigned
                 sealed = self.engine.signatures.sealed_late(outgoing)
             with suppress(Exception):  # one failure must not keep the others from stopping
-                self._send(sealed)
+                self._send(sealed._replace(until=self.engine.stop_until))
 
-    def _input_of(self, outcome: Outcome) -> Input:
+    def _input_of(self, outcome: Outcome) -> Input | None:
         """Return the engine's input for an outcome of the store; log a failure and its end."""
         match outcome:
+            case Evicted(text=text):
+                log.error("%s", text)
+                self.is_evicted = True
+                return None
+            case IdsGranted(first=first, count=count):
+                return inputs.IdsGranted(first, count)
+            case VehiclesLoaded(vehicles=vehicles, restored=restored):
+                return inputs.VehiclesTaken(vehicles, restored)
             case HaltNotKept(vehicle=vehicle, text=text):
                 log.error("%s", text)
                 return HaltNotStored(vehicle)

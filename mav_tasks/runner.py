@@ -38,7 +38,7 @@ from mav_tasks.mavlink.signing import Key
 from mav_tasks.observer import EngineObserver
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
-from mav_tasks.store import Kept, Store
+from mav_tasks.store import Evicted, HaltNotKept, NotKept, Store
 
 log = logging.getLogger("mav_tasks")
 
@@ -271,7 +271,7 @@ class Runner:
         """Close the store; log its last outcomes, as the engine no longer takes them."""
         self._store.close()
         for outcome in self._store.take_outcomes():
-            if not isinstance(outcome, Kept):
+            if isinstance(outcome, NotKept | HaltNotKept | Evicted):
                 log.error("%s", outcome.text)
 
     def _on_signal(self) -> None:

@@ -554,6 +554,14 @@ class Settings:
         key="rules.on_restart",
         parameter=(18, "TSK_ON_RESTART"),
     )
+    on_takeover: str = setting(
+        "hold",
+        Choice(("hold", "resume")),
+        "what a rover's interrupted task does after another gateway of the fleet has failed: wait"
+        " for a release, or resume once the rover stands on the task's line",
+        key="rules.on_takeover",
+        parameter=(20, "TSK_ON_TAKEOVER"),
+    )
     #: measurements of vehicles; each is used only for the vehicle that it was measured on
     profiles: tuple[VehicleProfile, ...] = ()
 

@@ -5,6 +5,7 @@ store must write, ``take_packets`` what the links must send. ``now`` is in monot
 never goes back.
 """
 
+from collections.abc import Iterable
 from math import inf
 from typing import assert_never
 
@@ -96,15 +97,16 @@ class Engine:
             fleet=self._fleet,
             timers=timers,
             settings=settings,
+            is_shared=earlier.is_shared,
         )
-        deduplicator = SubmissionDeduplicator(registry)
+        deduplicator = self._deduplicator = SubmissionDeduplicator(registry)
         deduplicator.restore(earlier.tasks, now=now)
         submissions = Submissions(gcs, registry, deduplicator, timers, settings)
         self._submissions = submissions
         self._parameters = ParameterServer(
             gcs, vehicles, registry, submissions, settings=configured, kept=earlier.parameters
         )
-        plans = Plans(registry, self._fleet, restored=earlier.plans)
+        plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
         self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
         displays, refusals = MessageRequests(gcs, vehicles, registry), Refusals(registry)
         modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
@@ -186,6 +188,12 @@ class Engine:
                 self._submissions.store_failed()
             case inputs.HaltNotStored(vehicle=vehicle):
                 self._publisher.warn_of_loss(vehicle, now=now)
+            case inputs.LeaseChanged():
+                self._vehicles.lease.change(item, now=now)
+            case inputs.VehiclesTaken(vehicles=vehicles, restored=restored):
+                self._take_over(vehicles, restored, now=now)
+            case inputs.IdsGranted(first=first, count=count):
+                self._registry.ids.grant(first, count)
             case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
                 self.not_in_force = self._parameters.not_in_force
@@ -258,6 +266,22 @@ class Engine:
                 f" {self._door.left_out} requests"
             ),
         )
+
+    def heard(self, *, now: float) -> frozenset[int]:
+        """Return the vehicles that are heard, also those that another gateway has."""
+        return self._vehicles.heard(now=now)
+
+    @property
+    def stop_until(self) -> float:
+        """Until when ``emergency_stop_packets`` may leave, s."""
+        return self._vehicles.lease.stop_until
+
+    def _take_over(self, vehicles: Iterable[int], restored: Restored, *, now: float) -> None:
+        """Serve vehicles that this gateway has got, with their tasks and plans."""
+        self._fleet.take_over(restored, now=now)
+        self._deduplicator.restore(restored.tasks, now=now)
+        self._plans.restore(restored.plans)
+        self._vehicles.take(vehicles, now=now)
 
     def _tell_statuses(self, *, now: float) -> None:
         self._publisher.send_statuses(now=now)

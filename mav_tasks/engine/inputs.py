@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.restored import Restored
 
 Peer = Hashable  # an endpoint on a link; only the link knows what it is
 
@@ -120,6 +121,34 @@ class HaltNotStored:
 
 
 @dataclass(frozen=True, slots=True)
+class LeaseChanged:
+    """What the lease of this gateway permits from now on; sent after each renewal.
+
+    ``move_until``: s, until when it may move its vehicles. ``stop_until``: until when it may send
+    them what stops them; after that another gateway may have them.
+    """
+
+    move_until: float
+    stop_until: float
+
+
+@dataclass(frozen=True, slots=True)
+class VehiclesTaken:
+    """This gateway has these vehicles now; ``restored`` is what the store has about them."""
+
+    vehicles: tuple[int, ...]
+    restored: Restored
+
+
+@dataclass(frozen=True, slots=True)
+class IdsGranted:
+    """The next ``count`` task ids from ``first`` on are this gateway's, besides earlier ones."""
+
+    first: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsChanged:
     """New settings are in force."""
 
@@ -149,6 +178,9 @@ Input = (
     | Committed
     | StoreFailed
     | HaltNotStored
+    | LeaseChanged
+    | VehiclesTaken
+    | IdsGranted
     | SettingsChanged
     | WallClock
     | Shutdown

@@ -11,6 +11,18 @@ from mav_tasks.mavlink.packet import Packet, with_seq
 from mav_tasks.mavlink.sequence import SequenceKeeper
 
 
+class Fence:
+    """Until when packets may leave, s: a gateway of a fleet has its vehicles for a term only.
+
+    ``until`` is for our own messages, ``relays_until`` for packets that are forwarded.
+    """
+
+    __slots__ = ("relays_until", "until")
+
+    def __init__(self) -> None:
+        self.until = self.relays_until = inf
+
+
 class PacketSender:
     """Sends to one endpoint of one link, and signs if the endpoint expects it."""
 
@@ -21,12 +33,15 @@ class PacketSender:
         queue: list[Outgoing],
         packer: Packer,
         signatures: Signatures | None = None,
+        fence: Fence | None = None,
     ) -> None:
+        """``fence``: of all packets but those that are sent ``unfenced``."""
         self.link = link
         self.peer = peer
         self._queue = queue
         self._packer = packer
         self._signatures = signatures
+        self._fence = fence or Fence()
         self._sequence = SequenceKeeper()
 
     def __repr__(self) -> str:
@@ -41,17 +56,21 @@ class PacketSender:
     ) -> None:
         """Send a message of our own in the name of ``source``; see ``Outgoing`` for the options."""
         raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
-        self._put(raw, first=first, until=until)
+        self._put(raw, first=first, until=min(until, self._fence.until))
+
+    def send_unfenced(self, message: Message, source: Address) -> None:
+        """Send a message that changes nothing at a vehicle, whoever has it."""
+        self._put(self._packer.pack(message, source, seq=self._sequence.injected(source)))
 
     def forward(self, packet: Packet) -> None:
         """Forward a packet; a gap in its source's sequence numbers stays visible."""
         seq = self._sequence.forwarded(packet.source, packet.seq)
-        self._put(with_seq(packet, seq))
+        self._put(with_seq(packet, seq), until=self._fence.relays_until)
 
     def inject(self, packet: Packet) -> None:
         """Forward a packet under our next number, for a source that is heard in several places."""
         seq = self._sequence.injected(packet.source)
-        self._put(with_seq(packet, seq))
+        self._put(with_seq(packet, seq), until=self._fence.relays_until)
 
     def withhold(self, source: Address) -> None:
         """Skip the number of a packet that is not forwarded, so that no gap shows."""

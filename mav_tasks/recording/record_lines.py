@@ -10,6 +10,7 @@ restored state, and the row formats (``store/codec``). Each following line is an
     ["backlog", now, [link, ...], ...]      likewise
     ["deadline", now]                       a call of Engine.handle_deadline
     ["link", now, ...], ["peer", ...]       the other inputs, with their fields in order
+    ["vehicles taken", now, [vehicle, ...], restored state, [row of a task, ...]]
     ["keys", now, [[name, role, ...], ...]] the keys with fingerprints, without secrets: a replay
                                             needs the key ring
     ["out", now, packets, digest, [row, ...]]   the engine's output of one turn: number of packets,
@@ -31,8 +32,8 @@ from typing import Any, assert_never, get_args
 from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Packets
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.recording.surroundings import settings_of
-from mav_tasks.store.codec import Encoder, format_of
+from mav_tasks.recording.surroundings import restored_of, restored_to_json, settings_of
+from mav_tasks.store.codec import Decoder, Encoder, format_of
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.task import Task
 
@@ -44,6 +45,7 @@ MOST_WAYS = 10_000  # cached JSON texts of links and peers
 
 EVENTS: dict[str, type] = {kind.__name__: kind for kind in get_args(Event)}
 ROWS = format_of(*EVENTS.values(), Task)
+_TASKS = Decoder(ROWS, is_exact=True)
 
 # The check for circular references costs a dict entry for each list; our values have none.
 dumps = JSONEncoder(separators=(",", ":"), check_circular=False).encode
@@ -65,6 +67,10 @@ class LineWriter:
 
     def taken(self, item: Input | None, *, now: float) -> str:
         """Return the line of an input, or (None) of a deadline; raise Unwritable for a peer."""
+        if isinstance(item, inputs.VehiclesTaken):
+            rows = [self._encoder.row(task, offset=0.0) for task in item.restored.tasks]
+            state = restored_to_json(item.restored)
+            return dumps(["vehicles taken", now, item.vehicles, state, rows])
         return dumps(_input_to_json(item, now))
 
     def given(self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float) -> str:
@@ -117,7 +123,11 @@ def input_of(line: Sequence[Any]) -> Input | None:
         case "settings":
             (settings,) = values
             return inputs.SettingsChanged(settings_of(settings))
-        case "committed" | "store failed" | "halt not stored" | "wall clock" | "shutdown":
+        case "vehicles taken":
+            vehicles, state, rows = values
+            tasks = tuple(_TASKS.values(Task, rows, offset=0.0))
+            return inputs.VehiclesTaken(tuple(vehicles), restored_of(state, tasks))
+        case _ if kind in _SIMPLE:
             return _SIMPLE[kind](*values)
         case _:
             raise ValueError(f"{kind!r} is unknown to this version")
@@ -133,12 +143,15 @@ _SIMPLE: Mapping[str, Callable[..., Input]] = {
     "committed": inputs.Committed,
     "store failed": inputs.StoreFailed,
     "halt not stored": inputs.HaltNotStored,
+    "lease": inputs.LeaseChanged,
+    "ids": inputs.IdsGranted,
     "wall clock": inputs.WallClock,
     "shutdown": inputs.Shutdown,
 }
 
 
 def _input_to_json(item: Input | None, now: float) -> list[Any]:
+    assert not isinstance(item, inputs.VehiclesTaken), "it has tasks, which need the encoder"
     match item:
         case None:
             return ["deadline", now]
@@ -167,6 +180,10 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["store failed", now, text]
         case inputs.HaltNotStored(vehicle=vehicle):
             return ["halt not stored", now, vehicle]
+        case inputs.LeaseChanged(move_until=move_until, stop_until=stop_until):
+            return ["lease", now, move_until, stop_until]
+        case inputs.IdsGranted(first=first, count=count):
+            return ["ids", now, first, count]
         case inputs.WallClock(offset=offset):
             return ["wall clock", now, offset]
         case inputs.Shutdown():

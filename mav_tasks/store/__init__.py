@@ -1,6 +1,27 @@
 """The durable journal of events. ``mav_tasks.store.opening`` opens each kind of store."""
 
-from mav_tasks.store.base import HaltNotKept, Kept, NotKept, Outcome, Store, Which
+from mav_tasks.store.base import (
+    Evicted,
+    HaltNotKept,
+    IdsGranted,
+    Kept,
+    NotKept,
+    Outcome,
+    Store,
+    VehiclesLoaded,
+    Which,
+)
 from mav_tasks.store.memory import MemoryStore
 
-__all__ = ["HaltNotKept", "Kept", "MemoryStore", "NotKept", "Outcome", "Store", "Which"]
+__all__ = [
+    "Evicted",
+    "HaltNotKept",
+    "IdsGranted",
+    "Kept",
+    "MemoryStore",
+    "NotKept",
+    "Outcome",
+    "Store",
+    "VehiclesLoaded",
+    "Which",
+]

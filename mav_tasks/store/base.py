@@ -33,7 +33,30 @@ class HaltNotKept:
     text: str
 
 
-Outcome = Kept | NotKept | HaltNotKept
+@dataclass(frozen=True, slots=True)
+class IdsGranted:
+    """``count`` task ids from ``first`` on are this gateway's."""
+
+    first: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class VehiclesLoaded:
+    """Everything that a fleet's store has about vehicles that this gateway has got."""
+
+    vehicles: tuple[int, ...]
+    restored: Restored
+
+
+@dataclass(frozen=True, slots=True)
+class Evicted:
+    """The fleet has ended this gateway's lease: it can store nothing any more."""
+
+    text: str
+
+
+Outcome = Kept | NotKept | HaltNotKept | IdsGranted | VehiclesLoaded | Evicted
 
 
 @dataclass(frozen=True, slots=True)

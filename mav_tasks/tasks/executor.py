@@ -94,6 +94,13 @@ class Executor:
         self._executed_before = task.progress.execution_time
         self._resumes_by_itself = False
 
+    def take_over(self, task: Task, *, now: float) -> None:
+        """Make a task the active one that another gateway drove; it resumes by itself."""
+        self.adopt(task)
+        self._since = self._lost_until = now
+        self._lost_at, self._was_silent, self._untaken_in = None, False, None
+        self._resumes_by_itself = True
+
     def give_up(self) -> None:
         """Drop the active task in the state that it has, to make room for another."""
         self.task_id = None
@@ -314,9 +321,11 @@ class Executor:
         return view.TAKE
 
     def _pause_if_lost(self, seen: VehicleView, now: float) -> bool:
-        """Pause the task if heartbeats or position are missing. Return whether they are."""
+        """Pause the task if lease, heartbeats or position are missing. Return whether so."""
         lost, motion = R.NONE, seen.motion
-        if not seen.heard:
+        if not seen.is_ours:
+            lost = R.LEASE_LOST
+        elif not seen.heard:
             lost = R.LINK_LOST
         elif motion is None or now - motion.at > self._settings.watch.position_lost:
             lost = R.POSITION_LOST
@@ -331,6 +340,9 @@ class Executor:
         if not self._resumes_by_itself:
             return
         watch = self._settings.watch
+        if not seen.is_ours:  # the time-out is for vehicles that stay silent
+            self._since = self._lost_until = now
+            return
         if now - self._since > watch.lost_timeout:
             self._finish(S.FAILED, R.LINK_TIMEOUT, actor=SERVER, now=now)
             return

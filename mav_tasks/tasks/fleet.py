@@ -9,7 +9,7 @@ from mav_tasks.tasks.lifecycle import ACTIVE, RUNNING, WAITING, TaskReason, Task
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Task
+from mav_tasks.tasks.task import Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R, S = TaskReason, TaskState
@@ -66,16 +66,38 @@ class Fleet:
 
     def restore(self, restored: Restored, *, now: float) -> None:
         """Load an earlier run: hold the tasks that ran, pause queues that must not go on alone."""
+        if restored.is_shared:
+            self._registry.ids.share()
+        else:
+            self._registry.ids.count_from(restored.next_id)
+        is_unclean = self._settings.on_restart == "pause" and not restored.ended_well
+        self.began_at = now
+        self._load(restored, S.HELD, is_unclean=is_unclean, now=now)
+        self._comes_up_paused = is_unclean  # for vehicles found from now on
+
+    def take_over(self, restored: Restored, *, now: float) -> None:
+        """Load vehicles that this gateway has got: what waits goes on, also if another one failed.
+
+        The task that ran is held, or resumes by itself, as the settings say.
+        """
+        interrupted = S.PAUSED if self._settings.on_takeover == "resume" else S.HELD
+        self._load(restored, interrupted, is_unclean=False, now=now)
+
+    def _load(
+        self, restored: Restored, interrupted: TaskState, *, is_unclean: bool, now: float
+    ) -> None:
+        """Load vehicles and their tasks; those that ran get the state ``interrupted``."""
         self.room.set_wall_offset(restored.wall_offset, now=now)
-        self._registry.restore(restored.tasks, next_id=restored.next_id)
+        self._registry.restore(restored.tasks)
         active: dict[int, list[Task]] = {}
         waiting: set[int] = set()
+        resuming: set[TaskId] = set()
         for task in restored.tasks:
             if task.state in RUNNING:
                 self._was_driven.add(task.vehicle)
-                task = self._registry.change(
-                    task.id, S.HELD, reason=R.OUTCOME_UNKNOWN, actor=SERVER, now=now
-                )
+                task = self._interrupted(task, interrupted, now=now)
+                if task.state is S.PAUSED:
+                    resuming.add(task.id)
             if task.state in ACTIVE:
                 active.setdefault(task.vehicle, []).append(task)
             elif task.state in WAITING:
@@ -83,16 +105,17 @@ class Fleet:
         self.room.restore(restored.tasks, now=now)
         # after a clean end, too: the end does not wait for a silent vehicle
         halted = restored.halted.items()
-        self._halted = {each: LastHalt(*halt) for each, halt in halted if halt[0] in WORDS}
+        self._halted.update({each: LastHalt(*halt) for each, halt in halted if halt[0] in WORDS})
         pauses = self._settings.on_restart == "pause"
-        self.began_at = now
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
         of_note |= restored.halt_epochs.keys() | restored.disarmed
         for vehicle in active.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
-            has_paused = any(task.state is S.PAUSED for task in active.get(vehicle, ()))
+            has_paused = any(
+                task.state is S.PAUSED and task.id not in resuming
+                for task in active.get(vehicle, ())
+            )
             is_late = restored.idle > LONG_IDLE and (vehicle in active or vehicle in waiting)
-            is_unclean = pauses and not restored.ended_well
             if not paused and (has_paused or is_unclean or (is_late and pauses)):
                 paused = R.RESTARTED
                 self._registry.record(QueuePaused(vehicle, paused, SERVER, now))
@@ -103,7 +126,14 @@ class Fleet:
                 uid=restored.uids.get(vehicle, ""),
                 halt_epoch=restored.halt_epochs.get(vehicle, 1),
                 may_be_armed=vehicle not in restored.disarmed,
+                resuming=resuming,
                 now=now,
             )
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)
-        self._comes_up_paused = pauses and not restored.ended_well  # for vehicles found from now on
+
+    def _interrupted(self, task: Task, state: TaskState, *, now: float) -> Task:
+        if task.state is S.CANCELLING or state is S.HELD:
+            state, reason = S.HELD, R.OUTCOME_UNKNOWN
+        else:
+            reason = R.LEASE_LOST
+        return self._registry.change(task.id, state, reason=reason, actor=SERVER, now=now)

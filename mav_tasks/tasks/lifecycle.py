@@ -68,6 +68,7 @@ class TaskReason(IntEnum):
     POSITION_LOST = 34
     STOPPED = 35
     FAILSAFE = 36
+    LEASE_LOST = 37
     # held
     OUTCOME_UNKNOWN = 50
     FENCE = 51
@@ -110,7 +111,7 @@ class TaskReason(IntEnum):
 #: a task is paused because a person, another program or the rover's own failsafe drives the rover
 TAKEN = frozenset({TaskReason.TAKEOVER, TaskReason.FAILSAFE})
 #: a task paused by one of these resumes by itself when the loss is over
-LOSSES = frozenset({TaskReason.LINK_LOST, TaskReason.POSITION_LOST})
+LOSSES = frozenset({TaskReason.LINK_LOST, TaskReason.POSITION_LOST, TaskReason.LEASE_LOST})
 
 _WORDS = {
     **{reason: reason.name.lower().replace("_", " ") for reason in TaskReason},
@@ -123,6 +124,7 @@ _WORDS = {
     TaskReason.OUTSIDE_OWN_FENCE: "outside the rover's own fence",
     TaskReason.STOPPED: "STOP",
     TaskReason.FAILSAFE: "rover's failsafe",
+    TaskReason.LEASE_LOST: "the gateway does not reach the fleet's database",
     TaskReason.OUTCOME_UNKNOWN: "interrupted, progress unknown",
     TaskReason.FENCE: "stopped at the fence",
     TaskReason.LATE: "server was late",
@@ -172,7 +174,7 @@ TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
     },
     _S.STARTING: {
         _S.EXECUTING: "in our mode and seen armed",
-        _S.PAUSED: "operator, takeover, link or position lost",
+        _S.PAUSED: "operator, takeover, link, position or lease lost",
         _S.CANCELLING: "client",
         _S.FAILED: "mode or arm refused",
         _S.HELD: "off track, position reference changed, server crashed",
@@ -180,7 +182,7 @@ TRANSITIONS: dict[TaskState, dict[TaskState, str]] = {
     },
     _S.EXECUTING: {
         _S.COMPLETED: "arrived and standing still",
-        _S.PAUSED: "operator, pre-empted, takeover, link or position lost",
+        _S.PAUSED: "operator, pre-empted, takeover, link, position or lease lost",
         _S.CANCELLING: "client",
         _S.FAILED: "stuck",
         _S.HELD: "off track, fence, overspeed, not standing, position reference changed,"

@@ -22,7 +22,8 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
-from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms, following
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task_ids import TaskIds
 from mav_tasks.tasks.timing import Timing
 
 STATES = len(TaskState)
@@ -33,7 +34,8 @@ class TaskRegistry:
     """Tasks by id, and the numbered journal of their events."""
 
     def __init__(self, *, next_id: int = 1) -> None:
-        self._next_id = next_id
+        #: the ids of new tasks
+        self.ids = TaskIds(next_id)
         self._tasks: dict[TaskId, Task] = {}
         self._last_event: dict[TaskId, int] = {}
         self._finished: deque[TaskId] = deque()
@@ -65,11 +67,12 @@ class TaskRegistry:
         """Return how many tasks of a vehicle are in each state; the index is the TaskState."""
         return list(self._counts.get(vehicle, [0] * STATES))
 
-    def restore(self, tasks: Sequence[Task], *, next_id: int) -> None:
-        """Load the tasks of an earlier run, all of them durable."""
-        self._next_id = next_id
+    def restore(self, tasks: Sequence[Task], *, next_id: int = 0) -> None:
+        """Load the tasks of an earlier run, all of them durable; ``next_id`` 0: as before."""
+        if next_id:
+            self.ids.count_from(next_id)
         self._tasks.update((task.id, task) for task in tasks)
-        self._last_event.update(dict.fromkeys(self._tasks, 0))
+        self._last_event.update((task.id, 0) for task in tasks)
         counts = Counter((task.vehicle, task.state) for task in tasks)
         for (vehicle, state), count in counts.items():
             self._counts[vehicle][state] += count
@@ -83,14 +86,8 @@ class TaskRegistry:
                 self._note_live(task)
 
     def submit(self, draft: Draft, *, now: float, state: TaskState = TaskState.QUEUED) -> Task:
-        """Create a task from a draft, with the next free id.
-
-        Ids begin at 1 again after MAX_TASK_ID. The earlier tasks with these ids are long forgotten;
-        an id that is still in use is skipped.
-        """
-        task_id = TaskId(self._next_id)
-        while task_id in self._tasks:
-            task_id = following(task_id)
+        """Create a task from a draft, with the next free id; raise Rejection if there is none."""
+        task_id = self.ids.take(self._tasks)
         task = Task(
             id=task_id,
             vehicle=draft.vehicle,
@@ -102,7 +99,6 @@ class TaskRegistry:
             terms=draft.terms,
             state=state,
         )
-        self._next_id = following(task_id)
         self._tasks[task.id] = task
         self._counts[task.vehicle][state] += 1
         self._note_live(task)

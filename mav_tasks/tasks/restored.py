@@ -20,7 +20,8 @@ class Restored:
     disarmed. ``plans`` by system id and kind are (id, source) as in PlanStored, ``parameters`` the
     last value of each by name, ``signatures`` and ``signed_until`` those of SignaturesSeen.
     ``ended_well``: the last run closed its store; ``idle`` is the seconds since it last wrote.
-    ``wall_offset`` is UTC minus monotonic time.
+    ``wall_offset`` is UTC minus monotonic time. ``is_shared``: several gateways use the store; this
+    one gets vehicles, their tasks and the ids of new tasks later, as inputs.
     """
 
     tasks: tuple[Task, ...] = ()
@@ -39,3 +40,4 @@ class Restored:
     ended_well: bool = True
     idle: float = 0.0
     wall_offset: float = 0.0
+    is_shared: bool = False

@@ -15,6 +15,8 @@ def start_blocker(
 
     The server takes over only from HOLD, from a mode that it set, or from MANUAL while disarmed.
     """
+    if not view.is_ours:
+        return TaskReason.LEASE_LOST
     if not view.heard or view.is_unknown:
         return TaskReason.VEHICLE_SILENT
     if view.other_controller:

@@ -3,7 +3,7 @@
 It knows no protocol: ``step`` returns what the vehicle must be made to do.
 """
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import replace
 
 from mav_tasks.errors import Rejection
@@ -65,8 +65,9 @@ class VehicleTasks(Lineup):
         now: float,
         halt_epoch: int = 1,
         may_be_armed: bool = True,
+        resuming: Container[TaskId] = (),
     ) -> None:
-        """Load the active and suspended tasks of an earlier run."""
+        """Load the active and suspended tasks of an earlier run; those ``resuming`` go on alone."""
         self.halts = Halts(epoch=halt_epoch)
         self.halts.restored_at = now
         self.halt(R.RESTARTED, actor=SERVER, now=now)
@@ -75,7 +76,10 @@ class VehicleTasks(Lineup):
         for task in tasks:
             self.of_earlier_run.add(task.id)
             if self.active is None and task.reason is not R.PREEMPTED:
-                self.executor.adopt(task)
+                if task.id in resuming:
+                    self.executor.take_over(task, now=now)
+                else:
+                    self.executor.adopt(task)
             else:
                 self.suspended_ids[task.id] = None
 

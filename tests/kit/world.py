@@ -180,14 +180,16 @@ class World(VirtualWorld):
         system_id: int = 255,
         component_id: int = 190,
         reads_dialect: bool = True,
+        server: str = CLIENT_LINK,
     ) -> FakeClient:
-        """Add another client."""
+        """Add another client, of the server with this link."""
         client = FakeClient(
             self.net,
             name,
             system_id=system_id,
             component_id=component_id,
             reads_dialect=reads_dialect,
+            server=server,
         )
         self.join(client)
         return client
@@ -433,6 +435,8 @@ class ObservedNet(MemoryNet):
         super().__init__(seed=seed, conditions=conditions)
         self.observers: dict[str, Observer] = {}
         self.is_server_away = False
+        #: the links of the server, or of all gateways
+        self.to_vehicles, self.to_clients = {VEHICLE_LINK}, {CLIENT_LINK}
         self._unread: list[tuple[str, str, bytes]] = []
         self._sent_at: dict[bytes, float] = {}  # rovers' motion reports, newest last
         #: whether rovers receive heartbeat requests; else they send heartbeats at 1 Hz only
@@ -446,9 +450,9 @@ class ObservedNet(MemoryNet):
 
     def send(self, source: str, target: str, data: bytes) -> None:
         """Show the server's packets to observers, then send."""
-        if source == VEHICLE_LINK and target in self.observers:
+        if source in self.to_vehicles and target in self.observers:
             self.observers[target].sent(self.now, data)
-        elif source == CLIENT_LINK and f"rover{data[5]}" in self.observers:
+        elif source in self.to_clients and f"rover{data[5]}" in self.observers:
             self.observers[f"rover{data[5]}"].answered(self.now, data)
         if source in self.observers and len(data) > HEADER and data[7] in MEASURED:
             self._sent_at.setdefault(data, self.now)
@@ -464,7 +468,7 @@ class ObservedNet(MemoryNet):
         if link.name in self.observers:
             self.observers[link.name].arrived(self.now, data)
             self.on_arrival(link.name, source, data)
-        elif link.name in (VEHICLE_LINK, CLIENT_LINK):
+        elif link.name in self.to_vehicles or link.name in self.to_clients:
             self._unread.append((link.name, source, data))
         super().arrive(link, source, data)
 
@@ -478,10 +482,10 @@ class ObservedNet(MemoryNet):
         if self.is_server_away:
             return
         for link, source, data in self._unread:
-            if link == CLIENT_LINK:
+            if link in self.to_clients:
                 self.on_read(source, data)
             for name, observer in self.observers.items():
-                if link == CLIENT_LINK:
+                if link in self.to_clients:
                     observer.asked(self.now, data, peer=source)
                 elif source == name or source not in self.observers:
                     sent_at = self._sent_at.get(data, self.now)

@@ -25,9 +25,10 @@ def public(thing: object) -> list[str]:
 
 
 @pytest.mark.patches_core
-def test_the_engine_has_five_methods_and_two_views() -> None:
+def test_the_engine_has_five_methods_and_four_views() -> None:
     methods = ["handle", "handle_deadline", "next_deadline", "take_events", "take_packets"]
-    assert public(Engine) == sorted([*methods, "snapshot", "parameters"])
+    views = ["snapshot", "parameters", "heard", "stop_until"]
+    assert public(Engine) == sorted([*methods, *views])
 
 
 @pytest.mark.patches_core
@@ -38,7 +39,7 @@ def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
 
 
 def test_time_comes_in_as_a_keyword() -> None:
-    for name in ("handle", "handle_deadline", "snapshot"):
+    for name in ("handle", "handle_deadline", "snapshot", "heard"):
         now = inspect.signature(getattr(Engine, name)).parameters["now"]
         assert (now.kind, now.default) == (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.empty)
 
@@ -55,6 +56,9 @@ def test_what_can_come_into_the_engine() -> None:
         "Committed",
         "StoreFailed",
         "HaltNotStored",
+        "LeaseChanged",
+        "VehiclesTaken",
+        "IdsGranted",
         "SettingsChanged",
         "WallClock",
         "Shutdown",
@@ -134,6 +138,7 @@ def test_every_setting_is_known_by_name() -> None:
             "operator_lost",
             "on_failure",
             "on_restart",
+            "on_takeover",
             "profiles",
         ],
         "VehicleProfile": [

@@ -69,12 +69,15 @@ class Plans:
     ) -> None:
         self._registry = registry
         self._fleet = fleet
-        self._stored = {
-            key: Stored(plan_id, unpacked(source)) for key, (plan_id, source) in restored.items()
-        }
+        self._stored: dict[tuple[int, int], Stored] = {}
         self._first: dict[int, int] = {}  # by vehicle: the item at which the next start begins
         self._started: dict[int, _Started] = {}  # the last start of each vehicle
-        for (system_id, kind), stored in self._stored.items():
+        self.restore(restored)
+
+    def restore(self, plans: Mapping[tuple[int, int], tuple[int, str]]) -> None:
+        """Load stored plans, (id, source) by system id and kind."""
+        for (system_id, kind), (plan_id, source) in plans.items():
+            stored = self._stored[system_id, kind] = Stored(plan_id, unpacked(source))
             self._apply_bounds(system_id, kind, stored.items)
 
     def stored(self, vehicle: int, kind: int) -> Stored:

@@ -27,6 +27,7 @@ class Event(Enum):
     CANCEL = auto()  # of the active task
     CLEAR = auto()  # cancel everything, also the active task
     OPERATOR_LOST = auto()
+    LEASE_ENDS = auto()  # another gateway may soon have it
     CLOSE = auto()  # the server shuts down
     # observations that halt it
     TAKEN = auto()  # somebody else has it, in whatever way
@@ -199,6 +200,7 @@ TABLE = (
         is_urgent=False,
     ),
     _row(_E.OPERATOR_LOST, _F.FORGET_RELEASE, _F.FORGET_START, _F.TELL, _E.PAUSE),
+    _row(_E.LEASE_ENDS, _E.DRIVING_ENDS, *TAKE_BACK, _F.STEP),
     _row(_E.CLOSE, _F.PAUSE, work=HAS_IT, grip=Grip.FREE),
     _row(_E.CLOSE, grip=Grip.FREE),
     _row(_E.CLOSE, _F.PAUSE, _F.BRAKE, work=HAS_IT),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from mav_tasks.engine.vehicles.armings import Armings
 from mav_tasks.engine.vehicles.authority import Authority
 from mav_tasks.engine.vehicles.hold_before import HoldBefore
+from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.own_failsafes import OwnFailsafes
 from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
 from mav_tasks.engine.vehicles.start_mark import StartMark
@@ -44,6 +45,8 @@ class Parts:
     monitor: HeartbeatMonitor
     authority: Authority
     settings: Settings
+    #: of this gateway on its vehicles
+    lease: LeaseWatch
     armings: Armings = field(default_factory=Armings)
     failsafes: OwnFailsafes = field(default_factory=OwnFailsafes)
     sticks: StickWatch = field(default_factory=StickWatch)
@@ -156,4 +159,5 @@ class Parts:
             turning_radius=persona.turning_radius or self.settings.driving.turning_radius,
             is_unknown=self._is_unknown,
             drives_on=drives_on,
+            is_ours=self.lease.is_trusted,
         )

@@ -15,6 +15,7 @@ from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.joint_control import JointControl
+from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
@@ -58,6 +59,7 @@ class Vehicle:
         registry: TaskRegistry,
         tasks: VehicleTasks,
         settings: Settings,
+        lease: LeaseWatch,
         may_arm: bool,
         now: float,
     ) -> None:
@@ -80,6 +82,7 @@ class Vehicle:
             monitor,
             Authority(persona, may_arm=may_arm),
             settings,
+            lease,
         )
         self.system_id = system_id
         self.tasks, self.requests, self.control = tasks, requests, requests.control

@@ -7,7 +7,7 @@ from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
-from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.packet_sender import Fence, PacketSender
 from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -44,6 +44,7 @@ class VehicleLinks:
         queue: list[Outgoing],
         packer: Packer,
         signatures: Signatures,
+        fence: Fence,
         settings: Settings,
         registry: TaskRegistry,
         timers: Timers,
@@ -60,6 +61,7 @@ class VehicleLinks:
         self._queue = queue
         self._packer = packer
         self._signatures = signatures
+        self._fence = fence
         self._settings = settings
         self._registry = registry
         self._note_once = note_once
@@ -198,7 +200,7 @@ class VehicleLinks:
         outlet = self._outlets.get((link, peer))
         if outlet is None:
             outlet = self._outlets[link, peer] = PacketSender(
-                link, peer, self._queue, self._packer, self._signatures
+                link, peer, self._queue, self._packer, self._signatures, self._fence
             )
         return outlet
 

@@ -5,9 +5,10 @@ changes anything.
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from math import inf
+from typing import NamedTuple
 
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import Outgoing, Peer
@@ -16,6 +17,7 @@ from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.deadline_heap import DeadlineHeap
 from mav_tasks.engine.vehicles.hands import Word
+from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
@@ -24,7 +26,7 @@ from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import gcs_heartbeat
-from mav_tasks.services.persona import persona_of
+from mav_tasks.services.persona import Persona, persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
@@ -35,6 +37,7 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 NANO = 1e9  # TIMESYNC is in ns
 ASKED = 64  # TIMESYNC requests, one a second and link, whose answers are still accepted
 OLD_NEWS = 0.3  # s after a stall of this process, in which packets may have waited to be read
+LAST_BEAT = 1.2  # s; heartbeats come each second
 MOST_NOTES = 256
 MOST_NAMED = 5  # tasks named in one text
 
@@ -69,6 +72,16 @@ NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
 DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 
 
+class _Beat(NamedTuple):
+    """A heartbeat, and where and when it came."""
+
+    link: str
+    peer: Peer
+    packet: Packet
+    message: m.Heartbeat
+    at: float
+
+
 class VehicleSide:
     """The vehicles by system id, and the vehicle links."""
 
@@ -82,7 +95,9 @@ class VehicleSide:
         fleet: Fleet,
         timers: Timers,
         settings: Settings,
+        is_shared: bool,
     ) -> None:
+        """``is_shared``: other gateways have vehicles, too; this one serves those of ``take``."""
         self._signatures = signatures
         self._registry = registry
         self._fleet = fleet
@@ -109,12 +124,17 @@ class VehicleSide:
         self.by_id: Mapping[int, Vehicle] = self._vehicles
         #: returns a vehicle, read-only
         self.look_at = self._vehicles.get
+        #: what may be sent to them now
+        self.lease = LeaseWatch(timers, self._change_of_lease, is_shared=is_shared)
+        self._ours: set[int] | None = set() if is_shared else None  # None: all
+        self._others: dict[int, _Beat] = {}  # the last heartbeat of each that is not ours
         #: the links and endpoints
         self.links = VehicleLinks(
             self._vehicles,
             queue=queue,
             packer=packer,
             signatures=signatures,
+            fence=self.lease.fence,
             settings=settings,
             registry=registry,
             timers=timers,
@@ -158,6 +178,24 @@ class VehicleSide:
     def has_listened(self, *, now: float) -> bool:
         """Return whether this run is old enough to have heard every vehicle that is there."""
         return now - self._fleet.began_at > self._settings.watch.heartbeat_lost
+
+    def take(self, vehicles: Iterable[int], *, now: float) -> None:
+        """Serve these vehicles, which this gateway has got.
+
+        One that was driven is stopped at once if its last heartbeat came just now.
+        """
+        assert self._ours is not None, "a server without a fleet has all vehicles"
+        for vehicle in vehicles:
+            self._ours.add(vehicle)
+            beat = self._others.pop(vehicle, None)
+            if beat is not None and now - beat.at <= LAST_BEAT:
+                self._meet(*beat[:4], now=now)
+
+    def heard(self, *, now: float) -> frozenset[int]:
+        """Return the vehicles whose heartbeats come, whether this gateway has them or not."""
+        since = now - self._settings.watch.heartbeat_lost
+        ours = {each.system_id for each in self.all if each.is_heard(now=now)}
+        return frozenset(ours | {each for each, beat in self._others.items() if beat.at >= since})
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle that has a task of a revoked key, even if another key's task drives.
@@ -215,11 +253,16 @@ class VehicleSide:
         if self._signatures.admit(link, peer, packet) is None:
             return None
         if packet.source == self.our_address or packet.message_id in SETPOINTS:
+            if self._ours is not None and isinstance(message, m.Heartbeat | m.Timesync):
+                return None  # another gateway's, which listens here, too
             self._note_intruder(link, packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
         if vehicle is None:
             if not isinstance(message, m.Heartbeat):
+                return None
+            if self._ours is not None and packet.system_id not in self._ours:
+                self._note_other(_Beat(link, peer, packet, message, now))
                 return None
             vehicle = self._meet(link, peer, packet, message, now=now)
             if vehicle is None:
@@ -269,18 +312,66 @@ class VehicleSide:
         """Return for how many seconds a packet that is read now may have waited."""
         return self._stood_for if now < self._old_until else 0.0
 
+    def _change_of_lease(self, *, now: float) -> None:
+        """Stop the vehicles that another gateway may get, or let their tasks go on."""
+        for vehicle in self.all:
+            self.deadline_heap.mark_dirty(vehicle)
+            if self.lease.is_trusted:
+                vehicle.joint.wake(now=now)
+            else:
+                vehicle.joint.on(Event.LEASE_ENDS, Word(), now=now)
+
+    def _note_other(self, beat: "_Beat") -> None:
+        """Note a vehicle that this gateway hears, but does not have: it may get it."""
+        if self._persona_of(beat.packet, beat.message, now=beat.at) is not None:
+            self._others[beat.packet.system_id] = beat
+
     def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
         """Send a heartbeat and a TIMESYNC request to each endpoint of a link, each second."""
         self._question.ts1 = round(now * NANO)
         self._asked.append(self._question.ts1)
         for outlet in outlets.values():
-            outlet.send(gcs_heartbeat(), self.our_address)
-            outlet.send(self._question, self.our_address)
+            outlet.send_unfenced(gcs_heartbeat(), self.our_address)
+            outlet.send_unfenced(self._question, self.our_address)
 
     def _meet(
         self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
     ) -> Vehicle | None:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
+        persona = self._persona_of(packet, heartbeat, now=now)
+        if persona is None:
+            return None
+        way = self.links.meets(link_name, peer)
+        if way is None:
+            return None
+        outlet, is_new = way
+        if is_new:
+            outlet.send_unfenced(gcs_heartbeat(), self.our_address)
+        vehicle = Vehicle(
+            packet.system_id,
+            heartbeat=heartbeat,
+            persona=persona,
+            outlet=outlet,
+            registry=self._registry,
+            tasks=self._fleet.of(packet.system_id),
+            settings=self._settings,
+            lease=self.lease,
+            may_arm=self.links.may_arm(link_name),
+            now=now,
+        )
+        self._vehicles[packet.system_id] = vehicle
+        self.links.learn(packet.system_id, (link_name, peer))
+        self.deadline_heap.mark_dirty(vehicle)
+        self._registry.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
+        number = packet.system_id
+        was_driven = self._fleet.was_driven(number)
+        halt = self._fleet.last_halt(number, now=now)
+        vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
+        vehicle.joint.step(now)
+        return vehicle
+
+    def _persona_of(self, packet: Packet, heartbeat: m.Heartbeat, *, now: float) -> Persona | None:
+        """Return the persona of the autopilot that sends a heartbeat; None: it is not driven."""
         if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
             return None
         if packet.system_id in (0, self.our_address.system_id):
@@ -298,33 +389,7 @@ class VehicleSide:
                 now=now,
             )
             return None
-        way = self.links.meets(link_name, peer)
-        if way is None:
-            return None
-        outlet, is_new = way
-        if is_new:
-            outlet.send(gcs_heartbeat(), self.our_address)
-        vehicle = Vehicle(
-            packet.system_id,
-            heartbeat=heartbeat,
-            persona=persona,
-            outlet=outlet,
-            registry=self._registry,
-            tasks=self._fleet.of(packet.system_id),
-            settings=self._settings,
-            may_arm=self.links.may_arm(link_name),
-            now=now,
-        )
-        self._vehicles[packet.system_id] = vehicle
-        self.links.learn(packet.system_id, (link_name, peer))
-        self.deadline_heap.mark_dirty(vehicle)
-        self._registry.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
-        number = packet.system_id
-        was_driven = self._fleet.was_driven(number)
-        halt = self._fleet.last_halt(number, now=now)
-        vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
-        vehicle.joint.step(now)
-        return vehicle
+        return persona
 
     def _note_intruder(
         self, link: str, packet: Packet, message: m.Message | None, *, now: float

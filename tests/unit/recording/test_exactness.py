@@ -12,7 +12,9 @@ from mav_tasks.engine.inputs import (
     Committed,
     Congestion,
     HaltNotStored,
+    IdsGranted,
     Input,
+    LeaseChanged,
     LinkChanged,
     LinkSide,
     Outgoing,
@@ -21,6 +23,7 @@ from mav_tasks.engine.inputs import (
     SettingsChanged,
     Shutdown,
     StoreFailed,
+    VehiclesTaken,
     WallClock,
 )
 from mav_tasks.recording.record_lines import (
@@ -40,12 +43,20 @@ from mav_tasks.settings import Clients, Retention, Settings
 from mav_tasks.store.codec import Decoder
 from mav_tasks.tasks.events import ServerStopped, VehicleHomeSet, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Frame, Pose, Progress, Task, TaskId, Terms
 from tests.unit.tasks.samples import draft
 
 PEERS = [("127.0.0.1", 14550), ("::1", 14550, 0, 0), "/dev/ttyUSB0", "rover1", 7]
+_REGISTRY = TaskRegistry()
+TAKEN_OVER = Restored(
+    tasks=(_REGISTRY.submit(draft(), now=0.1 + 0.2), _REGISTRY.submit(draft(), now=2.5)),
+    paused={3: TaskReason.OPERATOR},
+    halt_epochs={3: 9, 7: 2},
+    is_shared=True,
+)
 INPUTS: list[Input | None] = [
     None,
     *(Packets("link", [(peer, b"\x00\xfd\xff"), (peer, b"")]) for peer in PEERS),
@@ -59,6 +70,9 @@ INPUTS: list[Input | None] = [
     Committed(12),
     StoreFailed("the disk is full: ä \ud800"),
     HaltNotStored(7),
+    LeaseChanged(0.1 + 0.2, inf),
+    IdsGranted(1000, 2),
+    VehiclesTaken((3, 7), TAKEN_OVER),
     SettingsChanged(Settings(clients=Clients(priorities={"255/190": 7}, stream_interval=0))),
     WallClock(-0.0),
     Shutdown(),

@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 
-from mav_tasks.store import Kept
+from mav_tasks.store import HaltNotKept, Kept, NotKept
 from mav_tasks.store.opening import open_store
 from tests.unit.store.samples import submitted
 
@@ -43,7 +43,7 @@ def main(place: str, limit: int | None) -> None:
             if isinstance(outcome, Kept):
                 kept = before + outcome.through
                 print(f"kept {kept}", flush=True)
-            else:
+            elif isinstance(outcome, NotKept | HaltNotKept):
                 print(outcome.text, flush=True)
 
 

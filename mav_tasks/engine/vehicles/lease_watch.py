@@ -1,0 +1,47 @@
+"""What a gateway's lease permits: to move its vehicles, then only to stop them, then nothing.
+
+A server without a fleet has no lease, and needs none. ``mav_tasks.fleet`` has the rules of leases;
+here is what follows for the vehicles. Packets carry the time at which the permission ends, so that
+also those are dropped that leave late.
+"""
+
+from collections.abc import Callable
+from math import inf
+
+from mav_tasks.engine.inputs import LeaseChanged
+from mav_tasks.engine.packet_sender import Fence
+from mav_tasks.engine.timers import Timers, Turn
+
+
+class LeaseWatch:
+    """The present lease. ``on_change`` is called when its trust has ended, or is back."""
+
+    def __init__(self, timers: Timers, on_change: Callable[..., None], *, is_shared: bool) -> None:
+        """``is_shared``: the vehicles are a fleet's, so that nothing is permitted yet."""
+        self._on_change = on_change
+        self._timer = timers.timer(Turn.LINKS, self._end)
+        #: whether vehicles may be moved
+        self.is_trusted = not is_shared
+        #: of all packets to vehicles
+        self.fence = Fence()
+        #: until when packets that stop vehicles may leave, s
+        self.stop_until = inf
+        if is_shared:
+            self.stop_until = self.fence.until = self.fence.relays_until = -inf
+
+    def __repr__(self) -> str:
+        return f"LeaseWatch({'trusted' if self.is_trusted else 'ended'}, {self.fence.until})"
+
+    def change(self, lease: LeaseChanged, *, now: float) -> None:
+        """Take a new or renewed lease, or one that has ended."""
+        was_trusted, self.is_trusted = self.is_trusted, now < lease.move_until
+        self.stop_until, self.fence.relays_until = lease.stop_until, lease.move_until
+        self.fence.until = lease.move_until if self.is_trusted else lease.stop_until
+        self._timer.set(lease.move_until if self.is_trusted else inf)
+        if was_trusted is not self.is_trusted:
+            self._on_change(now=now)
+
+    def _end(self, *, now: float) -> None:
+        """Only stop the vehicles from here on: the lease was not renewed in time."""
+        self.is_trusted, self.fence.until = False, self.stop_until
+        self._on_change(now=now)

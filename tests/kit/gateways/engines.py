@@ -1,0 +1,317 @@
+"""Gateways in virtual time, each with its whole engine, over one fleet and one model database."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from mav_tasks.engine.inputs import LeaseChanged
+from mav_tasks.fleet.lease import Terms
+from mav_tasks.fleet.member import Change, Member, Request
+from mav_tasks.fleet.standing import Effect, Standing
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
+from mav_tasks.pump import Pump
+from mav_tasks.settings import Settings
+from mav_tasks.store import Evicted, IdsGranted, Kept, Outcome, Store, VehiclesLoaded
+from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Task
+from tests.kit.gateways.database import Database
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import World
+
+BLOCK = 1_000  # task ids
+GIVEN_UP = 0.4  # s, for which an answer is awaited
+PING = 0.1  # s
+SESSION_ENDS = 0.02  # s after the death of its process
+
+
+def part_of(restored: Restored, vehicles: frozenset[int]) -> Restored:
+    """Return what a store has about some vehicles."""
+
+    def some(mapping: Any) -> Any:
+        return {vehicle: value for vehicle, value in mapping.items() if vehicle in vehicles}
+
+    plans = {key: plan for key, plan in restored.plans.items() if key[0] in vehicles}
+    return replace(
+        restored,
+        tasks=tuple(task for task in restored.tasks if task.vehicle in vehicles),
+        paused=some(restored.paused),
+        uids=some(restored.uids),
+        speeds=some(restored.speeds),
+        homes=some(restored.homes),
+        halt_epochs=some(restored.halt_epochs),
+        halted=some(restored.halted),
+        disarmed=restored.disarmed & vehicles,
+        plans=plans,
+        is_shared=True,
+    )
+
+
+class SharedStore:
+    """What all gateways have stored, in the order of their commits."""
+
+    def __init__(self, path: Path) -> None:
+        self.store = PromptSqliteStore(path, wall_offset=0.0)
+        self._next_id = 1
+
+    def block(self) -> IdsGranted:
+        """Return the next ids."""
+        first, self._next_id = self._next_id, self._next_id + BLOCK
+        return IdsGranted(first, BLOCK)
+
+    def keep(self, events: Sequence[Event]) -> None:
+        """Make events durable."""
+        self.store.append(events)
+        self.store.take_outcomes()
+
+    def part(self, vehicles: frozenset[int]) -> Restored:
+        """Return what is stored about some vehicles."""
+        return part_of(self.store.load(), vehicles)
+
+    def tasks(self) -> tuple[Task, ...]:
+        """Return all stored tasks."""
+        return self.store.load().tasks
+
+
+class GatewayStore:
+    """The store of one gateway in one epoch; ``is_current`` is the database's fence."""
+
+    name = place = "shared"
+
+    def __init__(self, shared: SharedStore, is_current: Callable[[], bool]) -> None:
+        self._shared = shared
+        self._is_current = is_current
+        self._count = 0
+        self._outcomes: list[Outcome] = []
+        self.events: list[Event] = []
+        #: whether the database is reached; events wait meanwhile
+        self.is_reached = True
+        self._waiting: list[Event] = []
+
+    def load(self) -> Restored:
+        return Restored(is_shared=True)
+
+    def journal(self) -> Iterator[tuple[int, Event]]:
+        yield from enumerate(self.events, 1)
+
+    def append(self, events: Sequence[Event]) -> None:
+        self._waiting += events
+
+    def take_outcomes(self) -> list[Outcome]:
+        if self.is_reached and self._waiting:
+            if self._is_current():
+                self._shared.keep(self._waiting)
+                self.events += self._waiting
+                self._count += len(self._waiting)
+                self._outcomes.append(Kept(self._count))
+            else:
+                self._outcomes.append(Evicted("evicted"))
+            self._waiting = []
+        outcomes, self._outcomes = self._outcomes, []
+        return outcomes
+
+    def load_vehicles(self, vehicles: frozenset[int]) -> None:
+        """Answer in ``take_outcomes``."""
+        restored = self._shared.part(vehicles)
+        self._outcomes.append(VehiclesLoaded(tuple(sorted(vehicles)), restored))
+
+    def grant_ids(self) -> None:
+        """Answer in ``take_outcomes``."""
+        self._outcomes.append(self._shared.block())
+
+    def fileno(self) -> None:
+        return None
+
+    def close(self) -> None:
+        pass
+
+
+class Gateway:
+    """One process: its member, its engine, and its way to the model database."""
+
+    def __init__(self, world: "FleetWorld", name: str) -> None:
+        self.world, self.name = world, name
+        self.member = Member(name, Terms())
+        self.session: int | None = None
+        self._latest: int | None = None  # session; it may be over
+        self.effects: list[Effect] = []
+        self.got: list[tuple[float, int]] = []
+        self.is_reached = True  # the database
+        self.is_frozen = False
+        self.is_dead = False
+        self._asked: tuple[Request, float, float] | None = None  # when, and when it is answered
+        self._ping_at = 0.0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin with an engine that has no vehicle."""
+        self.store = GatewayStore(self.world.shared, self._is_current)
+        self.server = InMemoryServer(
+            self.world.net,
+            vehicles=self.world.rover_names,
+            settings=self.world.settings,
+            store=self.store,
+            restored=self.store.load(),
+            name=self.name,
+            now=self.world.now,
+        )
+        self.store.grant_ids()
+
+    def __repr__(self) -> str:
+        return f"Gateway({self.name}, {self.member.lease})"
+
+    @property
+    def engine(self) -> Any:
+        return self.server.engine
+
+    @property
+    def pump(self) -> Pump:
+        return self.server.pump
+
+    def next_deadline(self) -> float:
+        if self.is_frozen:
+            return self.world.now + 10.0
+        own = self.server.next_deadline()
+        due = [self._ping_at, self.member.next_turn if self._asked is None else self._asked[2]]
+        lease = self.member.lease.next_deadline()
+        return max(self.world.now, min([*due, *(at for at in (own, lease) if at is not None)]))
+
+    def turn(self, *, now: float) -> None:
+        if self.is_frozen:
+            return
+        self._tell(Change(tuple(self.member.lease.passed(now))), now=now)
+        if now >= self._ping_at:
+            self._ping_at = now + PING
+            self._ping(now)
+        self._talk(now)
+        self.server.turn(now=now)
+        if self.pump.is_evicted:
+            self._begin()
+
+    def _talk(self, now: float) -> None:
+        database = self.world.database
+        if self._asked is not None:
+            request, sent, at = self._asked
+            if now < at:
+                return
+            self._asked = None
+            if not self.is_reached or database.sessions.get(self.name) != self.session:
+                self.session = None
+                self._tell(self.member.unanswered(now), now=now)
+                return
+            row = database.execute(self.name, request)
+            self._tell(self.member.answered(request, row, sent=sent, now=now), now=now)
+        if self.session is None:
+            if self.is_reached and database.is_up:
+                self.session = database.connect(self.name, self._latest)
+                self._latest = self.session or self._latest
+            if self.session is None:
+                self.member.next_turn = max(self.member.next_turn, now + 0.1)
+                return
+        self.member.heard = set(self.engine.heard(now=now))
+        request_or_none = self.member.request(now)
+        if request_or_none is not None:
+            delay = self.world.delay() if self.is_reached else GIVEN_UP
+            self._asked = request_or_none, now, now + delay
+
+    def _ping(self, now: float) -> None:
+        for name in self.member.rivals.epochs():
+            other = self.world.gateways.get(name)
+            if other is None:
+                continue
+            if other.is_dead:
+                self.member.peer_refused(name, now=now)
+            elif not other.is_frozen:
+                self.member.peer_answered(name, now=now)
+
+    def _tell(self, change: Change, *, now: float) -> None:
+        lease = self.member.lease
+        self.effects += change.effects
+        if Effect.DROP in change.effects:
+            self._begin()
+        is_holder = lease.standing in (Standing.HOLDER, Standing.STOPPING)
+        move_until = lease.trusted_until if is_holder else -1.0
+        stop_until = lease.permit().term_end if is_holder else -1.0
+        self.server.take_in(LeaseChanged(move_until, stop_until), now=now)
+        if change.got:
+            self.got += [(now, vehicle) for vehicle in sorted(change.got)]
+            self.store.load_vehicles(change.got)
+
+    def _is_current(self) -> bool:
+        row = self.world.database.rows.get(self.name)
+        return row is not None and row.epoch == self.member.lease.epoch
+
+
+class FleetWorld(World):
+    """Rovers that every gateway hears. The first gateway is ``server``, a World's only one."""
+
+    def __init__(
+        self, folder: Path, *, names: Sequence[str] = ("server", "b"), seed: int = 0, **kw: Any
+    ) -> None:
+        self.database, self.shared = Database(), SharedStore(folder / "shared.sqlite3")
+        self.random = Random(seed)
+        self.gateways: dict[str, Gateway] = {}
+        self.settings: Settings | None = kw.get("settings")
+        self.rover_names = tuple(f"rover{n}" for n in range(1, kw.get("rovers", 1) + 1))
+        super().__init__(seed=seed, **kw)
+        for name in names[1:]:
+            self.watched.to_vehicles.add(VEHICLE_LINK.replace("server", name))
+            self.watched.to_clients.add(CLIENT_LINK.replace("server", name))
+            self.start(name)
+
+    def _new_server(self, _store: Store | None, _restored: Restored | None) -> Any:
+        return self.gateways.setdefault("server", Gateway(self, "server"))
+
+    def start(self, name: str) -> Gateway:
+        """Start a gateway's process."""
+        it = self.gateways[name] = Gateway(self, name)
+        self.join(it)
+        return it
+
+    def kill(self, name: str) -> None:
+        """SIGKILL: its machine closes its sockets."""
+        it = self.gateways[name]
+        it.is_dead = True
+        self.leave(it)
+        self.expect_new_server()
+        end = self.now + SESSION_ENDS
+
+        def ends(now: float) -> None:
+            if now >= end and self.database.sessions.get(name) == it.session:
+                del self.database.sessions[name]
+
+        self.watch(ends)
+
+    def freeze(self, name: str) -> None:
+        """SIGSTOP."""
+        self.gateways[name].is_frozen = True
+        self.expect_new_server()
+
+    def expect_new_server(self) -> None:
+        """Let the observers expect what a restart of the server expects: gaps, and HOLD."""
+        for observer in self.observers:
+            observer.server_restarted()
+
+    def holder(self, vehicle: int = 1) -> Gateway:
+        """Return the gateway that has a vehicle, once its engine serves it."""
+        found: list[Gateway] = []
+
+        def is_held() -> bool:
+            name = self.database.holder(vehicle)
+            it = self.gateways.get(name or "")
+            found[:] = [] if it is None or it.is_dead or it.is_frozen else [it]
+            return bool(found) and self.serves(found[0], vehicle)
+
+        self.until(is_held, within=10)
+        return found[0]
+
+    def serves(self, it: Gateway, vehicle: int) -> bool:
+        """Return whether a gateway's engine has met a vehicle."""
+        found = it.engine.snapshot(now=self.now).vehicles
+        return vehicle in [each.system_id for each in found]
+
+    def delay(self) -> float:
+        """Return how long the database takes for an answer."""
+        return self.random.uniform(0.002, 0.015)

@@ -1,0 +1,177 @@
+"""Two gateways over one fleet: one has a rover, the other one takes over when that fails."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.task import Task
+from tests.kit.client import ACCEPTED, GUIDED, FakeClient, setpoint
+from tests.kit.gateways.engines import FleetWorld, Gateway
+
+#: s without a holder after a process has ended, and after one fell silent (the issue's goals)
+AFTER_DEATH, AFTER_SILENCE = 0.3, 1.5
+CONTINUE, RELEASE, REMAINDER = 54004, 54013, 1
+
+
+class Fleet:
+    """A world of two gateways and a client at each."""
+
+    def __init__(self, folder: Path, *, settings: Settings | None = None) -> None:
+        self.world = FleetWorld(folder, settings=settings or Settings())
+        self.clients = {"server": self.world.client}
+        self.clients["b"] = self.world.add_client("client b", system_id=254, server="b:clients")
+        self.first = self.world.holder()
+        self.world.run(4.0)
+
+    @property
+    def other(self) -> Gateway:
+        """The gateway that does not have the rover at first."""
+        (other,) = (it for it in self.world.gateways.values() if it is not self.first)
+        return other
+
+    @property
+    def client(self) -> FakeClient:
+        """The client at the gateway that has the rover at first."""
+        return self.clients[self.first.name]
+
+    def task(self, task_id: int) -> Task:
+        """Return a task as it is stored."""
+        return {int(task.id): task for task in self.world.shared.tasks()}[task_id]
+
+    def submit(self, metres: float) -> int:
+        """Submit a move at the gateway that has the rover; return its id."""
+        sent = self.client.move(metres)
+        self.world.run(0.2)
+        assert sent.result == ACCEPTED
+        return sent.task_id
+
+    def drives(self, task_id: int) -> None:
+        """Let time pass until a task has driven for a while."""
+        self.world.until(lambda: self.task(task_id).state is S.EXECUTING, within=10)
+        self.world.run(1.0)
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Iterator[Fleet]:
+    it = Fleet(tmp_path)
+    yield it
+    it.world.check()
+
+
+def test_one_gateway_has_the_rover_and_drives_its_tasks(fleet: Fleet) -> None:
+    task = fleet.submit(1.0)
+    fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=20)
+    assert not fleet.world.serves(fleet.other, 1)
+
+
+def test_after_a_crash_the_other_one_holds_what_ran_and_what_waits_goes_on(fleet: Fleet) -> None:
+    ran, waits = fleet.submit(5.0), fleet.submit(0.5)
+    fleet.drives(ran)
+    died_at = fleet.world.now
+    fleet.world.kill(fleet.first.name)
+    assert fleet.world.holder() is fleet.other
+    assert fleet.other.got[-1][0] - died_at < AFTER_DEATH
+    fleet.world.until(fleet.world.stands, within=5)
+    assert (fleet.task(ran).state, fleet.task(ran).reason) == (S.HELD, R.OUTCOME_UNKNOWN)
+    assert fleet.task(waits).state is S.QUEUED
+    fleet.world.run(4.0)  # words from before do not count just after a takeover
+    client = fleet.clients[fleet.other.name]
+    sent = client.command(RELEASE, ran, REMAINDER)
+    fleet.world.until(lambda: fleet.task(waits).state is S.COMPLETED, within=40)
+    assert sent.result == ACCEPTED
+    assert fleet.task(ran).state is S.COMPLETED
+    assert abs(fleet.world.truth.north - 5.5) < 0.1
+    assert fleet.other.engine.snapshot(now=fleet.world.now).tasks[-1].id == waits
+
+
+def test_ids_are_unique_over_the_fleet(fleet: Fleet) -> None:
+    earlier = fleet.submit(0.3)
+    fleet.world.kill(fleet.first.name)
+    assert fleet.world.holder() is fleet.other
+    fleet.world.run(3.0)
+    sent = fleet.clients[fleet.other.name].move(0.3)
+    fleet.world.run(0.2)
+    assert sent.result == ACCEPTED
+    assert sent.task_id != earlier
+    assert len({task.id for task in fleet.world.shared.tasks()}) == 2
+
+
+def test_a_gateway_that_stands_still_sends_nothing_when_it_goes_on(fleet: Fleet) -> None:
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    stale, began = fleet.first, fleet.world.now
+    fleet.world.freeze(stale.name)
+    assert fleet.world.holder() is fleet.other
+    assert fleet.other.got[-1][0] - began < AFTER_SILENCE
+    fleet.world.run(1.0)
+    sent: list[bytes] = []
+
+    def look(source: str, _target: str, data: bytes) -> bool:
+        is_beat = data[7] in (0, 111)  # HEARTBEAT, TIMESYNC: they move nothing
+        if source == f"{stale.name}:vehicles" and not is_beat:
+            sent.append(data)
+        return False
+
+    fleet.world.watched.loses = look
+    stale.is_frozen = False
+    fleet.world.run(3.0)
+    assert sent == []
+    assert not fleet.world.serves(stale, 1)
+    assert fleet.task(task).state is S.HELD
+
+
+def test_a_short_loss_of_the_database_stops_the_rover_and_the_task_goes_on(fleet: Fleet) -> None:
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = False
+    fleet.world.run(3.0)
+    assert fleet.world.stands()
+    assert fleet.world.truth.north < 3.0
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = True
+    fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=40)
+    reasons = [why for _, why in fleet.world.history(task)] if fleet.first.name == "server" else []
+    assert R.LEASE_LOST in reasons or fleet.first.name != "server"
+    assert abs(fleet.world.truth.north - 5.0) < 0.1
+
+
+def test_a_client_that_drives_is_stopped_when_the_lease_ends(fleet: Fleet) -> None:
+    client = fleet.client
+    client.mode(GUIDED)
+    fleet.world.run(0.5)
+    client.arm()
+    fleet.world.run(1.0)
+    client.stream(setpoint(0.5), rate=10)
+    fleet.world.run(3.0)
+    assert not fleet.world.stands()
+    fleet.first.is_reached = fleet.first.store.is_reached = False
+    fleet.world.run(1.0)
+    fleet.world.until(fleet.world.stands, within=3)
+    north = fleet.world.truth.north
+    fleet.world.run(3.0)  # its stream goes on
+    assert abs(fleet.world.truth.north - north) < 0.05
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
+    tmp_path: Path, *, moved: bool
+) -> None:
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    fleet.world.kill(fleet.first.name)
+    assert fleet.world.holder() is fleet.other
+    if moved:
+        fleet.world.until(fleet.world.stands, within=5)
+        vars(fleet.world.rover.body)["_east"] += 2.0  # somebody carries it aside
+        fleet.world.until(lambda: fleet.task(task).state is S.HELD, within=10)
+        assert fleet.task(task).reason is R.OFF_TRACK
+    else:
+        fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=40)
+        assert abs(fleet.world.truth.north - 5.0) < 0.1
+    fleet.world.check()
