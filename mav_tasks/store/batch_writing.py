@@ -35,6 +35,15 @@ class Insert(Protocol):
 
 def write_batch(connection: Connection, batch: Batch, *, insert: Insert, utc: float) -> None:
     """Write the rows of a batch, and note its last number and the time, UTC seconds."""
+    write_rows(connection, batch, insert=insert)
+    connection.execute(
+        "UPDATE meta SET next_id = coalesce(?, next_id), last_number = ?, last_write = ?",
+        (batch.next_id, batch.last, utc),
+    )
+
+
+def write_rows(connection: Connection, batch: Batch, *, insert: Insert) -> None:
+    """Write the rows of a batch alone."""
     if batch.tasks:
         insert("tasks", TASKS, batch.tasks)
     if batch.journal:
@@ -58,10 +67,6 @@ def write_batch(connection: Connection, batch: Batch, *, insert: Insert, utc: fl
         )
     if batch.signatures:
         _keep_signatures(connection, batch.signatures)
-    connection.execute(
-        "UPDATE meta SET next_id = coalesce(?, next_id), last_number = ?, last_write = ?",
-        (batch.next_id, batch.last, utc),
-    )
     if batch.signed_until:
         connection.execute(
             "UPDATE meta SET signed_until = ? WHERE signed_until < ?",

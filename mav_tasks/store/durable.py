@@ -13,7 +13,7 @@ from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
 from mav_tasks.store.halt_keeper import HaltKeeper
-from mav_tasks.store.halt_record import HaltRecord, event_of, word_of
+from mav_tasks.store.halt_record import HaltRecord, Word, event_of, word_of
 from mav_tasks.store.journal import Journal
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.writer import Writer
@@ -123,14 +123,22 @@ class DurableStore:
         if self._is_open:
             self._is_open = False
             self._keeper.close(within=HALTS_LIMIT)
-            self._writer.close(within=CLOSE_LIMIT)
+            self._writer.close(within=self._close_limit())
             self._keeper.report_lost()
             self._mail.close()
+
+    def _close_limit(self) -> float:
+        """Return how long ``close`` may wait for the remaining events, s."""
+        return CLOSE_LIMIT
+
+    def _missing(self, words: list[Word]) -> list[Word]:
+        """Return those of the words that the database lacks by their numbers which count still."""
+        return words
 
     def _catch_up(self, record: HaltRecord) -> bool:
         """Write newer words of the halt record to the database; return False if it lacked any."""
         database = self._database
-        newer = record.words_after(database.last_number)
+        newer = self._missing(record.words_after(database.last_number))
         next_id = record.next_id_after(database.last_number)
         if not newer and next_id is None:
             return True

@@ -13,6 +13,8 @@ class Reader(Protocol):
 
     #: what people call the store
     name: str
+    #: a column of ``tasks`` that increases with the number of the submission, and has an index
+    task_key: str
 
     @property
     def connection(self) -> Connection: ...

@@ -27,7 +27,7 @@ class Journal:
         self._reader = reader
         self._which = which
         self._number = 0  # of the last event returned
-        self._task = 0  # id of the last task whose submission was returned
+        self._task = 0  # key of the last task whose submission was returned
 
     def __repr__(self) -> str:
         return f"Journal({self._reader.name}, event {self._number})"
@@ -53,7 +53,10 @@ class Journal:
         with self._reader.snapshot():
             rows = Rows(self._reader.connection)
             noted = self._rows("number, kind, body, 0", "journal", "number", self._number)
-            begun = self._rows("number, 'TaskSubmitted', submitted, id", "tasks", "id", self._task)
+            key = self._reader.task_key
+            begun = self._rows(
+                f"number, 'TaskSubmitted', submitted, {key}", "tasks", key, self._task
+            )
         full = [found[-1][0] for found in (noted, begun) if len(found) == PAGE]
         through = min(full, default=None)  # above it the other table's page may be incomplete
         found = [row for row in (*noted, *begun) if through is None or row[0] <= through]
@@ -66,10 +69,7 @@ class Journal:
         return page, through is not None
 
     def _rows(self, columns: str, table: str, key: str, after: int) -> list[tuple[Any, ...]]:
-        """Return the next rows of a table.
-
-        A submission is stored in its task's row; task ids increase with event numbers.
-        """
+        """Return the next rows of a table; a submission is stored in its task's row."""
         is_tasks = table == "tasks"
         wanted = {
             f"{key} > ?": after,

@@ -22,12 +22,13 @@ from mav_tasks.tasks.events import (
     TaskSubmitted,
     VehicleHomeSet,
 )
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
 CHUNK = 1_000  # rows whose JSON is parsed in one call
+MOST_OVER = 1_000  # finished tasks of each vehicle that a gateway loads when it gets them
 
 #: the fields that an event has in common with Task, besides the new state; in the order of the
 #: columns (changed, modified, advanced) that keep the last event of each kind
@@ -37,16 +38,28 @@ _OF_TASK = {
 }
 
 
-def read_restored(reader: Reader, *, offset: float, ended_well: bool, idle: float) -> Restored:
-    """Return the state in a store, times reduced by ``offset``; raise StoreError."""
+def read_restored(
+    reader: Reader,
+    *,
+    offset: float,
+    ended_well: bool,
+    idle: float,
+    vehicles: frozenset[int] | None = None,
+) -> Restored:
+    """Return the state in a store, times reduced by ``offset``; raise StoreError.
+
+    With ``vehicles``, what belongs to vehicles is returned of these only.
+    """
     connection = reader.connection
+    of_theirs, live_or_late = _only(vehicles)
     with in_one_line(reader), reader.snapshot():
         rows = Rows(connection)
         next_id, signed_until = connection.execute(
             "SELECT next_id, signed_until FROM meta"
         ).fetchone()
         found = connection.execute(
-            "SELECT submitted, changed, modified, advanced FROM tasks ORDER BY number"
+            f"SELECT submitted, changed, modified, advanced FROM tasks {live_or_late}"
+            " ORDER BY number"
         )
         tasks: list[Task] = []
         while chunk := found.fetchmany(CHUNK):
@@ -54,13 +67,15 @@ def read_restored(reader: Reader, *, offset: float, ended_well: bool, idle: floa
             for event, (_, *later) in zip(submitted, chunk, strict=True):
                 task = event.task
                 tasks.append(_changed(task, rows, later, offset) if any(later) else task)
-        vehicles = connection.execute(
+        known = connection.execute(
             "SELECT vehicle, paused, uid, speed, halt_epoch, may_arm, halt_reason, halted_utc"
-            " FROM vehicles"
+            f" FROM vehicles {of_theirs}"
         ).fetchall()
-        found = connection.execute("SELECT home FROM vehicles WHERE home IS NOT NULL")
-        homes = rows.values(VehicleHomeSet, [row[0] for row in found], offset)
-        plans = connection.execute("SELECT vehicle, kind, plan_id, source FROM plans").fetchall()
+        found = connection.execute(f"SELECT home FROM vehicles {of_theirs}")
+        homes = rows.values(VehicleHomeSet, [row[0] for row in found if row[0]], offset)
+        plans = connection.execute(
+            f"SELECT vehicle, kind, plan_id, source FROM plans {of_theirs}"
+        ).fetchall()
         parameters = connection.execute("SELECT name, value FROM parameters").fetchall()
         signatures = connection.execute(
             "SELECT key, link_id, system_id, component_id, timestamp FROM signatures"
@@ -68,17 +83,15 @@ def read_restored(reader: Reader, *, offset: float, ended_well: bool, idle: floa
         return Restored(
             tasks=tuple(tasks),
             next_id=next_id,
-            paused={row[0]: TaskReason(row[1]) for row in vehicles if row[1] is not None},
-            uids={row[0]: row[2] for row in vehicles if row[2] is not None},
-            speeds={row[0]: row[3] for row in vehicles if row[3] is not None},
+            paused={row[0]: TaskReason(row[1]) for row in known if row[1] is not None},
+            uids={row[0]: row[2] for row in known if row[2] is not None},
+            speeds={row[0]: row[3] for row in known if row[3] is not None},
             homes={home.vehicle: home for home in homes},
-            halt_epochs={row[0]: row[4] for row in vehicles if row[4] is not None},
+            halt_epochs={row[0]: row[4] for row in known if row[4] is not None},
             halted={
-                row[0]: (TaskReason(row[6]), row[7] - offset)
-                for row in vehicles
-                if row[7] is not None
+                row[0]: (TaskReason(row[6]), row[7] - offset) for row in known if row[7] is not None
             },
-            disarmed=frozenset(row[0] for row in vehicles if row[5] == 0),
+            disarmed=frozenset(row[0] for row in known if row[5] == 0),
             plans={(row[0], row[1]): (row[2], row[3]) for row in plans if row[2]},
             parameters={name: value for name, value in parameters if value is not None},
             signatures=tuple(SignatureTime(*row) for row in signatures),
@@ -86,6 +99,7 @@ def read_restored(reader: Reader, *, offset: float, ended_well: bool, idle: floa
             ended_well=ended_well,
             idle=idle,
             wall_offset=offset,
+            is_shared=vehicles is not None,
         )
 
 
@@ -94,6 +108,19 @@ def read_parameters(reader: Reader) -> dict[str, float]:
     with in_one_line(reader):
         found = reader.connection.execute("SELECT name, value FROM parameters").fetchall()
         return {name: value for name, value in found if value is not None}
+
+
+def _only(vehicles: frozenset[int] | None) -> tuple[str, str]:
+    """Return conditions of rows of some vehicles, and of their tasks; "": all."""
+    if vehicles is None:
+        return "", ""
+    listed = ",".join(map(str, sorted(vehicles))) or "NULL"
+    theirs = f"WHERE vehicle IN ({listed})"
+    late = (
+        f"SELECT id FROM tasks {theirs} AND state >= {TaskState.COMPLETED:d}"
+        f" ORDER BY changed_at DESC LIMIT {MOST_OVER * len(vehicles)}"
+    )
+    return theirs, f"{theirs} AND (state < {TaskState.COMPLETED:d} OR id IN ({late}))"
 
 
 class Rows:

@@ -16,6 +16,8 @@ from mav_tasks.store.reading import in_one_line
 class SqliteReader:
     """Implements ``Reader``. The constructor raises StoreError."""
 
+    task_key = "id"
+
     def __init__(self, path: Path) -> None:
         self.name = str(path)
         with in_one_line(self):

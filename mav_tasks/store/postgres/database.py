@@ -57,15 +57,19 @@ class PostgresDatabase:
 
     look_period = LOOK_PERIOD
 
-    def __init__(self, address: Address) -> None:
+    def __init__(
+        self, address: Address, *, ownership: Ownership | None = None, purpose: str = "serve"
+    ) -> None:
+        """``purpose`` tells the server's operator what its sessions are for."""
         self._address = address
-        self._ownership = Ownership()
+        self._purpose = purpose
+        self._ownership = ownership or Ownership()
         self._replaced: Replaced | None = None
         self.next_id = self.last_number = self.format_id = 0
         self.last_write: float | None = None
         self.ended_well = False
         with self._at_start():
-            self._session = Session(address, purpose="serve")
+            self._session = Session(address, purpose=purpose)
             try:
                 check_writable(self._session)
                 self._ownership.lock(self._session)
@@ -92,6 +96,11 @@ class PostgresDatabase:
             with self._fenced():  # durable before any rover is moved
                 self._session.execute("UPDATE meta SET ended_well = 0")
 
+    @property
+    def is_replaced(self) -> bool:
+        """Whether this server can store nothing any more."""
+        return self._replaced is not None
+
     def is_open(self) -> bool:
         """Return whether the session still exists, as far as this end knows."""
         return self._session.is_open()
@@ -104,7 +113,7 @@ class PostgresDatabase:
         if self._replaced is not None:
             raise self._replaced
         if self._session.is_lost:
-            self._session = Session(self._address, purpose="serve")
+            self._session = Session(self._address, purpose=self._purpose)
             try:
                 check_writable(self._session)
                 self._ownership.lock(self._session)
@@ -114,7 +123,7 @@ class PostgresDatabase:
                 if isinstance(error, Replaced):
                     self._replaced = error
                 raise
-        found, fleet = self._meta("last_number, fleet")
+        found, (fleet,) = self._stored(), self._meta("fleet")
         if found < self.last_number or fleet != self.fleet:
             self._session.close()
             raise PostgresError(LACKS_EVENTS.format(found=found, stored=self.last_number))
@@ -157,6 +166,10 @@ class PostgresDatabase:
     def failure(self, error: Exception) -> str | None:
         """Return the words for a failure; None: it is a bug of ours."""
         return failure(error)
+
+    def _stored(self) -> int:
+        """Return the number of the last event that this server has stored."""
+        return int(self._meta("last_number")[0])
 
     def _insert(self, table: str, _columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
         self._session.execute(_INSERTS[table], (dumps(rows),))

@@ -18,7 +18,7 @@ from mav_tasks.store.postgres.failures import PostgresError, Replaced
 from mav_tasks.store.postgres.session import Session
 from mav_tasks.store.postgres.session_lock import LOCK_NOT_AVAILABLE, SessionLock
 
-LOCK = 0x4D565453_00000001  # "MVTS", and the first purpose
+LOCK = 0x4D565453_00000001  # "MVTS", and the first purpose; gateways of a fleet share it
 
 _NOT_NULL_VIOLATION, _UNDEFINED_TABLE = "23502", "42P01"
 
@@ -40,9 +40,11 @@ class Holder:
 class Ownership:
     """The lock and the epoch of one server, over its sessions. Methods raise PostgresError."""
 
-    def __init__(self) -> None:
+    table = "writer"  # of the column that refuses a fence
+
+    def __init__(self, *, is_shared: bool = False) -> None:
         self.epoch = 0
-        self._lock = SessionLock(LOCK)
+        self._lock = SessionLock(LOCK, is_shared=is_shared)
 
     def __repr__(self) -> str:
         return f"Ownership(epoch {self.epoch})"
@@ -57,13 +59,16 @@ class Ownership:
         except PostgresError as error:
             if error.sqlstate != LOCK_NOT_AVAILABLE:
                 raise
-            holder = _holder_if_any(session)
-            if self.epoch and holder is not None and holder.epoch > self.epoch:
-                raise _replaced_by(holder) from error
-            if self.epoch and holder is not None and holder.epoch == self.epoch:
-                raise PostgresError("the database has not ended the lost session yet") from error
-            words = str(holder) if holder is not None and holder.epoch else "another server"
-            raise PostgresError(f"in use by {words}") from error
+            raise self._in_use(session) from error
+
+    def _in_use(self, session: Session) -> Exception:
+        """Return the error if another process has the lock."""
+        holder = holder_if_any(session)
+        if self.epoch and holder is not None and holder.epoch > self.epoch:
+            return _replaced_by(holder)
+        if self.epoch and holder is not None and holder.epoch == self.epoch:
+            return PostgresError("the database has not ended the lost session yet")
+        return PostgresError(f"in use by {_gateways(session) or words_for(holder)}")
 
     def begin(self, session: Session) -> None:
         """Make this server the writer, by a new epoch."""
@@ -95,7 +100,7 @@ class Ownership:
 
     def failure_of(self, session: Session, error: PostgresError) -> Exception:
         """Return Replaced if an error is the fence's, else the error itself."""
-        if error.sqlstate == _NOT_NULL_VIOLATION and error.table == "writer":
+        if error.sqlstate == _NOT_NULL_VIOLATION and error.table == self.table:
             return self._replaced(session)
         return error
 
@@ -119,7 +124,12 @@ def _holder(session: Session) -> Holder | None:
     return None if found is None else Holder(*found)
 
 
-def _holder_if_any(session: Session) -> Holder | None:
+def words_for(holder: Holder | None) -> str:
+    """Return the words for the server that has the lock for itself."""
+    return str(holder) if holder is not None and holder.epoch else "another server"
+
+
+def holder_if_any(session: Session) -> Holder | None:
     """Return the holder; None if the first server has not made the tables yet."""
     try:
         return _holder(session)
@@ -127,6 +137,20 @@ def _holder_if_any(session: Session) -> Holder | None:
         if error.sqlstate != _UNDEFINED_TABLE:
             raise
         return None
+
+
+def _gateways(session: Session) -> str:
+    """Return the words for the gateways that share the lock; "" if one has it for itself."""
+    found = session.execute(
+        "SELECT application_name FROM pg_locks JOIN pg_stat_activity USING (pid)"
+        " WHERE locktype = 'advisory' AND granted AND mode = 'ShareLock' AND objsubid = 1"
+        " AND classid = ? AND objid = ?"
+        " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+        " ORDER BY application_name",
+        (LOCK >> 32, LOCK & 0xFFFFFFFF),
+    ).fetchall()
+    names = [name.removeprefix("mav-tasks ").removesuffix(" store") for (name,) in found]
+    return f"a fleet: {', '.join(names)}" if names else ""
 
 
 def _replaced_by(holder: Holder) -> Replaced:

@@ -13,6 +13,8 @@ from mav_tasks.store.reading import in_one_line
 class PostgresReader:
     """Implements ``Reader``. The constructor raises StoreError."""
 
+    task_key = "number"
+
     def __init__(self, address: Address) -> None:
         self.name = address.shown
         with in_one_line(self):

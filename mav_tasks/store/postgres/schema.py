@@ -93,6 +93,14 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
             " VALUES (1, gen_random_uuid()::text || gen_random_uuid()::text)"
         ),
     ),
+    (  # a store that gateways share: fleet_database.py
+        (  # not in gateways: a write that hangs must not keep that gateway from its renewals
+            "CREATE TABLE gateway_writes (gateway INTEGER PRIMARY KEY REFERENCES gateways,"
+            " epoch BIGINT NOT NULL, written BIGINT NOT NULL)"
+        ),
+        "CREATE INDEX by_number ON tasks (number)",  # ids do not increase with it in a fleet
+        "CREATE INDEX not_over ON tasks (vehicle) WHERE state < 9",
+    ),
 )
 
 

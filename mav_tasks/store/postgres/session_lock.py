@@ -9,7 +9,9 @@ LOCK_NOT_AVAILABLE = "55P03"
 class SessionLock:
     """The lock of a number of 64 bits: the purpose above, 32 bits of what it is about below."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int, *, is_shared: bool = False) -> None:
+        """``is_shared``: others may have it, too, unless one has it for itself."""
+        self._lock = "pg_advisory_lock_shared" if is_shared else "pg_advisory_lock"
         self._halves = number >> 32, number & 0xFFFFFFFF
         self._number = number
         self._backend: tuple[int, str] | None = None  # of the session that had the lock last
@@ -25,7 +27,7 @@ class SessionLock:
         """
         if self._backend is not None:
             session.execute(_END_OWN_SESSION, (*self._halves, *self._backend))
-        session.execute("SELECT pg_advisory_lock(?)", (self._number,))
+        session.execute(f"SELECT {self._lock}(?)", (self._number,))
         found = session.execute(_OWN_BACKEND).fetchone()
         if found is None:
             raise PostgresError("the database does not show this session in pg_stat_activity")

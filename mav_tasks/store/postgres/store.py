@@ -1,14 +1,8 @@
 """The kind of store whose place is a URL of PostgreSQL."""
 
-import re
 from collections.abc import Callable
 from contextlib import ExitStack, closing
-from pathlib import Path
 
-from platformdirs import user_data_path
-
-from mav_tasks.errors import StoreError
-from mav_tasks.folders import make_private
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import Which
@@ -19,6 +13,7 @@ from mav_tasks.store.lock import Lock
 from mav_tasks.store.postgres import address
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.database import PostgresDatabase
+from mav_tasks.store.postgres.local_path import local_path
 from mav_tasks.store.postgres.reader import PostgresReader, opened
 
 
@@ -39,7 +34,7 @@ class PostgresStore(DurableStore):
         with ExitStack() as begun:
             database = PostgresDatabase(where)
             begun.callback(database.close, utc=None)
-            path = _local_path(database, name)
+            path = local_path(database.name, database.fleet, name=name)
             begun.callback(Lock(path, name=name).release)
             record = HaltRecord(path, name=name)
             begun.callback(record.close)
@@ -69,17 +64,3 @@ def read_parameters(place: str) -> dict[str, float]:
     """Return the parameters in a database; {} if it has no store yet."""
     with closing(PostgresReader(address.parse(place))) as reader:
         return {} if reader.is_empty else reading.read_parameters(reader)
-
-
-def _local_path(database: PostgresDatabase, name: str) -> Path:
-    """Return the path beside which the halt record is: in the user's data folder.
-
-    A copy of the database under another name has another record.
-    """
-    folder = user_data_path("mav-tasks", appauthor=False)
-    try:
-        make_private(folder)
-    except OSError as error:
-        raise StoreError(f"store {name}: {folder} cannot be created: {error.strerror}") from error
-    plain = re.sub(r"[^A-Za-z0-9_-]", "_", database.name)
-    return folder / f"{plain}-{database.fleet[:8]}"

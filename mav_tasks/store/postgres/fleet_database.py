@@ -1,0 +1,107 @@
+"""The database of a fleet, which several gateways write.
+
+Each gateway counts its own events. Their numbers in the journal are given by the database, under
+the lock of the row of ``meta``, which a transaction keeps until it is committed: so the numbers of
+all gateways are in the order of the commits, and a reader that has seen one has seen all before.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from mav_tasks.store.batch import Batch
+from mav_tasks.store.batch_writing import find_format, write_rows
+from mav_tasks.store.codec import dumps
+from mav_tasks.store.halt_record import Register, Word
+from mav_tasks.store.postgres.address import Address
+from mav_tasks.store.postgres.database import PostgresDatabase
+from mav_tasks.store.postgres.gateway_ownership import GatewayOwnership
+from mav_tasks.store.retention import Trimmer
+
+TRIM_LOCK = 0x4D565453_00000003  # of the gateway that deletes expired rows
+
+#: to the number of a row in its gateway's count, for the number in the journal
+_BASE = "current_setting('mav_tasks.base')::bigint"
+_INSERTS = {
+    "tasks": (
+        "INSERT INTO tasks (id, number, vehicle, state, changed_at, submitted)"
+        f" SELECT (r->>0)::bigint, {_BASE} + (r->>1)::bigint, (r->>2)::bigint, (r->>3)::integer,"
+        " (r->>4)::double precision, r->>5 FROM json_array_elements(?::json) AS r"
+        " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
+        " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
+        " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
+    ),
+    "journal": (
+        "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
+        f" SELECT {_BASE} + (r->>0)::bigint, (r->>1)::double precision, r->>2, (r->>3)::bigint,"
+        " (r->>4)::bigint, r->>5 FROM json_array_elements(?::json) AS r"
+    ),
+}
+
+
+class FleetDatabase(PostgresDatabase):
+    """Implements ``EventDatabase`` for one gateway under one lease."""
+
+    def __init__(self, address: Address, gateway: str, epoch: int) -> None:
+        self._lease = GatewayOwnership(gateway, epoch)
+        super().__init__(address, ownership=self._lease, purpose=f"gateway {gateway} store")
+
+    def begin(self) -> None:
+        """Become a writer, and read how far this gateway has written."""
+        with self._at_start():
+            self._lease.begin(self._session)
+            with self._session.transaction():
+                self.format_id = find_format(self._session)
+            self.last_number = self._stored()
+            (self.last_write,) = self._meta("last_write")
+            self.ended_well = True  # the tasks of each vehicle tell
+
+    def write(self, batch: Batch, *, utc: float) -> None:
+        """Make a batch durable, as a whole or not at all."""
+        count = batch.last - batch.first + 1
+        session = self._session
+        with self._fenced():
+            self._lease.wrote(session, batch.last)
+            session.execute(
+                "UPDATE meta SET last_number = last_number + ?, last_write = ?", (count, utc)
+            )
+            session.execute(
+                "SELECT set_config('mav_tasks.base', (last_number - ?::bigint)::text, true)"
+                " FROM meta",
+                (batch.last,),
+            )
+            write_rows(session, batch, insert=self._insert)
+        self.last_number = batch.last
+
+    def trim(self, trimmer: Trimmer, *, utc: float) -> bool:
+        """Delete some expired rows, unless another gateway is doing that."""
+        with self._cause(), self._session.transaction():
+            self._lease.fence(self._session)
+            query = "SELECT pg_try_advisory_xact_lock(?)"
+            ((is_ours,),) = self._session.execute(query, (TRIM_LOCK,)).fetchall()
+            return bool(is_ours) and trimmer.step(self._session, utc=utc)
+
+    def close(self, *, utc: float | None) -> None:  # noqa: ARG002  others go on writing
+        """End the session."""
+        self._session.close()
+
+    def missing(self, words: Sequence[Word]) -> list[Word]:
+        """Return the words about vehicles that no gateway has now and that were not halted since.
+
+        Another gateway may have had them since these words, and what it has stored is newer.
+        """
+        session = self._session
+        held = {v for (v,) in session.execute("SELECT vehicle FROM holdings WHERE gateway > 0")}
+        rows = session.execute("SELECT vehicle, coalesce(halt_epoch, 0) FROM vehicles")
+        epochs = dict(rows.fetchall())
+        told = {w.vehicle: w.value for w in words if w.register is Register.HALTS}
+        return [
+            word
+            for word in words
+            if word.vehicle not in held and told.get(word.vehicle, 0) > epochs.get(word.vehicle, 0)
+        ]
+
+    def _stored(self) -> int:
+        return self._lease.written(self._session)
+
+    def _insert(self, table: str, _columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
+        self._session.execute(_INSERTS[table], (dumps(rows),))

@@ -1,0 +1,121 @@
+"""The thread that gets a gateway what it needs from its fleet's store: task ids, and vehicles.
+
+It retries until the database answers, or the lease has ended.
+"""
+
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from queue import SimpleQueue
+from threading import Event, Thread
+
+from mav_tasks.errors import StoreError
+from mav_tasks.mailbox import Mailbox
+from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome, VehiclesLoaded
+from mav_tasks.store.postgres.address import Address
+from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
+from mav_tasks.store.postgres.gateway_ownership import GatewayOwnership
+from mav_tasks.store.postgres.reader import PostgresReader
+from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.reading import read_restored
+from mav_tasks.tasks.lifecycle import RUNNING
+from mav_tasks.tasks.task import MAX_TASK_ID, following
+
+BLOCK = 1_000  # task ids that a gateway gets at once
+RETRY = 0.25  # s between two attempts
+REPORT = 5.0  # s between two reports of a lasting failure
+
+Job = frozenset[int] | None  # vehicles to load; None: task ids
+
+
+class FleetLoader:
+    """Puts ``IdsGranted`` and ``VehiclesLoaded`` into a mailbox."""
+
+    def __init__(
+        self,
+        address: Address,
+        gateway: str,
+        epoch: int,
+        mail: Mailbox[Outcome],
+        *,
+        wall_offset: Callable[[], float],
+    ) -> None:
+        self._address = address
+        self._gateway, self._epoch = gateway, epoch
+        self._mail = mail
+        self._wall_offset = wall_offset
+        self._jobs: SimpleQueue[Job | Event] = SimpleQueue()
+        self._is_closing = Event()
+        self._report_at = 0.0
+        self._thread = Thread(target=self._run, name="fleet loader", daemon=True)
+        self._thread.start()
+
+    def __repr__(self) -> str:
+        return f"FleetLoader({self._gateway}, epoch {self._epoch})"
+
+    def ask(self, job: Job) -> None:
+        """Get something; never blocks."""
+        self._jobs.put(job)
+
+    def close(self, *, within: float) -> None:
+        """End the thread after its present attempt."""
+        self._is_closing.set()
+        self._jobs.put(self._is_closing)
+        self._thread.join(within)
+
+    def _run(self) -> None:
+        try:
+            while not isinstance(job := self._jobs.get(), Event):
+                while not self._is_done(job):
+                    if self._is_closing.wait(RETRY):
+                        return
+        except Replaced as end:
+            self._mail.put(Evicted(f"store {self._address.shown}: {end}"))
+        except Exception as mistake:  # noqa: BLE001 - a bug of ours: raised in the loop
+            self._mail.put_mistake(mistake)
+
+    def _is_done(self, job: Job) -> bool:
+        try:
+            self._mail.put(self._ids() if job is None else self._loaded(job))
+        except (PostgresError, StoreError) as error:
+            words = failure(error) if isinstance(error, PostgresError) else str(error)
+            if words is None:
+                raise
+            now = time.monotonic()
+            if now >= self._report_at:
+                self._report_at = now + REPORT
+                self._mail.put(NotKept(f"store {self._address.shown}: {words}"))
+            return False
+        return True
+
+    def _ids(self) -> IdsGranted:
+        lease = GatewayOwnership(self._gateway, self._epoch)
+        session = Session(self._address, purpose=f"gateway {self._gateway} ids")
+        try:
+            lease.resume(session)
+            with session.transaction():
+                lease.fence(session)
+                ((first,),) = session.execute("SELECT next_id FROM meta FOR UPDATE").fetchall()
+                last = min(first + BLOCK - 1, MAX_TASK_ID)
+                session.execute("UPDATE meta SET next_id = ?", (following(last),))
+        except PostgresError as error:
+            raise lease.failure_of(session, error) from error
+        finally:
+            session.close()
+        return IdsGranted(int(first), int(last - first + 1))
+
+    def _loaded(self, vehicles: frozenset[int]) -> VehiclesLoaded:
+        offset = self._wall_offset()
+        with closing(PostgresReader(self._address)) as reader:
+            ((last_write, utc),) = reader.connection.execute(
+                "SELECT last_write, extract(epoch FROM now()) FROM meta"
+            ).fetchall()
+            idle = 0.0 if last_write is None else max(0.0, float(utc) - last_write)
+            restored = read_restored(
+                reader, offset=offset, ended_well=True, idle=idle, vehicles=vehicles
+            )
+        was_running = any(task.state in RUNNING for task in restored.tasks)
+        return VehiclesLoaded(
+            tuple(sorted(vehicles)), replace(restored, ended_well=not was_running)
+        )

@@ -1,0 +1,376 @@
+"""The store that gateways share: fenced by their leases, one order of events for all readers."""
+
+import select
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import pytest
+
+from mav_tasks.errors import StoreError
+from mav_tasks.fleet.member import Evict, Join, Renew, Take
+from mav_tasks.fleet.rivals import Eviction
+from mav_tasks.fleet_io.lease_database import LeaseDatabase
+from mav_tasks.store import Evicted, IdsGranted, Kept, NotKept, Outcome, VehiclesLoaded, Which
+from mav_tasks.store.opening import kind_of
+from mav_tasks.store.postgres import address
+from mav_tasks.store.postgres.failures import PostgresError
+from mav_tasks.store.postgres.fleet_store import FleetStore
+from mav_tasks.tasks.events import Event, QueuePaused, TaskSubmitted, VehicleHalted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.task import MAX_TASK_ID, TaskId
+from tests.kit.postgres import PostgresServer, connected
+from tests.kit.tcp_proxy import TcpProxy
+from tests.unit.store.samples import FOR_EVER, OFFSET, opened, submitted
+from tests.unit.tasks.samples import draft
+
+PATIENCE = 20.0  # s
+Kind = TypeVar("Kind", bound=Outcome)
+
+
+@pytest.fixture
+def url(postgres: PostgresServer) -> str:
+    return postgres.new_database()
+
+
+class Hang:
+    """A lock that writes wait for after their fence."""
+
+    def __init__(self, connection: Any) -> None:
+        self._connection = connection
+
+    def is_waited_for(self) -> bool:
+        query = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'"
+        return bool(self._connection.execute(query).fetchone()[0])
+
+
+@contextmanager
+def hanging(url: str) -> Iterator[Hang]:
+    """Let each write hang, during a block."""
+    with connected(url) as connection, connected(url) as watching:
+        connection.execute("BEGIN")
+        connection.execute("SELECT * FROM meta FOR UPDATE")
+        yield Hang(watching)
+        connection.execute("ROLLBACK")
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+class Gateway:
+    """A lease and the store under it, in this process."""
+
+    def __init__(self, url: str, name: str) -> None:
+        self.name, self.url = name, url
+        self.leases = LeaseDatabase(address.parse(url), name, host="127.0.0.1", port=1)
+        self.outcomes: list[Outcome] = []
+        try:
+            self.join()
+        except BaseException:
+            self.leases.close()
+            raise
+
+    def join(self, replaced: Eviction | None = None) -> None:
+        """Begin a lease, and a store under it."""
+        self.epoch = self.leases.execute(Join(self.name, replaced)).row.epoch
+        assert self.epoch
+        self.open()
+
+    def open(self, url: str | None = None) -> None:
+        self.through = 0
+        self.store = FleetStore(
+            address.parse(url or self.url),
+            self.name,
+            self.epoch,
+            wall_offset=lambda: OFFSET,
+            retention=FOR_EVER,
+        )
+
+    def evict(self, other: "Gateway") -> None:
+        """End the lease of another gateway."""
+        answer = self.leases.execute(Renew(self.name, self.epoch))
+        (row,) = (each for each in answer.row.rivals if each.name == other.name)
+        rival = Eviction(row.name, row.epoch, row.renewals)
+        self.leases.execute(Evict(Renew(self.name, self.epoch), rival))
+
+    def next(self, kind: type[Kind]) -> Kind:
+        """Return the next outcome of a kind."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            for number, outcome in enumerate(self.outcomes):
+                if isinstance(outcome, kind):
+                    del self.outcomes[number]
+                    return outcome
+            assert time.monotonic() < end, f"no {kind.__name__}: {self.outcomes}"
+            fd = self.store.fileno()
+            assert fd is not None
+            select.select([fd], [], [], 0.1)
+            self.outcomes += self.store.take_outcomes()
+
+    def kept(self, through: int) -> None:
+        """Wait until so many events are kept."""
+        while self.through < through:
+            self.through = self.next(Kept).through
+
+    def close(self) -> None:
+        self.store.close()
+        self.leases.close()
+
+
+@contextmanager
+def gateways(url: str, *names: str) -> Iterator[list[Gateway]]:
+    found = [Gateway(url, name) for name in names]
+    try:
+        yield found
+    finally:
+        for each in found:
+            each.close()
+
+
+@contextmanager
+def away(postgres: PostgresServer, *gateways: Gateway) -> Iterator[None]:
+    """Let the database be away during a block."""
+    postgres.stop()
+    yield
+    postgres.start()
+    for each in gateways:
+        each.leases.connect()
+
+
+def of_vehicle(number: int, vehicle: int) -> TaskSubmitted:
+    event = submitted(number)
+    return TaskSubmitted(replace(event.task, vehicle=vehicle), event.at)
+
+
+def test_a_gateway_begins_with_nothing_but_ids(url: str) -> None:
+    with gateways(url, "a", "b") as (a, b):
+        assert (a.store.load().tasks, a.store.load().is_shared) == ((), True)
+        assert a.next(IdsGranted) == IdsGranted(1, 1000)
+        assert b.next(IdsGranted) == IdsGranted(1001, 1000)
+        a.store.append([submitted(number) for number in range(1, 502)])
+        assert a.next(IdsGranted) == IdsGranted(2001, 1000)
+
+
+def test_ids_go_on_at_1_after_the_last(url: str) -> None:
+    with gateways(url, "a") as (a,):
+        a.next(IdsGranted)
+    with connected(url) as connection:
+        connection.execute("UPDATE meta SET next_id = %s", (MAX_TASK_ID - 1,))
+    with gateways(url, "b") as (b,):
+        assert b.next(IdsGranted) == IdsGranted(MAX_TASK_ID - 1, 2)
+        assert b.next(IdsGranted) == IdsGranted(1, 1000)
+
+
+def test_another_gateway_loads_what_one_has_stored_about_a_vehicle(url: str) -> None:
+    registry = TaskRegistry()
+    for vehicle in (1, 2, 1):
+        registry.submit(draft(vehicle=vehicle), now=8.0)
+    registry.change(TaskId(1), S.STARTING, reason=R.NONE, actor="server", now=9.0)
+    registry.change(TaskId(3), S.CANCELLED, reason=R.CANCELLED, actor="client", now=9.0)
+    pauses = [QueuePaused(number, R.OPERATOR, "client", 10.0) for number in (1, 2)]
+    halts = [VehicleHalted(number, 6 + number, R.OPERATOR, "client", 10.0) for number in (1, 2)]
+    events = [*registry.take_events(), *pauses, *halts]
+    with gateways(url, "a", "b") as (a, b):
+        a.store.append(events)
+        a.kept(len(events))
+        b.store.load_vehicles(frozenset({1}))
+        loaded = b.next(VehiclesLoaded)
+        assert loaded.vehicles == (1,)
+        assert loaded.restored.tasks == tuple(t for t in registry.all() if t.vehicle == 1)
+        assert loaded.restored.paused == {1: R.OPERATOR}
+        assert loaded.restored.halt_epochs == {1: 7}
+        assert (loaded.restored.is_shared, loaded.restored.ended_well) == (True, False)
+
+
+def test_of_finished_tasks_only_the_latest_are_loaded(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mav_tasks.store.reading.MOST_OVER", 3)
+    registry = TaskRegistry()
+    for number in range(1, 11):
+        registry.submit(draft(), now=8.0)
+        if number != 2:
+            reason, state = R.CANCELLED, S.CANCELLED
+            registry.change(TaskId(number), state, reason=reason, actor="c", now=8.0 + number)
+    events = registry.take_events()
+    with gateways(url, "a") as (a,):
+        a.store.append(events)
+        a.kept(len(events))
+        a.store.load_vehicles(frozenset({1, 7}))
+        tasks = a.next(VehiclesLoaded).restored.tasks
+        assert [task.id for task in tasks] == [2, 5, 6, 7, 8, 9, 10]
+
+
+def test_after_an_eviction_nothing_is_written_and_it_is_told_once(url: str) -> None:
+    with gateways(url, "a", "b") as (a, b):
+        a.store.append([submitted(1)])
+        a.kept(1)
+        b.evict(a)
+        a.store.append([submitted(2)])
+        assert "gateway a" in a.next(Evicted).text
+        a.store.append([submitted(3)])
+        a.store.load_vehicles(frozenset({1}))
+        began = time.monotonic()
+        a.store.close()
+        assert time.monotonic() - began < 2.5  # it does not try for long
+        assert not [
+            each for each in a.store.take_outcomes() if not isinstance(each, VehiclesLoaded)
+        ]
+        assert ids_in(url) == [1]
+
+
+def stop(vehicle: int) -> Sequence[Event]:
+    """Return the events of a STOP."""
+    pause = QueuePaused(vehicle, R.STOPPED, "client", 100.0)
+    return [VehicleHalted(vehicle, 5, R.STOPPED, "client", 100.0), pause]
+
+
+def ids_in(url: str) -> list[int]:
+    with connected(url) as connection:
+        return [row[0] for row in connection.execute("SELECT id FROM tasks ORDER BY number")]
+
+
+def test_a_write_in_flight_is_over_before_an_eviction_ends(url: str) -> None:
+    """Either the eviction waits for the write, or the write fails: never both in between."""
+    with gateways(url, "a", "b") as (a, b):
+        done = threading.Event()
+
+        def evict() -> None:
+            while not done.is_set():
+                try:
+                    b.evict(a)
+                    done.set()
+                except PostgresError:  # it gives up waiting, and tries again
+                    b.leases.connect()
+
+        thread = threading.Thread(target=evict)
+        with hanging(url) as hang:
+            a.store.append([submitted(1)])
+            until(hang.is_waited_for)
+            renewed = a.leases.execute(Renew("a", a.epoch))  # is not kept waiting by the write
+            assert renewed.row.epoch == a.epoch
+            thread.start()
+            assert not done.wait(0.5)
+        assert done.wait(PATIENCE)
+        thread.join()
+        a.kept(1)
+        a.store.append([submitted(2)])
+        a.next(Evicted)
+        assert ids_in(url) == [1]
+
+
+def test_a_reader_follows_several_writers_without_a_gap(url: str) -> None:
+    """A number that is committed later than a higher one would be missed for ever."""
+    count, each = 400, ("a", "b", "c")
+    with gateways(url, *each) as found:
+        journal = kind_of(url).open_journal(url, Which())
+        seen: list[int] = []
+        threads = []
+        for place, it in enumerate(found):
+
+            def write(it: Gateway = it, first: int = 10_000 * (place + 1)) -> None:
+                for number in range(count):
+                    it.store.append([of_vehicle(first + number, 1)])
+                    if number % 7 == 0:
+                        it.kept(number + 1)
+                it.kept(count)
+
+            threads.append(threading.Thread(target=write))
+        for thread in threads:
+            thread.start()
+        with closing(journal):
+            while any(thread.is_alive() for thread in threads):
+                seen += [number for number, _ in journal.take(offset=OFFSET)]
+            seen += [number for number, _ in journal.take(offset=OFFSET)]
+        for thread in threads:
+            thread.join()
+        assert seen == list(range(1, 3 * count + 1))
+
+
+def test_a_restart_of_the_database_loses_and_doubles_nothing(
+    postgres: PostgresServer, url: str
+) -> None:
+    with gateways(url, "a", "b") as (a, b):
+        for it, first in ((a, 1), (b, 1001)):
+            it.store.append([submitted(first + number) for number in range(100)])
+        postgres.kill()
+        for it, first in ((a, 101), (b, 1101)):
+            it.store.append([submitted(first + number) for number in range(100)])
+            it.next(NotKept)
+        postgres.start()
+        a.kept(200)
+        b.kept(200)
+        wanted = [*range(1, 201), *range(1001, 1201)]
+        assert sorted(ids_in(url)) == wanted
+
+
+def test_a_commit_whose_answer_was_lost_is_not_made_twice(
+    postgres: PostgresServer, url: str
+) -> None:
+    with gateways(url, "a") as (a,), closing(TcpProxy(postgres.port)) as proxy:
+        a.store.close()
+        a.open(f"postgresql://postgres@127.0.0.1:{proxy.port}/{url.rpartition('/')[2]}")
+        a.store.append([submitted(1)])
+        a.kept(1)
+        with hanging(url) as hang:
+            a.store.append([submitted(2)])
+            until(hang.is_waited_for)
+            proxy.fall_silent()
+        until(lambda: ids_in(url) == [1, 2])
+        a.kept(2)
+        a.store.append([submitted(3)])
+        a.kept(3)
+        assert ids_in(url) == [1, 2, 3]
+
+
+def test_one_server_and_gateways_exclude_each_other(url: str) -> None:
+    with opened(url), pytest.raises(StoreError, match="in use by the server on"):
+        Gateway(url, "a")
+    with connected(url) as connection:
+        connection.execute("UPDATE gateways SET epoch = 0")
+    with (
+        gateways(url, "b", "c"),
+        pytest.raises(StoreError, match="in use by a fleet: gateway b, gateway c"),
+        opened(url),
+    ):
+        pass
+
+
+def test_a_stop_that_only_the_local_record_has_is_in_force_after_the_next_start(
+    postgres: PostgresServer, url: str
+) -> None:
+    with gateways(url, "a", "b") as (a, b):
+        b.store.append([VehicleHalted(2, 9, R.OPERATOR, "c", 100.0)])  # it is newer than the STOP
+        b.kept(1)
+        with away(postgres, a, b):
+            a.store.append([*stop(1), *stop(2)])
+            a.store.close()
+        b.evict(a)
+        a.join()
+        a.store.load_vehicles(frozenset({1, 2}))
+        restored = a.next(VehiclesLoaded).restored
+        assert restored.paused == {1: R.STOPPED}
+        assert restored.halt_epochs == {1: 5, 2: 9}
+
+
+def test_a_stop_of_a_vehicle_that_another_gateway_has_now_stays_local(
+    postgres: PostgresServer, url: str
+) -> None:
+    with gateways(url, "a", "b") as (a, b):
+        with away(postgres, a, b):
+            a.store.append(stop(1))
+            a.store.close()
+        b.evict(a)
+        b.leases.execute(Take(Renew("b", b.epoch), frozenset({1})))
+        a.join()
+        a.store.load_vehicles(frozenset({1}))
+        assert a.next(VehiclesLoaded).restored.paused == {}
