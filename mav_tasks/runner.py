@@ -10,7 +10,7 @@ import logging
 import os
 import signal
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from typing import Protocol
 
@@ -53,6 +53,8 @@ WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
 HANGUP = 0.2  # s after SIGHUP, when the runner checks whether the terminal is gone
 
 EXIT_FAILED = 70  # EX_SOFTWARE: the engine itself failed
+EVICTED = -1  # no exit code: the fleet has ended this gateway's lease, and serving begins again
+HEAR = 0.1  # s between two reports to the fleet of the vehicles that are heard
 
 
 #: the default of a link without a policy
@@ -111,6 +113,23 @@ class Keys(Protocol):
         """Stop reporting changes."""
 
 
+class Lease(Protocol):
+    """The interface of ``gateway``: the lease of a gateway of a fleet."""
+
+    #: whether the fleet has ended it: another gateway may have the vehicles
+    is_over: bool
+
+    def fileno(self) -> int | None:
+        """Return the descriptor that is readable while ``take`` has something."""
+
+    def take(self) -> Iterable[Input]:
+        """Return what has changed."""
+        ...
+
+    def hear(self, vehicles: frozenset[int]) -> None:
+        """Take which vehicles are heard."""
+
+
 class Runner:
     """Runs an engine on real links until a signal ends it."""
 
@@ -125,9 +144,14 @@ class Runner:
         reload: Reload | None = None,
         policies: Mapping[str, LinkPolicy] | None = None,
         keys: Keys | None = None,
+        lease: Lease | None = None,
         clock: Callable[[], float] = boot_time,
     ) -> None:
-        """``policies``: by link name. A link without a policy accepts unsigned packets."""
+        """``policies``: by link name. A link without a policy accepts unsigned packets.
+
+        ``lease``: of a gateway of a fleet; None: all vehicles are this server's.
+        """
+        self._lease = lease
         self._clock = clock
         self._reload = reload
         self._policies = policies or {}
@@ -158,7 +182,7 @@ class Runner:
         return self._ran_at
 
     async def run(self) -> int:
-        """Serve until SIGINT or SIGTERM; return the exit code."""
+        """Serve until SIGINT or SIGTERM; return the exit code, or EVICTED."""
         self._loop = asyncio.get_running_loop()
         self._over = self._loop.create_future()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -174,6 +198,9 @@ class Runner:
                 self._loop.add_reader(link.fileno(), self._on_readable, self._reader)
             if self._store_fd is not None:
                 self._loop.add_reader(self._store_fd, self._on_stored)
+            if self._lease is not None and (lease_fd := self._lease.fileno()) is not None:
+                self._loop.add_reader(lease_fd, self._on_lease, self._lease)
+                self._hear(self._lease, self._loop)
             self._tend(self._loop)
             if self._reload is not None:
                 self._loop.add_signal_handler(signal.SIGHUP, self._on_hangup, self._reload)
@@ -183,6 +210,8 @@ class Runner:
         finally:
             if self._store_fd is not None:
                 self._loop.remove_reader(self._store_fd)
+            if self._lease is not None and (lease_fd := self._lease.fileno()) is not None:
+                self._loop.remove_reader(lease_fd)
             for link, _ in self._sides:
                 self._loop.remove_reader(link.fileno())
                 link.close()
@@ -258,6 +287,25 @@ class Runner:
             link.poll()
             self._note(link, link.take_changes())
 
+    def _hear(self, lease: Lease, loop: asyncio.AbstractEventLoop) -> None:
+        """Report to the fleet which vehicles are heard, again and again."""
+        if self._over is None or self._over.done():
+            return
+        loop.call_later(HEAR, self._hear, lease, loop)
+        lease.hear(self._pump.engine.heard(now=self._clock()))
+
+    def _on_lease(self, lease: Lease) -> None:
+        self._wake()
+        try:
+            news = tuple(lease.take())
+        except Exception as mistake:  # noqa: BLE001 - a bug of its thread
+            self._fail(mistake)
+            return
+        for item in news:
+            self._guarded(item)
+        if lease.is_over:
+            self._finish(EVICTED)
+
     def _on_stored(self) -> None:
         self._wake()
         self._guarded(None)
@@ -329,10 +377,14 @@ class Runner:
             return
         try:
             self._turn(item)
-        except Exception:  # a bug of ours must not let a vehicle drive on
-            self._pump.send_last_words()  # first: a traceback reads files, from a slow disk perhaps
-            log.critical("internal error: stopping every vehicle and ending", exc_info=True)
-            self._finish(EXIT_FAILED)
+        except Exception as mistake:  # noqa: BLE001 - a bug must not let a vehicle drive on
+            self._fail(mistake)
+
+    def _fail(self, mistake: Exception) -> None:
+        """Stop the vehicles and end, because of a bug of ours."""
+        self._pump.send_last_words()  # first: a traceback reads files, from a slow disk perhaps
+        log.critical("internal error: stopping every vehicle and ending", exc_info=mistake)
+        self._finish(EXIT_FAILED)
 
     def _turn(self, item: Input | None) -> None:
         assert self._loop is not None
@@ -346,8 +398,8 @@ class Runner:
         else:
             self._pump.handle(item, now=now)
         self._pump.turn(now=now)
-        if self._pump.is_over:
-            self._finish(0)
+        if self._pump.is_over or self._pump.is_evicted:
+            self._finish(EVICTED if self._pump.is_evicted else 0)
             return
         self._rearm(self._loop)
 

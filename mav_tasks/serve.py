@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from mav_tasks.clock import boot_time
 from mav_tasks.config.reload import Reload
 from mav_tasks.engine.engine import Engine
+from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
 from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.link_keys import check_keys, in_words
@@ -31,14 +32,19 @@ from mav_tasks.logs.vehicle_texts import VehicleTexts
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
 from mav_tasks.recording.decisions import project_version
-from mav_tasks.runner import Runner
+from mav_tasks.runner import EVICTED, Runner
 from mav_tasks.settings import Links, Metrics, ServerSettings
 from mav_tasks.store import Store
 from mav_tasks.store.latest import note_latest
-from mav_tasks.store.opening import open_store
+from mav_tasks.store.opening import kind_of, open_store
 from mav_tasks.tasks.restored import Restored
 
+log = logging.getLogger("mav_tasks")
+
+AGAIN = 1.0  # s between two attempts to reach the fleet's database
+
 if TYPE_CHECKING:
+    from mav_tasks.gateway import Gateway
     from mav_tasks.metrics.endpoint import Endpoint
 
 
@@ -47,6 +53,15 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
 
     With ``reload``, SIGHUP reads the configuration again.
     """
+    while (code := _serve(settings, reload)) == EVICTED:
+        log.warning("gateway %s begins again, without rovers", settings.gateway.name)
+        while not _is_reachable(settings):
+            time.sleep(AGAIN)
+    return code
+
+
+def _serve(settings: ServerSettings, reload: Reload | None) -> int:
+    """Run a server until a signal, or until its fleet has ended its lease (EVICTED)."""
     links = settings.links
     for _, fault in faults_of(links):
         raise fault
@@ -70,7 +85,12 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             _open(opened, link.url, TO_VEHICLES) for link in asked if link.side == "vehicles"
         ]
         gc.disable()  # many tasks are loaded: each collection would scan them
-        store = open_store(settings.store, settings.engine.retention)
+        gateway = _join(settings)
+        if gateway is None:
+            store = open_store(settings.store, settings.engine.retention)
+        else:
+            opened.callback(gateway.close)
+            store = gateway.store
         opened.callback(store.close)
         note_latest(store.place)
         restored = store.load()
@@ -90,15 +110,52 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
             say("links.push not used: no link for clients is UDP")
         if metrics is not None:
             say(f"metrics on http://{settings.metrics.listen}/metrics")
-        say(f"store {store.name}, {len(restored.tasks) if restored else 0} tasks")
+        if gateway is None:
+            say(f"store {store.name}, {len(restored.tasks) if restored else 0} tasks")
+        else:
+            say(f"store {store.name}, as gateway {gateway.name} of its fleet")
         if restored is not None and restored.parameters:
             values = sorted(restored.parameters.items())
             told = ", ".join(f"{name} {value:g}" for name, value in values)
             say(f"parameters of an earlier run: {told}")
         running = _run(
-            settings, store, restored, client_links, vehicle_links, reload, keys, say, metrics
+            settings,
+            store,
+            restored,
+            client_links,
+            vehicle_links,
+            reload,
+            keys,
+            say,
+            metrics,
+            gateway,
         )
         return asyncio.run(running)
+
+
+def _join(settings: ServerSettings) -> "Gateway | None":
+    """Join the fleet, if the settings name a gateway; raise StoreError."""
+    if not settings.gateway.name:
+        return None
+    if not settings.store.startswith(("postgresql://", "postgres://")):
+        raise UsageError(
+            f"--gateway {settings.gateway.name} needs --store postgresql://USER@HOST/DATABASE:"
+            " the gateways of a fleet share it"
+        )
+    kind_of(settings.store)  # explains a missing package
+    from mav_tasks.gateway import Gateway  # noqa: PLC0415  # needs an extra
+
+    return Gateway(settings.store, settings.gateway, settings.engine.retention)
+
+
+def _is_reachable(settings: ServerSettings) -> bool:
+    """Return whether the fleet's database answers; log why not."""
+    try:
+        kind_of(settings.store).read_parameters(settings.store)
+    except StoreError as error:
+        log.error("%s", error)  # one line, no traceback
+        return False
+    return True
 
 
 def _leave_before_serving(_number: int, _frame: object) -> None:
@@ -158,6 +215,7 @@ async def _run(
     keys: RingWatch,
     say: Callable[[str], None],
     metrics: "Endpoint | None",
+    gateway: "Gateway | None",
 ) -> int:
     now = boot_time()
     engine = Engine(settings.engine, now=now, restored=restored)
@@ -190,6 +248,7 @@ async def _run(
         observers=listeners,
         policies={str(link.url): link.policy for link in links_of(settings.links)},
         keys=keys,
+        lease=gateway,
     )
     return await runner.run()
 

@@ -698,6 +698,27 @@ class Log:
 
 
 @dataclass(frozen=True, slots=True)
+class Gateway:
+    """A server that shares rovers and store with others."""
+
+    name: str = setting(
+        "",
+        Text('a name of this server in its fleet, "" for a server that shares nothing'),
+        "name of this gateway of a fleet; the fleet's store is a PostgreSQL database",
+        key="fleet.gateway",
+        is_live=False,
+        options=(Option("--gateway", "NAME"),),
+    )
+    address: str = setting(
+        "",
+        Text('an IP address, "" for the one from which the database is reached'),
+        "IP address at which the other gateways of the fleet reach this machine",
+        key="fleet.address",
+        is_live=False,
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class ServerSettings:
     """All settings of one server process: links, store, engine, recordings, metrics and log."""
 
@@ -714,6 +735,7 @@ class ServerSettings:
         variable="MAV_TASKS_STORE",  # older than the rule for names of variables
         options=(Option("--store", "PATH|URL|:memory:"),),
     )
+    gateway: Gateway = field(default_factory=Gateway)
     engine: Settings = field(default_factory=Settings)
     profiles: str = setting(
         "",
@@ -730,6 +752,7 @@ class ServerSettings:
 TABLES = (
     "links",
     "store",
+    "fleet",
     "signing",
     "roles",
     "vehicles",

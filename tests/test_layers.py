@@ -169,8 +169,20 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
+    "mav_tasks.gateway": frozenset(
+        {
+            "mav_tasks.clock",
+            "mav_tasks.engine",
+            "mav_tasks.fleet",
+            "mav_tasks.fleet_io",
+            "mav_tasks.store",
+            "mav_tasks.settings",
+            "mav_tasks.errors",
+        }
+    ),
     "mav_tasks.serve": frozenset(
         {
+            "mav_tasks.gateway",
             "mav_tasks.clock",
             "mav_tasks.config",
             "mav_tasks.key_ring",

@@ -38,13 +38,17 @@ class Trouble:
     words: str | None
 
 
-News = Change | Trouble
+News = Change | Trouble | Permit
+
+
+def _both_permits(earlier: News, later: News) -> bool:
+    return isinstance(earlier, Permit) and isinstance(later, Permit)
 
 
 class Keeper:
     """A gateway's lease. ``take`` returns what has changed, once ``fileno`` is readable.
 
-    It begins to hold vehicles after ``hear``.
+    Each renewal is a new Permit. It begins to hold vehicles after ``hear``.
     """
 
     def __init__(
@@ -78,7 +82,7 @@ class Keeper:
             self._selector.close()
             raise
         self._peers.begin(database.secret)
-        self._news: Mailbox[News] = Mailbox()
+        self._news: Mailbox[News] = Mailbox(replaces=_both_permits)
         self._results: Mailbox[Result] = Mailbox()
         self._asker = Asker(database, self._results)
         self._asked: tuple[Request, float] | None = None  # and when
@@ -209,6 +213,8 @@ class Keeper:
 
     def _tell(self, change: Change) -> None:
         """Publish what the lease permits now, and what has changed."""
-        self._permit = self._member.lease.permit()
+        before, self._permit = self._permit, self._member.lease.permit()
+        if self._permit != before:
+            self._news.put(self._permit)
         if change != Change():
             self._news.put(change)

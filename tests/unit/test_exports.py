@@ -96,6 +96,7 @@ def test_every_setting_is_known_by_name() -> None:
             "acceptance_radius",
             "turning_radius",
         ],
+        "Gateway": ["name", "address"],
         "Identity": ["system_id", "component_id"],
         "Limits": ["tasks", "max_priority", "max_speed", "quota", "rate"],
         "Links": ["clients", "push", "vehicles", "insecure", "keys", "unsigned"],
@@ -115,6 +116,7 @@ def test_every_setting_is_known_by_name() -> None:
         "ServerSettings": [
             "links",
             "store",
+            "gateway",
             "engine",
             "profiles",
             "recording",

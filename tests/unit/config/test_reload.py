@@ -223,7 +223,9 @@ def test_links_store_identity_recordings_and_metrics_are_as_they_were_at_the_sta
         *(
             name
             for name in KEYS
-            if name.startswith(("links.", "store.", "identity.", "recording.", "metrics."))
+            if name.startswith(
+                ("links.", "store.", "identity.", "recording.", "metrics.", "fleet.")
+            )
         ),
         *("rules.arming", "rules.yaw_rate", "watch.setpoint_period", "log.format"),
         *("signing.keys", "signing.unsigned"),

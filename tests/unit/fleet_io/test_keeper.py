@@ -1,15 +1,16 @@
 """The thread that keeps a lease, on a real database: what it permits, and what it tells."""
 
 import select
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
 import pytest
 
 from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
+from mav_tasks.fleet.lease import Permit
 from mav_tasks.fleet.member import Change
-from mav_tasks.fleet.standing import Effect
+from mav_tasks.fleet.standing import Effect, Standing
 from mav_tasks.fleet_io.keeper import Keeper, News, Trouble
 from mav_tasks.store.postgres.address import parse
 from tests.kit.postgres import PostgresServer
@@ -28,22 +29,42 @@ def kept(url: str, name: str, heard: frozenset[int] = BOTH) -> Iterator[Keeper]:
 
 def told(it: Keeper, *wanted: News) -> list[News]:
     """Wait for news by their descriptor until all the wanted ones came; return all."""
+    return news_until(it, lambda found: all(each in found for each in wanted))
+
+
+def news_until(it: Keeper, is_enough: Callable[[list[News]], bool]) -> list[News]:
+    """Wait for news by their descriptor until these are enough; return all."""
     found: list[News] = []
-    while any(each not in found for each in wanted):
+    while not is_enough(found):
         fileno = it.fileno()
         assert fileno is not None
         readable, _, _ = select.select([fileno], [], [], LIMIT)
-        assert readable, f"{wanted} within {LIMIT} s, not only {found}"
+        assert readable, f"only {found} within {LIMIT} s"
         found += it.take()
     return found
 
 
 def test_it_takes_what_it_hears_and_tells_so(postgres: PostgresServer) -> None:
     with kept(postgres.new_database(), "a") as it:
-        assert told(it, Change(got=BOTH)) == [Change(got=BOTH)]
+        news = told(it, Change(got=BOTH))
+        assert [each for each in news if not isinstance(each, Permit)] == [Change(got=BOTH)]
         assert [vehicle for vehicle in range(4) if it.may_move(vehicle)] == [1, 2]
         assert it.may_stop(1)
         assert it.epoch == 1
+
+
+def test_each_renewal_is_a_new_permit(postgres: PostgresServer) -> None:
+    with kept(postgres.new_database(), "a") as it:
+        news = news_until(it, lambda found: len(permits(found)) > 3)
+        until = [each.trusted_until for each in permits(news)]
+        assert until == sorted(until)
+        assert until[0] < until[-1]
+
+
+def permits(news: list[News]) -> list[Permit]:
+    """Return those of a holder."""
+    found = [each for each in news if isinstance(each, Permit)]
+    return [each for each in found if each.standing is Standing.HOLDER]
 
 
 def test_another_one_has_the_vehicles_after_an_end_in_order(postgres: PostgresServer) -> None:

@@ -1,0 +1,122 @@
+"""This server as a gateway of a fleet: its lease, and its part of the fleet's store.
+
+Both last for one lease. When the fleet has ended that, ``serve`` begins again with nothing.
+"""
+
+import logging
+import select
+import time
+from collections.abc import Iterator
+from math import inf
+
+from mav_tasks.clock import boot_time
+from mav_tasks.engine.inputs import LeaseChanged
+from mav_tasks.errors import StoreError
+from mav_tasks.fleet.lease import Permit
+from mav_tasks.fleet.member import Change
+from mav_tasks.fleet.standing import MAY_STOP, Effect, Standing
+from mav_tasks.fleet_io.keeper import Keeper, Trouble
+from mav_tasks.fleet_io.own_address import own_address
+from mav_tasks.settings import Gateway as GatewaySettings
+from mav_tasks.settings import Retention
+from mav_tasks.store.postgres.address import parse
+from mav_tasks.store.postgres.fleet_store import FleetStore
+
+log = logging.getLogger("mav_tasks")
+
+JOIN_LIMIT = 10.0  # s; a lease of an earlier process with this name ends within two
+
+
+class Gateway:
+    """A lease and the store under it; ``take`` returns what the engine must know of the lease."""
+
+    def __init__(self, place: str, settings: GatewaySettings, retention: Retention) -> None:
+        """Join the fleet whose database ``place`` names; raise StoreError if that fails."""
+        where = parse(place)
+        host = settings.address or own_address(where)
+        self.name = settings.name
+        self._keeper = Keeper(where, settings.name, host=host)
+        try:
+            self._await_lease()
+            self.store = FleetStore(
+                where,
+                settings.name,
+                self._keeper.epoch,
+                wall_offset=lambda: time.time() - boot_time(),
+                retention=retention,
+            )
+        except BaseException:
+            self._keeper.close()
+            raise
+        #: whether the fleet has ended this lease
+        self.is_over = False
+
+    def __repr__(self) -> str:
+        return f"Gateway({self._keeper!r})"
+
+    def fileno(self) -> int | None:
+        """Return the descriptor that is readable while ``take`` has something."""
+        return self._keeper.fileno()
+
+    def hear(self, vehicles: frozenset[int]) -> None:
+        """Take which vehicles are heard: the gateway gets those that no other one has."""
+        self._keeper.hear(vehicles)
+
+    def take(self) -> Iterator[LeaseChanged]:
+        """Yield the changes of the lease, and ask for the data of vehicles that it has got."""
+        for news in self._keeper.take():
+            match news:
+                case Permit():
+                    yield _changed(news)
+                case Change(effects=effects, got=got):
+                    if got:
+                        log.info("gateway %s has got %s", self.name, _named(got))
+                        self.store.load_vehicles(got)
+                    self._tell(effects)
+                case Trouble(words=None):
+                    log.warning("gateway %s reaches the fleet's database again", self.name)
+                case Trouble(words=words):
+                    log.error("gateway %s: the fleet's database: %s", self.name, words)
+
+    def close(self) -> None:
+        """Leave the fleet; close the store before."""
+        self._keeper.close()
+
+    def _tell(self, effects: tuple[Effect, ...]) -> None:
+        if Effect.STOP in effects:
+            log.error(
+                "gateway %s cannot renew its lease: its rovers are stopped, and another gateway"
+                " may get them",
+                self.name,
+            )
+        if Effect.RESUME in effects:
+            log.warning("gateway %s has renewed its lease: its tasks go on", self.name)
+        if Effect.DROP in effects:
+            self.is_over = True
+
+    def _await_lease(self) -> None:
+        end = time.monotonic() + JOIN_LIMIT
+        while not self._keeper.epoch:
+            fd = self._keeper.fileno()
+            left = end - time.monotonic()
+            if fd is None or left <= 0:
+                raise StoreError(
+                    f"gateway {self.name}: no lease within {JOIN_LIMIT:.0f} s; the database does"
+                    " not answer, or another process has the name"
+                )
+            select.select([fd], [], [], left)
+            for news in self._keeper.take():
+                if isinstance(news, Trouble) and news.words is not None:
+                    raise StoreError(f"gateway {self.name}: the fleet's database: {news.words}")
+
+
+def _changed(permit: Permit) -> LeaseChanged:
+    is_holder, may_stop = permit.standing is Standing.HOLDER, permit.standing in MAY_STOP
+    return LeaseChanged(
+        permit.trusted_until if is_holder else -inf, permit.term_end if may_stop else -inf
+    )
+
+
+def _named(vehicles: frozenset[int]) -> str:
+    names = ", ".join(map(str, sorted(vehicles)))
+    return f"rover {names}" if len(vehicles) == 1 else f"rovers {names}"
