@@ -49,6 +49,9 @@ COMMANDS = {
     "createuser rover": "tests/e2e/test_postgres.py",
     "createdb --owner=rover fleet": "tests/e2e/test_postgres.py",
     "mav-tasks serve --store postgresql://rover@localhost/fleet": "tests/e2e/test_postgres.py",
+    "mav-tasks serve --gateway north --store postgresql://rover@localhost/fleet": (
+        "tests/e2e/test_gateways.py"
+    ),
     "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
 }
 
