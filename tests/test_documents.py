@@ -50,7 +50,7 @@ COMMANDS = {
     "createdb --owner=rover fleet": "tests/e2e/test_postgres.py",
     "mav-tasks serve --store postgresql://rover@localhost/fleet": "tests/e2e/test_postgres.py",
     "mav-tasks serve --gateway north --store postgresql://rover@localhost/fleet": (
-        "tests/e2e/test_gateways.py"
+        "tests/e2e/test_postgres.py"
     ),
     "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580": "tests/sim/test_check_vehicle.py",
 }

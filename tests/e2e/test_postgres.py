@@ -153,12 +153,18 @@ def test_a_database_that_is_made_as_the_guide_says_serves(
     for command in ("createuser rover", "createdb --owner=rover fleet"):
         postgres.run(*command.split(), **create)
     client, vehicle = free_udp_ports(2)
-    command = "serve --store postgresql://rover@localhost/fleet"
     options = ["--no-push", "--client", f"udpin:127.0.0.1:{client}"]
     options += ["--vehicle", f"udpout:127.0.0.1:{vehicle}"]
-    with process(
-        "-m", "mav_tasks.cli", *command.split(), *options, folder=tmp_path, name="serve"
-    ) as server:
-        server.wait_for("store postgresql://rover@localhost/fleet, 0 tasks")
-        server.end()
-        assert server.popen.returncode == 0
+    for command, says in (
+        ("serve --store postgresql://rover@localhost/fleet", "0 tasks"),
+        (
+            "serve --gateway north --store postgresql://rover@localhost/fleet",
+            "as gateway north of its fleet",
+        ),
+    ):
+        with process(
+            "-m", "mav_tasks.cli", *command.split(), *options, folder=tmp_path, name=says
+        ) as server:
+            server.wait_for(f"store postgresql://rover@localhost/fleet, {says}")
+            server.end()
+            assert server.popen.returncode == 0
