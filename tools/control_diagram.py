@@ -61,7 +61,7 @@ def edges() -> dict[tuple[Queue, Queue], list[Event]]:
         make_of: dict[str, Any] = {**MAKES[make]}
         state = State(queue, grip, work, armed=True, **make_of)
         for event in Event:
-            if event is not Event.CLOSE and not can_happen(event, state):
+            if event not in (Event.CLOSE, Event.LEAVE) and not can_happen(event, state):
                 continue
             for each in variants(event, state):
                 for there in happens(event, each):

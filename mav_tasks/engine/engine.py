@@ -342,8 +342,7 @@ class Engine:
         self._submissions.close()
         self._stop_by = now + self._settings.watch.shutdown
         self._stopping.set(self._stop_by)
-        for vehicle in self._vehicles.addressed_by(0):
-            vehicle.joint.shut_down(now=now)
+        self._vehicles.shut_down(now=now)
 
     def _note_stopped(self, *, now: float) -> None:
         assert self._stop_by is not None

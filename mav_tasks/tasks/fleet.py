@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, QueuePaused
 from mav_tasks.tasks.halts import WORDS, LastHalt
-from mav_tasks.tasks.lifecycle import ACTIVE, RUNNING, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import ACTIVE, LOSSES, RUNNING, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
@@ -78,15 +78,25 @@ class Fleet:
     def take_over(self, restored: Restored, *, now: float) -> None:
         """Load vehicles that this gateway has got: what waits goes on, also if another one failed.
 
-        The task that ran is held, or resumes by itself, as the settings say.
+        The task that ran, or that waited for a link or a lease, is held, or resumes by itself, as
+        the settings say.
         """
         interrupted = S.PAUSED if self._settings.on_takeover == "resume" else S.HELD
-        self._load(restored, interrupted, is_unclean=False, now=now)
+        self._load(restored, interrupted, is_unclean=False, is_elsewhere=True, now=now)
 
     def _load(
-        self, restored: Restored, interrupted: TaskState, *, is_unclean: bool, now: float
+        self,
+        restored: Restored,
+        interrupted: TaskState,
+        *,
+        is_unclean: bool,
+        is_elsewhere: bool = False,
+        now: float,
     ) -> None:
-        """Load vehicles and their tasks; those that ran get the state ``interrupted``."""
+        """Load vehicles and their tasks; those that ran get the state ``interrupted``.
+
+        ``is_elsewhere``: another gateway had them.
+        """
         self.room.set_wall_offset(restored.wall_offset, now=now)
         self._registry.restore(restored.tasks)
         active: dict[int, list[Task]] = {}
@@ -95,6 +105,7 @@ class Fleet:
         for task in restored.tasks:
             if task.state in RUNNING:
                 self._was_driven.add(task.vehicle)
+            if task.state in RUNNING or (is_elsewhere and task.reason in LOSSES):
                 task = self._interrupted(task, interrupted, now=now)
                 if task.state is S.PAUSED:
                     resuming.add(task.id)
@@ -132,6 +143,8 @@ class Fleet:
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)
 
     def _interrupted(self, task: Task, state: TaskState, *, now: float) -> Task:
+        if task.state is state:
+            return task
         if task.state is S.CANCELLING or state is S.HELD:
             state, reason = S.HELD, R.OUTCOME_UNKNOWN
         else:

@@ -175,3 +175,24 @@ def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
         fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=40)
         assert abs(fleet.world.truth.north - 5.0) < 0.1
     fleet.world.check()
+
+
+@pytest.mark.parametrize("on_takeover", ["hold", "resume"])
+def test_a_gateway_that_ends_hands_its_rover_and_tasks_over(
+    tmp_path: Path, on_takeover: str
+) -> None:
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover=on_takeover))
+    ran, waits = fleet.submit(5.0), fleet.submit(0.5)
+    fleet.drives(ran)
+    fleet.world.end(fleet.first.name)
+    assert fleet.world.holder() is fleet.other
+    assert fleet.world.stands()
+    if on_takeover == "hold":
+        fleet.world.run(3.0)
+        assert fleet.task(ran).state is S.HELD
+        fleet.world.run(2.0)
+        fleet.clients[fleet.other.name].command(RELEASE, ran, REMAINDER)
+    fleet.world.until(lambda: fleet.task(waits).state is S.COMPLETED, within=60)
+    assert fleet.task(ran).state is S.COMPLETED
+    assert abs(fleet.world.truth.north - 5.5) < 0.1
+    fleet.world.check()

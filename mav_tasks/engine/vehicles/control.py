@@ -29,6 +29,7 @@ class Event(Enum):
     OPERATOR_LOST = auto()
     LEASE_ENDS = auto()  # another gateway may soon have it
     CLOSE = auto()  # the server shuts down
+    LEAVE = auto()  # the same for a gateway of a fleet, after LEASE_ENDS: its tasks go on elsewhere
     # observations that halt it
     TAKEN = auto()  # somebody else has it, in whatever way
     MODE = auto()  # it shows a mode that we did not ask for
@@ -205,6 +206,8 @@ TABLE = (
     _row(_E.CLOSE, grip=Grip.FREE),
     _row(_E.CLOSE, _F.PAUSE, _F.BRAKE, work=HAS_IT),
     _row(_E.CLOSE, _F.BRAKE),
+    _row(_E.LEAVE, grip=Grip.FREE),
+    _row(_E.LEAVE, _F.BRAKE),
     # observations that halt it
     _row(_E.TAKEN, _F.COUNT, queue=Queue.STOPPED),
     _row(_E.TAKEN, *TAKES, work=GOES_ON),  # also a task that runs although the queue is paused

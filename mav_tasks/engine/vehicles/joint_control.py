@@ -126,6 +126,14 @@ class JointControl:
         self._stops_task = active is not None and active.state in RUNNING
         self.on(Event.CLOSE, Word(), now=now)
 
+    def leave(self, *, now: float) -> None:
+        """Stop what we drive: this gateway leaves its fleet, and another one goes on with it."""
+        active = self._parts.tasks.active
+        self._stops_task = active is not None and active.state in RUNNING
+        self.on(Event.LEASE_ENDS, Word(), now=now)
+        self._pilot.close()
+        self.on(Event.LEAVE, Word(), now=now)
+
     def note_rest(self, *, now: float) -> None:
         """Store where the interrupted task has come to rest: the server ends now."""
         if self._stops_task:

@@ -20,8 +20,10 @@ class LeaseWatch:
         """``is_shared``: the vehicles are a fleet's, so that nothing is permitted yet."""
         self._on_change = on_change
         self._timer = timers.timer(Turn.LINKS, self._end)
+        self.is_shared = is_shared
         #: whether vehicles may be moved
         self.is_trusted = not is_shared
+        self._is_leaving = False
         #: of all packets to vehicles
         self.fence = Fence()
         #: until when packets that stop vehicles may leave, s
@@ -34,12 +36,20 @@ class LeaseWatch:
 
     def change(self, lease: LeaseChanged, *, now: float) -> None:
         """Take a new or renewed lease, or one that has ended."""
-        was_trusted, self.is_trusted = self.is_trusted, now < lease.move_until
-        self.stop_until, self.fence.relays_until = lease.stop_until, lease.move_until
+        was_trusted = self.is_trusted
+        self.is_trusted = now < lease.move_until and not self._is_leaving
+        self.stop_until = lease.stop_until
+        self.fence.relays_until = -inf if self._is_leaving else lease.move_until
         self.fence.until = lease.move_until if self.is_trusted else lease.stop_until
         self._timer.set(lease.move_until if self.is_trusted else inf)
         if was_trusted is not self.is_trusted:
             self._on_change(now=now)
+
+    def leave(self) -> None:
+        """Only stop the vehicles from here on: this gateway leaves the fleet."""
+        self._is_leaving, self.is_trusted = True, False
+        self.fence.until, self.fence.relays_until = self.stop_until, -inf
+        self._timer.set(inf)
 
     def _end(self, *, now: float) -> None:
         """Only stop the vehicles from here on: the lease was not renewed in time."""

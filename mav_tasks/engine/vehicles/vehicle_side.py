@@ -222,6 +222,16 @@ class VehicleSide:
             else:
                 vehicle.joint.on(Event.PAUSE_TASKS, Word(), now=now)
 
+    def shut_down(self, *, now: float) -> None:
+        """Stop what we drive: the server ends. In a fleet, other gateways get the vehicles."""
+        if self.lease.is_shared:
+            self.lease.leave()
+        for vehicle in self.addressed_by(0):
+            if self.lease.is_shared:
+                vehicle.joint.leave(now=now)
+            else:
+                vehicle.joint.shut_down(now=now)
+
     def commit(self, durable: int, *, now: float) -> None:
         """Mark events up to ``durable`` as durable; start the tasks that waited only for that."""
         waiting = self.deadline_heap.awaiting_commit()

@@ -284,6 +284,13 @@ class FleetWorld(World):
 
         self.watch(ends)
 
+    def end(self, name: str) -> None:
+        """SIGTERM: it stops its rovers, and leaves."""
+        it = self.gateways[name]
+        it.server.shut_down(now=self.now)
+        self.until(lambda: it.pump.is_over, within=10)
+        self.kill(name)
+
     def freeze(self, name: str) -> None:
         """SIGSTOP."""
         self.gateways[name].is_frozen = True

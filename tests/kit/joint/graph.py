@@ -68,7 +68,7 @@ def can_happen(event: Event, state: State) -> bool:
             return state.grip is Grip.FREE and not has_task
         case Event.COME_BACK_HALTED:
             return state.grip is Grip.FREE and not has_task and state.armed
-        case Event.CLOSE:
+        case Event.CLOSE | Event.LEAVE:
             return False  # final: nothing follows
         case _:
             return True
