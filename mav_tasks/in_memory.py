@@ -45,11 +45,13 @@ class InMemoryServer:
         policies: Mapping[str, LinkPolicy] | None = None,
         keys: tuple[Key, ...] | None = None,
         name: str = "server",
+        others: Sequence[MemoryLink] = (),
         now: float = 0.0,
     ) -> None:
         """``policies``: by the name of a link. ``keys``: None if there is no key ring.
 
-        The links of a server with another ``name`` begin with that.
+        The links of a server with another ``name`` begin with that. ``others`` are more links to
+        clients.
         """
         self.engine = Engine(settings or Settings(), now=now, restored=restored)
         self.store = store or MemoryStore()
@@ -57,12 +59,15 @@ class InMemoryServer:
         clients = net.link(CLIENT_LINK.replace("server", name))
         towards = net.link(VEHICLE_LINK.replace("server", name), peers=vehicles)
         self._now = now
-        self._links: dict[str, MemoryLink] = {link.name: link for link in (clients, towards)}
+        links = (clients, towards, *others)
+        self._links: dict[str, MemoryLink] = {link.name: link for link in links}
         if wall_offset is not None:
             self.pump.handle(WallClock(wall_offset), now=now)
         if keys is not None:
             self.pump.handle(KeysChanged(keys), now=now)
-        for link, side in ((towards, LinkSide.VEHICLES), (clients, LinkSide.CLIENTS)):
+        sides = dict.fromkeys(self._links.values(), LinkSide.CLIENTS)
+        sides[towards] = LinkSide.VEHICLES
+        for link, side in sides.items():
             policy = (policies or {}).get(link.name, TAKES_ALL)
             self.pump.handle(link_changed(link, side, policy), now=now)
         self.pump.turn(now=now)

@@ -12,6 +12,7 @@ from typing import assert_never
 from mav_tasks.engine import inputs
 from mav_tasks.engine.clients.broadcasts import Broadcasts
 from mav_tasks.engine.clients.door import Door
+from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
@@ -116,6 +117,7 @@ class Engine:
         )
         self._passing = Forwarder(vehicles, refusals)
         self._door = Door(vehicles, refusals)
+        self._elsewhere = Elsewhere(self._packets, gcs, vehicles)
         self._operator = OperatorWatch(timers, self._note_unheard, settings)
         self._reception = Reception(
             gcs=gcs,
@@ -123,6 +125,7 @@ class Engine:
             gates=self._gates,
             intake=self._intake,
             door=self._door,
+            elsewhere=self._elsewhere,
             broadcasts=Broadcasts(vehicles, packer),
             commands=Commands(vehicles, registry, submissions, plans, modes, control, displays),
             control=control,
@@ -192,6 +195,8 @@ class Engine:
                 self._vehicles.lease.change(item, now=now)
             case inputs.VehiclesTaken(vehicles=vehicles, restored=restored):
                 self._take_over(vehicles, restored, now=now)
+            case inputs.FleetChanged():
+                self._elsewhere.change(item)
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.SettingsChanged(settings=settings):

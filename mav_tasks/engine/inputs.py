@@ -12,6 +12,8 @@ from mav_tasks.tasks.restored import Restored
 
 Peer = Hashable  # an endpoint on a link; only the link knows what it is
 
+FLEET_LINK = "fleet"  # on which the gateways of a fleet pass on each other's clients
+
 
 class LinkSide(Enum):
     """What is on the other end of a link."""
@@ -141,6 +143,13 @@ class VehiclesTaken:
 
 
 @dataclass(frozen=True, slots=True)
+class FleetChanged:
+    """Which vehicle the other gateways have: pairs of its system id and the gateway's name."""
+
+    holders: tuple[tuple[int, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class IdsGranted:
     """The next ``count`` task ids from ``first`` on are this gateway's, besides earlier ones."""
 
@@ -180,6 +189,7 @@ Input = (
     | HaltNotStored
     | LeaseChanged
     | VehiclesTaken
+    | FleetChanged
     | IdsGranted
     | SettingsChanged
     | WallClock

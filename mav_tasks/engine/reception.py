@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.door import Door
+from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
@@ -20,7 +21,7 @@ from mav_tasks.engine.commands.forwarder import Forwarder
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.words import kind_of_message
-from mav_tasks.engine.inputs import Packets
+from mav_tasks.engine.inputs import FLEET_LINK, Packets
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionMessage, MissionServers
 from mav_tasks.engine.packet_reader import PacketReader
@@ -39,6 +40,7 @@ class Reception:
     gates: FloodGates
     intake: PacketReader
     door: Door
+    elsewhere: Elsewhere
     broadcasts: Broadcasts
     commands: Commands
     control: TaskControl
@@ -62,6 +64,8 @@ class Reception:
         others: list[Packets] = []
         for item in items:
             if item.link in self.gcs.links:
+                if item.link == FLEET_LINK:
+                    item = self.elsewhere.bring_back(item)
                 received += self._received(item, now=now)
             else:
                 others.append(item)
@@ -120,7 +124,7 @@ class Reception:
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
-        if not self.door.may_pass(received, now=now):
+        if not self.door.may_pass(received, now=now) or self.elsewhere.takes(received):
             return
         if len(received.client.introduced) < len(self.vehicles.by_id):
             self.publisher.welcome(received.client, now=now)

@@ -107,6 +107,10 @@ class Rivals:
         """Return the vehicles that they hold."""
         return {vehicle for seen in self._seen.values() for vehicle in seen.row.holds}
 
+    def holders(self) -> dict[int, str]:
+        """Return which of them holds which vehicle."""
+        return {vehicle: name for name, seen in self._seen.items() for vehicle in seen.row.holds}
+
     def epochs(self) -> dict[str, int]:
         """Return the epoch of each row, by name."""
         return {name: seen.row.epoch for name, seen in self._seen.items()}

@@ -11,6 +11,8 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
 from tests.kit.client import ACCEPTED, GUIDED, FakeClient, setpoint
 from tests.kit.gateways.engines import FleetWorld, Gateway
+from tests.kit.mission import Item, Upload
+from tests.kit.world import at
 
 #: s without a holder after a process has ended, and after one fell silent (the issue's goals)
 AFTER_DEATH, AFTER_SILENCE = 0.3, 1.5
@@ -86,6 +88,56 @@ def test_after_a_crash_the_other_one_holds_what_ran_and_what_waits_goes_on(fleet
     assert fleet.task(ran).state is S.COMPLETED
     assert abs(fleet.world.truth.north - 5.5) < 0.1
     assert fleet.other.engine.snapshot(now=fleet.world.now).tasks[-1].id == waits
+
+
+def test_a_client_at_another_gateway_drives_the_rover_and_hears_of_it(fleet: Fleet) -> None:
+    fleet.world.run(3.0)
+    far = fleet.clients[fleet.other.name]
+    sent = far.move(1.0, nonce=77)
+    fleet.world.until(lambda: sent.ack is not None, within=2)
+    assert sent.result == ACCEPTED
+    fleet.world.until(lambda: fleet.task(sent.task_id).state is S.COMPLETED, within=20)
+    assert far.heard("LOCAL_POSITION_NED")
+    assert S.COMPLETED in [status.state for status in far.statuses(sent.task_id)]
+    again = far.move(1.0, nonce=77)
+    fleet.world.run(0.5)
+    assert again.task_id == sent.task_id  # also by way of the other gateway
+    near = fleet.client.move(1.0, nonce=78)
+    fleet.world.run(0.5)
+    assert near.result == ACCEPTED
+
+
+def test_a_mission_comes_by_way_of_another_gateway(fleet: Fleet) -> None:
+    fleet.world.run(3.0)
+    far = fleet.clients[fleet.other.name]
+    items = [Item(16, **at(2.0, 0.0)), Item(16, **at(2.0, 2.0))]
+    upload = Upload(far, items)
+    fleet.world.until(lambda: upload.result is not None, within=5)
+    assert upload.result == 0
+    far.command(300, 0, 0, target=(1, 1))
+    fleet.world.until(lambda: abs(fleet.world.truth.east - 2.0) < 0.3, within=60)
+
+
+@pytest.mark.parametrize("everybody", [False, True])
+def test_stop_at_any_gateway_stops_the_rover(fleet: Fleet, *, everybody: bool) -> None:
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    far = fleet.clients[fleet.other.name]
+    fleet.world.watched.to_clients.clear()  # the observer expects a STOP that was read in force
+    began = fleet.world.now
+    sent = far.stop(target=(0 if everybody else 1, 191))
+    fleet.world.until(lambda: fleet.task(task).state is S.KILLED, within=1)
+    assert fleet.world.now - began < 0.1
+    fleet.world.until(fleet.world.stands, within=3)
+    fleet.world.run(0.5)
+    assert sent.result == ACCEPTED
+    epoch = fleet.world.shared.part(frozenset({1})).halt_epochs[1]
+    fleet.world.kill(fleet.first.name)
+    assert fleet.world.holder() is fleet.other
+    fleet.world.run(1.0)
+    after = fleet.world.shared.part(frozenset({1}))
+    assert after.paused == {1: R.STOPPED}
+    assert after.halt_epochs[1] >= epoch
 
 
 def test_ids_are_unique_over_the_fleet(fleet: Fleet) -> None:

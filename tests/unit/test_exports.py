@@ -58,6 +58,7 @@ def test_what_can_come_into_the_engine() -> None:
         "HaltNotStored",
         "LeaseChanged",
         "VehiclesTaken",
+        "FleetChanged",
         "IdsGranted",
         "SettingsChanged",
         "WallClock",

@@ -1,16 +1,19 @@
 """Gateways in virtual time, each with its whole engine, over one fleet and one model database."""
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import Any
 
-from mav_tasks.engine.inputs import LeaseChanged
+from mav_tasks.engine.clients.elsewhere import BACK, TOWARDS
+from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, LeaseChanged, Peer
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Change, Member, Request
 from mav_tasks.fleet.standing import Effect, Standing
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
+from mav_tasks.links.memory import MemoryLink
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
 from mav_tasks.store import Evicted, IdsGranted, Kept, Outcome, Store, VehiclesLoaded
@@ -22,6 +25,7 @@ from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 
 BLOCK = 1_000  # task ids
+CARRIED = 0.01  # s, for which a packet is under way between gateways
 GIVEN_UP = 0.4  # s, for which an answer is awaited
 PING = 0.1  # s
 SESSION_ENDS = 0.02  # s after the death of its process
@@ -47,6 +51,37 @@ def part_of(restored: Restored, vehicles: frozenset[int]) -> Restored:
         plans=plans,
         is_shared=True,
     )
+
+
+class FleetLink(MemoryLink):
+    """The link between gateways, as the real one is over the database: in order, with a delay."""
+
+    def __init__(self, world: "FleetWorld", gateway: str) -> None:
+        super().__init__(world.net, FLEET_LINK, (), 0)
+        self._world, self._gateway = world, gateway
+        self.under_way: deque[tuple[float, Peer, bytes]] = deque()
+        self.sent = 0
+
+    def send(self, peer: Peer, data: bytes) -> None:
+        assert isinstance(peer, tuple)
+        self.sent += 1
+        if peer[0] == TOWARDS:
+            _, there, number = peer
+            origin: Peer = (self._gateway, number)
+        else:
+            there, number = peer
+            origin = (BACK, self._gateway, number)
+        other = self._world.gateways.get(there)
+        if other is not None and not other.is_dead:
+            other.mail.under_way.append((self._world.now + CARRIED, origin, data))
+
+    def next_arrival(self) -> float | None:
+        return self.under_way[0][0] if self.under_way else None
+
+    def deliver(self, now: float) -> None:
+        while self.under_way and self.under_way[0][0] <= now:
+            _, peer, data = self.under_way.popleft()
+            self.arrived.append((peer, data))
 
 
 class SharedStore:
@@ -148,6 +183,8 @@ class Gateway:
     def _begin(self) -> None:
         """Begin with an engine that has no vehicle."""
         self.store = GatewayStore(self.world.shared, self._is_current)
+        self.mail = FleetLink(self.world, self.name)
+        self._told: tuple[tuple[int, str], ...] = ()
         self.server = InMemoryServer(
             self.world.net,
             vehicles=self.world.rover_names,
@@ -155,6 +192,7 @@ class Gateway:
             store=self.store,
             restored=self.store.load(),
             name=self.name,
+            others=(self.mail,),
             now=self.world.now,
         )
         self.store.grant_ids()
@@ -174,7 +212,9 @@ class Gateway:
         if self.is_frozen:
             return self.world.now + 10.0
         own = self.server.next_deadline()
-        due = [self._ping_at, self.member.next_turn if self._asked is None else self._asked[2]]
+        mail = self.mail.next_arrival()
+        due = [] if mail is None else [mail]
+        due += [self._ping_at, self.member.next_turn if self._asked is None else self._asked[2]]
         lease = self.member.lease.next_deadline()
         return max(self.world.now, min([*due, *(at for at in (own, lease) if at is not None)]))
 
@@ -186,6 +226,11 @@ class Gateway:
             self._ping_at = now + PING
             self._ping(now)
         self._talk(now)
+        holders = tuple(sorted(self.member.rivals.holders().items()))
+        if holders != self._told:
+            self._told = holders
+            self.server.take_in(FleetChanged(holders), now=now)
+        self.mail.deliver(now)
         self.server.turn(now=now)
         if self.pump.is_evicted:
             self._begin()
