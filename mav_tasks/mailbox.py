@@ -27,6 +27,9 @@ class Mailbox(Generic[T]):
     def __repr__(self) -> str:
         return f"Mailbox({self._values})"
 
+    def __len__(self) -> int:
+        return len(self._values)
+
     def fileno(self) -> int | None:
         """Return the descriptor; None once it is closed."""
         return self._read_fd if self._is_open else None

@@ -184,6 +184,21 @@ class Session:
         if self._warnings:
             raise PostgresError(f"not confirmed by the database: {self._warnings[0]}")
 
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when the server has said something."""
+        return self._pg.socket
+
+    def notifications(self) -> list[tuple[str, str]]:
+        """Return the notifications that have come since the last call, each a channel and a text.
+
+        It does not wait. Other sessions send them (NOTIFY), also while a statement is executed.
+        """
+        try:
+            self._pg.consume_input()
+            return list(self._notified())
+        except psycopg.Error as error:
+            raise self._loss(str(error)) from None
+
     def is_open(self) -> bool:
         """Return whether the session still exists; ask the server only if it has said something.
 
@@ -202,6 +217,10 @@ class Session:
     def close(self) -> None:
         """End the session; may be called again."""
         self._connection.close()
+
+    def _notified(self) -> Iterator[tuple[str, str]]:
+        while (it := self._pg.notifies()) is not None:
+            yield it.relname.decode(), it.extra.decode(errors="replace")
 
     def _check_version(self) -> None:
         version = self._pg.server_version
