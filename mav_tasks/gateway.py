@@ -10,16 +10,18 @@ from collections.abc import Iterator
 from math import inf
 
 from mav_tasks.clock import boot_time
-from mav_tasks.engine.inputs import LeaseChanged
+from mav_tasks.engine.inputs import FleetChanged, LeaseChanged
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.lease import Permit
 from mav_tasks.fleet.member import Change
 from mav_tasks.fleet.standing import MAY_STOP, Effect, Standing
-from mav_tasks.fleet_io.keeper import Keeper, Trouble
+from mav_tasks.fleet_io.carrier import Carrier
+from mav_tasks.fleet_io.keeper import Holders, Keeper, News, Trouble
 from mav_tasks.fleet_io.own_address import own_address
+from mav_tasks.fleet_link import FleetLink
 from mav_tasks.settings import Gateway as GatewaySettings
 from mav_tasks.settings import Retention
-from mav_tasks.store.postgres.address import parse
+from mav_tasks.store.postgres.address import Address, parse
 from mav_tasks.store.postgres.fleet_store import FleetStore
 
 log = logging.getLogger("mav_tasks")
@@ -35,6 +37,8 @@ class Gateway:
         where = parse(place)
         host = settings.address or own_address(where)
         self.name = settings.name
+        self._carrier: Carrier | None = None
+        self._early: list[News] = []  # that came before the engine was there
         self._keeper = Keeper(where, settings.name, host=host)
         try:
             self._await_lease()
@@ -45,8 +49,10 @@ class Gateway:
                 wall_offset=lambda: time.time() - boot_time(),
                 retention=retention,
             )
+            #: to the other gateways
+            self.link = FleetLink(self._begin_carrier(where))
         except BaseException:
-            self._keeper.close()
+            self.close()
             raise
         #: whether the fleet has ended this lease
         self.is_over = False
@@ -62,12 +68,15 @@ class Gateway:
         """Take which vehicles are heard: the gateway gets those that no other one has."""
         self._keeper.hear(vehicles)
 
-    def take(self) -> Iterator[LeaseChanged]:
-        """Yield the changes of the lease, and ask for the data of vehicles that it has got."""
-        for news in self._keeper.take():
+    def take(self) -> Iterator[LeaseChanged | FleetChanged]:
+        """Yield what has changed, and ask for the data of vehicles that this gateway has got."""
+        early, self._early = self._early, []
+        for news in (*early, *self._keeper.take()):
             match news:
                 case Permit():
                     yield _changed(news)
+                case Holders(pairs=pairs):
+                    yield FleetChanged(pairs)
                 case Change(effects=effects, got=got):
                     if got:
                         log.info("gateway %s has got %s", self.name, _named(got))
@@ -80,7 +89,13 @@ class Gateway:
 
     def close(self) -> None:
         """Leave the fleet; close the store before."""
+        if self._carrier is not None:
+            self._carrier.close()
         self._keeper.close()
+
+    def _begin_carrier(self, where: Address) -> Carrier:
+        self._carrier = Carrier(where, self.name)
+        return self._carrier
 
     def _tell(self, effects: tuple[Effect, ...]) -> None:
         if Effect.STOP in effects:
@@ -105,7 +120,9 @@ class Gateway:
                     " not answer, or another process has the name"
                 )
             select.select([fd], [], [], left)
-            for news in self._keeper.take():
+            early = self._keeper.take()
+            self._early += early
+            for news in early:
                 if isinstance(news, Trouble) and news.words is not None:
                     raise StoreError(f"gateway {self.name}: the fleet's database: {news.words}")
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from itertools import chain
 from math import inf
 
-from mav_tasks.engine.inputs import LinkSide, Packets, Peer
+from mav_tasks.engine.inputs import FLEET_LINK, LinkSide, Packets, Peer
 from mav_tasks.links.base import Link, PeerChange, PeerState, StampedLink, StreamLink
 
 DRAIN = 64  # datagrams read from one link before the others have their turn
@@ -31,6 +31,8 @@ class LinkReader:
         for link, side in sides:
             self._selector.register(link.fileno(), selectors.EVENT_READ, (link, side))
         self._streams = {link.name: link for link, _ in sides if isinstance(link, StreamLink)}
+        #: links on which each datagram tells how long it was under way
+        self._stamped = {link.name for link, _ in sides if link.name == FLEET_LINK}
         self._gone: dict[str, tuple[StreamLink, list[PeerChange]]] = {}
         self._stood_still = 0.0  # s, length of the last stall
         self._settled_at = -inf
@@ -53,6 +55,8 @@ class LinkReader:
 
     def read(self, link: Link, *, now: float) -> Packets:
         """Read one link. Call ``note_gone`` after the engine has handled the packets."""
+        if link.name in self._stamped and isinstance(link, StampedLink):
+            return Packets(link.name, *link.receive_stamped(DRAIN, longest=0.0))
         datagrams = self._received(link)
         waited: Sequence[float] = ()
         if now < self._settled_at and link.is_stream:

@@ -12,11 +12,12 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
-from typing import Protocol
+from typing import Protocol, cast
 
 from mav_tasks.clock import boot_time
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
+    FLEET_LINK,
     AtOnce,
     Backlog,
     Congestion,
@@ -161,6 +162,8 @@ class Runner:
         self._sides += [(link, LinkSide.CLIENTS) for link in clients]
         self._links = {link.name: link for link, _ in self._sides}
         self._streams = [link for link, _ in self._sides if isinstance(link, StreamLink)]
+        #: links that send some packets before others
+        self._hurries = {*(link.name for link in self._streams), FLEET_LINK}
         self._store = store
         self._store_fd = store.fileno()
         self._pump = Pump(engine, store, self._send, observers=observers)
@@ -428,8 +431,8 @@ class Runner:
         if outgoing.until < inf and self._is_over_for(outgoing):
             return
         link = self._links[outgoing.link]
-        if outgoing.is_first and isinstance(link, StreamLink):
-            link.send(outgoing.peer, outgoing.data, first=True)
+        if outgoing.is_first and outgoing.link in self._hurries:
+            cast(StreamLink, link).send(outgoing.peer, outgoing.data, first=True)
         else:
             link.send(outgoing.peer, outgoing.data)
 

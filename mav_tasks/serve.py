@@ -76,7 +76,7 @@ def _serve(settings: ServerSettings, reload: Reload | None) -> int:
         opened.enter_context(log_to_stderr(settings.log))
         metrics = _metrics(opened, settings.metrics)
         keys = _watched_ring(links)
-        client_links = [
+        client_links: list[Link] = [
             _open(opened, link.url, TO_CLIENTS, push=pushed if link.url == pushing else ())
             for link in asked
             if link.side == "clients"
@@ -91,6 +91,7 @@ def _serve(settings: ServerSettings, reload: Reload | None) -> int:
         else:
             opened.callback(gateway.close)
             store = gateway.store
+            client_links.append(gateway.link)
         opened.callback(store.close)
         note_latest(store.place)
         restored = store.load()

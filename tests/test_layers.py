@@ -169,8 +169,12 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
+    "mav_tasks.fleet_link": frozenset(
+        {"mav_tasks.engine", "mav_tasks.fleet_io", "mav_tasks.links"}
+    ),
     "mav_tasks.gateway": frozenset(
         {
+            "mav_tasks.fleet_link",
             "mav_tasks.clock",
             "mav_tasks.engine",
             "mav_tasks.fleet",

@@ -284,9 +284,7 @@ class Exchange:
             else:
                 self.arrived += 1
                 waited = under_way + each.age
-                yield Arrived(
-                    packet.name, packet.session, each.payload, now, waited, each.first
-                )
+                yield Arrived(packet.name, packet.session, each.payload, now, waited, each.first)
 
     def _next(self) -> int:
         self._counter += 1

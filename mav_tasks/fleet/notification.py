@@ -8,7 +8,8 @@ is not in the packet; only a HELLO, which is for all, is for no session. Nothing
 ::
 
   kind (1)  session of the sender (16)  counter (8)  number (8)  sent (8)  since (8)  taken (8)
-  length of the name (1)  name  [length, with FIRST (2)  age (2)  time left (2)  payload] …  tag (16)
+  length of the name (1)  name  [length, with FIRST (2)  age (2)  time left (2)  payload] …
+  tag (16)
 """
 
 import struct
@@ -60,7 +61,7 @@ class Packet:
 
     - ``session``: of the sender, also the one that answers are for.
     - ``counter``: rises with each packet of the session.
-    - ``number``: counts the packets for the receiver, over all sessions; 0: this one is not counted.
+    - ``number``: counts the packets for the receiver, over all sessions; 0: not this one.
     - ``sent``: microseconds on the sender's clock, when it was packed.
     - ``since``: microseconds on the receiver's clock: it was packed then or later. 0: unknown.
     - ``taken``: the highest counter of the receiver's session that the sender has taken.

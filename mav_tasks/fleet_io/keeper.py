@@ -38,7 +38,14 @@ class Trouble:
     words: str | None
 
 
-News = Change | Trouble | Permit
+@dataclass(frozen=True, slots=True)
+class Holders:
+    """Which vehicle the other gateways hold: pairs of its system id and the gateway's name."""
+
+    pairs: tuple[tuple[int, str], ...] = ()
+
+
+News = Change | Trouble | Permit | Holders
 
 
 def _both_permits(earlier: News, later: News) -> bool:
@@ -68,6 +75,7 @@ class Keeper:
             raise StoreError(f"gateway {name!r}: a name has up to 40 letters, digits, dots, - or _")
         self._member = Member(name, terms or Terms())
         self._permit = Permit()
+        self._holders = Holders()
         self._heard: frozenset[int] = frozenset()
         self._selector = selectors.DefaultSelector()
         try:
@@ -206,6 +214,10 @@ class Keeper:
                 assert self._asked is not None
                 (request, sent), self._asked = self._asked, None
                 self._tell(self._member.answered(request, row, sent=sent, now=now))
+                holders = Holders(tuple(sorted(self._member.rivals.holders().items())))
+                if holders != self._holders:
+                    self._holders = holders
+                    self._news.put(holders)
                 self._peers.update(endpoints)
                 if self._is_troubled:
                     self._is_troubled = False

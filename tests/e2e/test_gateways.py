@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks import Move, Refused, SyncClient, TaskState
+from mav_tasks import Move, Refused, SyncClient, TaskReason, TaskState
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, free_udp_ports, process, wait_until
 
@@ -153,6 +153,26 @@ def test_without_the_database_the_rover_stops_and_the_task_goes_on_with_it(
         client.stop()  # is obeyed without the database
     fleet.processes["a"].wait_for("has renewed its lease")
     fleet.until_state(task.id, S.KILLED)
+
+
+def test_a_client_at_another_gateway_drives_and_stops_the_rover(fleet: Fleet) -> None:
+    fleet.start("a")
+    assert fleet.holder() == "a"
+    fleet.start("b")
+    b = fleet.client("b")
+    assert [rover.id for rover in b.vehicles()] == [1]
+    done = b.submit(Move(0.5), nonce=5).done()
+    assert done.state is S.COMPLETED
+    assert fleet.client("a").submit(Move(0.5), nonce=5).id == done.id
+    task = b.submit(Move(8.0))
+    fleet.until_state(task.id, S.EXECUTING)
+    b.stop()
+    fleet.until_state(task.id, S.KILLED)
+    wait_until(lambda: speed(fleet.truth) < 0.01, within=5)
+    fleet.processes["a"].end(signal.SIGKILL)
+    fleet.processes["b"].wait_for("rover 1: found")
+    queue = b.queue()
+    assert queue.paused is TaskReason.STOPPED
 
 
 def speed(truth: Path) -> float:
