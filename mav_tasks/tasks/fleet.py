@@ -103,9 +103,9 @@ class Fleet:
         waiting: set[int] = set()
         resuming: set[TaskId] = set()
         for task in restored.tasks:
-            if task.state in RUNNING:
-                self._was_driven.add(task.vehicle)
+            # one that stopped the vehicle at the end of its lease left it in our mode
             if task.state in RUNNING or (is_elsewhere and task.reason in LOSSES):
+                self._was_driven.add(task.vehicle)
                 task = self._interrupted(task, interrupted, now=now)
                 if task.state is S.PAUSED:
                     resuming.add(task.id)

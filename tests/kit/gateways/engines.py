@@ -282,6 +282,8 @@ class Gateway:
         self.server.take_in(LeaseChanged(move_until, stop_until), now=now)
         if change.got:
             self.got += [(now, vehicle) for vehicle in sorted(change.got)]
+            for vehicle in change.got:  # as after a restart of the server
+                self.world.observers[vehicle - 1].server_restarted()
             self.store.load_vehicles(change.got)
 
     def _is_current(self) -> bool:
@@ -320,12 +322,12 @@ class FleetWorld(World):
         it = self.gateways[name]
         it.is_dead = True
         self.leave(it)
-        self.expect_new_server()
         end = self.now + SESSION_ENDS
 
         def ends(now: float) -> None:
-            if now >= end and self.database.sessions.get(name) == it.session:
-                del self.database.sessions[name]
+            sessions = self.database.sessions
+            if now >= end and it.session is not None and sessions.get(name) == it.session:
+                del sessions[name]
 
         self.watch(ends)
 
@@ -339,12 +341,6 @@ class FleetWorld(World):
     def freeze(self, name: str) -> None:
         """SIGSTOP."""
         self.gateways[name].is_frozen = True
-        self.expect_new_server()
-
-    def expect_new_server(self) -> None:
-        """Let the observers expect what a restart of the server expects: gaps, and HOLD."""
-        for observer in self.observers:
-            observer.server_restarted()
 
     def holder(self, vehicle: int = 1) -> Gateway:
         """Return the gateway that has a vehicle, once its engine serves it."""
