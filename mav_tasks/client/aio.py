@@ -352,9 +352,19 @@ class Client:
         """Stop all rovers, or only ``vehicle``, at once; no task runs until ``resume``.
 
         This ignores the client's default rover, and needs no ``found``. ``clear`` also cancels the
-        waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds.
+        waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds,
+        and then to each rover that is known, until each has answered.
         After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard.
         """
+        await self._stop(vehicle, clear=clear, within=within)
+        rovers = self._open.session.fleet.served() if vehicle is None else []
+        if len(rovers) > 1:  # several gateways may have them, and one has answered
+            each = (self._stop(rover, clear=clear, within=within) for rover in rovers)
+            for outcome in await asyncio.gather(*each, return_exceptions=True):
+                if isinstance(outcome, BaseException):
+                    raise outcome
+
+    async def _stop(self, vehicle: int | None, *, clear: bool, within: float) -> None:
         command = self._stop_command(vehicle, clear=clear)
         await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
 

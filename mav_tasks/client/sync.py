@@ -286,7 +286,8 @@ class SyncClient(BlockingClient):
         """Stop all rovers, or only ``vehicle``, at once; no task runs until ``resume``.
 
         This ignores the client's default rover, and needs no ``found``. ``clear`` also cancels the
-        waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds.
+        waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds,
+        and then to each rover that is known, until each has answered.
         After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard.
         """
         self._call(self._aio.stop(clear=clear, vehicle=vehicle, within=within))

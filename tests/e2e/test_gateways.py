@@ -30,12 +30,21 @@ class Fleet:
             process("-m", "rover_sim", *rover, "--truth", str(self.truth), folder=folder, name="r")
         )
 
-    def start(self, name: str, *options: str) -> Process:
-        """Start a gateway."""
+    def add_rover(self, system_id: int) -> int:
+        """Start another rover; return its port."""
+        (port,) = free_udp_ports(1)
+        rover = ["--port", str(port), "--body", "kinematic", "--noise", "off"]
+        rover += ["--system-id", str(system_id)]
+        it = process("-m", "rover_sim", *rover, folder=self._folder, name=f"r{system_id}")
+        self._opened.enter_context(it)
+        return port
+
+    def start(self, name: str, *options: str, rover: int = 0) -> Process:
+        """Start a gateway that hears a rover at a port, by default the first one."""
         port = self.ports.setdefault(name, self._client_ports[len(self.ports) % 3])
         command = ["-m", "mav_tasks.cli", "serve", "--gateway", name, "--store", self.url]
         command += ["--client", f"udpin:127.0.0.1:{port}", "--no-push"]
-        command += ["--vehicle", f"udpout:127.0.0.1:{self.rover_port}"]
+        command += ["--vehicle", f"udpout:127.0.0.1:{rover or self.rover_port}"]
         command += ["--set", "rules.loss_failsafe=accept", *options]
         label = f"{name}{sum(each.startswith(name) for each in self.processes)}"
         it = process(*command, folder=self._folder, name=label)
@@ -173,6 +182,23 @@ def test_a_client_at_another_gateway_drives_and_stops_the_rover(fleet: Fleet) ->
     fleet.processes["b"].wait_for("rover 1: found")
     queue = b.queue()
     assert queue.paused is TaskReason.STOPPED
+
+
+def test_a_stop_of_all_is_acknowledged_by_each_gateway_for_its_rover(fleet: Fleet) -> None:
+    second = fleet.add_rover(2)
+    fleet.start("a")
+    fleet.start("b", rover=second)
+    fleet.processes["a"].wait_for("rover 1: found")
+    fleet.processes["b"].wait_for("rover 2: found")
+    b = fleet.client("b")
+    wait_until(lambda: [rover.id for rover in b.vehicles()] == [1, 2], within=10)
+    tasks = [b.submit(Move(8.0), vehicle=rover) for rover in (1, 2)]
+    for task in tasks:
+        fleet.until_state(task.id, S.EXECUTING)
+    b.stop()
+    assert [b.queue(vehicle=rover).paused for rover in (1, 2)] == [TaskReason.STOPPED] * 2
+    for task in tasks:
+        fleet.until_state(task.id, S.KILLED)
 
 
 def speed(truth: Path) -> float:
