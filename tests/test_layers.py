@@ -307,10 +307,12 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "rover_sim.demo": frozenset(
         {
             "rover_sim",
+            "mav_tasks.client",
             "mav_tasks.in_memory",
             "mav_tasks.links",
             "mav_tasks.recording",
             "mav_tasks.settings",
+            "mav_tasks.tasks",
             "mav_tasks.errors",
         }
     ),

@@ -69,9 +69,11 @@ SLACK = 0.7  # of an interval: the jitter of a stream must not halve its rate
 class StreamRateLimiter:
     """Which of a vehicle's streamed messages one client gets."""
 
-    def __init__(self, *, default_interval: float) -> None:
+    def __init__(self, *, default_interval: float, least: float = 0.0) -> None:
+        """``least``: s between messages of one type, whatever the client wishes."""
         #: s between messages that the client has no wish for
         self.default_interval = default_interval
+        self._least = least
         self._intervals: dict[int, dict[int, float | None]] = {}  # by system and message
         #: whether somebody who may command wished it, by system and message: of what the vehicle
         #: itself is asked for
@@ -158,7 +160,8 @@ class StreamRateLimiter:
     def _interval(self, system_id: int, message_id: int) -> float | None:
         wishes = self._intervals.get(system_id)
         default = self.default_interval
-        return default if wishes is None else wishes.get(message_id, default)
+        interval = default if wishes is None else wishes.get(message_id, default)
+        return None if interval is None else max(interval, self._least)
 
     def _stretched(self, interval: float, message_id: int, *, now: float) -> float:
         """Return the interval that the way out to the client allows.

@@ -49,6 +49,19 @@ def test_the_demo_shows_three_tasks_and_finds_all_as_it_should_be(options: tuple
     assert Path(picture[1]).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(150)
+def test_in_the_fleet_s_demo_a_gateway_is_killed_and_its_rovers_go_on() -> None:
+    done = demo("--fleet", "--body", "kinematic")
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "gateway north has rovers 1, 2, 3, 4" in done.stdout
+    assert "gateway south has no rover" in done.stdout
+    assert re.search(r"gateway south has rovers 1, 2, 3, 4 after \d\.\d s", done.stdout)
+    ended = re.findall(r"rover (\d): task \d+ (\w+)", done.stdout)
+    assert ended == [(str(rover), "completed") for rover in (1, 2, 3, 4)]
+
+
 @pytest.mark.timeout(60)
 def test_a_recorded_demo_decides_the_same_again(tmp_path: Path) -> None:
     done = demo("--fast", "--body", "kinematic", "--record", str(tmp_path))

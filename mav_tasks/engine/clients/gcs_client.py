@@ -6,6 +6,7 @@ from math import inf
 from mav_tasks.engine.clients.rights import NOTHING, Rights
 from mav_tasks.engine.clients.sender import Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
+from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -29,6 +30,7 @@ BACK_AFTER = 3.5  # s of silence, after which a ground station may have been res
 OLD = 0.5  # s; a packet that lay here longer may be older than packets that came since
 MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
+ELSEWHERE = 0.5  # s between messages of one type to a client at another gateway
 MAX_SENDERS = 32  # addresses at one endpoint whose commands are remembered: there may be a router
 
 
@@ -75,7 +77,9 @@ class GcsClient:
         #: whether it has used our dialect: it gets TASK_STATUS then
         self.uses_dialect = False
         self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
-        self.thinner = StreamRateLimiter(default_interval=settings.stream_interval)
+        self.thinner = StreamRateLimiter(
+            default_interval=settings.stream_interval, least=ELSEWHERE if link == FLEET_LINK else 0
+        )
         self.statuses = TaskStatusSender(rate=settings.status_rate, wake=wake, now=now)
         self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
         self._text_id = 0

@@ -31,6 +31,7 @@ NO_PICTURE = (
 NO_WINDOW = "demo: --gui shows pybullet's window: it needs pybullet, and cannot be used with --fast"
 
 NO_PAGE = "demo: --web needs real time, and cannot be used with --fast"
+NO_FLEET = "demo: --fleet cannot be used with --fast, --web, --gui or --record"
 
 
 def main() -> int:
@@ -48,8 +49,15 @@ def main() -> int:
     if options.web and options.fast:
         _say(console, NO_PAGE)
         return 2
+    if options.fleet and (options.fast or options.web or options.gui or options.record):
+        _say(console, NO_FLEET)
+        return 2
     try:
         with Screen(console) as screen:
+            if options.fleet:
+                from rover_sim.demo import fleet  # noqa: PLC0415  # needs more packages
+
+                return _judge(console, fleet.drive(screen, body=body, noise=options.noise))
             party, track = _drive(screen, options, body)
     except (DemoError, MissingExtra, RecordError) as error:
         _say(console, f"demo: {error}")
@@ -92,7 +100,11 @@ def _conclude(console: Console, party: ThirdParty, track: list[Place], picture: 
     wrong = problems(party)
     for problem in wrong:
         _say(console, f"WRONG: {problem}")
-    _say(console, "demo: all correct" if not wrong else f"demo: {len(wrong)} wrong")
+    return _judge(console, len(wrong))
+
+
+def _judge(console: Console, wrong: int) -> int:
+    _say(console, f"demo: {wrong} wrong" if wrong else "demo: all correct")
     return 1 if wrong else 0
 
 
@@ -109,6 +121,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--gui", action="store_true", help="show pybullet's window instead of writing a picture")
     add("--web", action="store_true", help="serve the web page, too, until Ctrl-C")
+    add(
+        "--fleet",
+        action="store_true",
+        help="two gateways over PostgreSQL and four rovers: one gateway is killed",
+    )
     add("--body", choices=("bullet", "kinematic"), help="default: bullet if it is installed")
     add(
         "--record",
