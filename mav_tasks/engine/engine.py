@@ -286,6 +286,7 @@ class Engine:
         self._fleet.take_over(restored, now=now)
         self._deduplicator.restore(restored.tasks, now=now)
         self._plans.restore(restored.plans)
+        self.signatures.take_lead(restored.signing_lead)
         self._vehicles.take(vehicles, now=now)
 
     def _tell_statuses(self, *, now: float) -> None:

@@ -15,11 +15,13 @@ class Fence:
     """Until when packets may leave, s: a gateway of a fleet has its vehicles for a term only.
 
     ``until`` is for our own messages, ``relays_until`` for packets that are forwarded.
+    ``is_shared``: the vehicles are a fleet's.
     """
 
-    __slots__ = ("relays_until", "until")
+    __slots__ = ("is_shared", "relays_until", "until")
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_shared: bool = False) -> None:
+        self.is_shared = is_shared
         self.until = self.relays_until = inf
 
 
@@ -58,9 +60,13 @@ class PacketSender:
         raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
         self._put(raw, first=first, until=min(until, self._fence.until))
 
-    def send_unfenced(self, message: Message, source: Address) -> None:
-        """Send a message that changes nothing at a vehicle, whoever has it."""
-        self._put(self._packer.pack(message, source, seq=self._sequence.injected(source)))
+    def send_unfenced(self, message: Message, source: Address, *, is_ours: bool) -> None:
+        """Send a message that changes nothing at a vehicle, whoever has it.
+
+        ``is_ours``: a vehicle that this gateway has is there.
+        """
+        raw = self._packer.pack(message, source, seq=self._sequence.injected(source))
+        self._put(raw, is_ours=is_ours)
 
     def forward(self, packet: Packet) -> None:
         """Forward a packet; a gap in its source's sequence numbers stays visible."""
@@ -80,7 +86,12 @@ class PacketSender:
         """Continue our numbering although the packet's source has restarted its own at 0."""
         self._sequence.continued(packet.source, packet.seq)
 
-    def _put(self, raw: bytes, *, first: bool = False, until: float = inf) -> None:
+    def _put(
+        self, raw: bytes, *, first: bool = False, until: float = inf, is_ours: bool = True
+    ) -> None:
         if self._signatures is not None and self._signatures.may_sign:
-            raw = self._signatures.sealed(self.link, self.peer, raw)
+            if self._fence.is_shared and is_ours:
+                raw = self._signatures.sealed_as_holder(self.link, self.peer, raw)
+            else:
+                raw = self._signatures.sealed(self.link, self.peer, raw)
         self._queue.append(Outgoing(self.link, self.peer, raw, first, until))

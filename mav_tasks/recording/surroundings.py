@@ -56,6 +56,7 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
         "idle": restored.idle,
         "wall_offset": restored.wall_offset,
         "is_shared": restored.is_shared,
+        "signing_lead": restored.signing_lead,
     }
 
 
@@ -81,6 +82,7 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         idle=values["idle"],
         wall_offset=values["wall_offset"],
         is_shared=values.get("is_shared", False),
+        signing_lead=values.get("signing_lead", 0.0),
     )
 
 

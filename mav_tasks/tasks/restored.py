@@ -21,7 +21,8 @@ class Restored:
     last value of each by name, ``signatures`` and ``signed_until`` those of SignaturesSeen.
     ``ended_well``: the last run closed its store; ``idle`` is the seconds since it last wrote.
     ``wall_offset`` is UTC minus monotonic time. ``is_shared``: several gateways use the store; this
-    one gets vehicles, their tasks and the ids of new tasks later, as inputs.
+    one gets vehicles, their tasks and the ids of new tasks later, as inputs. ``signing_lead``: the
+    seconds by which it signs ahead of its clock to these vehicles, more than the gateway before.
     """
 
     tasks: tuple[Task, ...] = ()
@@ -41,3 +42,4 @@ class Restored:
     idle: float = 0.0
     wall_offset: float = 0.0
     is_shared: bool = False
+    signing_lead: float = 0.0

@@ -2,12 +2,17 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.clients.signatures import FENCE_LINK_ID
+from mav_tasks.mavlink.signing import Key, signed, timestamp_at
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.signing_lead import STEP
 from mav_tasks.tasks.task import Task
 from tests.kit.client import ACCEPTED, GUIDED, FakeClient, setpoint
 from tests.kit.gateways.engines import FleetWorld, Gateway
@@ -22,8 +27,8 @@ CONTINUE, RELEASE, REMAINDER = 54004, 54013, 1
 class Fleet:
     """A world of two gateways and a client at each."""
 
-    def __init__(self, folder: Path, *, settings: Settings | None = None) -> None:
-        self.world = FleetWorld(folder, settings=settings or Settings())
+    def __init__(self, folder: Path, *, settings: Settings | None = None, **kw: Any) -> None:
+        self.world = FleetWorld(folder, settings=settings or Settings(), **kw)
         self.clients = {"server": self.world.client}
         self.clients["b"] = self.world.add_client("client b", system_id=254, server="b:clients")
         self.first = self.world.holder()
@@ -251,3 +256,61 @@ def test_a_gateway_that_ends_hands_its_rover_and_tasks_over(
     assert fleet.task(ran).state is S.COMPLETED
     assert abs(fleet.world.truth.north - 5.5) < 0.1
     fleet.world.check()
+
+
+KEY, UTC = Key("rovers", bytes(range(32))), 1.8e9
+
+
+def test_a_signed_rover_itself_refuses_a_stale_gateway(tmp_path: Path) -> None:
+    """Also one whose clock is right and that signs now, without any guard of its own."""
+    fleet = Fleet(tmp_path, keys=(KEY,), rover_key=KEY, wall_offset=UTC)
+    task = fleet.submit(8.0)
+    fleet.drives(task)
+    fleet.world.freeze(fleet.first.name)
+    assert fleet.world.holder() is fleet.other
+    fleet.world.until(fleet.world.stands, within=8)
+    assert fleet.task(task).state is S.HELD
+    judge = Judge()
+    north = fleet.world.truth.north
+
+    def look(source: str, target: str, data: bytes) -> bool:
+        if (source, target) == (f"{fleet.other.name}:vehicles", "rover1"):
+            judge.accepted += judge.accepts(data)
+        return False
+
+    fleet.world.watched.loses = look
+    fleet.world.run(1.2)  # a heartbeat comes each second
+    assert judge.accepted > 1
+    fleet.world.watched.to_vehicles.clear()  # the observers need not see what is refused
+    for _ in range(40):
+        stale = by_stale(fleet.world.now)
+        assert not judge.accepts(stale)
+        fleet.world.net.send(f"{fleet.first.name}:vehicles", "rover1", stale)
+        fleet.world.run(0.05)
+    assert abs(fleet.world.truth.north - north) < 0.02
+    # so that this means something: one with a lead as that of the holder is accepted
+    assert judge.accepts(by_stale(fleet.world.now, lead=3 * STEP))
+
+
+def by_stale(now: float, *, lead: float = STEP) -> bytes:
+    """Return a setpoint that a gateway with the lead of the first takeover signs now."""
+    packer = common.MAVLink(None, srcSystem=250, srcComponent=191)
+    raw = bytes(setpoint(1.0).pack(packer))
+    at = timestamp_at(UTC + now + lead)
+    return signed(raw, KEY.secret, link_id=FENCE_LINK_ID, timestamp=at)
+
+
+class Judge:
+    """pymavlink's own verifier of signatures, as a rover that takes signed packets only."""
+
+    def __init__(self) -> None:
+        self._mav = common.MAVLink(None)
+        self._mav.robust_parsing = True
+        self._mav.signing.secret_key = KEY.secret
+        self._mav.signing.timestamp = timestamp_at(UTC)
+        self.accepted = 0
+
+    def accepts(self, data: bytes) -> bool:
+        """Return whether a packet is verified and newer than the one before."""
+        found = self._mav.parse_buffer(data) or []
+        return all(message.get_type() != "BAD_DATA" for message in found) and bool(found)

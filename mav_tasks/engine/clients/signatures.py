@@ -27,6 +27,7 @@ from mav_tasks.mavlink.signing import (
     timestamp_of,
 )
 from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen, SignatureTime
+from mav_tasks.tasks.signing_lead import DECAY
 
 #: stands for the key of unsigned packets, where they are allowed
 UNSIGNED = Key("", b"", fingerprint="-")
@@ -44,6 +45,9 @@ STREAMED = frozenset(
 #: s, within which a timestamp goes to the store. A minute, because each write is some 13 kB on the
 #: disk: each second it would be 1.1 GB a day for one idle station
 HARMLESS_WITHIN, STREAMED_WITHIN = 60.0, 1.0
+#: link id of what only the gateway that has a vehicle signs to it, over all links and gateways
+FENCE_LINK_ID = 254
+BEHIND = int(50 * UNITS)  # behind a vehicle's time, at most: it takes no new stream a minute behind
 RESERVE = int(120 * UNITS)  # own timestamps stored ahead: none is used twice if a clock is set back
 #: a clock before 2020 was never set: the computer has no battery for it, and no network
 SET_SINCE = timestamp_at(1_577_836_800.0)
@@ -88,6 +92,8 @@ class Signatures:
         self._numbers: dict[str, int] = {}
         self._times: dict[str, StreamTimes] = {}  # by fingerprint
         self._signers: dict[tuple[str, Peer], Signer] = {}
+        self._fenced: dict[tuple[str, Peer], Signer] = {}  # to vehicles of a fleet that are ours
+        self._lead = (0.0, 0.0)  # s ahead of our clock, and when it was that
         #: whether there is a key or an endpoint to sign for
         self.may_sign = False
         self._offset: float | None = None  # UTC less ``now``
@@ -159,8 +165,9 @@ class Signatures:
         """Add a link with its key and rules when it comes up, remove it when it goes down."""
         if not change.up:
             self._links.pop(change.link, None)
-            for way in [way for way in self._signers if way[0] == change.link]:
-                del self._signers[way]
+            for signers in (self._signers, self._fenced):
+                for way in [way for way in signers if way[0] == change.link]:
+                    del signers[way]
             return
         number = self._numbers.setdefault(change.link, len(self._numbers) + 1)
         self._links[change.link] = _Link(
@@ -307,6 +314,32 @@ class Signatures:
             self._highest = max(self._highest, signer.last)
         return sealed
 
+    def sealed_as_holder(self, link: str, peer: Peer, raw: bytes) -> bytes:
+        """Return a packet to a vehicle of a fleet that is ours, as it leaves.
+
+        All gateways sign with one link id to it, each with a lead over the one before: so the
+        vehicle refuses what a gateway signs that does not have it any more. This follows no
+        vehicle's time, which others hear, too, but where it would be refused for being old.
+        """
+        there = self._links.get(link)
+        key = self._keys.get(there.key) if there is not None and there.key else None
+        if key is None:
+            return self.sealed(link, peer, raw)
+        signer = self._fenced.get((link, peer))
+        if signer is None or signer.key != key:
+            signer = self._fenced[link, peer] = Signer(key, link_id=FENCE_LINK_ID)
+        heard = self._signer(link, peer, key).last
+        lead, since = self._lead
+        ahead = int(max(0.0, lead - DECAY * (self.now - since)) * UNITS)
+        sealed = signer.sign(raw, clock=max(self._own_clock() + ahead, heard - BEHIND))
+        self._note_own(link, signer, sealed)
+        return sealed
+
+    def take_lead(self, lead: float) -> None:
+        """Sign at least so many seconds ahead of our clock to vehicles that are ours."""
+        left = self._lead[0] - DECAY * (self.now - self._lead[1])
+        self._lead = max(lead, left), self.now
+
     def _note_own(self, link: str, signer: Signer, raw: bytes) -> None:
         if raw[0] != MAGIC_V2:
             return
@@ -318,7 +351,9 @@ class Signatures:
 
     def sealed_late(self, outgoing: Outgoing) -> Outgoing:
         """Return a packet that was made long before, signed for sending now."""
-        data = self.sealed(outgoing.link, outgoing.peer, outgoing.data)
+        link, peer, raw = outgoing.link, outgoing.peer, outgoing.data
+        is_held = (link, peer) in self._fenced
+        data = self.sealed_as_holder(link, peer, raw) if is_held else self.sealed(link, peer, raw)
         return outgoing._replace(data=data)
 
     def _signer(self, link: str, peer: Peer, key: Key) -> Signer:

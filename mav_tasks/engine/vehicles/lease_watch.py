@@ -25,7 +25,7 @@ class LeaseWatch:
         self.is_trusted = not is_shared
         self._is_leaving = False
         #: of all packets to vehicles
-        self.fence = Fence()
+        self.fence = Fence(is_shared=is_shared)
         #: until when packets that stop vehicles may leave, s
         self.stop_until = inf
         if is_shared:

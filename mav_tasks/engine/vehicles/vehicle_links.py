@@ -119,6 +119,10 @@ class VehicleLinks:
                 if self.router.place_of(vehicle.system_id) == place:
                     vehicle.comes_anew()
 
+    def has_vehicle_at(self, link: str, peer: Peer) -> bool:
+        """Return whether one of our vehicles is at an endpoint."""
+        return any(self.router.place_of(each) == (link, peer) for each in self._all)
+
     def owns(self, link: str) -> bool:
         """Return whether a link of this name is a vehicle link."""
         return link in self._links

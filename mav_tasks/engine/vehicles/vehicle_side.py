@@ -341,8 +341,9 @@ class VehicleSide:
         self._question.ts1 = round(now * NANO)
         self._asked.append(self._question.ts1)
         for outlet in outlets.values():
-            outlet.send_unfenced(gcs_heartbeat(), self.our_address)
-            outlet.send_unfenced(self._question, self.our_address)
+            is_ours = self.links.has_vehicle_at(outlet.link, outlet.peer)
+            outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=is_ours)
+            outlet.send_unfenced(self._question, self.our_address, is_ours=is_ours)
 
     def _meet(
         self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
@@ -356,7 +357,7 @@ class VehicleSide:
             return None
         outlet, is_new = way
         if is_new:
-            outlet.send_unfenced(gcs_heartbeat(), self.our_address)
+            outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=True)
         vehicle = Vehicle(
             packet.system_id,
             heartbeat=heartbeat,

@@ -4,12 +4,13 @@ It retries until the database answers, or the lease has ended.
 """
 
 import time
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from queue import SimpleQueue
 from threading import Event, Thread
 
+from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.mailbox import Mailbox
 from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome, VehiclesLoaded
@@ -20,11 +21,17 @@ from mav_tasks.store.postgres.reader import PostgresReader
 from mav_tasks.store.postgres.session import Session
 from mav_tasks.store.reading import read_restored
 from mav_tasks.tasks.lifecycle import RUNNING
+from mav_tasks.tasks.signing_lead import DECAY, MOST_LEAD, STEP
 from mav_tasks.tasks.task import MAX_TASK_ID, following
 
 BLOCK = 1_000  # task ids that a gateway gets at once
 RETRY = 0.25  # s between two attempts
 REPORT = 5.0  # s between two reports of a lasting failure
+
+_LEAD = (
+    "UPDATE holdings SET lead = least(?, greatest(0, lead - ?::float8 * (? - lead_utc)) + ?),"
+    " lead_utc = ? WHERE vehicle = ANY(?::bigint[]) RETURNING lead"
+)
 
 Job = frozenset[int] | None  # vehicles to load; None: task ids
 
@@ -90,23 +97,29 @@ class FleetLoader:
         return True
 
     def _ids(self) -> IdsGranted:
+        with self._in_transaction("ids") as session:
+            ((first,),) = session.execute("SELECT next_id FROM meta FOR UPDATE").fetchall()
+            last = min(first + BLOCK - 1, MAX_TASK_ID)
+            session.execute("UPDATE meta SET next_id = ?", (following(last),))
+        return IdsGranted(int(first), int(last - first + 1))
+
+    @contextmanager
+    def _in_transaction(self, purpose: str) -> Iterator[Session]:
+        """Execute the block in a session of its own, unless the lease has ended."""
         lease = GatewayOwnership(self._gateway, self._epoch)
-        session = Session(self._address, purpose=f"gateway {self._gateway} ids")
+        session = Session(self._address, purpose=f"gateway {self._gateway} {purpose}")
         try:
             lease.resume(session)
             with session.transaction():
                 lease.fence(session)
-                ((first,),) = session.execute("SELECT next_id FROM meta FOR UPDATE").fetchall()
-                last = min(first + BLOCK - 1, MAX_TASK_ID)
-                session.execute("UPDATE meta SET next_id = ?", (following(last),))
+                yield session
         except PostgresError as error:
             raise lease.failure_of(session, error) from error
         finally:
             session.close()
-        return IdsGranted(int(first), int(last - first + 1))
 
     def _loaded(self, vehicles: frozenset[int]) -> VehiclesLoaded:
-        offset = self._wall_offset()
+        offset, lead = self._wall_offset(), self._lead(vehicles)
         with closing(PostgresReader(self._address)) as reader:
             ((last_write, utc),) = reader.connection.execute(
                 "SELECT last_write, extract(epoch FROM now()) FROM meta"
@@ -117,5 +130,14 @@ class FleetLoader:
             )
         was_running = any(task.state in RUNNING for task in restored.tasks)
         return VehiclesLoaded(
-            tuple(sorted(vehicles)), replace(restored, ended_well=not was_running)
+            tuple(sorted(vehicles)),
+            replace(restored, ended_well=not was_running, signing_lead=lead),
         )
+
+    def _lead(self, vehicles: frozenset[int]) -> float:
+        """Take the next lead of signatures for these vehicles, and return it."""
+        utc = boot_time() + self._wall_offset()
+        listed = ",".join(map(str, sorted(vehicles)))
+        with self._in_transaction("lead") as session:
+            found = session.execute(_LEAD, (MOST_LEAD, DECAY, utc, STEP, utc, f"{{{listed}}}"))
+            return max((float(lead) for (lead,) in found), default=0.0)

@@ -100,6 +100,11 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         ),
         "CREATE INDEX by_number ON tasks (number)",  # ids do not increase with it in a fleet
         "CREATE INDEX not_over ON tasks (vehicle) WHERE state < 9",
+        (  # s by which the holder signs ahead of its clock, as of a time: a fence at the vehicle
+            "ALTER TABLE holdings DROP COLUMN signing_time,"
+            " ADD COLUMN lead DOUBLE PRECISION NOT NULL DEFAULT 0,"
+            " ADD COLUMN lead_utc DOUBLE PRECISION NOT NULL DEFAULT 0"
+        ),
     ),
 )
 

@@ -14,11 +14,14 @@ from mav_tasks.fleet.member import Change, Member, Request
 from mav_tasks.fleet.standing import Effect, Standing
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import MemoryLink
+from mav_tasks.links.policy import LinkPolicy
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
 from mav_tasks.store import Evicted, IdsGranted, Kept, Outcome, Store, VehiclesLoaded
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.signing_lead import MOST_LEAD, STEP
 from mav_tasks.tasks.task import Task
 from tests.kit.gateways.database import Database
 from tests.kit.store import PromptSqliteStore
@@ -90,11 +93,18 @@ class SharedStore:
     def __init__(self, path: Path) -> None:
         self.store = PromptSqliteStore(path, wall_offset=0.0)
         self._next_id = 1
+        self.leads: dict[int, float] = {}
 
     def block(self) -> IdsGranted:
         """Return the next ids."""
         first, self._next_id = self._next_id, self._next_id + BLOCK
         return IdsGranted(first, BLOCK)
+
+    def next_lead(self, vehicles: frozenset[int]) -> float:
+        """Return the next lead of signatures, as fleet_loader does, without the decay."""
+        for vehicle in vehicles:
+            self.leads[vehicle] = min(MOST_LEAD, self.leads.get(vehicle, 0.0) + STEP)
+        return max(self.leads[vehicle] for vehicle in vehicles)
 
     def keep(self, events: Sequence[Event]) -> None:
         """Make events durable."""
@@ -111,11 +121,14 @@ class SharedStore:
 
 
 class GatewayStore:
-    """The store of one gateway in one epoch; ``is_current`` is the database's fence."""
+    """The store of one gateway in one epoch; ``is_current`` is the database's fence.
+
+    None: there is no lease yet, under which the real store begins.
+    """
 
     name = place = "shared"
 
-    def __init__(self, shared: SharedStore, is_current: Callable[[], bool]) -> None:
+    def __init__(self, shared: SharedStore, is_current: Callable[[], bool | None]) -> None:
         self._shared = shared
         self._is_current = is_current
         self._count = 0
@@ -135,8 +148,9 @@ class GatewayStore:
         self._waiting += events
 
     def take_outcomes(self) -> list[Outcome]:
-        if self.is_reached and self._waiting:
-            if self._is_current():
+        is_current = self._is_current()
+        if self.is_reached and self._waiting and is_current is not None:
+            if is_current:
                 self._shared.keep(self._waiting)
                 self.events += self._waiting
                 self._count += len(self._waiting)
@@ -149,7 +163,8 @@ class GatewayStore:
 
     def load_vehicles(self, vehicles: frozenset[int]) -> None:
         """Answer in ``take_outcomes``."""
-        restored = self._shared.part(vehicles)
+        lead = self._shared.next_lead(vehicles)
+        restored = replace(self._shared.part(vehicles), signing_lead=lead)
         self._outcomes.append(VehiclesLoaded(tuple(sorted(vehicles)), restored))
 
     def grant_ids(self) -> None:
@@ -193,6 +208,9 @@ class Gateway:
             restored=self.store.load(),
             name=self.name,
             others=(self.mail,),
+            wall_offset=self.world.wall_offset,
+            policies=self.world.policies_of(self.name),
+            keys=self.world.keys,
             now=self.world.now,
         )
         self.store.grant_ids()
@@ -286,7 +304,9 @@ class Gateway:
                 self.world.observers[vehicle - 1].server_restarted()
             self.store.load_vehicles(change.got)
 
-    def _is_current(self) -> bool:
+    def _is_current(self) -> bool | None:
+        if self.member.lease.standing in (Standing.OUT, Standing.EVICTED):
+            return None
         row = self.world.database.rows.get(self.name)
         return row is not None and row.epoch == self.member.lease.epoch
 
@@ -301,12 +321,21 @@ class FleetWorld(World):
         self.random = Random(seed)
         self.gateways: dict[str, Gateway] = {}
         self.settings: Settings | None = kw.get("settings")
+        self.keys: tuple[Key, ...] | None = kw.get("keys")
+        self.wall_offset: float | None = kw.get("wall_offset")
         self.rover_names = tuple(f"rover{n}" for n in range(1, kw.get("rovers", 1) + 1))
         super().__init__(seed=seed, **kw)
         for name in names[1:]:
             self.watched.to_vehicles.add(VEHICLE_LINK.replace("server", name))
             self.watched.to_clients.add(CLIENT_LINK.replace("server", name))
             self.start(name)
+
+    def policies_of(self, name: str) -> dict[str, LinkPolicy] | None:
+        """Return the policies of a gateway's links: with a key, its rovers take only that."""
+        if not self.keys:
+            return None
+        policy = LinkPolicy(takes_unsigned=False, key=self.keys[0].name)
+        return {VEHICLE_LINK.replace("server", name): policy}
 
     def _new_server(self, _store: Store | None, _restored: Restored | None) -> Any:
         return self.gateways.setdefault("server", Gateway(self, "server"))
