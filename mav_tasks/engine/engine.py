@@ -5,7 +5,7 @@ store must write, ``take_packets`` what the links must send. ``now`` is in monot
 never goes back.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from math import inf
 from typing import assert_never
 
@@ -196,7 +196,7 @@ class Engine:
             case inputs.VehiclesTaken(vehicles=vehicles, restored=restored):
                 self._take_over(vehicles, restored, now=now)
             case inputs.FleetChanged():
-                self._elsewhere.change(item)
+                self._elsewhere.change(item, now=now)
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.SettingsChanged(settings=settings):
@@ -281,13 +281,15 @@ class Engine:
         """Until when ``emergency_stop_packets`` may leave, s."""
         return self._vehicles.lease.stop_until
 
-    def _take_over(self, vehicles: Iterable[int], restored: Restored, *, now: float) -> None:
+    def _take_over(self, vehicles: Sequence[int], restored: Restored, *, now: float) -> None:
         """Serve vehicles that this gateway has got, with their tasks and plans."""
         self._fleet.take_over(restored, now=now)
         self._deduplicator.restore(restored.tasks, now=now)
         self._plans.restore(restored.plans)
         self.signatures.take_lead(restored.signing_lead)
         self._vehicles.take(vehicles, now=now)
+        for vehicle in vehicles:
+            self._reception.stop_taken(vehicle, now=now)
 
     def _tell_statuses(self, *, now: float) -> None:
         self._publisher.send_statuses(now=now)

@@ -123,8 +123,14 @@ class Reception:
         vehicle = self.vehicles.look_at(target) if target else next(iter(self.vehicles.all), None)
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
+    def stop_taken(self, vehicle: int, *, now: float) -> None:
+        """Obey the STOPs of our clients that came just before this gateway got a vehicle."""
+        for received in self.elsewhere.stops_of(vehicle, now=now):
+            self.gcs.hear_out(received, now=now)
+            self._see_to(received, now=now)
+
     def _receive_from_client(self, received: Received, *, now: float) -> None:
-        if not self.door.may_pass(received, now=now) or self.elsewhere.takes(received):
+        if not self.door.may_pass(received, now=now) or self.elsewhere.takes(received, now=now):
             return
         if len(received.client.introduced) < len(self.vehicles.by_id):
             self.publisher.welcome(received.client, now=now)

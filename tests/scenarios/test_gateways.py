@@ -30,14 +30,18 @@ class Fleet:
     def __init__(self, folder: Path, *, settings: Settings | None = None, **kw: Any) -> None:
         self.world = FleetWorld(folder, settings=settings or Settings(), **kw)
         self.clients = {"server": self.world.client}
-        self.clients["b"] = self.world.add_client("client b", system_id=254, server="b:clients")
+        for number, name in enumerate(("b", "c")):
+            it = self.world.add_client(
+                f"client {name}", system_id=254 - 2 * number, server=f"{name}:clients"
+            )
+            self.clients[name] = it
         self.first = self.world.holder()
         self.world.run(4.0)
 
     @property
     def other(self) -> Gateway:
         """The gateway that does not have the rover at first."""
-        (other,) = (it for it in self.world.gateways.values() if it is not self.first)
+        other, *_ = (it for it in self.world.gateways.values() if it is not self.first)
         return other
 
     @property
@@ -146,6 +150,29 @@ def test_stop_at_any_gateway_stops_the_rover(fleet: Fleet, *, everybody: bool) -
     after = fleet.world.shared.part(frozenset({1}))
     assert after.paused == {1: R.STOPPED}
     assert after.halt_epochs[1] >= epoch
+
+
+@pytest.mark.parametrize("everybody", [False, True])
+def test_a_stop_while_nobody_has_the_rover_is_in_force_as_soon_as_somebody_has(
+    tmp_path: Path, *, everybody: bool
+) -> None:
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"), names=("server", "b", "c"))
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    fleet.world.watched.to_clients.clear()  # the observer expects a STOP that was read in force
+    others = [it.name for it in fleet.world.gateways.values() if it is not fleet.first]
+    far = fleet.world.add_client("far", system_id=253, server=f"{others[0]}:clients")
+    fleet.world.run(2.0)
+    fleet.world.kill(fleet.first.name)
+    sent = far.stop(target=(0 if everybody else 1, 191))
+    fleet.world.run(0.05)
+    assert fleet.world.database.holder(1) == fleet.first.name  # nobody has taken it yet
+    assert fleet.world.holder().name in others
+    fleet.world.run(1.0)
+    assert fleet.world.shared.part(frozenset({1})).paused == {1: R.STOPPED}
+    assert fleet.task(task).state is S.KILLED
+    assert sent.result == ACCEPTED
+    fleet.world.until(fleet.world.stands, within=5)
 
 
 def test_ids_are_unique_over_the_fleet(fleet: Fleet) -> None:

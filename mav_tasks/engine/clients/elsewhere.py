@@ -17,6 +17,9 @@ from mav_tasks.services.command_receiver import is_stop
 
 EVERYBODY = 0  # target_system
 MOST = 4096  # clients whose number is remembered
+#: s; the longest time without a holder after a gateway has failed, and what the database then takes
+IN_TRANSIT = 3.0
+MOST_STOPS = 100
 
 #: begin the peers of FLEET_LINK that are no clients, before a gateway's name and the number of a
 #: client of ours: there goes what it sends, from there comes what it is sent. The peer of another
@@ -32,7 +35,9 @@ class Elsewhere:
         self._queue = queue
         self._gcs = gcs
         self._vehicles = vehicles
+        self.is_shared = vehicles.lease.is_shared
         self._holders: Mapping[int, str] = {}
+        self._stops: list[tuple[float, Received]] = []  # the latest of our clients, and when
         self._clients: dict[int, tuple[str, Peer]] = {}  # by number
         self._numbers: dict[tuple[str, Peer], int] = {}
         self._last = 0  # number
@@ -40,15 +45,30 @@ class Elsewhere:
     def __repr__(self) -> str:
         return f"Elsewhere({self._holders}, {len(self._clients)} clients)"
 
-    def change(self, change: FleetChanged) -> None:
-        """Take which gateway has which vehicle now."""
-        self._holders = dict(change.holders)
+    def change(self, change: FleetChanged, *, now: float) -> None:
+        """Take which gateway has which vehicle now; pass on a STOP that came just before."""
+        before, self._holders = self._holders, dict(change.holders)
+        for vehicle, gateway in change.holders:
+            if before.get(vehicle) != gateway:
+                for received in self.stops_of(vehicle, now=now):
+                    self._pass_on(gateway, received)
 
-    def takes(self, received: Received) -> bool:
+    def stops_of(self, vehicle: int, *, now: float) -> list[Received]:
+        """Return the STOPs for a vehicle that came just now, when nobody may have had it."""
+        self._stops = [(at, each) for at, each in self._stops if now - at <= IN_TRANSIT]
+        return [
+            each
+            for _, each in self._stops
+            if getattr(each.message, "target_system", None) in (EVERYBODY, vehicle)
+        ]
+
+    def takes(self, received: Received, *, now: float) -> bool:
         """Pass a packet on if it is for others; return whether it is for another one alone."""
         message = received.message
-        if not self._holders or message is None or received.client.key[0] == FLEET_LINK:
+        if not self.is_shared or message is None or received.client.key[0] == FLEET_LINK:
             return False
+        if is_stop(message):
+            self._stops = [*self._stops[-MOST_STOPS:], (now, received)]
         target = getattr(message, "target_system", None)
         if target == EVERYBODY or isinstance(message, m.Heartbeat):
             for gateway in sorted(set(self._holders.values())):
