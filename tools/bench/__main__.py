@@ -16,6 +16,7 @@ from tests.kit.other_revision import checked_out
 from . import (
     against,
     calls,
+    carrier,
     commands,
     floods,
     forwarding,
@@ -37,6 +38,7 @@ MEASUREMENTS: dict[str, Callable[[], list[Row]]] = {
     "commands": commands.measure,
     "durable": commands.measure_durable,
     "postgres": postgres.measure,
+    "carrier": carrier.measure,
     "recorded": commands.measure_recorded,
     "turns": turns.measure,
     "stop": stop.measure,

@@ -35,7 +35,7 @@ def measure() -> list[Row]:
     answer = m.CommandAck.id
     ours: list[float] = []
     inserts: list[float] = []
-    with _database_server() as database, connected(database.new_database()) as plain:
+    with database_server() as database, connected(database.new_database()) as plain:
         plain.execute("CREATE TABLE public.plain (id BIGSERIAL, body TEXT)")
         with server("--store", database.new_database()) as (client, vehicle):
             one_by_one(client, list(islice(supply, WARM_UP)), answer, vehicle)
@@ -66,7 +66,7 @@ def _insert(plain: Any) -> float:
 
 
 @contextmanager
-def _database_server() -> Iterator[PostgresServer]:
+def database_server() -> Iterator[PostgresServer]:
     """Run a database server; records of halts are in a folder that is removed."""
     before = os.environ.get("XDG_DATA_HOME")
     made = PostgresServer(installed())
