@@ -17,6 +17,7 @@ from mav_tasks.store.postgres.database import PostgresDatabase
 from mav_tasks.store.postgres.gateway_ownership import GatewayOwnership
 from mav_tasks.store.retention import Trimmer
 
+AT_WORK = 30.0  # s after the start; vehicles are loaded within some seconds
 TRIM_LOCK = 0x4D565453_00000003  # of the gateway that deletes expired rows
 
 #: to the number of a row in its gateway's count, for the number in the journal
@@ -43,6 +44,7 @@ class FleetDatabase(PostgresDatabase):
 
     def __init__(self, address: Address, gateway: str, epoch: int) -> None:
         self._lease = GatewayOwnership(gateway, epoch)
+        self._first_look = 0.0  # UTC, s
         super().__init__(address, ownership=self._lease, purpose=f"gateway {gateway} store")
 
     def begin(self) -> None:
@@ -73,9 +75,16 @@ class FleetDatabase(PostgresDatabase):
         self.last_number = batch.last
 
     def trim(self, trimmer: Trimmer, *, utc: float) -> bool:
-        """Delete some expired rows, unless another gateway is doing that."""
+        """Delete some expired rows, unless another gateway is doing that.
+
+        It also notes that the fleet is at work, if nothing was to be stored for long: queues that
+        nobody has looked after for hours must not go on alone (``tasks/fleet.py``).
+        """
         with self._cause(), self._session.transaction():
             self._lease.fence(self._session)
+            self._first_look = self._first_look or utc
+            if utc - self._first_look >= AT_WORK:  # not at the start, which may be after hours
+                self._session.execute("UPDATE meta SET last_write = ?", (utc,))
             query = "SELECT pg_try_advisory_xact_lock(?)"
             ((is_ours,),) = self._session.execute(query, (TRIM_LOCK,)).fetchall()
             return bool(is_ours) and trimmer.step(self._session, utc=utc)

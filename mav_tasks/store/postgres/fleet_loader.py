@@ -121,10 +121,8 @@ class FleetLoader:
     def _loaded(self, vehicles: frozenset[int]) -> VehiclesLoaded:
         offset, lead = self._wall_offset(), self._lead(vehicles)
         with closing(PostgresReader(self._address)) as reader:
-            ((last_write, utc),) = reader.connection.execute(
-                "SELECT last_write, extract(epoch FROM now()) FROM meta"
-            ).fetchall()
-            idle = 0.0 if last_write is None else max(0.0, float(utc) - last_write)
+            ((last_write,),) = reader.connection.execute("SELECT last_write FROM meta").fetchall()
+            idle = 0.0 if last_write is None else max(0.0, boot_time() + offset - last_write)
             restored = read_restored(
                 reader, offset=offset, ended_well=True, idle=idle, vehicles=vehicles
             )

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import pytest
 
+from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Evict, Join, Renew, Take
 from mav_tasks.fleet.rivals import Eviction
@@ -18,7 +19,9 @@ from mav_tasks.store import Evicted, IdsGranted, Kept, NotKept, Outcome, Vehicle
 from mav_tasks.store.opening import kind_of
 from mav_tasks.store.postgres import address
 from mav_tasks.store.postgres.failures import PostgresError
+from mav_tasks.store.postgres.fleet_database import FleetDatabase
 from mav_tasks.store.postgres.fleet_store import FleetStore
+from mav_tasks.store.retention import Trimmer
 from mav_tasks.tasks.events import Event, QueuePaused, TaskSubmitted, VehicleHalted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -330,6 +333,23 @@ def test_a_commit_whose_answer_was_lost_is_not_made_twice(
         a.store.append([submitted(3)])
         a.kept(3)
         assert ids_in(url) == [1, 2, 3]
+
+
+def test_a_fleet_that_has_nothing_to_store_is_seen_to_be_at_work(url: str) -> None:
+    """Else the next gateway would pause the queues, as after hours without anybody."""
+    hours_ago = boot_time() + OFFSET - 7_200.0
+    with gateways(url, "a") as (a,), connected(url) as connection:
+        connection.execute("UPDATE meta SET last_write = %s", (hours_ago,))
+        a.store.load_vehicles(frozenset({1}))
+        assert a.next(VehiclesLoaded).restored.idle > 7_000
+        database = FleetDatabase(address.parse(url), "a", a.epoch)
+        database.begin()
+        utc = boot_time() + OFFSET
+        for seconds, is_noted in ((0.0, False), (10.0, False), (60.0, True)):
+            database.trim(Trimmer(FOR_EVER), utc=utc + seconds)
+            (last,) = connection.execute("SELECT last_write FROM meta").fetchone()
+            assert (last > hours_ago) is is_noted
+        database.close(utc=None)
 
 
 def test_one_server_and_gateways_exclude_each_other(url: str) -> None:
