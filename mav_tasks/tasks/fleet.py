@@ -101,14 +101,16 @@ class Fleet:
         self._registry.restore(restored.tasks)
         active: dict[int, list[Task]] = {}
         waiting: set[int] = set()
-        resuming: set[TaskId] = set()
+        goes_on: set[TaskId] = set()  # alone, or when its turn comes again
         for task in restored.tasks:
             # one that stopped the vehicle at the end of its lease left it in our mode
             if task.state in RUNNING or (is_elsewhere and task.reason in LOSSES):
                 self._was_driven.add(task.vehicle)
                 task = self._interrupted(task, interrupted, now=now)
                 if task.state is S.PAUSED:
-                    resuming.add(task.id)
+                    goes_on.add(task.id)
+            elif is_elsewhere and task.state is S.PAUSED and task.reason is R.PREEMPTED:
+                goes_on.add(task.id)
             if task.state in ACTIVE:
                 active.setdefault(task.vehicle, []).append(task)
             elif task.state in WAITING:
@@ -123,7 +125,7 @@ class Fleet:
         for vehicle in active.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
             has_paused = any(
-                task.state is S.PAUSED and task.id not in resuming
+                task.state is S.PAUSED and task.id not in goes_on
                 for task in active.get(vehicle, ())
             )
             is_late = restored.idle > LONG_IDLE and (vehicle in active or vehicle in waiting)
@@ -137,7 +139,7 @@ class Fleet:
                 uid=restored.uids.get(vehicle, ""),
                 halt_epoch=restored.halt_epochs.get(vehicle, 1),
                 may_be_armed=vehicle not in restored.disarmed,
-                resuming=resuming,
+                resuming=goes_on,
                 now=now,
             )
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.clients.signatures import FENCE_LINK_ID
 from mav_tasks.mavlink.signing import Key, signed, timestamp_at
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.signing_lead import STEP
@@ -173,6 +173,22 @@ def test_a_stop_while_nobody_has_the_rover_is_in_force_as_soon_as_somebody_has(
     assert fleet.task(task).state is S.KILLED
     assert sent.result == ACCEPTED
     fleet.world.until(fleet.world.stands, within=5)
+
+
+def test_what_was_pre_empted_goes_on_after_a_takeover(tmp_path: Path) -> None:
+    queueing = Queueing(preemption_gap=3, preemption_rest=0.3)
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume", queueing=queueing))
+    slow = fleet.submit(4.0)
+    fleet.drives(slow)
+    urgent = fleet.client.move(2.0, priority=9)
+    fleet.world.until(lambda: urgent.ack is not None, within=2)
+    fleet.drives(urgent.task_id)
+    assert (fleet.task(slow).state, fleet.task(slow).reason) == (S.PAUSED, R.PREEMPTED)
+    fleet.world.kill(fleet.first.name)
+    assert fleet.world.holder() is fleet.other
+    fleet.world.until(lambda: fleet.task(slow).state is S.COMPLETED, within=60)
+    assert fleet.task(urgent.task_id).state is S.COMPLETED
+    fleet.world.check()
 
 
 def test_ids_are_unique_over_the_fleet(fleet: Fleet) -> None:
