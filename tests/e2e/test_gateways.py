@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskReason, TaskState
+from tests.kit.commands import mav_tasks
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, free_udp_ports, process, wait_until
 
@@ -135,8 +136,10 @@ def test_a_gateway_that_stood_still_begins_again_without_the_rover(fleet: Fleet)
     assert fleet.client("b").status(task.id).state is S.HELD
 
 
-def test_a_gateway_that_ends_leaves_its_rover_to_another_at_once(fleet: Fleet) -> None:
-    fleet.start("a")
+def test_a_gateway_that_ends_leaves_its_rover_to_another_at_once(
+    fleet: Fleet, tmp_path: Path
+) -> None:
+    fleet.start("a", "--record", str(tmp_path / "records"))
     assert fleet.holder() == "a"
     fleet.start("b")
     waits = fleet.client("a").submit(Move(0.5), delay=3600.0)
@@ -146,6 +149,8 @@ def test_a_gateway_that_ends_leaves_its_rover_to_another_at_once(fleet: Fleet) -
     assert b.status(waits.id).state is S.SCHEDULED
     done = b.submit(Move(0.5)).done()
     assert done.state is S.COMPLETED
+    (record,) = (tmp_path / "records").iterdir()
+    assert "same: " in mav_tasks("replay", str(record)).output
 
 
 def test_without_the_database_the_rover_stops_and_the_task_goes_on_with_it(
