@@ -18,13 +18,14 @@ from typing import Any
 
 RELEASE = "pginstall18"  # the folder of the newest version in the wheel
 NOBODY = 65534
-START_LIMIT = 30.0  # s
+START_LIMIT = 120.0  # s; after a crash it syncs its files, and the disk may be busy
 LOOK = 0.02  # s between two looks
 SETTINGS = {
     "fsync": "on",
     "max_connections": "40",
     "shared_buffers": "16MB",
     "autovacuum": "on",
+    "recovery_init_sync_method": "syncfs",  # one sync after a crash, not one for each file
     "log_min_messages": "warning",
 }
 
@@ -111,7 +112,7 @@ class PostgresServer:
         )
 
     def _answers(self) -> bool:
-        where = ("-h", "127.0.0.1", "-p", str(self.port))
+        where = ("-h", "127.0.0.1", "-p", str(self.port), "-U", "postgres", "-d", "postgres")
         return self._ran("pg_isready", *where).returncode == 0
 
     def _reachable(self, install: Path) -> Path:

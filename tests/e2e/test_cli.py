@@ -115,7 +115,7 @@ def test_a_shell_completes_values_and_the_options_of_the_simulator(tmp_path: Pat
         "queue --sign ": {"anna"},
         "sim --perso": {"--persona"},
         "sim --persona ": {"ardupilot", "px4", "generic"},
-        "demo --f": {"--fast"},
+        "demo --f": {"--fast", "--fleet"},
     }.items():
         words = mav_tasks(
             _MAV_TASKS_COMPLETE="complete_bash",

@@ -16,9 +16,9 @@ from tests.kit.postgres import PostgresServer
 from tests.kit.processes import wait_until
 
 S = TaskState
-FEW = 5
+FEW = 4
 #: 100 take a quarter of an hour: FLEET_FAULTS=100 ./tools/test tests/e2e/test_gateway_faults.py
-MANY = int(os.environ.get("FLEET_FAULTS", "8"))
+MANY = int(os.environ.get("FLEET_FAULTS", "4"))
 METRES = 1.5
 SETTLED = 60.0  # s, the most for a task with a fault, on a busy machine
 

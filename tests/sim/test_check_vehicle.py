@@ -23,6 +23,11 @@ EXACT = ("--noise", "off")  # a rover that is as the checker demands
 LIMIT = 50.0  # s
 
 
+#: a rover that got no processor for a second, on a busy machine, looks as if it had no telemetry;
+#: one that has none looks so the second time, too
+STARVED = "no LOCAL_POSITION_NED for 1 s"
+
+
 @contextmanager
 def rover(folder: Path, *options: str) -> Iterator[str]:
     """Run a simulated rover; gives its URL."""
@@ -48,8 +53,11 @@ def test_it_passes_the_simulated_rover_with_everything_on(persona: str, tmp_path
     truth = tmp_path / "truth.csv"
     options = ("--persona", persona, "--speed", SPEED, "--truth", str(truth))
     everything = ("--arm", "--drive", "--write", "--persona", persona, "--speed", SPEED)
-    with rover(tmp_path, *options) as url:
-        result = check(url, *everything)
+    for _ in range(2):
+        with rover(tmp_path, *options) as url:
+            result = check(url, *everything)
+        if STARVED not in result.stdout:
+            break
     assert result.returncode == 0, result.stdout
     *lines, summary = result.stdout.splitlines()
     assert re.fullmatch(r"\d+ ok, 0 failed, 0 skipped, \d notes", summary)
