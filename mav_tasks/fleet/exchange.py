@@ -73,7 +73,7 @@ class Counts:
     dropped: int = 0  # datagrams, because too many waited
     expired: int = 0  # datagrams, because they could not leave in time
     arrived: int = 0  # datagrams
-    late: int = 0  # datagrams that arrived after the time for which they are of use
+    late: int = 0  # datagrams that arrived after ``until``; those that are first count as arrived
     unread: int = 0  # datagrams that arrived while too many waited for the event loop
     lost: int = 0  # notifications of other gateways that did not arrive
     refused: int = 0  # notifications: forged, recorded, or for an earlier session of ours
@@ -273,13 +273,13 @@ class Exchange:
             self._had_of[packet.name] = packet.number
 
     def _datagrams(self, packet: Packet, now: float) -> Iterator[Arrived]:
-        """Return the datagrams of a packet that are still of use."""
+        """Return the datagrams of a packet that are still of use; a STOP always is."""
         under_way = now - packet.since / _MICRO if packet.since else inf
         if under_way < -APART:  # this machine was suspended, and its clock with it
             under_way = inf
         under_way = max(0.0, under_way)
         for each in packet.datagrams:
-            if under_way > each.left:
+            if under_way > each.left and not each.first:
                 self.late += 1
             else:
                 self.arrived += 1
