@@ -3,7 +3,8 @@
 A thread with one session listens and sends: libpq takes notifications also while a statement is
 executed, and a gateway costs the server one connection. The session is never in a transaction
 longer than one statement, because it would keep PostgreSQL from emptying its queue of
-notifications. It does not wait for the disk: a notification does not outlive a crash anyway.
+notifications. It does not wait for the disk (``synchronous_commit``): a notification does not
+outlive a crash anyway. PostgreSQL 18 would not wait either, as nothing else is written.
 
 Each gateway has a channel of its own, and all have one in common. PostgreSQL notifies within a
 database only, so fleets in two databases never meet. ``mav_tasks.fleet.exchange`` has the rules.
@@ -28,7 +29,7 @@ from mav_tasks.store.postgres.session import Limits, Session
 from mav_tasks.store.postgres.writable import check_writable
 
 OF_USE = 0.5  # s for which an ordinary datagram is of use
-GAP = 0.004  # s from one sending of ordinary datagrams to the next: those between go together
+GAP = 0.01  # s from one sending of ordinary datagrams to the next: those between go together
 RETRY = 0.2  # s from a failure to connect to the next attempt
 CLOSE_LIMIT = 0.5  # s for what still waits, at the end
 UNREAD = 10_000  # datagrams that wait for the loop; later ones are dropped, but none that is first
@@ -94,7 +95,8 @@ class Carrier:
 
         It leaves in the order of ``send``, but before all others if it is ``first``, and until
         ``until`` (boot_time) or not at all: by default 0.5 s, and 1 s if it is first. Those that
-        are first are sent again after a lost connection, and may arrive twice.
+        are first are sent again after a lost connection, and may arrive twice. Once they have left
+        they are delivered, however late; ``waited`` tells. Others must also arrive until ``until``.
         """
         if len(payload) > LONGEST:
             raise ValueError(f"a datagram of {len(payload)} bytes: it has up to {LONGEST}")
