@@ -1,22 +1,39 @@
 """Datagrams between gateways by way of a real PostgreSQL."""
 
+import os
 import select
+import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+from typing import Any
 
 import pytest
 
+from mav_tasks.clock import boot_time
 from mav_tasks.fleet.exchange import Arrived
 from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
+from mav_tasks.fleet.outbox import LIMIT as OUTBOX
 from mav_tasks.fleet_io.carrier import OF_USE, Carrier
 from mav_tasks.fleet_io.keeper import Trouble
 from mav_tasks.fleet_io.lease_database import LeaseDatabase
 from mav_tasks.store.postgres.address import parse
 from tests.kit.postgres import PostgresServer, connected
-from tests.kit.processes import wait_until
+from tests.kit.processes import Process, process, wait_until
 
 LIMIT = 20.0  # s
+RECEIVER = """
+import select, sys
+from mav_tasks.fleet_io.carrier import Carrier
+from mav_tasks.store.postgres.address import parse
+
+it = Carrier(parse(sys.argv[1]), sys.argv[2])
+while True:
+    select.select([it.fileno()], [], [])
+    for each in it.take():
+        print(each.payload.decode(), each.waited, each.at, flush=True)
+"""
 
 
 @contextmanager
@@ -29,6 +46,24 @@ def carriers(url: str, *names: str) -> Iterator[list[Carrier]]:
             others = frozenset(names) - {name}
             wait_until(lambda it=it, others=others: it.peers == others, within=LIMIT)  # type: ignore[misc]
         yield found
+
+
+@contextmanager
+def receiver(url: str, name: str, folder: Path) -> Iterator[Process]:
+    """Run a process that prints what arrives, each with how long it waited, and when."""
+    with process("-c", RECEIVER, url, name, folder=folder, name=name) as it:
+        yield it
+
+
+def cut_off(connection: Any, name: str) -> None:
+    """End the session of a carrier."""
+    query = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = %s"
+    found = connection.execute(f"{query} AND datname = current_database()", (mail_of(name),))
+    assert found.fetchall() == [(True,)]
+
+
+def mail_of(name: str) -> str:
+    return f"mav-tasks gateway {name} mail"
 
 
 def taken(it: Carrier, is_enough: Callable[[list[Arrived]], bool]) -> list[Arrived]:
@@ -88,6 +123,98 @@ def test_another_role_cannot_speak_for_a_gateway(postgres: PostgresServer) -> No
         a.send("b", b"true")
         assert [each.payload for each in taken(b, bool)] == [b"true"]
         wait_until(lambda: b.counts.refused >= len(texts), within=LIMIT)
+
+
+def test_a_recording_of_what_a_gateway_said_is_refused(postgres: PostgresServer) -> None:
+    """By a role that may read the secret's table, too: it needs no key to repeat a notification."""
+    url = postgres.new_database()
+    with carriers(url, "a", "b") as (a, b), connected(url) as stranger:
+        secret, fleet = stranger.execute(
+            "SELECT secret, fleet FROM gateway_secret, meta"
+        ).fetchone()
+        channel = Seal(secret.encode(), fleet).channel("b")
+        stranger.execute(f"LISTEN {channel}")
+        a.send("b", b"drive")
+        assert [each.payload for each in taken(b, bool)] == [b"drive"]
+        recorded = [each.payload for each in stranger.notifies(timeout=LIMIT, stop_after=2)]
+        stranger.execute(f"UNLISTEN {channel}")
+
+        def repeat() -> None:
+            refused = b.counts.refused
+            for text in recorded:
+                stranger.execute("SELECT pg_notify(%s, %s)", (channel, text))
+            wait_until(lambda: b.counts.refused >= refused + len(recorded), within=LIMIT)
+
+        repeat()
+        a.close()  # nothing of it shows b any more how far it has counted
+        cut_off(stranger, "b")
+        wait_until(lambda: Trouble(None) in b.take(), within=LIMIT)
+        repeat()
+        assert b.take() == []
+
+
+def test_a_stop_arrives_though_the_receiver_has_lost_its_connection(
+    postgres: PostgresServer,
+) -> None:
+    """The sender does not know that nobody listens, and sends it once."""
+    url = postgres.new_database()
+    with carriers(url, "a", "b") as (a, b), connected(url) as operator:
+        cut_off(operator, "b")
+        a.send("b", b"stop", first=True, until=boot_time() + LIMIT)
+        assert [each.payload for each in taken(b, bool)] == [b"stop"]
+
+
+def test_while_the_database_is_away_few_wait_and_stops_are_not_dropped(
+    postgres: PostgresServer,
+) -> None:
+    with carriers(postgres.new_database(), "a", "b") as (a, b):
+        postgres.stop()
+        wait_until(lambda: any(isinstance(each, Trouble) for each in a.take()), within=LIMIT)
+        until = boot_time() + 2 * LIMIT
+        a.send("b", b"stop", first=True, until=until)
+        for number in range(OUTBOX + 500):
+            a.send("b", b"%d" % number, until=until)
+        assert a.counts.dropped == 500
+        postgres.start()
+        found = [each.payload for each in taken(b, lambda found: len(found) > OUTBOX)]
+        assert found == [b"stop", *(b"%d" % number for number in range(500, OUTBOX + 500))]
+
+
+def test_fleets_in_two_databases_of_a_server_do_not_meet(postgres: PostgresServer) -> None:
+    with (
+        carriers(postgres.new_database(), "a", "b") as (a, b),
+        carriers(postgres.new_database(), "b", "c") as (other_b, c),
+    ):
+        a.send("", b"of the one", first=True)
+        a.send("c", b"for nobody")
+        c.send("", b"of the other", first=True)
+        assert [each.payload for each in taken(b, bool)] == [b"of the one"]
+        assert [each.payload for each in taken(other_b, bool)] == [b"of the other"]
+        assert (a.peers, c.peers) == (frozenset({"b"}), frozenset({"b"}))
+        assert a.take() + c.take() == []
+        assert [it.counts.refused for it in (a, b, other_b, c)] == [0, 0, 0, 0]
+
+
+def test_a_process_that_was_stopped_learns_how_late_it_reads(
+    postgres: PostgresServer, tmp_path: Path
+) -> None:
+    url = postgres.new_database()
+    with carriers(url, "a") as (a,), receiver(url, "b", tmp_path) as b:
+        wait_until(lambda: a.peers, within=LIMIT)
+        os.kill(b.popen.pid, signal.SIGSTOP)
+        sent_at = boot_time()
+        a.send("b", b"telemetry")
+        a.send("b", b"stop", first=True)
+        a.send("b", b"kept", until=sent_at + LIMIT)
+        wait_until(lambda: boot_time() > sent_at + 1.2, within=LIMIT)  # it could be first's end
+        resumed_at = boot_time()
+        os.kill(b.popen.pid, signal.SIGCONT)
+        b.wait_for("kept")
+        found = [line.split() for line in b.text.splitlines()]
+        assert [payload for payload, _, _ in found] == ["stop", "kept"]
+        for _, waited, at in found:  # one machine, one clock
+            assert float(waited) >= float(at) - sent_at - 0.001
+            assert float(waited) >= resumed_at - sent_at - 0.001
 
 
 def test_too_long_a_datagram_and_a_bad_name_are_refused(postgres: PostgresServer) -> None:
