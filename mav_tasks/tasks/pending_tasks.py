@@ -270,8 +270,9 @@ class PendingTasks:
         except Rejection:
             return False
         if run.left_out:
-            words = f"left out {left_out_words(run.left_out)} while task {task.id} waited or ran"
-            self._note(task, f"{words}; task {added.id} is next", now=now)
+            words = f"left out {left_out_words(run.left_out, terms.repeat)}"
+            words += f" while task {task.id} waited or ran; task {added.id} is next"
+            self._note(task, words, now=now)
         return True
 
     def _moved_on(self, task: Task, *, now: float) -> Task:
@@ -286,7 +287,9 @@ class PendingTasks:
         run = next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
         if run is None or not run.left_out:
             return task
-        words = f"left out {left_out_words(1 + run.left_out)} that passed meanwhile"
+        words = (
+            f"left out {left_out_words(1 + run.left_out, run.terms.repeat)} that passed meanwhile"
+        )
         task = self._registry.modify(task.id, run.terms, actor=SERVER, now=now)
         at = utc_text(self.times.start(task.terms) + self.times.wall_offset)
         self._note(task, f"{words}; task {task.id} starts {at}", now=now)

@@ -19,7 +19,7 @@ R, S = TaskReason, TaskState
 MIN_PERIOD = 10  # s
 MAX_PERIOD = 16_777_215  # s, half a year: the whole numbers that a float32 holds exactly
 MAX_REPEAT = 64  # bytes of an expression with its time zone
-MOST_COUNTED = 100  # times left out; beyond this their number is not told
+MOST_COUNTED = 100  # times of an expression that are left out; beyond this nobody counts them
 CORRECTION = 3 * 3600.0  # s; Debian's cron follows a clock at once that was set by more than this
 
 Rule = int | Cron
@@ -139,8 +139,8 @@ def _count(cron: Cron, after: float, *, before: float) -> int:
     return count
 
 
-def left_out_words(count: int) -> str:
-    """Return a number of planned times as text."""
-    if count >= MOST_COUNTED:
+def left_out_words(count: int, repeat: str) -> str:
+    """Return a number of planned times of a repetition as text."""
+    if count >= MOST_COUNTED and isinstance(rule_of(repeat), Cron):
         return f"{MOST_COUNTED} or more runs"
     return "1 run" if count == 1 else f"{count} runs"
