@@ -1,5 +1,6 @@
 """A series in real processes: killed between two runs and at the end of one; its commands."""
 
+import shlex
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -9,7 +10,7 @@ import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskState
 from mav_tasks.client.values import TaskStatus
-from tests.kit.commands import called
+from tests.kit.commands import Done, called, mav_tasks
 from tests.kit.processes import Stand, free_udp_ports, process, stand, wait_until
 
 PERIOD = 10  # s, the shortest
@@ -160,6 +161,27 @@ def test_a_mission_repeats_at_the_times_of_an_expression(server: str, tmp_path: 
     assert changed.lines == [f"rover 1: task {task['id']} changed"]
     (task,) = called("status", str(task["id"]), "--json", server=server).objects
     assert (task["cron"], task["series"]) == (None, task["id"])
+
+
+def test_the_commands_of_the_guide_do_what_it_says(server: str, tmp_path: Path) -> None:
+    (tmp_path / "round.waypoints").write_text(WAY, encoding="ascii")
+
+    def run(line: str, task: str = "") -> Done:
+        words = shlex.split(line.replace("12", task) if task else line)
+        done = mav_tasks(*words, server=server, folder=tmp_path)
+        assert (done.status, done.error) == (0, ""), line
+        return done
+
+    patrol, mission = (
+        run(line).output.strip().rpartition(" ")[2]
+        for line in (
+            "submit move 5 --label patrol --every 1h --deadline 10m",
+            'mission upload round.waypoints --every "0 6 * * 1-5 Europe/Zurich"',
+        )
+    )
+    assert run("modify 12 --every never", mission).lines == [f"rover 1: task {mission} changed"]
+    ended = run("cancel --series 12", patrol)
+    assert ended.lines == [f"rover 1: task {patrol} cancelled, and its series"]
 
 
 @pytest.mark.parametrize(
