@@ -65,8 +65,12 @@ async def cancel(
         else:
             rover = client.vehicle
             task_id = await (client.kill() if kill else client.cancel())
+        status = await client.status(task_id, vehicle=rover)
     words = f"rover {rover}: task {task_id} {'killed' if kill else 'cancelled'}"
-    words += ", and its series" if series else ""
+    if series:
+        words += ", and its series"
+    elif status.every is not None and not kill:
+        words += f"; it repeats; to end its series: mav-tasks cancel --series {task_id}"
     output.say_done(common.json, "kill" if kill else "cancel", words, task=task_id, vehicle=rover)
 
 

@@ -137,7 +137,9 @@ def test_a_series_is_submitted_looked_at_and_ended(server: str) -> None:
     assert f"series        {number}" in shown
     assert "every 1h30m" in called("queue", server=server).output
 
-    assert called("cancel", number, server=server).lines == [f"rover 1: task {number} cancelled"]
+    told = f"it repeats; to end its series: mav-tasks cancel --series {number}"
+    cancelled = called("cancel", number, server=server).lines
+    assert cancelled == [f"rover 1: task {number} cancelled; {told}"]
     (queue,) = called("queue", "--json", server=server).objects
     (following,) = queue["waiting"]
     assert (following["series"], following["every"]) == (task["id"], 5400)

@@ -1,6 +1,7 @@
 """Tasks that repeat: a day of runs, crashes, STOP, outages, clocks that are set."""
 
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 from shutil import copy
 from struct import unpack
@@ -15,9 +16,9 @@ from mav_tasks.tasks.lifecycle import TERMINAL, WAITING
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
-from tests.kit.client import ACCEPTED, DENIED, Sent
+from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
-from tests.kit.store import PromptSqliteStore
+from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -320,6 +321,22 @@ def test_a_staged_plan_cannot_repeat(world: World) -> None:
     sent = world.client.command(MODIFY, 1, EVERY, 60)
     world.run(0.1)
     assert sent.answer == (DENIED, R.WRONG_STATE)
+
+
+def test_that_a_task_repeats_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:
+    store = LateStore()
+    world = make_world(store=store)
+    task = submit(world)
+    store.delay = 0.2
+    sent = world.client.command(MODIFY, task, EVERY, 60)
+    world.run(0.1)
+    assert sent.ack is None
+    world.run(0.2)
+    assert sent.answer == (ACCEPTED, task)
+    store.delay = inf
+    sent = world.client.command(MODIFY, task, EVERY, 90)
+    world.run(1.0)
+    assert sent.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
 
 
 # restarts

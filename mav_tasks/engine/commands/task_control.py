@@ -181,6 +181,12 @@ class TaskControl:
         return task
 
 
+def sets_repetition(command: Command) -> bool:
+    """Whether a command lets a task repeat, or sends a piece of that."""
+    is_modify = command.command == MavCmd.TASK_MODIFY
+    return is_modify and command.params[1] in (P.EVERY, P.REPEAT)
+
+
 def _words(task: Task) -> str:
     return task.state.name.lower()
 
