@@ -29,23 +29,29 @@ LACKS_EVENTS = (
     " restore the right one, or end the server and check"
 )
 
-#: many rows as one text; the server takes it apart faster than Python would make arrays
-_INSERTS = {
-    "tasks": (
-        "INSERT INTO tasks (id, number, vehicle, state, changed_at, submitted)"
-        " SELECT (r->>0)::bigint, (r->>1)::bigint, (r->>2)::bigint, (r->>3)::integer,"
-        " (r->>4)::double precision, r->>5 FROM json_array_elements(?::json) AS r"
-        # ids wrap around: without retention an old task may still have the id
-        " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
-        " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
-        " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
-    ),
-    "journal": (
-        "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
-        " SELECT (r->>0)::bigint, (r->>1)::double precision, r->>2, (r->>3)::bigint,"
-        " (r->>4)::bigint, r->>5 FROM json_array_elements(?::json) AS r"
-    ),
-}
+
+def inserts(base: str = "") -> dict[str, str]:
+    """Return the statement that inserts many rows, by table; ``base`` + a row's number is stored.
+
+    The rows come as one text: the server takes it apart faster than Python would make arrays.
+    """
+    return {
+        "tasks": (
+            "INSERT INTO tasks (id, number, vehicle, state, changed_at, submitted)"
+            f" SELECT (r->>0)::bigint, {base}(r->>1)::bigint, (r->>2)::bigint,"
+            " (r->>3)::integer, (r->>4)::double precision, r->>5"
+            " FROM json_array_elements(?::json) AS r"
+            # ids wrap around: without retention an old task may still have the id
+            " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
+            " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
+            " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
+        ),
+        "journal": (
+            "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
+            f" SELECT {base}(r->>0)::bigint, (r->>1)::double precision, r->>2, (r->>3)::bigint,"
+            " (r->>4)::bigint, r->>5 FROM json_array_elements(?::json) AS r"
+        ),
+    }
 
 
 class PostgresDatabase:
@@ -56,6 +62,7 @@ class PostgresDatabase:
     """
 
     look_period = LOOK_PERIOD
+    _inserts = inserts()
 
     def __init__(
         self, address: Address, *, ownership: Ownership | None = None, purpose: str = "serve"
@@ -172,7 +179,7 @@ class PostgresDatabase:
         return int(self._meta("last_number")[0])
 
     def _insert(self, table: str, _columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
-        self._session.execute(_INSERTS[table], (dumps(rows),))
+        self._session.execute(self._inserts[table], (dumps(rows),))
 
     @contextmanager
     def _fenced(self) -> Iterator[None]:

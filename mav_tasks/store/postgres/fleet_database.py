@@ -6,14 +6,12 @@ all gateways are in the order of the commits, and a reader that has seen one has
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_rows
-from mav_tasks.store.codec import dumps
 from mav_tasks.store.halt_record import Register, Word
 from mav_tasks.store.postgres.address import Address
-from mav_tasks.store.postgres.database import PostgresDatabase
+from mav_tasks.store.postgres.database import PostgresDatabase, inserts
 from mav_tasks.store.postgres.gateway_ownership import GatewayOwnership
 from mav_tasks.store.retention import Trimmer
 
@@ -21,26 +19,13 @@ AT_WORK = 30.0  # s after the start; vehicles are loaded within some seconds
 TRIM_LOCK = 0x4D565453_00000003  # of the gateway that deletes expired rows
 
 #: to the number of a row in its gateway's count, for the number in the journal
-_BASE = "current_setting('mav_tasks.base')::bigint"
-_INSERTS = {
-    "tasks": (
-        "INSERT INTO tasks (id, number, vehicle, state, changed_at, submitted)"
-        f" SELECT (r->>0)::bigint, {_BASE} + (r->>1)::bigint, (r->>2)::bigint, (r->>3)::integer,"
-        " (r->>4)::double precision, r->>5 FROM json_array_elements(?::json) AS r"
-        " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
-        " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
-        " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
-    ),
-    "journal": (
-        "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
-        f" SELECT {_BASE} + (r->>0)::bigint, (r->>1)::double precision, r->>2, (r->>3)::bigint,"
-        " (r->>4)::bigint, r->>5 FROM json_array_elements(?::json) AS r"
-    ),
-}
+_BASE = "current_setting('mav_tasks.base')::bigint + "
 
 
 class FleetDatabase(PostgresDatabase):
     """Implements ``EventDatabase`` for one gateway under one lease."""
+
+    _inserts = inserts(_BASE)
 
     def __init__(self, address: Address, gateway: str, epoch: int) -> None:
         self._lease = GatewayOwnership(gateway, epoch)
@@ -111,6 +96,3 @@ class FleetDatabase(PostgresDatabase):
 
     def _stored(self) -> int:
         return self._lease.written(self._session)
-
-    def _insert(self, table: str, _columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
-        self._session.execute(_INSERTS[table], (dumps(rows),))
