@@ -5,7 +5,7 @@ import select
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,11 @@ from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
 from mav_tasks.fleet.outbox import LIMIT as OUTBOX
 from mav_tasks.fleet_io.carrier import OF_USE, Carrier
 from mav_tasks.fleet_io.keeper import Trouble
-from mav_tasks.fleet_io.lease_database import LeaseDatabase
 from mav_tasks.store.postgres.address import parse
+from tests.kit.carriers import LIMIT, carriers
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, process, wait_until
 
-LIMIT = 20.0  # s
 RECEIVER = """
 import select, sys
 from mav_tasks.fleet_io.carrier import Carrier
@@ -34,18 +33,6 @@ while True:
     for each in it.take():
         print(each.payload.decode(), each.waited, each.at, flush=True)
 """
-
-
-@contextmanager
-def carriers(url: str, *names: str) -> Iterator[list[Carrier]]:
-    """Run carriers that have met."""
-    LeaseDatabase(parse(url), "first", host="127.0.0.1", port=1).close()  # makes the tables
-    with ExitStack() as ends:
-        found = [ends.enter_context(closing(Carrier(parse(url), name))) for name in names]
-        for name, it in zip(names, found, strict=True):
-            others = frozenset(names) - {name}
-            wait_until(lambda it=it, others=others: it.peers == others, within=LIMIT)  # type: ignore[misc]
-        yield found
 
 
 @contextmanager
