@@ -154,6 +154,7 @@ class Carrier:
         with closing(session):
             check_writable(session)
             self._listen(session)
+            self._send(session, boot_time())  # HELLO: it fails if the queue is full
             if self._is_troubled:
                 self._is_troubled = False
                 self._inbox.put(Trouble(None))
@@ -169,6 +170,9 @@ class Carrier:
         query = "SELECT secret, fleet FROM gateway_secret, meta"
         ((secret, fleet),) = session.execute(query).fetchall()
         session.execute("SELECT set_config('synchronous_commit', 'off', false)")
+        # A full queue stays full: PostgreSQL removes what all have read only after a notification
+        # that has succeeded, and in this function.
+        session.execute("SELECT pg_notification_queue_usage()")
         seal = Seal(secret.encode(), fleet)
         for channel in (seal.channel(self._name), seal.channel(ALL)):  # a hash in hexadecimal
             session.execute(f"LISTEN {channel}")
