@@ -66,6 +66,11 @@ def failure(error: Exception) -> str | None:
     words = _WORDS.get(code) or _WORDS.get(code[:2])
     if code == "42501" and "for database" in str(error):
         words = "the role may not create the schema mav_tasks: GRANT CREATE ON DATABASE … TO it"
+    if code == "54000" and "NOTIFY" in str(error):
+        words = (
+            "the server's queue of notifications is full: end the session that listens and does"
+            " not end its transaction (pg_stat_activity)"
+        )
     return f"{words} ({error})" if words else str(error)
 
 
