@@ -18,7 +18,7 @@ from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
 from mav_tasks.store.postgres.ownership import Ownership
 from mav_tasks.store.postgres.reader import PostgresReader
-from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.postgres.session import Limits, Session
 from mav_tasks.store.postgres.writable import check_writable
 from mav_tasks.store.retention import Trimmer
 
@@ -65,18 +65,23 @@ class PostgresDatabase:
     _inserts = inserts()
 
     def __init__(
-        self, address: Address, *, ownership: Ownership | None = None, purpose: str = "serve"
+        self,
+        address: Address,
+        *,
+        ownership: Ownership | None = None,
+        purpose: str = "serve",
+        limits: Limits | None = None,
     ) -> None:
         """``purpose`` tells the server's operator what its sessions are for."""
         self._address = address
-        self._purpose = purpose
+        self._purpose, self._limits = purpose, limits
         self._ownership = ownership or Ownership()
         self._replaced: Replaced | None = None
         self.next_id = self.last_number = self.format_id = 0
         self.last_write: float | None = None
         self.ended_well = False
         with self._at_start():
-            self._session = Session(address, purpose=purpose)
+            self._session = Session(address, purpose=purpose, limits=limits)
             try:
                 check_writable(self._session)
                 self._ownership.lock(self._session)
@@ -120,7 +125,7 @@ class PostgresDatabase:
         if self._replaced is not None:
             raise self._replaced
         if self._session.is_lost:
-            self._session = Session(self._address, purpose=self._purpose)
+            self._session = Session(self._address, purpose=self._purpose, limits=self._limits)
             try:
                 check_writable(self._session)
                 self._ownership.lock(self._session)
@@ -167,8 +172,8 @@ class PostgresDatabase:
             self._session.close()
 
     def reader(self) -> PostgresReader:
-        """Return a new session for reading."""
-        return PostgresReader(self._address)
+        """Return a new session for reading what was committed: not from a standby, which lags."""
+        return PostgresReader(self._address, purpose=f"{self._purpose} load")
 
     def failure(self, error: Exception) -> str | None:
         """Return the words for a failure; None: it is a bug of ours."""
