@@ -6,7 +6,6 @@ the client at the gateway to which that one is connected, and the packet.
 
 import logging
 import struct
-from collections import deque
 
 from mav_tasks.engine.clients.elsewhere import BACK, TOWARDS
 from mav_tasks.engine.inputs import FLEET_LINK
@@ -34,7 +33,6 @@ class FleetLink:
         fd = carrier.fileno()
         assert fd is not None, "it is open"
         self._fd = fd
-        self._arrived: deque[tuple[Peer, bytes, float]] = deque()
 
     def __repr__(self) -> str:
         return f"FleetLink({self._carrier!r})"
@@ -53,7 +51,9 @@ class FleetLink:
     ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
         """Return datagrams as ``receive`` does, and the most that each was under way, s."""
         del longest  # the carrier measures, stalls of this process included
-        for each in self._carrier.take():
+        found: list[tuple[Peer, bytes]] = []
+        waited: list[float] = []
+        for each in self._carrier.take(limit):
             if isinstance(each, Trouble):
                 if each.words is not None:
                     log.warning("other gateways cannot be reached: %s", each.words)
@@ -62,13 +62,11 @@ class FleetLink:
                 continue
             kind, number = _HEAD.unpack_from(each.payload)
             data = each.payload[_HEAD.size :]
-            if kind == _TO:
-                self._arrived.append(((each.sender, number), data, each.waited))
-            elif kind == _BACK:
-                self._arrived.append(((BACK, each.sender, number), data, each.waited))
-        count = min(limit, len(self._arrived))
-        found = [self._arrived.popleft() for _ in range(count)]
-        return [(peer, data) for peer, data, _ in found], [waited for _, _, waited in found]
+            if kind in (_TO, _BACK):
+                way = (BACK,) if kind == _BACK else ()
+                found.append(((*way, each.sender, number), data))
+                waited.append(each.waited)
+        return found, waited
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
         """Send a packet on its way to another gateway, or back to one; never block."""

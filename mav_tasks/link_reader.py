@@ -69,7 +69,8 @@ class LinkReader:
         """Read all links, clients' first, after a stall of so many seconds.
 
         If the wall clock was set during the stall (not ``wall_is_even``), kernel timestamps are
-        useless: then everything counts as having waited for the whole stall.
+        useless: then everything counts as having waited for the whole stall. Other gateways'
+        packets may have waited longer, and tell so by another clock.
         """
         self._stood_still, self._settled_at = seconds, now + SETTLES
         came: dict[str, tuple[list[tuple[Peer, bytes]], list[float]]] = {}
@@ -78,7 +79,8 @@ class LinkReader:
             for link in chain(*self.readable()):
                 if link.name in self._gone:  # later data belongs to another connection
                     continue
-                if wall_is_even and isinstance(link, StampedLink):
+                has_stamps = wall_is_even or link.name in self._stamped
+                if has_stamps and isinstance(link, StampedLink):
                     datagrams, waited = link.receive_stamped(DRAIN, longest=seconds)
                 else:
                     datagrams = self._received(link)

@@ -61,7 +61,7 @@ class PacketSender:
         self._put(raw, first=first, until=min(until, self._fence.until))
 
     def send_unfenced(self, message: Message, source: Address, *, is_ours: bool) -> None:
-        """Send a message that changes nothing at a vehicle, whoever has it.
+        """Send a message that changes nothing at a vehicle, whichever gateway has it.
 
         ``is_ours``: a vehicle that this gateway has is there.
         """

@@ -54,6 +54,7 @@ class Arrived:
     """A datagram of another gateway, which was read at ``at`` (boot_time of this machine).
 
     ``waited``: it was given to ``send`` so many seconds before ``at``, or less; inf: unknown.
+    ``until``: it is of use until then, or less long (boot_time of this machine).
     ``session`` changes when the sender's process, or only its connection, has begun again.
     """
 
@@ -63,6 +64,7 @@ class Arrived:
     at: float
     waited: float
     first: bool = False
+    until: float = inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +75,7 @@ class Counts:
     dropped: int = 0  # datagrams, because too many waited
     expired: int = 0  # datagrams, because they could not leave in time
     arrived: int = 0  # datagrams
-    late: int = 0  # datagrams that arrived after ``until``; those that are first count as arrived
+    late: int = 0  # datagrams that came to the loop after ``until``; first ones are never late
     unread: int = 0  # datagrams that arrived while too many waited for the event loop
     lost: int = 0  # notifications of other gateways that did not arrive
     refused: int = 0  # notifications: forged, recorded, or for an earlier session of ours
@@ -283,8 +285,15 @@ class Exchange:
                 self.late += 1
             else:
                 self.arrived += 1
-                waited = under_way + each.age
-                yield Arrived(packet.name, packet.session, each.payload, now, waited, each.first)
+                yield Arrived(
+                    packet.name,
+                    packet.session,
+                    each.payload,
+                    now,
+                    under_way + each.age,
+                    each.first,
+                    now + each.left - under_way if under_way < inf else inf,
+                )
 
     def _next(self) -> int:
         self._counter += 1

@@ -14,15 +14,16 @@ import re
 import secrets
 import select
 from contextlib import closing
+from math import inf
 from threading import Thread
 
 from mav_tasks.clock import boot_time
 from mav_tasks.fleet.exchange import Arrived, Counts, Exchange
 from mav_tasks.fleet.notification import LONGEST, SESSION, Seal
 from mav_tasks.fleet.outbox import ALL, KEPT, Pressing, Waiting
+from mav_tasks.fleet_io.inbox import Inbox
 from mav_tasks.fleet_io.keeper import Trouble
 from mav_tasks.fleet_io.shared_outbox import SharedOutbox
-from mav_tasks.mailbox import Mailbox
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, failure
 from mav_tasks.store.postgres.session import Limits, Session
@@ -32,7 +33,6 @@ OF_USE = 0.5  # s for which an ordinary datagram is of use
 GAP = 0.01  # s from one sending of ordinary datagrams to the next: those between go together
 RETRY = 0.2  # s from a failure to connect to the next attempt
 CLOSE_LIMIT = 0.5  # s for what still waits, at the end
-UNREAD = 10_000  # datagrams that wait for the loop; later ones are dropped, but none that is first
 LIMITS = Limits(answer=1.0, statement=1.0, lock=1.0, in_transaction=1.0, sending=1.0)
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,40}")
@@ -56,8 +56,7 @@ class Carrier:
         self._name = name
         self._outbox = SharedOutbox()
         self._exchange = Exchange(name, self._outbox)
-        self._inbox: Mailbox[Arrived | Trouble] = Mailbox()
-        self._unread = 0
+        self._inbox = Inbox()
         self._peers: frozenset[str] = frozenset()
         self._is_troubled = False
         self._is_ending = False
@@ -76,14 +75,14 @@ class Carrier:
     @property
     def counts(self) -> Counts:
         """What has come of datagrams and notifications so far."""
-        it, outbox = self._exchange, self._outbox
+        it, outbox, inbox = self._exchange, self._outbox, self._inbox
         return Counts(
             it.sent,
             outbox.dropped,
             outbox.expired,
             it.arrived,
-            it.late,
-            self._unread,
+            it.late + inbox.late,
+            inbox.unread,
             it.lost,
             it.refused,
         )
@@ -105,9 +104,12 @@ class Carrier:
             until = now + (KEPT if first else OF_USE)
         self._outbox.put(to, Waiting(payload, now, until, first))
 
-    def take(self) -> list[Arrived | Trouble]:
-        """Return what has arrived, in its order, and troubles; raise an exception of the thread."""
-        return self._inbox.take()
+    def take(self, most: float = inf) -> list[Arrived | Trouble]:
+        """Return up to ``most`` of what has arrived, in its order, and troubles.
+
+        Datagrams that are first come before all others. Raise an exception of the thread.
+        """
+        return self._inbox.take(most, now=boot_time())
 
     def fileno(self) -> int | None:
         """Return the descriptor that is readable while ``take`` has something; None: closed."""
@@ -152,6 +154,7 @@ class Carrier:
         with closing(session):
             check_writable(session)
             self._listen(session)
+            self._send(session, boot_time())  # HELLO: it fails if the queue is full
             if self._is_troubled:
                 self._is_troubled = False
                 self._inbox.put(Trouble(None))
@@ -167,6 +170,9 @@ class Carrier:
         query = "SELECT secret, fleet FROM gateway_secret, meta"
         ((secret, fleet),) = session.execute(query).fetchall()
         session.execute("SELECT set_config('synchronous_commit', 'off', false)")
+        # A full queue stays full: PostgreSQL removes what all have read only after a notification
+        # that has succeeded, and in this function.
+        session.execute("SELECT pg_notification_queue_usage()")
         seal = Seal(secret.encode(), fleet)
         for channel in (seal.channel(self._name), seal.channel(ALL)):  # a hash in hexadecimal
             session.execute(f"LISTEN {channel}")
@@ -201,8 +207,5 @@ class Carrier:
     def _receive(self, session: Session) -> None:
         for _, text in session.notifications():
             for each in self._exchange.receive(text, now=boot_time()):
-                if len(self._inbox) < UNREAD or each.first:
-                    self._inbox.put(each)
-                else:
-                    self._unread += 1
+                self._inbox.put(each)
         self._peers = self._exchange.peers

@@ -116,10 +116,13 @@ def _only(vehicles: frozenset[int] | None) -> tuple[str, str]:
         return "", ""
     listed = ",".join(map(str, sorted(vehicles))) or "NULL"
     theirs = f"WHERE vehicle IN ({listed})"
-    late = (
-        f"SELECT id FROM tasks {theirs} AND state >= {TaskState.COMPLETED:d}"
-        f" ORDER BY changed_at DESC LIMIT {MOST_OVER * len(vehicles)}"
+    late = " UNION ALL ".join(
+        f"SELECT * FROM (SELECT id FROM tasks WHERE vehicle = {vehicle:d}"
+        f" AND state >= {TaskState.COMPLETED:d} ORDER BY changed_at DESC LIMIT {MOST_OVER})"
+        f" AS of_{vehicle:d}"
+        for vehicle in sorted(vehicles)
     )
+    late = late or "NULL"
     return theirs, f"{theirs} AND (state < {TaskState.COMPLETED:d} OR id IN ({late}))"
 
 

@@ -52,7 +52,7 @@ def test_without_its_database_the_server_refuses_new_tasks_and_nothing_else(
             for nonce in (11, 12):
                 refused = command_long(link, MOVE, 1.0, 0, 0, nonce)
                 assert (refused.result, refused.result_param2) == REFUSED
-            wait_for(link, "STATUSTEXT", "'Task 1 done' in STATUSTEXT.text", within=20)
+            running.server.wait_for("task 1 completed", within=20)
             running.server.wait_for(f"{re.escape(url)}: .*: new tasks are refused")
             assert command_long(link, STOP).result == 0
             wait_for(link, "HEARTBEAT", f"HEARTBEAT.type==10 and HEARTBEAT.custom_mode=={HOLD}")

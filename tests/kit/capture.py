@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from struct import iter_unpack
-from time import monotonic
 
 from mav_tasks.links.memory import Conditions
 from tests.kit.lossy_udp import LossyUdp, _Way
@@ -22,7 +21,7 @@ class Capture(LossyUdp):
 
     def __init__(self, rover_port: int) -> None:
         super().__init__(rover_port, Conditions(), seed=0)
-        #: per setpoint: monotonic seconds, and whether it moves the rover
+        #: per setpoint: UTC seconds, and whether it moves the rover
         self.setpoints: list[tuple[float, bool]] = []
 
     @property
@@ -38,7 +37,7 @@ class Capture(LossyUdp):
 
     def _put_under_way(self, way: _Way, data: bytes) -> None:
         if way.traffic is self.to_server and data[7] == SETPOINT:
-            self.setpoints.append((monotonic(), moves(data[SPEEDS])))
+            self.setpoints.append((self.arrived_at, moves(data[SPEEDS])))
         super()._put_under_way(way, data)
 
 

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from itertools import count
 from random import Random
 from threading import Thread
-from time import monotonic
+from time import monotonic, time
 
+from mav_tasks.links import stamps
 from mav_tasks.links.memory import Conditions
 
 LOOPBACK = "127.0.0.1"
@@ -51,6 +52,8 @@ class LossyUdp:
 
     def __init__(self, server_port: int, conditions: Conditions, *, seed: int) -> None:
         self.to_server, self.to_clients = Traffic(), Traffic()
+        #: when the system received the latest datagram, in UTC s: not later if this process waits
+        self.arrived_at = 0.0
         self._server = (LOOPBACK, server_port)
         self._conditions = conditions
         self._random = Random(seed)
@@ -106,8 +109,9 @@ class LossyUdp:
         taken = 0
         with suppress(BlockingIOError, ConnectionRefusedError):  # refused: the server has ended
             while taken < AT_A_TIME:
-                data, peer = source.recvfrom(MAX_DATAGRAM)
+                data, control, _, peer = source.recvmsg(MAX_DATAGRAM, stamps.ROOM)
                 taken += 1
+                self.arrived_at = stamps.stamp_in(control) or time()
                 way = self._way_up(peer) if source is self._front else self._ways_down[source]
                 if way is not None:
                     self._put_under_way(way, data)
@@ -153,6 +157,7 @@ def _udp_socket() -> socket.socket:
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sock.setblocking(False)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+    stamps.ask_for_stamps(sock)
     sock.bind((LOOPBACK, 0))
     return sock
 

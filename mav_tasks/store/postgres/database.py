@@ -18,7 +18,7 @@ from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
 from mav_tasks.store.postgres.ownership import Ownership
 from mav_tasks.store.postgres.reader import PostgresReader
-from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.postgres.session import Limits, Session
 from mav_tasks.store.postgres.writable import check_writable
 from mav_tasks.store.retention import Trimmer
 
@@ -29,23 +29,29 @@ LACKS_EVENTS = (
     " restore the right one, or end the server and check"
 )
 
-#: many rows as one text; the server takes it apart faster than Python would make arrays
-_INSERTS = {
-    "tasks": (
-        "INSERT INTO tasks (id, number, vehicle, state, changed_at, submitted)"
-        " SELECT (r->>0)::bigint, (r->>1)::bigint, (r->>2)::bigint, (r->>3)::integer,"
-        " (r->>4)::double precision, r->>5 FROM json_array_elements(?::json) AS r"
-        # ids wrap around: without retention an old task may still have the id
-        " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
-        " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
-        " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
-    ),
-    "journal": (
-        "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
-        " SELECT (r->>0)::bigint, (r->>1)::double precision, r->>2, (r->>3)::bigint,"
-        " (r->>4)::bigint, r->>5 FROM json_array_elements(?::json) AS r"
-    ),
-}
+
+def inserts(base: str = "") -> dict[str, str]:
+    """Return the statement that inserts many rows, by table; ``base`` + a row's number is stored.
+
+    The rows come as one text: the server takes it apart faster than Python would make arrays.
+    """
+    return {
+        "tasks": (
+            "INSERT INTO tasks (id, number, vehicle, state, changed_at, submitted)"
+            f" SELECT (r->>0)::bigint, {base}(r->>1)::bigint, (r->>2)::bigint,"
+            " (r->>3)::integer, (r->>4)::double precision, r->>5"
+            " FROM json_array_elements(?::json) AS r"
+            # ids wrap around: without retention an old task may still have the id
+            " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
+            " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
+            " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
+        ),
+        "journal": (
+            "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
+            f" SELECT {base}(r->>0)::bigint, (r->>1)::double precision, r->>2, (r->>3)::bigint,"
+            " (r->>4)::bigint, r->>5 FROM json_array_elements(?::json) AS r"
+        ),
+    }
 
 
 class PostgresDatabase:
@@ -56,20 +62,26 @@ class PostgresDatabase:
     """
 
     look_period = LOOK_PERIOD
+    _inserts = inserts()
 
     def __init__(
-        self, address: Address, *, ownership: Ownership | None = None, purpose: str = "serve"
+        self,
+        address: Address,
+        *,
+        ownership: Ownership | None = None,
+        purpose: str = "serve",
+        limits: Limits | None = None,
     ) -> None:
         """``purpose`` tells the server's operator what its sessions are for."""
         self._address = address
-        self._purpose = purpose
+        self._purpose, self._limits = purpose, limits
         self._ownership = ownership or Ownership()
         self._replaced: Replaced | None = None
         self.next_id = self.last_number = self.format_id = 0
         self.last_write: float | None = None
         self.ended_well = False
         with self._at_start():
-            self._session = Session(address, purpose=purpose)
+            self._session = Session(address, purpose=purpose, limits=limits)
             try:
                 check_writable(self._session)
                 self._ownership.lock(self._session)
@@ -113,7 +125,7 @@ class PostgresDatabase:
         if self._replaced is not None:
             raise self._replaced
         if self._session.is_lost:
-            self._session = Session(self._address, purpose=self._purpose)
+            self._session = Session(self._address, purpose=self._purpose, limits=self._limits)
             try:
                 check_writable(self._session)
                 self._ownership.lock(self._session)
@@ -160,8 +172,8 @@ class PostgresDatabase:
             self._session.close()
 
     def reader(self) -> PostgresReader:
-        """Return a new session for reading."""
-        return PostgresReader(self._address)
+        """Return a new session for reading what was committed: not from a standby, which lags."""
+        return PostgresReader(self._address, purpose=f"{self._purpose} load")
 
     def failure(self, error: Exception) -> str | None:
         """Return the words for a failure; None: it is a bug of ours."""
@@ -172,7 +184,7 @@ class PostgresDatabase:
         return int(self._meta("last_number")[0])
 
     def _insert(self, table: str, _columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
-        self._session.execute(_INSERTS[table], (dumps(rows),))
+        self._session.execute(self._inserts[table], (dumps(rows),))
 
     @contextmanager
     def _fenced(self) -> Iterator[None]:

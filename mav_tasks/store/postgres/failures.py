@@ -10,6 +10,7 @@ _WORDS = {
     "53": "the database server lacks a resource",
     "55P03": "another program has locked its tables",
     "57014": "the database took too long",
+    "25P04": "the database took too long",
     "57P01": "the database server is shutting down",
     "57P02": "the database server has crashed and restarts",
     "57P03": "the database server is starting or shutting down",
@@ -44,10 +45,11 @@ LOST = "08006"
 class PostgresError(Exception):
     """An error of the server, or the loss of its connection (LOST). The text is one line."""
 
-    def __init__(self, text: str, *, sqlstate: str = "", table: str = "") -> None:
+    def __init__(self, text: str, *, sqlstate: str = "", table: str = "", column: str = "") -> None:
         super().__init__(in_one_line(text))
         self.sqlstate = sqlstate
         self.table = table
+        self.column = column
 
 
 class Replaced(Exception):
@@ -64,6 +66,11 @@ def failure(error: Exception) -> str | None:
     words = _WORDS.get(code) or _WORDS.get(code[:2])
     if code == "42501" and "for database" in str(error):
         words = "the role may not create the schema mav_tasks: GRANT CREATE ON DATABASE … TO it"
+    if code == "54000" and "NOTIFY" in str(error):
+        words = (
+            "the server's queue of notifications is full: end the session that listens and does"
+            " not end its transaction (pg_stat_activity)"
+        )
     return f"{words} ({error})" if words else str(error)
 
 

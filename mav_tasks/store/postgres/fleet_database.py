@@ -6,46 +6,32 @@ all gateways are in the order of the commits, and a reader that has seen one has
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_rows
-from mav_tasks.store.codec import dumps
 from mav_tasks.store.halt_record import Register, Word
 from mav_tasks.store.postgres.address import Address
-from mav_tasks.store.postgres.database import PostgresDatabase
-from mav_tasks.store.postgres.gateway_ownership import GatewayOwnership
+from mav_tasks.store.postgres.database import PostgresDatabase, inserts
+from mav_tasks.store.postgres.gateway_ownership import LIMITS, GatewayOwnership
 from mav_tasks.store.retention import Trimmer
 
 AT_WORK = 30.0  # s after the start; vehicles are loaded within some seconds
 TRIM_LOCK = 0x4D565453_00000003  # of the gateway that deletes expired rows
 
 #: to the number of a row in its gateway's count, for the number in the journal
-_BASE = "current_setting('mav_tasks.base')::bigint"
-_INSERTS = {
-    "tasks": (
-        "INSERT INTO tasks (id, number, vehicle, state, changed_at, submitted)"
-        f" SELECT (r->>0)::bigint, {_BASE} + (r->>1)::bigint, (r->>2)::bigint, (r->>3)::integer,"
-        " (r->>4)::double precision, r->>5 FROM json_array_elements(?::json) AS r"
-        " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
-        " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
-        " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
-    ),
-    "journal": (
-        "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
-        f" SELECT {_BASE} + (r->>0)::bigint, (r->>1)::double precision, r->>2, (r->>3)::bigint,"
-        " (r->>4)::bigint, r->>5 FROM json_array_elements(?::json) AS r"
-    ),
-}
+_BASE = "current_setting('mav_tasks.base')::bigint + "
 
 
 class FleetDatabase(PostgresDatabase):
     """Implements ``EventDatabase`` for one gateway under one lease."""
 
+    _inserts = inserts(_BASE)
+
     def __init__(self, address: Address, gateway: str, epoch: int) -> None:
         self._lease = GatewayOwnership(gateway, epoch)
         self._first_look = 0.0  # UTC, s
-        super().__init__(address, ownership=self._lease, purpose=f"gateway {gateway} store")
+        purpose = f"gateway {gateway} store"
+        super().__init__(address, ownership=self._lease, purpose=purpose, limits=LIMITS)
 
     def begin(self) -> None:
         """Become a writer, and read how far this gateway has written."""
@@ -62,7 +48,7 @@ class FleetDatabase(PostgresDatabase):
         count = batch.last - batch.first + 1
         session = self._session
         with self._fenced():
-            self._lease.wrote(session, batch.last)
+            self._lease.wrote(session, self.last_number, batch.last)
             session.execute(
                 "UPDATE meta SET last_number = last_number + ?, last_write = ?", (count, utc)
             )
@@ -78,13 +64,19 @@ class FleetDatabase(PostgresDatabase):
         """Delete some expired rows, unless another gateway is doing that.
 
         It also notes that the fleet is at work, if nothing was to be stored for long: queues that
-        nobody has looked after for hours must not go on alone (``tasks/fleet.py``).
+        nobody has looked after for hours must not go on alone (``tasks/fleet.py``). That locks the
+        row of ``meta``, for which every write waits, so it is a transaction of its own.
         """
+        has_more = self._trim(trimmer, utc=utc)
+        self._first_look = self._first_look or utc
+        if not has_more and utc - self._first_look >= AT_WORK:  # not at the start, after hours
+            with self._fenced():
+                self._session.execute("UPDATE meta SET last_write = ?", (utc,))
+        return has_more
+
+    def _trim(self, trimmer: Trimmer, *, utc: float) -> bool:
         with self._cause(), self._session.transaction():
             self._lease.fence(self._session)
-            self._first_look = self._first_look or utc
-            if utc - self._first_look >= AT_WORK:  # not at the start, which may be after hours
-                self._session.execute("UPDATE meta SET last_write = ?", (utc,))
             query = "SELECT pg_try_advisory_xact_lock(?)"
             ((is_ours,),) = self._session.execute(query, (TRIM_LOCK,)).fetchall()
             return bool(is_ours) and trimmer.step(self._session, utc=utc)
@@ -111,6 +103,3 @@ class FleetDatabase(PostgresDatabase):
 
     def _stored(self) -> int:
         return self._lease.written(self._session)
-
-    def _insert(self, table: str, _columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
-        self._session.execute(_INSERTS[table], (dumps(rows),))

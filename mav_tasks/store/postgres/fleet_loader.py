@@ -16,18 +16,23 @@ from mav_tasks.mailbox import Mailbox
 from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome, VehiclesLoaded
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
-from mav_tasks.store.postgres.gateway_ownership import GatewayOwnership
+from mav_tasks.store.postgres.gateway_ownership import LIMITS, GatewayOwnership
 from mav_tasks.store.postgres.reader import PostgresReader
-from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.postgres.session import Found, Session
 from mav_tasks.store.reading import read_restored
 from mav_tasks.tasks.lifecycle import RUNNING
 from mav_tasks.tasks.signing_lead import DECAY, MOST_LEAD, STEP
-from mav_tasks.tasks.task import MAX_TASK_ID, following
+from mav_tasks.tasks.task import MAX_TASK_ID
 
 BLOCK = 1_000  # task ids that a gateway gets at once
 RETRY = 0.25  # s between two attempts
 REPORT = 5.0  # s between two reports of a lasting failure
 
+#: the id after the block, or 1 if the block reaches the last id
+_RESERVE = (
+    "UPDATE meta SET next_id = CASE WHEN next_id + ?::bigint > ?::bigint THEN 1"
+    " ELSE next_id + ?::bigint END"
+)
 _LEAD = (
     "UPDATE holdings SET lead = least(?, greatest(0, lead - ?::float8 * (? - lead_utc)) + ?),"
     " lead_utc = ? WHERE vehicle = ANY(?::bigint[]) RETURNING lead"
@@ -97,36 +102,43 @@ class FleetLoader:
         return True
 
     def _ids(self) -> IdsGranted:
-        with self._in_transaction("ids") as session:
-            ((first,),) = session.execute("SELECT next_id FROM meta FOR UPDATE").fetchall()
-            last = min(first + BLOCK - 1, MAX_TASK_ID)
-            session.execute("UPDATE meta SET next_id = ?", (following(last),))
-        return IdsGranted(int(first), int(last - first + 1))
+        with self._in_transaction("ids") as (session, found):
+            session.execute("SELECT next_id FROM meta FOR UPDATE")  # what follows sees this one
+            session.execute(_RESERVE, (BLOCK, MAX_TASK_ID, BLOCK))
+        ((first,),) = found[0]
+        return IdsGranted(int(first), int(min(BLOCK, MAX_TASK_ID + 1 - first)))
 
     @contextmanager
-    def _in_transaction(self, purpose: str) -> Iterator[Session]:
-        """Execute the block in a session of its own, unless the lease has ended."""
+    def _in_transaction(self, purpose: str) -> Iterator[tuple[Session, list[Found]]]:
+        """Execute the block in a session of its own, unless the lease has ended.
+
+        It is one round trip: other gateways wait for the locked rows. After the block the list has
+        what each query in it has found.
+        """
         lease = GatewayOwnership(self._gateway, self._epoch)
-        session = Session(self._address, purpose=f"gateway {self._gateway} {purpose}")
+        purpose = f"gateway {self._gateway} {purpose}"
+        session = Session(self._address, purpose=purpose, limits=LIMITS)
         try:
             lease.resume(session)
-            with session.transaction():
+            with session.batch() as found:
                 lease.fence(session)
-                yield session
+                yield session, found
         except PostgresError as error:
             raise lease.failure_of(session, error) from error
         finally:
             session.close()
 
     def _loaded(self, vehicles: frozenset[int]) -> VehiclesLoaded:
-        offset, lead = self._wall_offset(), self._lead(vehicles)
-        with closing(PostgresReader(self._address)) as reader:
+        offset, purpose = self._wall_offset(), f"gateway {self._gateway} load"
+        with closing(PostgresReader(self._address, purpose=purpose)) as reader:
             ((last_write,),) = reader.connection.execute("SELECT last_write FROM meta").fetchall()
             idle = 0.0 if last_write is None else max(0.0, boot_time() + offset - last_write)
             restored = read_restored(
                 reader, offset=offset, ended_well=True, idle=idle, vehicles=vehicles
             )
         was_running = any(task.state in RUNNING for task in restored.tasks)
+        # last: an attempt that fails before must not move it
+        lead = self._lead(vehicles)
         return VehiclesLoaded(
             tuple(sorted(vehicles)),
             replace(restored, ended_well=not was_running, signing_lead=lead),
@@ -136,6 +148,6 @@ class FleetLoader:
         """Take the next lead of signatures for these vehicles, and return it."""
         utc = boot_time() + self._wall_offset()
         listed = ",".join(map(str, sorted(vehicles)))
-        with self._in_transaction("lead") as session:
-            found = session.execute(_LEAD, (MOST_LEAD, DECAY, utc, STEP, utc, f"{{{listed}}}"))
-            return max((float(lead) for (lead,) in found), default=0.0)
+        with self._in_transaction("lead") as (session, found):
+            session.execute(_LEAD, (MOST_LEAD, DECAY, utc, STEP, utc, f"{{{listed}}}"))
+        return max((float(lead) for (lead,) in found[0]), default=0.0)

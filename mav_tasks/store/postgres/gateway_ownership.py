@@ -5,11 +5,18 @@ which fails unless the gateway's row has this epoch. It locks the row against th
 which takes the row for itself first, but not against renewals, so that a write that hangs does not
 cost the lease. So once a lease has ended, a transaction under it has either been committed before
 or never will be.
+
+A session that this gateway has lost may still commit its last batch, after another session has
+asked what is stored. So a batch says after which event it comes, and fails at any other place.
 """
 
 from mav_tasks.store.postgres.failures import PostgresError, Replaced
 from mav_tasks.store.postgres.ownership import Ownership, holder_if_any, words_for
-from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.postgres.session import Limits, Session
+
+#: a gateway that stops in a transaction keeps others from writing, and its lease from ending: the
+#: database cannot see that while its machine answers
+LIMITS = Limits(in_transaction=1.0, transaction=2.0)
 
 EVICTED = "the fleet has ended the lease of gateway {}: another gateway may have its rovers"
 
@@ -56,11 +63,23 @@ class GatewayOwnership(Ownership):
             (self.epoch, self.number, self.number),
         )
 
-    def wrote(self, session: Session, last: int) -> None:
-        """Note, in a batch's transaction, the number of its last event."""
+    def wrote(self, session: Session, before: int, last: int) -> None:
+        """Note, in a batch's transaction, the number of its last event.
+
+        Make it fail unless ``before`` is the number of the last one that is stored.
+        """
         session.execute(
-            "UPDATE gateway_writes SET written = ? WHERE gateway = ?", (last, self.number)
+            "UPDATE gateway_writes SET written = CASE WHEN written = ? THEN ?::bigint END"
+            " WHERE gateway = ?",
+            (before, last, self.number),
         )
+
+    def failure_of(self, session: Session, error: PostgresError) -> Exception:
+        """Return Replaced if an error is the fence's, another one if it is that of ``wrote``."""
+        cause = super().failure_of(session, error)
+        if isinstance(cause, Replaced) and error.column == "written":
+            return PostgresError("a lost session of this gateway has stored events since")
+        return cause
 
     def written(self, session: Session) -> int:
         """Return the number of the last event that this gateway has stored."""

@@ -7,6 +7,7 @@ from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import failure
 from mav_tasks.store.postgres.session import READING, Session
+from mav_tasks.store.postgres.writable import check_writable
 from mav_tasks.store.reading import in_one_line
 
 
@@ -15,11 +16,17 @@ class PostgresReader:
 
     task_key = "number"
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, *, purpose: str = "read") -> None:
+        """``purpose`` tells the server's operator what the session is for.
+
+        A standby, which lags, will do for "read"; for any other purpose it is refused.
+        """
         self.name = address.shown
         with in_one_line(self):
-            self.connection = Session(address, purpose="read", limits=READING)
+            self.connection = Session(address, purpose=purpose, limits=READING)
             try:
+                if purpose != "read":
+                    check_writable(self.connection)
                 self.is_empty = not schema.version_of(self.connection)
             except BaseException:
                 self.connection.close()

@@ -23,6 +23,7 @@ from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import LOST, PostgresError, connecting
 
 OLDEST = 140_000  # PostgreSQL 14; older ones get no corrections any more
+WITH_TRANSACTION_TIMEOUT = 170_000  # PostgreSQL 17
 SCHEMA = "mav_tasks"
 
 _CONNECT_LIMIT = 2  # s for each host, libpq's least
@@ -41,6 +42,9 @@ class Limits:
     lock: float = 1.0  # after which the server gives up waiting for a lock of another program
     in_transaction: float = 5.0  # after which it ends the transaction of a suspended process
     sending: float = 3.0  # in which the other machine must acknowledge what was sent
+    #: after which the server ends a session whose transaction is not over, also if a batch was sent
+    #: only in part; PostgreSQL 17 and newer. 0: never
+    transaction: float = 0.0
 
 
 READING = Limits(answer=30.0, statement=30.0)  # a query may sort many rows
@@ -112,7 +116,7 @@ class Session:
         try:
             self._pg.enter_pipeline_mode()
             self._check_version()
-            self._set_up(_settings(limits))
+            self._set_up(_settings(limits, version=self._pg.server_version))
         except BaseException:
             self.close()
             raise
@@ -308,8 +312,9 @@ class Session:
             self._warnings.append(_field(notice, pq.DiagnosticField.MESSAGE_PRIMARY))
 
 
-def _settings(limits: Limits) -> dict[str, str]:
-    """Return the parameters of a session."""
+def _settings(limits: Limits, *, version: int) -> dict[str, str]:
+    """Return the parameters of a session with a server of this version."""
+    timeout = {"transaction_timeout": _milliseconds(limits.transaction)}
     return {
         "search_path": SCHEMA,
         "statement_timeout": _milliseconds(limits.statement),
@@ -319,6 +324,7 @@ def _settings(limits: Limits) -> dict[str, str]:
         "client_min_messages": "warning",
         **{f"tcp_{name}": value for name, value in _KEEPALIVES.items()},
         "tcp_user_timeout": _milliseconds(limits.sending),
+        **(timeout if version >= WITH_TRANSACTION_TIMEOUT else {}),
     }
 
 
@@ -350,6 +356,7 @@ def _error_of(result: pq.abc.PGresult) -> PostgresError:
         _field(result, pq.DiagnosticField.MESSAGE_PRIMARY) or result.error_message.decode(),
         sqlstate=_field(result, pq.DiagnosticField.SQLSTATE),
         table=_field(result, pq.DiagnosticField.TABLE_NAME),
+        column=_field(result, pq.DiagnosticField.COLUMN_NAME),
     )
 
 

@@ -5,24 +5,29 @@ import select
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psycopg
 import pytest
 
 from mav_tasks.clock import boot_time
 from mav_tasks.fleet.exchange import Arrived
 from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
 from mav_tasks.fleet.outbox import LIMIT as OUTBOX
-from mav_tasks.fleet_io.carrier import OF_USE, Carrier
+from mav_tasks.fleet_io.carrier import OF_USE, RETRY, Carrier
 from mav_tasks.fleet_io.keeper import Trouble
-from mav_tasks.fleet_io.lease_database import LeaseDatabase
 from mav_tasks.store.postgres.address import parse
+from tests.kit.carriers import LIMIT, carriers
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, process, wait_until
 
-LIMIT = 20.0  # s
+QUEUE_PAGES = 64  # of the server's queue of notifications, the least; none has two long ones
+FULL = (
+    "the server's queue of notifications is full: end the session that listens and does not end"
+    " its transaction (pg_stat_activity) (too many notifications in the NOTIFY queue)"
+)
 RECEIVER = """
 import select, sys
 from mav_tasks.fleet_io.carrier import Carrier
@@ -36,16 +41,21 @@ while True:
 """
 
 
-@contextmanager
-def carriers(url: str, *names: str) -> Iterator[list[Carrier]]:
-    """Run carriers that have met."""
-    LeaseDatabase(parse(url), "first", host="127.0.0.1", port=1).close()  # makes the tables
-    with ExitStack() as ends:
-        found = [ends.enter_context(closing(Carrier(parse(url), name))) for name in names]
-        for name, it in zip(names, found, strict=True):
-            others = frozenset(names) - {name}
-            wait_until(lambda it=it, others=others: it.peers == others, within=LIMIT)  # type: ignore[misc]
-        yield found
+@pytest.fixture
+def small_queue(postgres: PostgresServer) -> Iterator[None]:
+    """Let the server's queue of notifications be as small as it can be; begin again with it."""
+    postgres.execute(f"ALTER SYSTEM SET max_notify_queue_pages = {QUEUE_PAGES}")
+    postgres.stop()
+    postgres.start()
+    yield
+    postgres.execute("ALTER SYSTEM RESET max_notify_queue_pages")
+    postgres.stop()
+    postgres.start()
+
+
+def notify_until_full(connection: Any) -> None:
+    for _ in range(QUEUE_PAGES + 1):
+        connection.execute("SELECT pg_notify('somebody', repeat('x', 7900))")
 
 
 @contextmanager
@@ -178,6 +188,31 @@ def test_while_the_database_is_away_few_wait_and_stops_are_not_dropped(
         postgres.start()
         found = [each.payload for each in taken(b, lambda found: len(found) > OUTBOX)]
         assert found == [b"stop", *(b"%d" % number for number in range(500, OUTBOX + 500))]
+
+
+def test_a_full_queue_of_the_server_is_told_once_and_used_again_when_there_is_room(
+    postgres: PostgresServer, small_queue: None
+) -> None:
+    """A program that listens in a transaction keeps PostgreSQL from emptying it."""
+    url = postgres.new_database()
+    with carriers(url, "a", "b") as (a, b):
+        with connected(url) as sleeper, connected(url) as filler:
+            sleeper.execute("LISTEN x")
+            sleeper.execute("BEGIN")
+            sleeper.execute("SELECT 1")
+            with pytest.raises(psycopg.errors.ProgramLimitExceeded):
+                notify_until_full(filler)
+            fd = a.fileno()
+            assert fd is not None
+            select.select([fd], [], [], LIMIT)
+            told = a.take()
+            a.send("b", b"stop", first=True, until=boot_time() + LIMIT)
+            retried_at = boot_time() + 3 * RETRY
+            wait_until(lambda: boot_time() > retried_at, within=LIMIT)
+            told += a.take()
+        assert [isinstance(each, Trouble) and each.words for each in told] == [FULL]
+        assert [each.payload for each in taken(b, bool)] == [b"stop"]
+        assert a.take() == [Trouble(None)]
 
 
 def test_fleets_in_two_databases_of_a_server_do_not_meet(postgres: PostgresServer) -> None:

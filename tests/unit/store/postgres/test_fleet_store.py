@@ -1,157 +1,45 @@
 """The store that gateways share: fenced by their leases, one order of events for all readers."""
 
-import select
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
-from dataclasses import replace
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from contextlib import closing
 
 import pytest
 
 from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
-from mav_tasks.fleet.member import Evict, Join, Renew, Take
-from mav_tasks.fleet.rivals import Eviction
-from mav_tasks.fleet_io.lease_database import LeaseDatabase
-from mav_tasks.store import Evicted, IdsGranted, Kept, NotKept, Outcome, VehiclesLoaded, Which
+from mav_tasks.fleet.member import Renew, Take
+from mav_tasks.store import Evicted, IdsGranted, NotKept, VehiclesLoaded, Which
 from mav_tasks.store.opening import kind_of
 from mav_tasks.store.postgres import address
 from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.fleet_database import FleetDatabase
-from mav_tasks.store.postgres.fleet_store import FleetStore
 from mav_tasks.store.retention import Trimmer
-from mav_tasks.tasks.events import Event, QueuePaused, TaskSubmitted, VehicleHalted
+from mav_tasks.tasks.events import Event, QueuePaused, VehicleHalted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import MAX_TASK_ID, TaskId
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.tcp_proxy import TcpProxy
+from tests.unit.store.postgres.gateways import (
+    PATIENCE,
+    Gateway,
+    away,
+    gateways,
+    hanging,
+    ids_in,
+    of_vehicle,
+    until,
+)
 from tests.unit.store.samples import FOR_EVER, OFFSET, opened, submitted
 from tests.unit.tasks.samples import draft
-
-PATIENCE = 20.0  # s
-Kind = TypeVar("Kind", bound=Outcome)
 
 
 @pytest.fixture
 def url(postgres: PostgresServer) -> str:
     return postgres.new_database()
-
-
-class Hang:
-    """A lock that writes wait for after their fence."""
-
-    def __init__(self, connection: Any) -> None:
-        self._connection = connection
-
-    def is_waited_for(self) -> bool:
-        query = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'"
-        return bool(self._connection.execute(query).fetchone()[0])
-
-
-@contextmanager
-def hanging(url: str) -> Iterator[Hang]:
-    """Let each write hang, during a block."""
-    with connected(url) as connection, connected(url) as watching:
-        connection.execute("BEGIN")
-        connection.execute("SELECT * FROM meta FOR UPDATE")
-        yield Hang(watching)
-        connection.execute("ROLLBACK")
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
-class Gateway:
-    """A lease and the store under it, in this process."""
-
-    def __init__(self, url: str, name: str) -> None:
-        self.name, self.url = name, url
-        self.leases = LeaseDatabase(address.parse(url), name, host="127.0.0.1", port=1)
-        self.outcomes: list[Outcome] = []
-        try:
-            self.join()
-        except BaseException:
-            self.leases.close()
-            raise
-
-    def join(self, replaced: Eviction | None = None) -> None:
-        """Begin a lease, and a store under it."""
-        self.epoch = self.leases.execute(Join(self.name, replaced)).row.epoch
-        assert self.epoch
-        self.open()
-
-    def open(self, url: str | None = None) -> None:
-        self.through = 0
-        self.store = FleetStore(
-            address.parse(url or self.url),
-            self.name,
-            self.epoch,
-            wall_offset=lambda: OFFSET,
-            retention=FOR_EVER,
-        )
-
-    def evict(self, other: "Gateway") -> None:
-        """End the lease of another gateway."""
-        answer = self.leases.execute(Renew(self.name, self.epoch))
-        (row,) = (each for each in answer.row.rivals if each.name == other.name)
-        rival = Eviction(row.name, row.epoch, row.renewals)
-        self.leases.execute(Evict(Renew(self.name, self.epoch), rival))
-
-    def next(self, kind: type[Kind]) -> Kind:
-        """Return the next outcome of a kind."""
-        end = time.monotonic() + PATIENCE
-        while True:
-            for number, outcome in enumerate(self.outcomes):
-                if isinstance(outcome, kind):
-                    del self.outcomes[number]
-                    return outcome
-            assert time.monotonic() < end, f"no {kind.__name__}: {self.outcomes}"
-            fd = self.store.fileno()
-            assert fd is not None
-            select.select([fd], [], [], 0.1)
-            self.outcomes += self.store.take_outcomes()
-
-    def kept(self, through: int) -> None:
-        """Wait until so many events are kept."""
-        while self.through < through:
-            self.through = self.next(Kept).through
-
-    def close(self) -> None:
-        self.store.close()
-        self.leases.close()
-
-
-@contextmanager
-def gateways(url: str, *names: str) -> Iterator[list[Gateway]]:
-    found = [Gateway(url, name) for name in names]
-    try:
-        yield found
-    finally:
-        for each in found:
-            each.close()
-
-
-@contextmanager
-def away(postgres: PostgresServer, *gateways: Gateway) -> Iterator[None]:
-    """Let the database be away during a block."""
-    postgres.stop()
-    yield
-    postgres.start()
-    for each in gateways:
-        each.leases.connect()
-
-
-def of_vehicle(number: int, vehicle: int) -> TaskSubmitted:
-    event = submitted(number)
-    return TaskSubmitted(replace(event.task, vehicle=vehicle), event.at)
 
 
 def test_a_gateway_begins_with_nothing_but_ids(url: str) -> None:
@@ -210,7 +98,27 @@ def test_of_finished_tasks_only_the_latest_are_loaded(
         a.kept(len(events))
         a.store.load_vehicles(frozenset({1, 7}))
         tasks = a.next(VehiclesLoaded).restored.tasks
-        assert [task.id for task in tasks] == [2, 5, 6, 7, 8, 9, 10]
+        assert [task.id for task in tasks] == [2, 8, 9, 10]
+
+
+def test_a_busy_vehicle_leaves_the_finished_tasks_of_another_loaded(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A repeat of a submission is recognised by its finished task."""
+    monkeypatch.setattr("mav_tasks.store.reading.MOST_OVER", 3)
+    registry = TaskRegistry()
+    for number, vehicle in enumerate((2, *[1] * 9), 1):
+        registry.submit(draft(vehicle=vehicle), now=8.0)
+        registry.change(
+            TaskId(number), S.CANCELLED, reason=R.CANCELLED, actor="c", now=8.0 + number
+        )
+    events = registry.take_events()
+    with gateways(url, "a") as (a,):
+        a.store.append(events)
+        a.kept(len(events))
+        a.store.load_vehicles(frozenset({1, 2}))
+        tasks = a.next(VehiclesLoaded).restored.tasks
+        assert [task.id for task in tasks] == [1, 8, 9, 10]
 
 
 def test_after_an_eviction_nothing_is_written_and_it_is_told_once(url: str) -> None:
@@ -235,11 +143,6 @@ def stop(vehicle: int) -> Sequence[Event]:
     """Return the events of a STOP."""
     pause = QueuePaused(vehicle, R.STOPPED, "client", 100.0)
     return [VehicleHalted(vehicle, 5, R.STOPPED, "client", 100.0), pause]
-
-
-def ids_in(url: str) -> list[int]:
-    with connected(url) as connection:
-        return [row[0] for row in connection.execute("SELECT id FROM tasks ORDER BY number")]
 
 
 def test_a_write_in_flight_is_over_before_an_eviction_ends(url: str) -> None:

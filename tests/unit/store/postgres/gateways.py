@@ -1,0 +1,149 @@
+"""Gateways for tests: each a lease and the store under it, in this process."""
+
+import select
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from mav_tasks.fleet.member import Evict, Join, Renew
+from mav_tasks.fleet.rivals import Eviction
+from mav_tasks.fleet_io.lease_database import LeaseDatabase
+from mav_tasks.store import Kept, Outcome
+from mav_tasks.store.postgres import address
+from mav_tasks.store.postgres.fleet_store import FleetStore
+from mav_tasks.tasks.events import TaskSubmitted
+from tests.kit.postgres import PostgresServer, connected
+from tests.unit.store.samples import FOR_EVER, OFFSET, submitted
+
+PATIENCE = 20.0  # s
+Kind = TypeVar("Kind", bound=Outcome)
+
+
+class Hang:
+    """A lock that writes wait for after their fence."""
+
+    def __init__(self, connection: Any) -> None:
+        self._connection = connection
+
+    def is_waited_for(self) -> bool:
+        """Return whether a session waits for a lock."""
+        return self.waiting() > 0
+
+    def waiting(self) -> int:
+        """Return how many sessions wait for a lock."""
+        query = "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock'"
+        return int(self._connection.execute(query).fetchone()[0])
+
+
+@contextmanager
+def hanging(url: str) -> Iterator[Hang]:
+    """Let each write hang, during a block."""
+    with connected(url) as connection, connected(url) as watching:
+        connection.execute("BEGIN")
+        connection.execute("SELECT * FROM meta FOR UPDATE")
+        yield Hang(watching)
+        connection.execute("ROLLBACK")
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+class Gateway:
+    """A lease and the store under it, in this process."""
+
+    def __init__(self, url: str, name: str) -> None:
+        self.name, self.url = name, url
+        self.leases = LeaseDatabase(address.parse(url), name, host="127.0.0.1", port=1)
+        self.outcomes: list[Outcome] = []
+        try:
+            self.join()
+        except BaseException:
+            self.leases.close()
+            raise
+
+    def join(self, replaced: Eviction | None = None) -> None:
+        """Begin a lease, and a store under it."""
+        self.epoch = self.leases.execute(Join(self.name, replaced)).row.epoch
+        assert self.epoch
+        self.open()
+
+    def open(self, url: str | None = None) -> None:
+        self.through = 0
+        self.store = FleetStore(
+            address.parse(url or self.url),
+            self.name,
+            self.epoch,
+            wall_offset=lambda: OFFSET,
+            retention=FOR_EVER,
+        )
+
+    def evict(self, other: "Gateway") -> None:
+        """End the lease of another gateway."""
+        self.evict_named(other.name)
+
+    def evict_named(self, name: str) -> None:
+        """End the lease of a gateway, which may be another process."""
+        answer = self.leases.execute(Renew(self.name, self.epoch))
+        (row,) = (each for each in answer.row.rivals if each.name == name)
+        rival = Eviction(row.name, row.epoch, row.renewals)
+        self.leases.execute(Evict(Renew(self.name, self.epoch), rival))
+
+    def next(self, kind: type[Kind]) -> Kind:
+        """Return the next outcome of a kind."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            for number, outcome in enumerate(self.outcomes):
+                if isinstance(outcome, kind):
+                    del self.outcomes[number]
+                    return outcome
+            assert time.monotonic() < end, f"no {kind.__name__}: {self.outcomes}"
+            fd = self.store.fileno()
+            assert fd is not None
+            select.select([fd], [], [], 0.1)
+            self.outcomes += self.store.take_outcomes()
+
+    def kept(self, through: int) -> None:
+        """Wait until so many events are kept."""
+        while self.through < through:
+            self.through = self.next(Kept).through
+
+    def close(self) -> None:
+        self.store.close()
+        self.leases.close()
+
+
+@contextmanager
+def gateways(url: str, *names: str) -> Iterator[list[Gateway]]:
+    found = [Gateway(url, name) for name in names]
+    try:
+        yield found
+    finally:
+        for each in found:
+            each.close()
+
+
+@contextmanager
+def away(postgres: PostgresServer, *gateways: Gateway) -> Iterator[None]:
+    """Let the database be away during a block."""
+    postgres.stop()
+    yield
+    postgres.start()
+    for each in gateways:
+        each.leases.connect()
+
+
+def of_vehicle(number: int, vehicle: int) -> TaskSubmitted:
+    event = submitted(number)
+    return TaskSubmitted(replace(event.task, vehicle=vehicle), event.at)
+
+
+def ids_in(url: str) -> list[int]:
+    """Return the ids of all tasks, in the order of their submission."""
+    with connected(url) as connection:
+        return [row[0] for row in connection.execute("SELECT id FROM tasks ORDER BY number")]
