@@ -172,7 +172,7 @@ class TaskRegistry:
         return task
 
     def modify(self, task_id: TaskId, terms: Terms, *, actor: str, now: float) -> Task:
-        """Change the terms of a task that is not over."""
+        """Change the terms of a task that is not over, or no longer repeats."""
         old = self._tasks[task_id]
         task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)
         self._note_run(old, task)
@@ -222,6 +222,22 @@ class TaskRegistry:
         """Return a vehicle's finished tasks, newest first: ``count`` from offset ``first`` on."""
         over = (each for each in reversed(self._finished) if self._tasks[each].vehicle == vehicle)
         return list(islice(over, first, first + count))
+
+    def repeat_no_more(self, task_id: TaskId, *, actor: str, now: float) -> None:
+        """Let a task no longer repeat; its run may be over, with the next one not planned yet."""
+        terms = replace(self._tasks[task_id].terms, repeat="")
+        self.modify(task_id, terms, actor=actor, now=now)
+        self.unplanned.pop(task_id, None)
+
+    def between_runs(self, series: int) -> TaskId | None:
+        """Return the last run of a series that is over and which another one is to follow."""
+        runs = (self._tasks[each] for each in self.unplanned if each in self._tasks)
+        return next((task.id for task in runs if task.terms.series == series), None)
+
+    def unplanned_of(self, vehicle: int) -> list[Task]:
+        """Return the runs of a vehicle that are over, and which another one is to follow."""
+        over = (self._tasks[each] for each in self.unplanned if each in self._tasks)
+        return [task for task in over if task.vehicle == vehicle and not why_series_ends(task)]
 
     def runs_of(self, vehicle: int) -> list[Task]:
         """Return the runs of a vehicle's series that are not over, one of each series."""

@@ -308,8 +308,9 @@ class VehicleTasks(Lineup):
             if task.state in WAITING:
                 self.room.end(task, S.KILLED, reason, actor=actor, now=now)
             else:
-                terms = replace(task.terms, repeat="")
-                self.registry.modify(task.id, terms, actor=actor, now=now)
+                self.registry.repeat_no_more(task.id, actor=actor, now=now)
+        for task in self.registry.unplanned_of(self.vehicle):  # between two runs
+            self.registry.repeat_no_more(task.id, actor=actor, now=now)
 
     # time
 

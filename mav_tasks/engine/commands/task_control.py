@@ -83,11 +83,15 @@ class TaskControl:
         if task_id == 0 and active is None:
             raise Rejection(R.NOT_FOUND, "no task is running")
         task_id = active.id if task_id == 0 and active is not None else task_id
-        task = self._find(asked, self._run_of(task_id) if is_series else task_id)
+        run = self._run_of(task_id) if is_series else task_id
+        task = self._find(asked, run, may_be_over=is_series and run in self._registry.unplanned)
         asked.rights.require_own(task, asked.submitter, "cancel")
         if asked.client.is_late and task.state is TaskState.HELD:  # other tasks would start
             words = f"delayed by the server; task {task.id} is held now: cancel it again"
             raise Rejection(R.STALE, words)
+        if is_series and task.state in TERMINAL:  # between two runs
+            self._registry.repeat_no_more(task.id, actor=asked.actor, now=now)
+            return task.id
         if is_series:
             terms = replace(task.terms, repeat="")
             asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
@@ -96,10 +100,10 @@ class TaskControl:
         return task.id
 
     def _run_of(self, task_id: int) -> int:
-        """Return the run of a series that is not over, by the id of any of its runs."""
+        """Return the present run of a series, or the last one, by the id of any of its runs."""
         named = self._registry.get(task_id)
         series = named.terms.series if named is not None else task_id
-        run = self._registry.runs.get(series)
+        run = self._registry.runs.get(series) or self._registry.between_runs(series)
         if run is None and named is not None:
             raise Rejection(R.WRONG_STATE, f"task {task_id} does not repeat")
         return task_id if run is None else run
@@ -170,13 +174,13 @@ class TaskControl:
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
         return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
 
-    def _find(self, asked: CommandRequest, task_id: int) -> Task:
+    def _find(self, asked: CommandRequest, task_id: int, *, may_be_over: bool = False) -> Task:
         task = self._registry.get(task_id)
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
         if task.vehicle != asked.vehicle.system_id:
             raise Rejection(R.NOT_FOUND, f"task {task_id} belongs to rover {task.vehicle}")
-        if task.state in TERMINAL:
+        if task.state in TERMINAL and not may_be_over:
             raise Rejection(R.WRONG_STATE, f"task {task_id} has ended ({_words(task)})")
         return task
 
