@@ -8,9 +8,19 @@ import typer
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.lazy import completing
-from mav_tasks.cli.options import Common, Deadline, StartAt, StartIn, TaskId, seconds_of, start_of
+from mav_tasks.cli.options import (
+    Common,
+    Deadline,
+    StartAt,
+    StartIn,
+    TaskId,
+    every_of,
+    seconds_of,
+    start_of,
+)
 from mav_tasks.cli.session import find_task, opened, values_checked
 from mav_tasks.cli.typed_words import in_typed_words
+from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Release
 from mav_tasks.errors import UsageError
 
@@ -31,18 +41,44 @@ async def cancel(
     kill: Annotated[
         bool, typer.Option("--kill", help="Also put the rover into HOLD at once.")
     ] = False,
+    series: Annotated[
+        bool,
+        typer.Option(
+            "--series", help="Cancel the series of this run: it does not repeat any more."
+        ),
+    ] = False,
 ) -> None:
-    """Cancel a task, by default the running one."""
+    """Cancel a task, by default the running one.
+
+    If it repeats, its next run stays planned unless you give --series (or --kill).
+    """
+    if series and kill:
+        raise UsageError("--kill ends the series, too: leave out --series")
     async with opened(common) as client:
-        if task_id is not None:
+        if series:
+            rover = await _rover_of(client, common, task_id)
+            task_id = await client.cancel(task_id, series=True, vehicle=rover)
+        elif task_id is not None:
             task = await find_task(client, common, task_id)
             rover = task.vehicle
             await (task.kill() if kill else task.cancel())
         else:
             rover = client.vehicle
             task_id = await (client.kill() if kill else client.cancel())
+        status = await client.status(task_id, vehicle=rover)
     words = f"rover {rover}: task {task_id} {'killed' if kill else 'cancelled'}"
+    if series:
+        words += ", and its series"
+    elif status.every is not None and not kill:
+        words += f"; it repeats; to end its series: mav-tasks cancel --series {task_id}"
     output.say_done(common.json, "kill" if kill else "cancel", words, task=task_id, vehicle=rover)
+
+
+async def _rover_of(client: Client, common: Common, task_id: int | None) -> int:
+    """Return the rover of a series, which may be named by a run that is long over."""
+    if task_id is None or common.vehicle is not None or len(client.vehicles()) == 1:
+        return client.vehicle
+    return (await find_task(client, common, task_id)).vehicle
 
 
 @command
@@ -73,6 +109,13 @@ async def modify(
     ] = None,
     start_in: StartIn = "",
     start_at: StartAt = "",
+    every: Annotated[
+        str,
+        typer.Option(
+            metavar="PERIOD|CRON|never",
+            help="Repeat, as in 'submit'; never: this is the last run.",
+        ),
+    ] = "",
     deadline: Deadline = "",
     after: Annotated[
         int | None, typer.Option(metavar="ID", help="Run after this task has completed; 0: none.")
@@ -100,7 +143,8 @@ async def modify(
     """
     delay, at = start_of(start_in, start_at)
     until = seconds_of("--deadline", deadline)
-    wishes = (priority, delay, at, until, after, preemptible, preemptive, label)
+    repeats = every_of(every) if every else None
+    wishes = (priority, delay, at, until, after, preemptible, preemptive, label, repeats)
     if all(wish is None for wish in wishes):
         raise UsageError(f"modify {task_id}: nothing to change; give --priority or another option")
     async with opened(common) as client:
@@ -115,6 +159,7 @@ async def modify(
                 preemptive=preemptive,
                 at=at,
                 label=label,
+                every=repeats,
             )
     words = f"rover {task.vehicle}: task {task_id} changed"
     output.say_done(common.json, "modify", words, task=task_id, vehicle=task.vehicle)

@@ -12,6 +12,7 @@ from mav_tasks.errors import UsageError
 
 DEFAULT_SERVER = "udpout:127.0.0.1:14560"
 PRIORITY = 5
+NEVER = "never"  # of --every
 
 StartIn = Annotated[
     str, typer.Option("--in", metavar="DURATION", help="Start after this delay: 30s, 5m, 1h30m.")
@@ -22,6 +23,14 @@ StartAt = Annotated[
         "--at",
         metavar="TIME",
         help="Start at 14:30 or 2026-11-20T14:30; local time unless it names a zone.",
+    ),
+]
+Every = Annotated[
+    str,
+    typer.Option(
+        metavar="PERIOD|CRON",
+        help="Repeat: 90s, 1h30m, 1d, or a cron expression in UTC or a zone: "
+        "'0 6 * * 1-5 Europe/Zurich'.",
     ),
 ]
 Deadline = Annotated[
@@ -103,6 +112,7 @@ class TaskOptions:
     ] = 0
     start_in: StartIn = ""
     start_at: StartAt = ""
+    every: Every = ""
     deadline: Deadline = ""
     nonce: Annotated[
         int,
@@ -127,6 +137,16 @@ def start_of(start_in: str, start_at: str) -> tuple[float | None, datetime | Non
     if not start_at:
         return seconds_of("--in", start_in), None
     return None, parse_moment("--at", start_at, now=datetime.now(UTC))
+
+
+def every_of(text: str) -> float | str:
+    """Return the argument ``every`` of the library for ``--every``; 0: not given, or "never".
+
+    Raise UsageError for an invalid duration; the library checks the rest.
+    """
+    if text in ("", NEVER):
+        return 0.0
+    return text if len(text.split()) > 1 else parse_duration("--every", text)
 
 
 def seconds_of(name: str, text: str) -> float | None:

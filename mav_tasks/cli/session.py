@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any
 
-from mav_tasks.cli.options import Common, Reach, TaskOptions, seconds_of, start_of
+from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.errors import NoAnswer, UsageError
@@ -15,7 +15,8 @@ def read(terms: TaskOptions) -> dict[str, Any]:
     delay, at = start_of(terms.start_in, terms.start_at)
     deadline = seconds_of("--deadline", terms.deadline) or 0.0
     shared = {name: getattr(terms, name) for name in ("priority", "after", "nonce", "label")}
-    return {"delay": delay or 0.0, "at": at, "deadline": deadline, **shared}
+    every = every_of(terms.every)
+    return {"delay": delay or 0.0, "at": at, "every": every, "deadline": deadline, **shared}
 
 
 @asynccontextmanager

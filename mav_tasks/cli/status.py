@@ -72,6 +72,8 @@ def _fields(
         ("remaining", words.left_of(status)),
         ("item", f"{status.item} of {status.items}" if status.items > 1 else ""),
         ("starts in", words.starts_of(status)),
+        ("repeats", words.every_of(status)),
+        ("series", str(status.series or "")),
         ("ends in", words.ends_of(status)),
         ("run time", words.took_of(status)),
         ("ended", _ended(status)),

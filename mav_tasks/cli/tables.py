@@ -59,6 +59,7 @@ TASK_COLUMNS: tuple[Column[Row], ...] = (
     Column("goal", lambda row: what_of(row.status), is_words=True),
     Column("reason", lambda row: row.why, worth=1, is_words=True),
     Column("starts in", lambda row: words.starts_of(row.status), worth=3, is_right=True),
+    Column("repeats", lambda row: words.every_of(row.status), worth=3, is_words=True),
     Column("ends in", lambda row: words.ends_of(row.status), worth=4, is_right=True),
     Column("done", lambda row: words.percent_of(row.status), worth=5, is_right=True),
     Column("left", lambda row: words.left_of(row.status), worth=6, is_right=True),

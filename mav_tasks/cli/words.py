@@ -47,6 +47,13 @@ def starts_of(status: TaskStatus) -> str:
     return time_of(status.time_to_start) if status.is_waiting else ""
 
 
+def every_of(status: TaskStatus) -> str:
+    """Return when a task repeats: "every 1h", or a cron expression; "" if it does not."""
+    if isinstance(status.every, int):
+        return f"every {format_duration(status.every)}"
+    return status.every or ""
+
+
 def ends_of(status: TaskStatus) -> str:
     """Return the time until a task ends; "" if it has ended."""
     return "" if status.is_over else time_of(status.time_to_finish)

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Container, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from math import nan
 from pathlib import Path
@@ -40,7 +40,7 @@ from mav_tasks.mavlink.enums import (
     TaskProperty,
 )
 from mav_tasks.mavlink.float_param import to_param
-from mav_tasks.mavlink.label import check_label, pieces_of
+from mav_tasks.mavlink.label import check_label, pieces_of, text_pieces
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import (
     PlanFile,
@@ -58,6 +58,8 @@ SCRIPT = Address(244, 190)
 FIND_WITHIN = 5.0  # s
 STOP_AGAIN = 0.1  # s between copies of a STOP
 STOP_WITHIN = 3.0  # s
+#: s, a year: the first run of a cron expression waits so long, until the server knows that
+UNTIL_REPEATED = 31_536_000.0
 KILL = 1.0  # param2 of TASK_CANCEL
 RESUME = 1.0  # param1 of DO_PAUSE_CONTINUE
 EPOCHS = 1 << 24  # integers that a float32 holds exactly
@@ -188,6 +190,7 @@ class Client:
         vehicle: int | None = None,
         nonce: int = 0,
         label: str = "",
+        every: float | str = 0.0,
     ) -> Task:
         """Submit a goal, or several goals in order as one task. Return once the task is durable.
 
@@ -197,22 +200,29 @@ class Client:
         the submission until it is answered; the server creates one task per ``nonce`` (1 to
         1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
         ``label``: a name of up to 24 bytes, shown with the task.
+
+        ``every``: the task repeats, so many seconds from one start to the next (10 to 16,777,215),
+        or at the times of a cron expression in UTC, or in the time zone after it: "0 6 * * 1-5
+        Europe/Zurich". Then ``deadline`` counts from each start. With an expression there is no
+        ``delay`` and no ``at``.
         """
         check_label(label)
+        repeat = _repeat_of(every, delay, at)
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
-        wait = self._submissions.delay(delay, at, mark)
-        terms = TaskOptions(priority, _id_of(after), wait, deadline)
+        wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
+        within = 0.0 if repeat else deadline  # else counted from each start, and set afterwards
+        terms = TaskOptions(priority, _id_of(after), wait, within)
         goals = goal if isinstance(goal, Sequence) and not isinstance(goal, str) else (goal,)
         if not goals:
             raise ValueError("no goals: nothing to do")
         if len(goals) == 1 and isinstance(goals[0], Move | Rotate | Drive):
             task = await self._submit_command(goals[0], terms, system_id, mark)
-            await self._complete(task, deadline=deadline, at=at, label=label, nonce=mark)
         else:
             items = (*wire.items_of_goals(goals), wire.options_of(terms, nonce=mark))
             task = await self._submit_plan(items, system_id, mark)
-            await self._complete(task, deadline=0.0, at=at, label=label, nonce=mark)
+            deadline -= within  # which its options carried
+        await self._complete(task, repeat=repeat, deadline=deadline, at=at, label=label, nonce=mark)
         return task
 
     async def task(self, task_id: int, *, vehicle: int | None = None) -> Task:
@@ -234,9 +244,15 @@ class Client:
         """
         return await self._ask.timing(task_id or 0, self._which(vehicle))
 
-    async def cancel(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """Cancel a task, by default the running one. Return its id. Raise Refused if none runs."""
-        return await self._cancel(task_id, 0.0, vehicle)
+    async def cancel(
+        self, task_id: int | None = None, *, series: bool = False, vehicle: int | None = None
+    ) -> int:
+        """Cancel a task, by default the running one. Return its id. Raise Refused if none runs.
+
+        If the task repeats, its next run stays planned. ``series``: cancel the present run of its
+        series, and all further ones; ``task_id`` may be that of any run.
+        """
+        return await self._cancel(task_id, 0.0, vehicle, series=series)
 
     async def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
         """Cancel a task and put the rover into HOLD at once. Return the task's id."""
@@ -258,13 +274,16 @@ class Client:
         preemptive: bool | None = None,
         at: datetime | None = None,
         label: str | None = None,
+        every: float | str | None = None,
         vehicle: int | None = None,
     ) -> None:
         """Change a task that has not ended; an argument of None changes nothing.
 
         Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
-        it may interrupt other tasks.
+        it may interrupt other tasks. ``every`` as in ``submit``; 0: it does not repeat any more.
         """
+        if every is not None:
+            await self._set_repeat(task_id, wire.repeat_of(every), vehicle=vehicle)
         changes: list[tuple[TaskProperty, float]] = []
         named: tuple[tuple[TaskProperty, float | None], ...] = (
             (TaskProperty.PRIORITY, priority),
@@ -449,6 +468,7 @@ class Client:
         nonce: int = 0,
         check: int = 0,
         label: str = "",
+        every: float | str = 0.0,
     ) -> Task:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
@@ -458,13 +478,17 @@ class Client:
         """
         check_label(label)
         wire.check_check(check)
+        repeat = _repeat_of(every, delay, at)
         system_id = self._which(vehicle)
         mark = self._submissions.nonce(nonce)
-        wait = self._submissions.delay(delay, at, mark)
-        terms = TaskOptions(priority, _id_of(after), wait, deadline)
+        wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
+        within = 0.0 if repeat else deadline
+        terms = TaskOptions(priority, _id_of(after), wait, within)
         items = (*items_of(plan), wire.options_of(terms, nonce=mark, check=check))
         task = await self._submit_plan(items, system_id, mark)
-        await self._complete(task, deadline=0.0, at=at, label=label, nonce=mark)
+        await self._complete(
+            task, repeat=repeat, deadline=deadline - within, at=at, label=label, nonce=mark
+        )
         return task
 
     async def stage_mission(self, plan: Plan, *, vehicle: int | None = None) -> Task:
@@ -608,21 +632,40 @@ class Client:
                 raise ClientError(OVERTAKEN)
         return float(epoch % EPOCHS)
 
-    async def _cancel(self, task_id: int | None, how: float, vehicle: int | None) -> int:
+    async def _cancel(
+        self, task_id: int | None, how: float, vehicle: int | None, *, series: bool = False
+    ) -> int:
         if task_id is None:  # look up its id: a repeated command must not cancel the next task
             task_id = (await self._ask.overview(self._which(vehicle))).running_id
             if not task_id:
                 words = "no task is running"
                 raise Refused(words, result=MavResult.DENIED, reason=TaskReason.NOT_FOUND)
-        await self._control(
+        named = task_id
+        return await self._control(
             vehicle,
             MavCmd.TASK_CANCEL,
             to_param(task_id),
             how,
+            float(series),
             is_urgent=how == KILL,
-            fits=lambda ack: ack.result_param2 == task_id,
+            fits=lambda ack: series or ack.result_param2 == named,
         )
-        return task_id
+
+    async def _set_repeat(self, task_id: int, repeat: str, *, vehicle: int | None) -> None:
+        if not repeat or repeat.isdigit():
+            params = to_param(task_id), float(TaskProperty.EVERY), float(repeat or 0)
+            await self._control(vehicle, MavCmd.TASK_MODIFY, *params)
+            return
+        for piece in text_pieces(repeat):
+            await self._modify_exactly(
+                task_id,
+                TaskProperty.REPEAT,
+                piece.x,
+                piece.y,
+                float(piece.offset),
+                size=len(repeat),
+                vehicle=vehicle,
+            )
 
     async def _modify_exactly(
         self,
@@ -632,11 +675,12 @@ class Client:
         y: int,
         value: float,
         *,
+        size: float = nan,
         vehicle: int | None,
     ) -> None:
         """Change a property whose value a float32 cannot hold exactly."""
         system_id, mark = self._which(vehicle), to_param(self._submissions.nonce())
-        first = to_param(task_id), float(name), value, nan
+        first = to_param(task_id), float(name), value, size
         command = m.CommandInt(
             system_id, AUTOPILOT, 0, MavCmd.TASK_MODIFY, 0, 0, *first, x, y, mark
         )
@@ -679,20 +723,40 @@ class Client:
         return self._submitted_as(task_id, vehicle, mark or 0)
 
     async def _complete(
-        self, task: Task, *, deadline: float, at: datetime | None, label: str, nonce: int
+        self,
+        task: Task,
+        *,
+        repeat: str,
+        deadline: float,
+        at: datetime | None,
+        label: str,
+        nonce: int,
     ) -> None:
         """Set the properties that the submission could not carry."""
         try:
+            if repeat:
+                await self._repeat(task, repeat)
+            if at is not None:
+                await task.modify(at=at)
             if deadline:
                 with _in_any_state():  # it may have started in time already
                     await task.modify(deadline=deadline)
-            if at is not None:
-                await task.modify(at=at)
             if label:
                 with _in_any_state():  # it may have ended already
                     await task.modify(label=label)
         except NoAnswer as error:  # the task exists: a second try needs its nonce
             raise NoAnswer(str(error), nonce=nonce) from None
+
+    async def _repeat(self, task: Task, repeat: str) -> None:
+        """Let a new task repeat. If the server refuses that, cancel the task."""
+        try:
+            await self._set_repeat(task.id, repeat, vehicle=task.vehicle)
+        except Refused as refused:
+            if refused.reason == TaskReason.WRONG_STATE and (await task.refresh()).series:
+                return  # submitted before: its first run has ended
+            with suppress(Refused):
+                await task.cancel()
+            raise
 
     def _submitted_as(self, task_id: int, vehicle: int, nonce: int) -> Task:
         self._submissions.note(task_id, nonce, now=self._now)
@@ -723,6 +787,18 @@ def _in_any_state() -> Iterator[None]:
     except Refused as refused:
         if refused.reason != TaskReason.WRONG_STATE:
             raise
+
+
+def _repeat_of(every: float | str, delay: float, at: datetime | None) -> str:
+    """Return the text of a repetition, "" for none. Raise ValueError if it is invalid."""
+    repeat = wire.repeat_of(every)
+    if _is_cron(repeat) and (delay or at is not None):
+        raise ValueError(f"every {every!r}: an expression names the start times, without delay, at")
+    return repeat
+
+
+def _is_cron(repeat: str) -> bool:
+    return bool(repeat) and not repeat.isdigit()
 
 
 def _id_of(task: int | Task) -> int:

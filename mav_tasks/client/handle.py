@@ -44,6 +44,11 @@ class Task:
         """The last status received; None before the first."""
         return self._followed.status
 
+    @property
+    def series(self) -> int | None:
+        """The id of the first run of its series; None: it is in none, or no status has come yet."""
+        return None if self.status is None else self.status.series
+
     async def done(self) -> TaskStatus:
         """Wait until the task has ended. Return its final status.
 
@@ -88,12 +93,13 @@ class Task:
         """Return how evenly its setpoints have left so far; also works after the end."""
         return await self._client.timing(self.id, vehicle=self.vehicle)
 
-    async def cancel(self) -> None:
+    async def cancel(self, *, series: bool = False) -> None:
         """Cancel the task; if it is being driven, the rover stops at once.
 
-        ``done`` waits for standstill. Raise Refused if the task has ended.
+        ``done`` waits for standstill. ``series``: also all further runs of its series, if it
+        repeats. Raise Refused if the task, or with ``series`` its series, has ended.
         """
-        await self._client.cancel(self.id, vehicle=self.vehicle)
+        await self._client.cancel(self.id, series=series, vehicle=self.vehicle)
 
     async def kill(self) -> None:
         """Cancel the task and put the rover into HOLD; no task starts until it stands still."""
@@ -110,6 +116,7 @@ class Task:
         preemptive: bool | None = None,
         at: datetime | None = None,
         label: str | None = None,
+        every: float | str | None = None,
     ) -> None:
         """Change the task: see ``Client.modify``."""
         await self._client.modify(
@@ -123,6 +130,7 @@ class Task:
             preemptive=preemptive,
             at=at,
             label=label,
+            every=every,
         )
 
     async def release(self, how: Release) -> None:

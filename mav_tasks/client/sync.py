@@ -39,6 +39,11 @@ class SyncTask(BlockingTask):
         """The last status received; None before the first."""
         return self._aio.status
 
+    @property
+    def series(self) -> int | None:
+        """The id of the first run of its series; None: it is in none, or no status has come yet."""
+        return self._aio.series
+
     def updates(self, *, interval: float = 0.5) -> Iterator[TaskStatus]:
         """Yield the status now, at each change, and every ``interval`` seconds while it is driven.
 
@@ -54,12 +59,13 @@ class SyncTask(BlockingTask):
         """Return how evenly its setpoints have left so far; also works after the end."""
         return self._call(self._aio.timing())
 
-    def cancel(self) -> None:
+    def cancel(self, *, series: bool = False) -> None:
         """Cancel the task; if it is being driven, the rover stops at once.
 
-        ``done`` waits for standstill. Raise Refused if the task has ended.
+        ``done`` waits for standstill. ``series``: also all further runs of its series, if it
+        repeats. Raise Refused if the task, or with ``series`` its series, has ended.
         """
-        self._call(self._aio.cancel())
+        self._call(self._aio.cancel(series=series))
 
     def kill(self) -> None:
         """Cancel the task and put the rover into HOLD; no task starts until it stands still."""
@@ -76,6 +82,7 @@ class SyncTask(BlockingTask):
         preemptive: bool | None = None,
         at: datetime | None = None,
         label: str | None = None,
+        every: float | str | None = None,
     ) -> None:
         """Change the task: see ``SyncClient.modify``."""
         self._call(
@@ -88,6 +95,7 @@ class SyncTask(BlockingTask):
                 preemptive=preemptive,
                 at=at,
                 label=label,
+                every=every,
             )
         )
 
@@ -168,6 +176,7 @@ class SyncClient(BlockingClient):
         vehicle: int | None = None,
         nonce: int = 0,
         label: str = "",
+        every: float | str = 0.0,
     ) -> SyncTask:
         """Submit a goal, or several goals in order as one task. Return once the task is durable.
 
@@ -177,6 +186,11 @@ class SyncClient(BlockingClient):
         the submission until it is answered; the server creates one task per ``nonce`` (1 to
         1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
         ``label``: a name of up to 24 bytes, shown with the task.
+
+        ``every``: the task repeats, so many seconds from one start to the next (10 to 16,777,215),
+        or at the times of a cron expression in UTC, or in the time zone after it: "0 6 * * 1-5
+        Europe/Zurich". Then ``deadline`` counts from each start. With an expression there is no
+        ``delay`` and no ``at``.
         """
         return self._handle(
             SyncTask,
@@ -190,6 +204,7 @@ class SyncClient(BlockingClient):
                 vehicle=vehicle,
                 nonce=nonce,
                 label=label,
+                every=every,
             ),
         )
 
@@ -208,9 +223,15 @@ class SyncClient(BlockingClient):
         """
         return self._call(self._aio.timing(task_id, vehicle=vehicle))
 
-    def cancel(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
-        """Cancel a task, by default the running one. Return its id. Raise Refused if none runs."""
-        return self._call(self._aio.cancel(task_id, vehicle=vehicle))
+    def cancel(
+        self, task_id: int | None = None, *, series: bool = False, vehicle: int | None = None
+    ) -> int:
+        """Cancel a task, by default the running one. Return its id. Raise Refused if none runs.
+
+        If the task repeats, its next run stays planned. ``series``: cancel the present run of its
+        series, and all further ones; ``task_id`` may be that of any run.
+        """
+        return self._call(self._aio.cancel(task_id, series=series, vehicle=vehicle))
 
     def kill(self, task_id: int | None = None, *, vehicle: int | None = None) -> int:
         """Cancel a task and put the rover into HOLD at once. Return the task's id."""
@@ -232,12 +253,13 @@ class SyncClient(BlockingClient):
         preemptive: bool | None = None,
         at: datetime | None = None,
         label: str | None = None,
+        every: float | str | None = None,
         vehicle: int | None = None,
     ) -> None:
         """Change a task that has not ended; an argument of None changes nothing.
 
         Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
-        it may interrupt other tasks.
+        it may interrupt other tasks. ``every`` as in ``submit``; 0: it does not repeat any more.
         """
         self._call(
             self._aio.modify(
@@ -250,6 +272,7 @@ class SyncClient(BlockingClient):
                 preemptive=preemptive,
                 at=at,
                 label=label,
+                every=every,
                 vehicle=vehicle,
             )
         )
@@ -329,6 +352,7 @@ class SyncClient(BlockingClient):
         nonce: int = 0,
         check: int = 0,
         label: str = "",
+        every: float | str = 0.0,
     ) -> SyncTask:
         """Queue a mission as one task: a .plan or QGC WPL 110 file, or goals.
 
@@ -349,6 +373,7 @@ class SyncClient(BlockingClient):
                 nonce=nonce,
                 check=check,
                 label=label,
+                every=every,
             ),
         )
 

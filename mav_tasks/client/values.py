@@ -36,6 +36,8 @@ class TaskStatus:
     is the leg. ``version`` grows with each change. ``halt_epoch`` grows with each event that halts
     its rover. ``label`` is the submitter's name for it, "" for none. ``ended_ago``: seconds from
     its end to the answer of a request; None: it has not ended, or the server does not say.
+    ``every``: it repeats, so many seconds from one start to the next, or at the times of a cron
+    expression; None: it does not. ``series``: id of the first run of its series; None: in none.
     """
 
     id: int
@@ -61,6 +63,8 @@ class TaskStatus:
     halt_epoch: int = 0
     label: str = ""
     ended_ago: float | None = None
+    every: int | str | None = None
+    series: int | None = None
 
     @property
     def is_over(self) -> bool:
@@ -205,7 +209,14 @@ def task_status_of(message: m.TaskStatus, vehicle: int) -> TaskStatus:
         halt_epoch=message.halt_epoch,
         label=_text(message._label_raw),
         ended_ago=-finish if is_over and finish is not None else None,
+        every=every_of(_text(message._repeat_raw)),
+        series=message.series or None,
     )
+
+
+def every_of(repeat: str) -> int | str | None:
+    """Return a repetition: seconds, or a cron expression; None: no repetition."""
+    return int(repeat) if repeat.isdigit() else repeat or None
 
 
 def task_timing_of(message: m.TaskTiming, vehicle: int) -> TaskTiming:

@@ -25,6 +25,7 @@ from mav_tasks.tasks.goal import (
     Rotate,
     Wait,
 )
+from mav_tasks.tasks.repetition import canonical
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_TASK_ID
 
 #: the goals that a client can submit; angles in radians
@@ -55,6 +56,18 @@ class TaskOptions:
         for name, value in (("delay", self.delay), ("deadline", self.deadline)):
             if not (isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} {value!r}: expected seconds, 0 or more")
+
+
+def repeat_of(every: float | str) -> str:
+    """Return the text of a repetition: seconds, or a cron expression; "" for 0 or "".
+
+    Raise ValueError if it is invalid. A time zone is looked up here, too.
+    """
+    if isinstance(every, str):
+        return canonical(every) if every else ""
+    if isinstance(every, bool) or not isfinite(every) or every != int(every):
+        raise ValueError(f"every {every!r}: expected whole seconds, or a cron expression")
+    return canonical(f"{every:.0f}") if every else ""
 
 
 def check_nonce(nonce: int) -> None:

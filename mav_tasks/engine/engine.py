@@ -323,6 +323,8 @@ class Engine:
         times = signatures.take_times()
         if times is not None:
             self._registry.record(times)
+        if self._registry.unplanned:
+            room.plan_runs(now=now)
         events = self._registry.take_events()
         if events:
             self._publisher.publish(events, now=now)

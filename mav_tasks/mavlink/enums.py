@@ -230,3 +230,5 @@ class TaskProperty(IntEnum):
     PREEMPTIVE = 6
     START_UTC = 7
     LABEL = 8
+    EVERY = 9
+    REPEAT = 10

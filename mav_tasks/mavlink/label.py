@@ -1,8 +1,8 @@
-"""A task's label on the wire: UTF-8 in pieces of up to 8 bytes, each in x and y of a COMMAND_INT.
+"""Texts of a task on the wire: UTF-8 in pieces of up to 8 bytes, in x and y of a COMMAND_INT.
 
 A command has no text, but two integers that keep every bit. A piece holds whole characters and
-names the byte of the label at which it begins; bytes behind it are removed. So a piece that comes
-twice changes nothing, and the label can be read after each piece.
+names the byte of the text at which it begins; bytes behind it are removed. So a piece that comes
+twice changes nothing, and a label can be read after each piece.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ PIECE = 8
 
 
 class Piece(NamedTuple):
-    """Up to 8 bytes of a label, as two little-endian integers, and the byte where they begin."""
+    """Up to 8 bytes of a text, as two little-endian integers, and the byte where they begin."""
 
     offset: int
     x: int
@@ -28,10 +28,15 @@ def check_label(label: str) -> None:
 
 
 def pieces_of(label: str) -> list[Piece]:
-    """Return the pieces to be sent, in order; an empty label is one empty piece. ValueError."""
+    """Return the pieces of a label, in order; an empty label is one empty piece. ValueError."""
     check_label(label)
+    return text_pieces(label)
+
+
+def text_pieces(text: str) -> list[Piece]:
+    """Return the pieces of a text to be sent, in order; an empty text is one empty piece."""
     pieces, offset, data = [], 0, b""
-    for character in map(str.encode, label):
+    for character in map(str.encode, text):
         if len(data) + len(character) > PIECE:
             pieces.append(_piece(offset, data))
             offset, data = offset + len(data), b""
@@ -39,20 +44,23 @@ def pieces_of(label: str) -> list[Piece]:
     return [*pieces, _piece(offset, data)]
 
 
-def with_piece(label: str, piece: Piece) -> str:
-    """Return a label with a piece put in. ValueError if it does not fit, or makes no label."""
-    known = label.encode()
+def with_piece(text: str, piece: Piece, *, name: str = "label", most: int = MAX_LABEL) -> str:
+    """Return a text with a piece put in. ValueError if it does not fit, or makes no text.
+
+    ``name`` is the text's in errors; ``most`` its bytes.
+    """
+    known = text.encode()
     if piece.offset > len(known):
-        raise ValueError(f"label: byte {piece.offset} comes after byte {len(known)}")
+        raise ValueError(f"{name}: byte {piece.offset} comes after byte {len(known)}")
     data = b"".join(n.to_bytes(4, "little", signed=True) for n in (piece.x, piece.y))
     try:
         whole = (known[: piece.offset] + data.rstrip(b"\0")).decode()
     except UnicodeDecodeError:
-        raise ValueError("label: not UTF-8") from None
-    if len(whole.encode()) > MAX_LABEL:
-        raise ValueError(f"label: more than {MAX_LABEL} bytes")
+        raise ValueError(f"{name}: not UTF-8") from None
+    if len(whole.encode()) > most:
+        raise ValueError(f"{name}: more than {most} bytes")
     if not whole.isprintable():
-        raise ValueError("label: a character that cannot be printed")
+        raise ValueError(f"{name}: a character that cannot be printed")
     return whole
 
 

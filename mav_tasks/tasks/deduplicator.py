@@ -77,6 +77,8 @@ class SubmissionDeduplicator:
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Load the tasks of an earlier run, oldest first: all nonces, and recent submissions."""
         for task in tasks:
+            if task.is_made:
+                continue  # nobody submitted it
             nonce = task.marks.nonce
             if nonce:
                 self._nonces[_key(task.submitter, nonce)] = task.id

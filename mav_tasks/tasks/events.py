@@ -33,9 +33,10 @@ class TaskSubmitted:
     def __str__(self) -> str:
         task = self.task
         label = f" '{task.terms.label}'" if task.terms.label else ""
+        run = f", a run of series {task.terms.series}" if task.is_made else ""
         return (
             f"rover {task.vehicle}: task {task.id} submitted: {describe(task.goal)}{label}, "
-            f"priority {task.priority}, by {task.submitter}"
+            f"priority {task.priority}, by {task.submitter}{run}"
         )
 
 

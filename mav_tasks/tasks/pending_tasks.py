@@ -7,15 +7,23 @@ directly or through others.
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.cron import utc_text
 from mav_tasks.tasks.dependencies import Dependencies
-from mav_tasks.tasks.events import SERVER
+from mav_tasks.tasks.events import SERVER, VehicleNoted
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState
 from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
 from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.repetition import (
+    CORRECTION,
+    brought_forward,
+    left_out_words,
+    next_run,
+    why_series_ends,
+)
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.times import Times
 
@@ -106,9 +114,12 @@ class PendingTasks:
             raise Rejection(R.QUOTA, f"quota: this client has {queueing.quota} waiting tasks")
         if draft.terms.after:
             self._dependencies.check(draft.terms.after)
+        return self._add(draft, now=now)
+
+    def _add(self, draft: Draft, *, now: float) -> Task:
         state = self._state_by(draft.terms, now=now)
         task = self._registry.submit(draft, state=state, now=now)
-        self._enter(task, owner, now=now)
+        self._enter(task, draft.submitter.owner, now=now)
         if state is S.QUEUED:  # wakes nobody: it is not durable yet
             self._line_up(task)
         return task
@@ -116,6 +127,7 @@ class PendingTasks:
     def restore(self, tasks: Iterable[Task], *, now: float) -> None:
         """Add those tasks of an earlier run that were waiting."""
         waiting = [task for task in tasks if task.state in WAITING]
+        waiting = [self._moved_on(task, now=now) for task in waiting]
         for task in waiting:
             due = self.times.start(task.terms)
             came_at = max(task.submitted_at, due) if due <= now else task.submitted_at
@@ -156,6 +168,10 @@ class PendingTasks:
     def _settle(self, task: Task, *, now: float) -> Task:
         """Move a waiting task to the state and queue that its terms require now."""
         wanted = self._state_by(task.terms, now=now)
+        if task.state is S.SCHEDULED and wanted is not S.SCHEDULED and task.terms.repeat:
+            task = self._moved_on(task, now=now)  # the clock may have passed more than one run
+            wanted = self._state_by(task.terms, now=now)
+            self.times.note(task)
         if task.state is S.SCHEDULED and wanted is not S.SCHEDULED:
             waiter = self._waiters[task.id]
             waiter.came_at = max(waiter.came_at, self.times.start(task.terms))
@@ -188,7 +204,7 @@ class PendingTasks:
         """Expire tasks whose deadline has passed, and settle those whose start time has come."""
         for at, task_id in self.times.take_over(now=now):
             task = self._waiting(task_id)
-            if task is not None and task.terms.deadline == at:  # not modified since
+            if task is not None and self.times.deadline(task.terms) == at:  # not modified since
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
         for _, task_id in self.times.take_starts(now=now):
             task = self._waiting(task_id)
@@ -198,7 +214,10 @@ class PendingTasks:
     def set_wall_offset(self, offset: float, *, now: float) -> None:
         """Set UTC minus monotonic time, s; this moves the tasks that start at a UTC time."""
         waiting = [self._registry[task_id] for task_id in self._waiters]
+        is_corrected = self.times.wall_offset - offset > CORRECTION
         self.times.set_wall_offset(offset, waiting)
+        if is_corrected:
+            waiting = [self._brought_forward(task, now=now) for task in waiting]
         for task in waiting:
             if task.terms.start_utc is not None:
                 self._settle(task, now=now)
@@ -220,6 +239,75 @@ class PendingTasks:
         self._rerank(task)
         self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
+
+    # series
+
+    def plan_runs(self, *, now: float) -> None:
+        """Add the next run of each series whose run has ended since, or say that it ends.
+
+        The engine calls it before it hands out the events of a turn, so that an end and the run
+        after it are stored in one transaction. A next run counts towards no limit: its series had
+        one before.
+        """
+        for task_id in tuple(self._registry.unplanned):
+            task = self._registry.get(task_id)
+            if task is not None and not self._is_continued(task, now=now):
+                return  # no id is granted: later
+            del self._registry.unplanned[task_id]
+
+    def _is_continued(self, task: Task, *, now: float) -> bool:
+        """Add the run after a task, or say why there is none; return False if there is no id."""
+        why_not = why_series_ends(task)
+        run = None if why_not else next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
+        if run is None:
+            why_not = why_not or "it has no further time"
+            self._note(task, f"will not repeat task {task.id}: {why_not}", now=now)
+            return True
+        terms = replace(run.terms, after=0, is_staged=False)
+        draft = Draft(task.vehicle, task.command, task.goal, task.submitter, terms)
+        try:
+            added = self._add(draft, now=now)
+        except Rejection:
+            return False
+        if run.left_out:
+            words = f"left out {left_out_words(run.left_out, terms.repeat)}"
+            words += f" while task {task.id} waited or ran; task {added.id} is next"
+            self._note(task, words, now=now)
+        return True
+
+    def _moved_on(self, task: Task, *, now: float) -> Task:
+        """Return a waiting run; if the one after it is due, too, it starts later.
+
+        So it went while the server was off, or the clock was set: a run starts late only as long as
+        no other is due.
+        """
+        due = self.times.start(task.terms)
+        if not task.terms.repeat or task.state is S.BLOCKED or due > now:
+            return task
+        run = next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
+        if run is None or not run.left_out:
+            return task
+        words = (
+            f"left out {left_out_words(1 + run.left_out, run.terms.repeat)} that passed meanwhile"
+        )
+        task = self._registry.modify(task.id, run.terms, actor=SERVER, now=now)
+        at = utc_text(self.times.start(task.terms) + self.times.wall_offset)
+        self._note(task, f"{words}; task {task.id} starts {at}", now=now)
+        return task
+
+    def _brought_forward(self, task: Task, *, now: float) -> Task:
+        """Return a waiting run; if the clock was set back far, its times count from now."""
+        terms = task.terms
+        if task.is_made and terms.repeat and task.state is S.SCHEDULED:
+            terms = brought_forward(terms, utc=now + self.times.wall_offset)
+        if terms is task.terms:
+            return task
+        task = self._registry.modify(task.id, terms, actor=SERVER, now=now)
+        self.times.note(task)
+        return task
+
+    def _note(self, task: Task, words: str, *, now: float) -> None:
+        self._registry.record(VehicleNoted(task.vehicle, words, now))
 
     # removal
 

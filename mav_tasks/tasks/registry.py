@@ -22,6 +22,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
+from mav_tasks.tasks.repetition import why_series_ends
 from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.task_ids import TaskIds
 from mav_tasks.tasks.timing import Timing
@@ -40,6 +41,10 @@ class TaskRegistry:
         self._last_event: dict[TaskId, int] = {}
         self._finished: deque[TaskId] = deque()
         self._live: dict[tuple[Submitter, int, int], dict[TaskId, None]] = {}
+        #: by series: its run that is not over
+        self.runs: dict[int, TaskId] = {}
+        #: runs that are over, and whose series has not been continued or ended yet
+        self.unplanned: dict[TaskId, None] = {}
         #: by vehicle, then by state
         self._counts: dict[int, list[int]] = defaultdict(lambda: [0] * STATES)
         #: return a task, or None if the id is unknown or forgotten
@@ -81,9 +86,16 @@ class TaskRegistry:
             key=lambda task: task.submitted_at if task.changed_at is None else task.changed_at
         )
         self._finished.extend(task.id for task in over)
+        newest: dict[int, Task] = {}  # by series
         for task in tasks:
             if task.state not in TERMINAL:
                 self._note_live(task)
+            if task.terms.series:
+                newest[task.terms.series] = task
+        for task in newest.values():
+            is_over = task.state in TERMINAL and task.terms.series not in self.runs
+            if is_over and task.terms.repeat and not why_series_ends(task):
+                self.unplanned[task.id] = None  # there was no id for the next run
 
     def submit(self, draft: Draft, *, now: float, state: TaskState = TaskState.QUEUED) -> Task:
         """Create a task from a draft, with the next free id; raise Rejection if there is none."""
@@ -154,13 +166,16 @@ class TaskRegistry:
         self._last_event[task_id] = self.recorded
         if new in TERMINAL:
             self._forget_live(task)
+            if task.terms.repeat:
+                self.unplanned[task_id] = None
             self._finish(task_id)
         return task
 
     def modify(self, task_id: TaskId, terms: Terms, *, actor: str, now: float) -> Task:
-        """Change the terms of a task that is not over."""
+        """Change the terms of a task that is not over, or no longer repeats."""
         old = self._tasks[task_id]
         task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)
+        self._note_run(old, task)
         modified = TaskModified(task_id, task.vehicle, task.version, terms, actor, now, old.terms)
         self.record(modified)
         self._last_event[task_id] = self.recorded
@@ -208,6 +223,27 @@ class TaskRegistry:
         over = (each for each in reversed(self._finished) if self._tasks[each].vehicle == vehicle)
         return list(islice(over, first, first + count))
 
+    def repeat_no_more(self, task_id: TaskId, *, actor: str, now: float) -> None:
+        """Let a task no longer repeat; its run may be over, with the next one not planned yet."""
+        terms = replace(self._tasks[task_id].terms, repeat="")
+        self.modify(task_id, terms, actor=actor, now=now)
+        self.unplanned.pop(task_id, None)
+
+    def between_runs(self, series: int) -> TaskId | None:
+        """Return the last run of a series that is over and which another one is to follow."""
+        runs = (self._tasks[each] for each in self.unplanned if each in self._tasks)
+        return next((task.id for task in runs if task.terms.series == series), None)
+
+    def unplanned_of(self, vehicle: int) -> list[Task]:
+        """Return the runs of a vehicle that are over, and which another one is to follow."""
+        over = (self._tasks[each] for each in self.unplanned if each in self._tasks)
+        return [task for task in over if task.vehicle == vehicle and not why_series_ends(task)]
+
+    def runs_of(self, vehicle: int) -> list[Task]:
+        """Return the runs of a vehicle's series that are not over, one of each series."""
+        runs = (self._tasks[task_id] for task_id in self.runs.values())
+        return [task for task in runs if task.vehicle == vehicle]
+
     def is_awaited_at(self, link: str, endpoint: str) -> bool:
         """Return whether a client's endpoint has an unfinished task."""
         return any((s.link, s.endpoint) == (link, endpoint) for s, _, _ in self._live)
@@ -237,9 +273,20 @@ class TaskRegistry:
     def _note_live(self, task: Task) -> None:
         key = task.submitter, task.command, task.vehicle
         self._live.setdefault(key, {})[task.id] = None
+        if task.terms.repeat:
+            self.runs[task.terms.series] = task.id
+
+    def _note_run(self, before: Task, task: Task) -> None:
+        """Note that a task has begun, or ceased, to repeat."""
+        if before.terms.repeat:
+            self.runs.pop(before.terms.series, None)
+        if task.terms.repeat:
+            self.runs[task.terms.series] = task.id
 
     def _forget_live(self, task: Task) -> None:
         key = task.submitter, task.command, task.vehicle
+        if task.terms.repeat:
+            self.runs.pop(task.terms.series, None)
         live = self._live[key]
         del live[task.id]
         if not live:

@@ -143,6 +143,10 @@ class Terms:
     command. ``top_speed`` in m/s limits any other speed; None: only the settings limit it.
     ``is_cruising``: if the goal names no speed, the task drives at the vehicle's own cruise speed.
     ``label`` is the submitter's name for the task, "" for none; it changes nothing.
+
+    ``repeat`` says when the task runs again (``tasks/repetition.py``), "" for never; ``series`` is
+    the id of the first run of its series, 0 if it is in none. A task that repeats has a start time,
+    and instead of ``deadline`` ``start_within``: the seconds after its start time.
     """
 
     priority: int = DEFAULT_PRIORITY
@@ -156,6 +160,9 @@ class Terms:
     top_speed: float | None = None
     is_cruising: bool = False
     label: str = ""
+    repeat: str = ""
+    series: int = 0
+    start_within: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,3 +234,8 @@ class Task:
     def priority(self) -> int:
         """Priority as submitted or modified, 0–10; 10 runs first."""
         return self.terms.priority
+
+    @property
+    def is_made(self) -> bool:
+        """Whether the server made it, as a later run of a series."""
+        return self.terms.series not in (0, self.id)

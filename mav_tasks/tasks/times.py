@@ -27,14 +27,31 @@ class Times:
         from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
         return max(from_utc, -inf if terms.start_at is None else terms.start_at)
 
+    @property
+    def wall_offset(self) -> float:
+        """UTC minus monotonic time, s."""
+        return self._wall_offset
+
+    def deadline(self, terms: Terms) -> float | None:
+        """Return the monotonic time until which a task must have started; None without one."""
+        if terms.start_within is None:
+            return terms.deadline
+        return self.start(terms) + terms.start_within
+
+    def is_too_late(self, task: Task, *, now: float) -> bool:
+        """Return whether a waiting task's deadline has passed."""
+        deadline = self.deadline(task.terms)
+        return deadline is not None and deadline <= now
+
     def note(self, task: Task) -> None:
         """Add the start time and the deadline of a waiting task."""
         terms = task.terms
         if terms.start_utc is not None or terms.start_at is not None:
             heappush(self._starts, (self.start(terms), task.id))
             self._look()
-        if terms.deadline is not None:
-            heappush(self._deadlines, (terms.deadline, task.id))
+        deadline = self.deadline(terms)
+        if deadline is not None:
+            heappush(self._deadlines, (deadline, task.id))
             self._look()
 
     def _look(self) -> None:
@@ -57,14 +74,13 @@ class Times:
         return due
 
     def set_wall_offset(self, offset: float, tasks: Iterable[Task]) -> None:
-        """Set UTC minus monotonic time, s, and rebuild the start times of all waiting tasks."""
+        """Set UTC minus monotonic time, s, and rebuild the times of all waiting tasks."""
         self._wall_offset = offset
+        tasks = list(tasks)
+        deadlines = [(self.deadline(task.terms), task.id) for task in tasks]
+        self._deadlines = [(at, task_id) for at, task_id in deadlines if at is not None]
+        heapify(self._deadlines)
         starts = [(self.start(task.terms), task.id) for task in tasks]
         self._starts = [(due, task_id) for due, task_id in starts if due > -inf]
         heapify(self._starts)
         self._look()
-
-
-def is_too_late(task: Task, *, now: float) -> bool:
-    """Return whether a waiting task's deadline has passed."""
-    return task.terms.deadline is not None and task.terms.deadline <= now

@@ -6,7 +6,6 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.lineup import Lineup
 from mav_tasks.tasks.scheduler import outranks
 from mav_tasks.tasks.task import Task, TaskId
-from mav_tasks.tasks.times import is_too_late
 from mav_tasks.tasks.view import VehicleView
 
 R, S = TaskReason, TaskState
@@ -53,7 +52,8 @@ class Turns:
             return False
         for task_id in lineup.queue.interrupters():
             waiting = lineup.registry[task_id]
-            if not lineup.registry.is_durable(task_id) or is_too_late(waiting, now=now):
+            is_too_late = lineup.room.times.is_too_late(waiting, now=now)
+            if not lineup.registry.is_durable(task_id) or is_too_late:
                 continue
             outranked = outranks(waiting, running, queueing=queueing)
             if outranked and not lineup.blocker(seen, goal_of(waiting), now=now):
@@ -69,8 +69,9 @@ class Turns:
         if first is None:
             return
         task = self._lineup.registry[first]
-        if task.state is S.QUEUED and is_too_late(task, now=now):
-            self._lineup.room.handle_deadline(now=now)  # after a delay this may precede its timer
+        room = self._lineup.room
+        if task.state is S.QUEUED and room.times.is_too_late(task, now=now):
+            room.handle_deadline(now=now)  # after a delay this may precede its timer
             self.begin_next(seen, now=now)
             return
         blocker = self._lineup.blocker(seen, goal_of(task), now=now)

@@ -169,6 +169,7 @@ class VehicleTasks(Lineup):
     def clear(self, *, begun_too: bool, actor: str, now: float) -> None:
         """Cancel the waiting tasks; with ``begun_too`` the active and suspended ones, too."""
         self.room.clear(self.vehicle, R.CLEARED, actor=actor, now=now)
+        self._repeat_nothing(R.CLEARED, actor=actor, now=now)
         if not begun_too:
             return
         for task in [*self.suspended, *([] if self.active is None else [self.active])]:
@@ -285,16 +286,31 @@ class VehicleTasks(Lineup):
         return False
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
-        """Kill the active task and latch STOP; with ``clear`` cancel the others. Return its id."""
+        """Kill the active task and latch STOP; with ``clear`` cancel the others. Return its id.
+
+        STOP ends each series, also one that waits for its time: after a resume hours later the
+        vehicle would start by itself, and nobody would think of it.
+        """
         self.halt(R.STOPPED, actor=actor, now=now)
         killed = self.executor.kill(R.STOP, actor=actor, now=now)
         self.immediate = None
         self.pause_queue(R.STOPPED, actor=actor, now=now)
         if clear:
             self.clear(begun_too=True, actor=actor, now=now)
+        self._repeat_nothing(R.STOP, actor=actor, now=now)
         if killed is not None:
             self.room.ended(killed, now=now)
         return killed
+
+    def _repeat_nothing(self, reason: TaskReason, *, actor: str, now: float) -> None:
+        """End each series: its waiting run ends, one that has started does not repeat."""
+        for task in self.registry.runs_of(self.vehicle):
+            if task.state in WAITING:
+                self.room.end(task, S.KILLED, reason, actor=actor, now=now)
+            else:
+                self.registry.repeat_no_more(task.id, actor=actor, now=now)
+        for task in self.registry.unplanned_of(self.vehicle):  # between two runs
+            self.registry.repeat_no_more(task.id, actor=actor, now=now)
 
     # time
 

@@ -55,6 +55,11 @@ RELEASE = (
 )
 
 
+def own_of(status: TaskStatus) -> int:
+    """Return the id by which the submitter of a task is known: the first one of its series."""
+    return status.series or status.id
+
+
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
     client, live = services.client, services.live
@@ -103,24 +108,27 @@ def operations(services: Services) -> list[Operation]:
         return {"points": live.tracks.of_task(call.task)}
 
     async def modify(call: Call) -> Any:
-        services.check_may("modify", call.task, call.identity)
         status = await status_of(call)
+        services.check_may("modify", own_of(status), call.identity)
         changes = dict(call.body) | {"at": moment_of(call.body["at"])}
         await client.modify(status.id, vehicle=status.vehicle, **changes)
         live.hurry(status.vehicle)
         return live.task_form(await client.status(status.id, vehicle=status.vehicle))
 
     async def cancel(call: Call) -> None:
-        services.check_may("cancel", call.task, call.identity)
         status = await status_of(call)
-        ended = client.kill if call.body["kill"] else client.cancel
-        await ended(status.id, vehicle=status.vehicle)
+        services.check_may("cancel", own_of(status), call.identity)
+        if call.body["kill"]:
+            await client.kill(status.id, vehicle=status.vehicle)
+        else:
+            series = bool(call.body["series"])
+            await client.cancel(status.id, series=series, vehicle=status.vehicle)
         live.hurry(status.vehicle)
 
     async def release(call: Call) -> None:
-        services.check_may("release", call.task, call.identity)
         epoch, how = seen_epoch(call.body), call.body["how"]
         status = await status_of(call)
+        services.check_may("release", own_of(status), call.identity)
         await client.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
         live.hurry(status.vehicle)
 
@@ -184,7 +192,10 @@ def operations(services: Services) -> list[Operation]:
             "Cancel a task",
             cancel,
             may="own",
-            body=[Field("kill", "boolean", "put the rover into HOLD at once")],
+            body=[
+                Field("kill", "boolean", "put the rover into HOLD at once"),
+                Field("series", "boolean", "end its series, too: it does not repeat any more"),
+            ],
         ),
         Operation("POST", f"{one}/release", "Release a held task", release, "own", body=RELEASE),
     ]

@@ -16,6 +16,7 @@ from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.wire import Goal
 from mav_tasks.errors import Refused
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, MIN_PERIOD
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID
 from mav_tasks.web.fields import Field
 from mav_tasks.web.problems import Problem, invalid
@@ -36,7 +37,23 @@ DEADLINE = Field(
     LONGEST_WAIT,
 )
 LABEL = Field("label", "string", "name of the task, at most 24 bytes of UTF-8", False, 0, 24)
-TERMS = (PRIORITY, AFTER, DELAY, AT, DEADLINE, LABEL)
+EVERY = Field(
+    "every",
+    "integer",
+    "repeat: s from one start to the next; a deadline counts from each start",
+    False,
+    MIN_PERIOD,
+    MAX_PERIOD,
+)
+CRON = Field(
+    "cron",
+    "string",
+    "repeat: minute, hour, day of month, month, day of week, and perhaps a time zone, else UTC",
+    False,
+    1,
+    MAX_REPEAT,
+)
+TERMS = (PRIORITY, AFTER, DELAY, AT, DEADLINE, LABEL, EVERY, CRON)
 GOALS = Field(
     "goals", "array", "what to do, in this order, as one task", True, 1, 200, items=goal_schema()
 )
@@ -73,11 +90,15 @@ async def submit(
     """Submit a task. Return it once it is durable. Raise Problem for a key of another task."""
     key = headers.get(KEY)
     label = terms["label"] or ""
+    if terms["every"] and terms["cron"]:
+        raise invalid("every and cron: choose one of them")
     numbers: dict[str, int] = {}
     if key is not None:
         if not 0 < len(key) <= LONGEST:
             raise invalid(f"Idempotency-Key: expected 1 to {LONGEST} characters")
-        numbers = numbers_of(f"{by} {key}", label=label)._asdict()
+        repeat = terms["every"] or terms["cron"]
+        named = f"{label}\0{repeat}" if repeat else label
+        numbers = numbers_of(f"{by} {key}", label=named)._asdict()
     try:
         return await client.submit_mission(
             plan,
@@ -88,6 +109,7 @@ async def submit(
             at=moment_of(terms["at"]),
             deadline=terms["deadline"] or 0.0,
             label=label,
+            every=terms["every"] or terms["cron"] or 0.0,
             **numbers,
         )
     except Refused as error:

@@ -637,3 +637,84 @@ def test_a_label_that_is_too_long_submits_no_task(world: RoverWorld) -> None:
             assert (await client.queue()).waiting_count == 0
 
     world.run(script())
+
+
+def test_a_task_that_repeats_is_followed_and_ended_through_the_library(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with world.client() as client:
+            task = await client.submit(Move(0.2), every=30.0, deadline=20.0, label="round")
+            await task.done()
+            assert task.series == task.id
+            (status,) = (await client.queue()).waiting
+            assert (status.series, status.every, status.label) == (task.id, 30, "round")
+            assert status.time_to_start == pytest.approx(30, abs=8)
+            run = await client.task(status.id)
+            await run.done()
+            await run.refresh()
+            (following,) = (await client.queue()).waiting
+            assert await client.cancel(task.id, series=True) == following.id
+            assert (await client.queue()).waiting_count == 0
+            with pytest.raises(Refused, match="does not repeat"):
+                await run.cancel(series=True)
+
+    world.run(script())
+
+
+def test_a_series_by_a_cron_expression_survives_a_crash(world: RoverWorld) -> None:
+    async def script() -> None:
+        async with world.client() as client:
+            text = "30 6 * * 1-5 Europe/Zurich"
+            task = await client.submit([Wait(1.0), Move(0.2)], every=text, deadline=60.0)
+            status = await task.refresh()
+            assert (status.state, status.every, status.series) == (S.SCHEDULED, text, task.id)
+            assert status.time_to_start is not None
+            assert status.time_to_start < 4 * 86_400  # not that which bridges the submission
+            world.server.kill()
+            world.server.start()
+            await client.found()
+            assert (await task.refresh()).every == text
+            await task.modify(every="0 * * * *")
+            assert (await task.refresh()).time_to_start <= 3600  # type: ignore[operator]
+            await task.modify(every=0)
+            assert (await task.refresh()).every is None
+
+    world.run(script())
+
+
+@pytest.mark.parametrize(
+    ("terms", "words"),
+    [
+        ({"every": 5.0}, "expected 10 s"),
+        ({"every": 10.5}, "whole seconds"),
+        ({"every": "61 * * * *"}, "bad minute"),
+        ({"every": "0 6 * * * Mars/X"}, "time zone"),
+        ({"every": "0 6 * * *", "delay": 5.0}, "names the start times"),
+    ],
+)
+def test_an_invalid_repetition_submits_no_task(
+    world: RoverWorld, terms: dict[str, Any], words: str
+) -> None:
+    async def script() -> None:
+        async with world.client() as client:
+            with pytest.raises(ValueError, match=words):
+                await client.submit(Move(0.2), **terms)
+            assert (await client.queue()).waiting_count == 0
+
+    world.run(script())
+
+
+def test_a_repetition_that_the_server_refuses_leaves_no_task(
+    world: RoverWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a server that is older, or has no data of that time zone."""
+    monkeypatch.setattr(
+        "mav_tasks.engine.commands.task_control.canonical", lambda text: int("no rule")
+    )
+
+    async def script() -> None:
+        async with world.client() as client:
+            with pytest.raises(Refused):
+                await client.submit(Move(5.0), every="0 6 * * *")
+            assert (await client.queue()).waiting_count == 0
+
+    world.run(script())

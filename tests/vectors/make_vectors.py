@@ -60,7 +60,12 @@ TASK_QUEUE_STATUS: list[Field] = [
     ("uint8_t", "paused_reason", 0),
     ("uint8_t", "flags", 0),
 ]
-STATUS_EXTENSION: list[Field] = [*HALT_EPOCH, ("char", "label", 24)]
+STATUS_EXTENSION: list[Field] = [
+    *HALT_EPOCH,
+    ("char", "label", 24),
+    ("uint32_t", "series", 0),
+    ("char", "repeat", 64),
+]
 QUEUE_EXTENSION: list[Field] = [*HALT_EPOCH, ("uint32_t", "heartbeat_age", 0)]
 TASK_TIMING: list[Field] = [
     *[("uint32_t", name, 0) for name in ("time_boot_ms", "task_id", "count", "late")],
@@ -244,9 +249,11 @@ def _by_hand() -> list[dict[str, Any]]:
         "text": "move 2 m: executing",
         "halt_epoch": 0,
         "label": "",
+        "series": 0,
+        "repeat": "",
     }
     full = status | {"text": "x" * 50, "state": 9, "progress": 100, "halt_epoch": 1 << 24}
-    full |= {"label": "y" * 24}
+    full |= {"label": "y" * 24, "series": 1 << 24, "repeat": "z" * 64}
     queue = {
         "time_boot_ms": 1000,
         "version": 7,

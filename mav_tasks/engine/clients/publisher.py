@@ -88,6 +88,8 @@ class Publisher:
             self._submissions.gate.hold(_Ended(frozenset(ended)), now=now)
         for event in events:
             if isinstance(event, TaskSubmitted):
+                if event.task.is_made:
+                    self.note_change(event.task.id)
                 continue  # ``Submissions`` and ``MissionUploads`` tell everybody of it
             spoken = translate.text_of(event)
             if spoken is not None:

@@ -23,7 +23,7 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
 from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions
-from mav_tasks.engine.commands.task_control import TaskControl
+from mav_tasks.engine.commands.task_control import TaskControl, sets_repetition
 from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.commands.words import halts_again
 from mav_tasks.engine.missions.plans import Plans
@@ -53,6 +53,13 @@ class _UndoesHold(NamedTuple):
     actor: str
 
 
+class _Repeats(NamedTuple):
+    """A task that repeats from now on; the request is acknowledged once that is durable."""
+
+    asked: CommandRequest
+    task_id: int
+
+
 @dataclass(repr=False, eq=False)
 class Commands:
     """The dispatcher of client commands."""
@@ -67,6 +74,7 @@ class Commands:
 
     def __post_init__(self) -> None:
         self._submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
+        self._submissions.gate.knows(_Repeats, _acknowledge_repeats, self._refuse_repeats)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """Execute or refuse a client's command, and answer it."""
@@ -192,7 +200,11 @@ class Commands:
                 | MavCmd.TASK_RELEASE
                 | MavCmd.DO_CHANGE_SPEED
             ):
-                asked.answer(MavResult.ACCEPTED, self._control.act(asked, now=now))
+                task_id = self._control.act(asked, now=now)
+                if sets_repetition(asked.command):  # a crash must not leave a task that runs once
+                    self._submissions.gate.hold(_Repeats(asked, task_id), now=now)
+                else:
+                    asked.answer(MavResult.ACCEPTED, task_id)
             case MavCmd.NAV_TAKEOFF if claims:  # examples for every kind of vehicle send it
                 asked.answer(MavResult.ACCEPTED)
             case MavCmd.NAV_LAND if claims:
@@ -226,6 +238,11 @@ class Commands:
             case _:
                 return False
         return True
+
+    def _refuse_repeats(self, repeats: _Repeats, *, now: float) -> None:
+        words = f"task {repeats.task_id}: not stored in time that it repeats: send it again"
+        refusal = Rejection(R.STORE_UNAVAILABLE, words)
+        self._registry.record(repeats.asked.refuse(refusal, now=now))
 
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
         """Raise Rejection if an observer's question is too much for the rover's link."""
@@ -322,6 +339,10 @@ class Commands:
 def _looks_for_servers(command: Command) -> bool:
     is_request = command.command == MavCmd.REQUEST_MESSAGE
     return is_request and message_id_of(command) == m.TaskQueueStatus.id
+
+
+def _acknowledge_repeats(repeats: _Repeats, *, now: float) -> None:  # noqa: ARG001
+    repeats.asked.answer(MavResult.ACCEPTED, repeats.task_id)
 
 
 def _undo_hold(undoes: _UndoesHold, *, now: float) -> None:

@@ -19,12 +19,15 @@ from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import MAX_PRIORITY, Task, Terms
+from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, canonical, repeating
+from mav_tasks.tasks.task import MAX_PRIORITY, Task, TaskId, Terms
+from mav_tasks.tasks.times import Times
 
 R, P = TaskReason, TaskProperty
 
 AGAIN, REMAINDER, SKIP = range(3)  # TASK_RELEASE, param2
 NO_CHANGE, DEFAULT = -1.0, -2.0  # DO_CHANGE_SPEED, param2
+MOST_BEGUN = 64  # repetitions of which some pieces have come
 GROUND_OR_AIR = 1  # DO_CHANGE_SPEED, highest param1: airspeed counts as ground speed
 
 
@@ -33,6 +36,7 @@ class TaskControl:
 
     def __init__(self, registry: TaskRegistry) -> None:
         self._registry = registry
+        self._begun: dict[TaskId, str] = {}  # the pieces of each task's repetition so far
 
     def act(self, asked: CommandRequest, *, now: float) -> int:
         """Execute one of these commands; return the task's id, or 0."""
@@ -64,24 +68,45 @@ class TaskControl:
             vehicle.joint.cancel(task, kill=False, actor=str(submitter), now=now)
 
     def _cancel(self, asked: CommandRequest, *, now: float) -> int:
-        """Cancel one task. A copy gets the answer of the first, and cancels no other task."""
+        """Cancel one task, or a series. A copy gets the first one's answer, and cancels no other.
+
+        The id of any run names its series, whose present run is cancelled, too.
+        """
         first = asked.receiver.answer_to_counted_copy(asked.command, now=now)
         if first is not None and first.result == MavResult.ACCEPTED:
             return first.result_param2
         if first is not None:
             raise Rejection(R(first.result_param2), "just refused; send it again if you mean it")
         task_id = identifier(asked.command, 1, "task", default=None)
-        kill = flag(asked.command, 2, "kill")
+        kill, is_series = flag(asked.command, 2, "kill"), flag(asked.command, 3, "series")
         active = asked.vehicle.tasks.active
         if task_id == 0 and active is None:
             raise Rejection(R.NOT_FOUND, "no task is running")
-        task = active if task_id == 0 and active is not None else self._find(asked, task_id)
+        task_id = active.id if task_id == 0 and active is not None else task_id
+        run = self._run_of(task_id) if is_series else task_id
+        task = self._find(asked, run, may_be_over=is_series and run in self._registry.unplanned)
         asked.rights.require_own(task, asked.submitter, "cancel")
         if asked.client.is_late and task.state is TaskState.HELD:  # other tasks would start
             words = f"delayed by the server; task {task.id} is held now: cancel it again"
             raise Rejection(R.STALE, words)
+        if is_series and task.state in TERMINAL:  # between two runs
+            self._registry.repeat_no_more(task.id, actor=asked.actor, now=now)
+            return task.id
+        if is_series:
+            terms = replace(task.terms, repeat="")
+            asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
+            task = self._registry[task.id]
         asked.vehicle.joint.cancel(task, kill=kill, actor=asked.actor, now=now)
         return task.id
+
+    def _run_of(self, task_id: int) -> int:
+        """Return the present run of a series, or the last one, by the id of any of its runs."""
+        named = self._registry.get(task_id)
+        series = named.terms.series if named is not None else task_id
+        run = self._registry.runs.get(series) or self._registry.between_runs(series)
+        if run is None and named is not None:
+            raise Rejection(R.WRONG_STATE, f"task {task_id} does not repeat")
+        return task_id if run is None else run
 
     def _clear(self, asked: CommandRequest, *, now: float) -> int:
         begun_too = flag(asked.command, 1, "scope")
@@ -116,13 +141,28 @@ class TaskControl:
     def _modify(self, asked: CommandRequest, *, now: float) -> int:
         task = self._find(asked, identifier(asked.command, 1, "task", low=1, default=None))
         asked.rights.require_own(task, asked.submitter, "modify")
-        terms = _modified(task, asked.command, now=now)
+        times = asked.vehicle.tasks.room.times
+        if asked.command.params[1] == P.REPEAT:
+            terms = self._with_piece(task, asked.command, times, now=now)
+        else:
+            terms = _modified(task, asked.command, times, now=now)
         if terms.priority > task.terms.priority:
             asked.rights.check_priority(terms.priority)
         if terms.is_preemptive and not task.terms.is_preemptive:
             asked.rights.check_preemptive()
         asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
         return task.id
+
+    def _with_piece(self, task: Task, command: Command, times: Times, *, now: float) -> Terms:
+        """Return a task's terms with a piece of its repetition; unchanged until all have come."""
+        size = whole(command, 4, "bytes", low=1, high=MAX_REPEAT, default=None)
+        text = _with_piece(self._begun.pop(task.id, ""), command, "repeat", most=MAX_REPEAT)
+        self._begun[task.id] = text  # also when all have come: the last one may come twice
+        if len(self._begun) > MOST_BEGUN:
+            del self._begun[next(iter(self._begun))]
+        if len(text.encode()) < size:
+            return task.terms
+        return _repeating(task, text, times, now=now)
 
     def _change_speed(self, asked: CommandRequest, *, now: float) -> int:
         whole(asked.command, 1, "speed type", high=GROUND_OR_AIR)
@@ -134,26 +174,33 @@ class TaskControl:
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
         return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
 
-    def _find(self, asked: CommandRequest, task_id: int) -> Task:
+    def _find(self, asked: CommandRequest, task_id: int, *, may_be_over: bool = False) -> Task:
         task = self._registry.get(task_id)
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
         if task.vehicle != asked.vehicle.system_id:
             raise Rejection(R.NOT_FOUND, f"task {task_id} belongs to rover {task.vehicle}")
-        if task.state in TERMINAL:
+        if task.state in TERMINAL and not may_be_over:
             raise Rejection(R.WRONG_STATE, f"task {task_id} has ended ({_words(task)})")
         return task
+
+
+def sets_repetition(command: Command) -> bool:
+    """Whether a command lets a task repeat, or sends a piece of that."""
+    is_modify = command.command == MavCmd.TASK_MODIFY
+    return is_modify and command.params[1] in (P.EVERY, P.REPEAT)
 
 
 def _words(task: Task) -> str:
     return task.state.name.lower()
 
 
-def _modified(task: Task, command: Command, *, now: float) -> Terms:
+def _modified(task: Task, command: Command, times: Times, *, now: float) -> Terms:
     """Return a task's terms with one property changed."""
     terms = task.terms
     wanted = whole(command, 2, "property", low=1, high=max(P), default=None)
-    if task.state not in WAITING and wanted in _OF_WAITING:
+    is_of_next = wanted == P.DEADLINE and terms.repeat  # of the next run, too
+    if task.state not in WAITING and wanted in _OF_WAITING and not is_of_next:
         words = f"task {task.id} has started: {P(wanted).name} can no longer change"
         raise Rejection(R.WRONG_STATE, words)
     match wanted:
@@ -166,7 +213,12 @@ def _modified(task: Task, command: Command, *, now: float) -> Terms:
             return replace(terms, start_at=now + delay if delay else None, start_utc=None)
         case P.DEADLINE:
             deadline = number(command, 3, "deadline", low=0.0, high=MAX_DELAY)
-            return replace(terms, deadline=now + deadline if deadline else None)
+            if terms.repeat:
+                return replace(terms, deadline=None, start_within=deadline or None)
+            return replace(terms, deadline=now + deadline if deadline else None, start_within=None)
+        case P.EVERY:
+            period = whole(command, 3, "every", high=MAX_PERIOD, default=None)
+            return _repeating(task, str(period) if period else "", times, now=now)
         case P.RUN_AFTER:
             return replace(terms, after=identifier(command, 3, "run after", default=None))
         case P.PREEMPTIBLE:
@@ -174,7 +226,8 @@ def _modified(task: Task, command: Command, *, now: float) -> Terms:
         case P.PREEMPTIVE:
             return replace(terms, is_preemptive=flag(command, 3, "pre-emptive", default=None))
         case P.LABEL:
-            return replace(terms, label=_label(terms.label, command))
+            label = _with_piece(terms.label, command, "label", most=MAX_LABEL)
+            return replace(terms, label=label)
         case _:
             return replace(terms, start_at=None, start_utc=_utc(command))
 
@@ -182,14 +235,27 @@ def _modified(task: Task, command: Command, *, now: float) -> Terms:
 _OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
 
 
-def _label(label: str, command: Command) -> str:
-    """Return the label with the piece in a command put in."""
+def _repeating(task: Task, text: str, times: Times, *, now: float) -> Terms:
+    """Return a task's terms with a repetition; "": none."""
+    if task.terms.is_staged:
+        raise Rejection(R.WRONG_STATE, f"task {task.id} needs a start command: it cannot repeat")
+    try:
+        repeat = canonical(text) if text else ""
+        if repeat == task.terms.repeat:  # a copy: the task may have moved on
+            return task.terms
+        return repeating(task, repeat, now=now, wall_offset=times.wall_offset)
+    except ValueError as error:
+        raise Rejection(R.BAD_PARAMETER, str(error), param=3) from None
+
+
+def _with_piece(text: str, command: Command, name: str, *, most: int) -> str:
+    """Return a text with the piece in a command put in."""
     if command.frame is None:
-        raise Rejection(R.BAD_PARAMETER, "LABEL must be sent as COMMAND_INT")
-    offset = whole(command, 3, "byte", high=MAX_LABEL, default=None)
+        raise Rejection(R.BAD_PARAMETER, f"{name.upper()} must be sent as COMMAND_INT")
+    offset = whole(command, 3, "byte", high=most, default=None)
     x, y = int(command.params[4]), int(command.params[5])
     try:
-        return with_piece(label, Piece(offset, x, y))
+        return with_piece(text, Piece(offset, x, y), name=name, most=most)
     except ValueError as error:
         raise Rejection(R.BAD_PARAMETER, str(error), param=5) from None
 

@@ -153,6 +153,8 @@ def task_status(
         text=_cut(_words(task, reason, tasks.turns.words_of_blocker(task.id)), TEXT),
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
         label=task.terms.label.encode(),
+        series=task.terms.series,
+        repeat=task.terms.repeat.encode(),
     )
 
 

@@ -114,6 +114,7 @@ function find(id) {
 
 function waitWords(task) {
   const parts = [`priority ${task.priority}`];
+  if (task.every || task.cron) parts.push(`repeats ${task.every ? `every ${duration(task.every)}` : `at ${task.cron}`}`);
   const [begin, end] = [task.time_to_start, task.time_to_finish];
   if (begin !== null && end !== null) parts.push(`runs in ${duration(begin)} to ${duration(end)}`);
   else if (begin !== null) parts.push(`starts in ${duration(begin)}`);

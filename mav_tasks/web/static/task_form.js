@@ -29,6 +29,7 @@ export function openTaskForm(vehicle, goal = {}) {
     labelled("Name of the task", h("input", { name: "label", maxLength: state.session.label_bytes, autocomplete: "off" }), `at most ${state.session.label_bytes} bytes`),
     labelled("Priority", h("input", { name: "priority", type: "number", min: least, max: most, step: 1, value: usual }), `${most} runs first`),
     labelled("Start in (s)", h("input", { name: "delay", type: "number", min: 0, step: "any" }), "empty: when it is its turn"),
+    labelled("Repeat every (s)", h("input", { name: "every", type: "number", min: 10, step: 1 }), "empty: once"),
     labelled("After task", h("input", { name: "after", type: "number", min: 1, step: 1 }), "empty: none"));
   const key = newKey();
   ask({
@@ -48,7 +49,7 @@ function bodyOf(form, kind) {
   };
   const goal = { kind: kind.kind };
   for (const each of kind.numbers) if (number(each.name) !== null) goal[each.name] = number(each.name);
-  return { goals: [goal], label: String(data.get("label") ?? ""), priority: number("priority"), delay: number("delay"), after: number("after") };
+  return { goals: [goal], label: String(data.get("label") ?? ""), priority: number("priority"), delay: number("delay"), every: number("every"), after: number("after") };
 }
 
 function field(number, value) {

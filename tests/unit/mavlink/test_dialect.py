@@ -11,10 +11,10 @@ STATES = 14
 
 
 def test_task_status_is_as_the_contract_draws_it() -> None:
-    assert (m.TaskStatus.id, m.TaskStatus.unpacker.size) == (54000, 132)
-    assert m.TaskStatus.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50sI24s"
+    assert (m.TaskStatus.id, m.TaskStatus.unpacker.size) == (54000, 200)
+    assert m.TaskStatus.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50sI24sI64s"
     assert m.TaskStatus.ordered_fieldnames == m.TaskStatus.fieldnames
-    assert struct.calcsize("<5I4f4H10B50sI24s") == 132
+    assert struct.calcsize("<5I4f4H10B50sI24sI64s") == 200
 
 
 def test_task_queue_status_is_as_the_contract_draws_it() -> None:
