@@ -49,6 +49,12 @@ HARMLESS_WITHIN, STREAMED_WITHIN = 60.0, 1.0
 FENCE_LINK_ID = 254
 BEHIND = int(50 * UNITS)  # behind a vehicle's time, at most: it takes no new stream a minute behind
 RESERVE = int(120 * UNITS)  # own timestamps stored ahead: none is used twice if a clock is set back
+#: a signature later than our clock by more than this follows the time of the other end. By less:
+#: each packet is signed later than the one before, 10,000 of them in one moment
+COUNTED = int(0.1 * UNITS)
+#: by how much the clock may be behind what was signed before without having been set back: another
+#: gateway of the fleet may have signed that
+CLOCKS_APART = int(5 * UNITS)
 #: a clock before 2020 was never set: the computer has no battery for it, and no network
 SET_SINCE = timestamp_at(1_577_836_800.0)
 TELL_EACH = 60.0  # s between log lines about one key whose clock is wrong
@@ -130,7 +136,9 @@ class Signatures:
         self._offset = offset
         self._highest_offset = max(self._highest_offset, offset)
         clock = self._clock()
-        self._from = self._signed_until if clock < self._signed_until - RESERVE else 0
+        stored_at = self._signed_until - RESERVE
+        is_set_back = clock < stored_at - CLOCKS_APART
+        self._from = self._signed_until if is_set_back else max(0, stored_at + COUNTED)
 
     def change_keys(self, change: KeysChanged) -> set[str]:
         """Replace the keys. No longer sign for endpoints whose key was removed or changed.
@@ -310,7 +318,7 @@ class Signatures:
         clock = self._own_clock()
         sealed = signer.sign(raw, clock=clock)
         self._note_own(link, signer, sealed)
-        if signer.last <= clock + RESERVE:  # beyond, it is the other end's time, for it alone
+        if signer.last <= clock + COUNTED:  # beyond, it is the other end's time, for it alone
             self._highest = max(self._highest, signer.last)
         return sealed
 
