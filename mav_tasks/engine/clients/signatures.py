@@ -27,7 +27,7 @@ from mav_tasks.mavlink.signing import (
     timestamp_of,
 )
 from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen, SignatureTime
-from mav_tasks.tasks.signing_lead import DECAY
+from mav_tasks.tasks.signing_lead import DECAY, STEP
 
 #: stands for the key of unsigned packets, where they are allowed
 UNSIGNED = Key("", b"", fingerprint="-")
@@ -100,6 +100,8 @@ class Signatures:
         self._signers: dict[tuple[str, Peer], Signer] = {}
         self._fenced: dict[tuple[str, Peer], Signer] = {}  # to vehicles of a fleet that are ours
         self._lead = (0.0, 0.0)  # s ahead of our clock, and when it was that
+        #: the lead with which each way began to be signed as a vehicle of ours
+        self._began: dict[tuple[str, Peer], tuple[float, float]] = {}
         #: whether there is a key or an endpoint to sign for
         self.may_sign = False
         self._offset: float | None = None  # UTC less ``now``
@@ -327,7 +329,8 @@ class Signatures:
 
         All gateways sign with one link id to it, each with a lead over the one before: so the
         vehicle refuses what a gateway signs that does not have it any more. This follows no
-        vehicle's time, which others hear, too, but where it would be refused for being old.
+        vehicle's time, which others hear, too, but where it would be refused for being old; and
+        once, when it gets the vehicle: what the one before has signed is not later than that time.
         """
         there = self._links.get(link)
         key = self._keys.get(there.key) if there is not None and there.key else None
@@ -339,7 +342,12 @@ class Signatures:
         heard = self._signer(link, peer, key).last
         lead, since = self._lead
         ahead = int(max(0.0, lead - DECAY * (self.now - since)) * UNITS)
-        sealed = signer.sign(raw, clock=max(self._own_clock() + ahead, heard - BEHIND))
+        clock = self._own_clock() + ahead
+        if self._began.get((link, peer)) != self._lead:
+            self._began[link, peer] = self._lead
+            if heard > clock:
+                signer.heard(heard + int(STEP * UNITS))
+        sealed = signer.sign(raw, clock=max(clock, heard - BEHIND))
         self._note_own(link, signer, sealed)
         return sealed
 
