@@ -27,7 +27,7 @@ from mav_tasks.mavlink.signing import (
     timestamp_of,
 )
 from mav_tasks.tasks.server_events import SignatureRefused, SignaturesSeen, SignatureTime
-from mav_tasks.tasks.signing_lead import DECAY
+from mav_tasks.tasks.signing_lead import DECAY, STEP
 
 #: stands for the key of unsigned packets, where they are allowed
 UNSIGNED = Key("", b"", fingerprint="-")
@@ -49,6 +49,12 @@ HARMLESS_WITHIN, STREAMED_WITHIN = 60.0, 1.0
 FENCE_LINK_ID = 254
 BEHIND = int(50 * UNITS)  # behind a vehicle's time, at most: it takes no new stream a minute behind
 RESERVE = int(120 * UNITS)  # own timestamps stored ahead: none is used twice if a clock is set back
+#: a signature later than our clock by more than this follows the time of the other end. By less:
+#: each packet is signed later than the one before, 10,000 of them in one moment
+COUNTED = int(0.1 * UNITS)
+#: by how much the clock may be behind what was signed before without having been set back: another
+#: gateway of the fleet may have signed that
+CLOCKS_APART = int(5 * UNITS)
 #: a clock before 2020 was never set: the computer has no battery for it, and no network
 SET_SINCE = timestamp_at(1_577_836_800.0)
 TELL_EACH = 60.0  # s between log lines about one key whose clock is wrong
@@ -94,6 +100,8 @@ class Signatures:
         self._signers: dict[tuple[str, Peer], Signer] = {}
         self._fenced: dict[tuple[str, Peer], Signer] = {}  # to vehicles of a fleet that are ours
         self._lead = (0.0, 0.0)  # s ahead of our clock, and when it was that
+        #: the lead with which each way began to be signed as a vehicle of ours
+        self._began: dict[tuple[str, Peer], tuple[float, float]] = {}
         #: whether there is a key or an endpoint to sign for
         self.may_sign = False
         self._offset: float | None = None  # UTC less ``now``
@@ -130,7 +138,9 @@ class Signatures:
         self._offset = offset
         self._highest_offset = max(self._highest_offset, offset)
         clock = self._clock()
-        self._from = self._signed_until if clock < self._signed_until - RESERVE else 0
+        stored_at = self._signed_until - RESERVE
+        is_set_back = clock < stored_at - CLOCKS_APART
+        self._from = self._signed_until if is_set_back else max(0, stored_at + COUNTED)
 
     def change_keys(self, change: KeysChanged) -> set[str]:
         """Replace the keys. No longer sign for endpoints whose key was removed or changed.
@@ -310,7 +320,7 @@ class Signatures:
         clock = self._own_clock()
         sealed = signer.sign(raw, clock=clock)
         self._note_own(link, signer, sealed)
-        if signer.last <= clock + RESERVE:  # beyond, it is the other end's time, for it alone
+        if signer.last <= clock + COUNTED:  # beyond, it is the other end's time, for it alone
             self._highest = max(self._highest, signer.last)
         return sealed
 
@@ -319,7 +329,8 @@ class Signatures:
 
         All gateways sign with one link id to it, each with a lead over the one before: so the
         vehicle refuses what a gateway signs that does not have it any more. This follows no
-        vehicle's time, which others hear, too, but where it would be refused for being old.
+        vehicle's time, which others hear, too, but where it would be refused for being old; and
+        once, when it gets the vehicle: what the one before has signed is not later than that time.
         """
         there = self._links.get(link)
         key = self._keys.get(there.key) if there is not None and there.key else None
@@ -331,7 +342,12 @@ class Signatures:
         heard = self._signer(link, peer, key).last
         lead, since = self._lead
         ahead = int(max(0.0, lead - DECAY * (self.now - since)) * UNITS)
-        sealed = signer.sign(raw, clock=max(self._own_clock() + ahead, heard - BEHIND))
+        clock = self._own_clock() + ahead
+        if self._began.get((link, peer)) != self._lead:
+            self._began[link, peer] = self._lead
+            if heard > clock:
+                signer.heard(heard + int(STEP * UNITS))
+        sealed = signer.sign(raw, clock=max(clock, heard - BEHIND))
         self._note_own(link, signer, sealed)
         return sealed
 

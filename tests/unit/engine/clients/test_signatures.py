@@ -219,6 +219,52 @@ def test_each_end_is_signed_to_later_than_before_also_after_a_restart_with_the_c
     assert times == sorted(set(times))
 
 
+@pytest.mark.parametrize("ahead", [0.0, 0.05, 0.5, 5.0, 60.0, 110.0])
+def test_a_vehicle_that_is_ahead_leads_no_time_away_over_restarts(ahead: float) -> None:
+    """An autopilot's time is a minute ahead after its start: each run would add two."""
+    until, utc = 0, UTC
+    for _ in range(4):
+        it = signatures(signed_until=until)
+        it.set_wall(utc)
+        assert it.admit(VEHICLES, "rover", packet(ROVER, timestamp=timestamp_at(utc + ahead)))
+        it.sealed(VEHICLES, "rover", UNSIGNED_HEARTBEAT)
+        it.sign_to(CLIENTS, "p", ANNA)
+        to_client = it.sealed(CLIENTS, "p", UNSIGNED_HEARTBEAT)
+        assert timestamp_of(split_datagram(to_client)[0]) - timestamp_at(utc) < 100_000
+        seen = it.take_times()
+        until = until if seen is None else seen.signed_until
+        utc += 0.5
+
+
+@pytest.mark.parametrize("behind", [0.0, 2.0])
+def test_what_a_gateway_signed_whose_clock_is_ahead_leads_no_time_away(behind: float) -> None:
+    it = signatures()
+    it.sealed(VEHICLES, "rover", UNSIGNED_HEARTBEAT)
+    seen = it.take_times()
+    assert seen is not None
+    other = signatures(signed_until=seen.signed_until)
+    other.set_wall(UTC - behind)
+    sent = other.sealed(VEHICLES, "rover", UNSIGNED_HEARTBEAT)
+    assert timestamp_of(split_datagram(sent)[0]) < NOW + 100_000
+
+
+@pytest.mark.parametrize("ahead", [0.0, 60.0, 110.0, 3600.0])
+def test_each_holder_signs_later_than_the_one_before_to_a_vehicle_that_is_ahead(
+    ahead: float,
+) -> None:
+    """The vehicle counts on each of its links by itself, so its time differs between them."""
+    newest, times = timestamp_at(UTC + ahead), []
+    for lead in (3.0, 6.0, 9.0):
+        it = signatures()
+        assert it.admit(VEHICLES, "rover", packet(ROVER, timestamp=newest - 100_000))
+        it.take_lead(lead)
+        sent = [it.sealed_as_holder(VEHICLES, "rover", UNSIGNED_HEARTBEAT) for _ in range(3)]
+        times += [timestamp_of(split_datagram(each)[0]) for each in sent]
+        newest = max(newest, *times)
+    assert times == sorted(set(times))
+    assert min(times) > timestamp_at(UTC + ahead) - 50 * 100_000
+
+
 def test_a_holder_of_a_key_cannot_lead_the_servers_time_away() -> None:
     """Or else what others hear would be of one time for ever, and so no news to them.
 
