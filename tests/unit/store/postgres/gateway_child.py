@@ -5,10 +5,10 @@ report. At POINT it stops itself (SIGSTOP): ``write`` in a batch whose end was n
 ``trim`` between two statements that delete expired rows.
 """
 
-import os
 import select
 import signal
 import sys
+import threading
 from typing import Any
 
 from mav_tasks.store import Kept
@@ -26,7 +26,8 @@ def stop_in(kind: type, method: str) -> None:
 
     def stopping(*arguments: Any, **more: Any) -> Any:
         result = original(*arguments, **more)
-        os.kill(os.getpid(), signal.SIGSTOP)
+        # to this thread: another one would take it later, and this one would go on until then
+        signal.pthread_kill(threading.get_ident(), signal.SIGSTOP)
         return result
 
     setattr(kind, method, stopping)
