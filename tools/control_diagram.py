@@ -34,6 +34,7 @@ WORDS = {
     Event.HOLD: "HOLD",
     Event.MODE: "another mode",
     Event.LAPSED: "HOLD while a task drives",
+    Event.LAPSED_WITH_LEASE: "failsafe while the lease is lost",
     Event.LATE_MODE: "late mode request",
     Event.LATE_ARMING: "late arming request",
     Event.DISARM: "disarm request",

@@ -14,9 +14,11 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.signing_lead import STEP
 from mav_tasks.tasks.task import Task
+from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.client import ACCEPTED, GUIDED, FakeClient, setpoint
 from tests.kit.gateways.engines import FleetWorld, Gateway
 from tests.kit.mission import Item, Upload
+from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import at
 
 #: s without a holder after a process has ended, and after one fell silent (the issue's goals)
@@ -241,6 +243,42 @@ def test_a_short_loss_of_the_database_stops_the_rover_and_the_task_goes_on(fleet
     reasons = [why for _, why in fleet.world.history(task)] if fleet.first.name == "server" else []
     assert R.LEASE_LOST in reasons or fleet.first.name != "server"
     assert abs(fleet.world.truth.north - 5.0) < 0.1
+
+
+@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
+@pytest.mark.parametrize("away", [2.5, 6.0])
+def test_a_task_goes_on_after_the_failsafe_that_the_end_of_the_lease_caused(
+    tmp_path: Path, away: float, persona: Persona
+) -> None:
+    fleet = Fleet(tmp_path, persona=persona)
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = False
+    fleet.world.run(away)
+    assert fleet.world.stands()
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = True
+    fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=40)
+    assert abs(fleet.world.truth.north - 5.0) < 0.2
+    fleet.world.check()
+
+
+def test_who_sets_hold_while_the_lease_is_lost_keeps_the_rover(tmp_path: Path) -> None:
+    fleet = Fleet(tmp_path, persona=PROMPT_PX4)
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = False
+    fleet.world.run(0.9)  # before its failsafe
+    fleet.world.operator_mode(Mode.HOLD)
+    fleet.world.run(5.0)
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = True
+    where = fleet.world.truth.north
+    fleet.world.run(10.0)
+    assert fleet.task(task).state is S.PAUSED
+    assert abs(fleet.world.truth.north - where) < 0.1
 
 
 def test_a_client_that_drives_is_stopped_when_the_lease_ends(fleet: Fleet) -> None:

@@ -34,6 +34,7 @@ class Event(Enum):
     TAKEN = auto()  # somebody else has it, in whatever way
     MODE = auto()  # it shows a mode that we did not ask for
     LAPSED = auto()  # it shows HOLD while set-points stream: a failsafe's, or somebody's
+    LAPSED_WITH_LEASE = auto()  # the same, surely a failsafe's: set-points ended with the lease
     LATE_MODE = auto()  # it shows a mode that a client asked for before a halt
     LATE_ARMING = auto()  # it shows armed, by a request from before a disarming or STOP
     EXPLAINED = auto()  # a text explains the takeover: a failsafe's
@@ -219,6 +220,9 @@ TABLE = (
     # the next set-point under way would end a failsafe's HOLD
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
+    # nobody has taken it: its task goes on with the lease, out of this HOLD
+    _row(_E.LAPSED_WITH_LEASE, *TAKE_BACK, _F.LOSE, work=Work.LOST),
+    _row(_E.LAPSED_WITH_LEASE, _E.LAPSED),
     # something was let go since: it is a person at the vehicle, or as good as one
     _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.LOST)),
     _row(_E.LATE_MODE, grip=GOES_INTO_HOLD),  # we are asking for HOLD

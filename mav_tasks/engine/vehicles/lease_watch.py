@@ -12,6 +12,8 @@ from mav_tasks.engine.inputs import LeaseChanged
 from mav_tasks.engine.packet_sender import Fence
 from mav_tasks.engine.timers import Timers, Turn
 
+SHOWN = 1.5  # s after which heartbeats, one a second, have shown what the end of set-points did
+
 
 class LeaseWatch:
     """The present lease. ``on_change`` is called when its trust has ended, or is back."""
@@ -24,6 +26,7 @@ class LeaseWatch:
         #: whether vehicles may be moved
         self.is_trusted = not is_shared
         self._is_leaving = False
+        self._back_at = -inf  # s, when it was trusted again
         #: of all packets to vehicles
         self.fence = Fence(is_shared=is_shared)
         #: until when packets that stop vehicles may leave, s
@@ -43,7 +46,12 @@ class LeaseWatch:
         self.fence.until = lease.move_until if self.is_trusted else lease.stop_until
         self._timer.set(lease.move_until if self.is_trusted else inf)
         if was_trusted is not self.is_trusted:
+            self._back_at = now if self.is_trusted else self._back_at
             self._on_change(now=now)
+
+    def has_silenced(self, *, now: float) -> bool:
+        """Return whether vehicles may show a failsafe because no set-point was permitted."""
+        return self.is_shared and (not self.is_trusted or now - self._back_at <= SHOWN)
 
     def leave(self) -> None:
         """Only stop the vehicles from here on: this gateway leaves the fleet."""

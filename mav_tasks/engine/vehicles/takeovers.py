@@ -201,6 +201,8 @@ class Takeovers:
         cause = parts.failsafes.mode_changed(now=now)
         lapses = parts.control.is_streaming and mode == persona.hold_mode
         event = Event.LAPSED if lapses else Event.MODE
+        if cause and lapses and parts.lease.has_silenced(now=now):
+            event = Event.LAPSED_WITH_LEASE
         if cause:
             what = f"{what}, set by its failsafe: {cause}"
             self._taken(event, what, reason=R.FAILSAFE, now=now)
