@@ -170,8 +170,9 @@ def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
     if queue.paused is not None:
         does += f"; queue paused ({words_of(queue.paused)})"
         does += f"; to resume: {resume_command(queue.vehicle, is_alone=is_alone)}"
-    silence = silence_of(queue.heartbeat_age)
-    rover = f"rover {queue.vehicle} ({silence})" if silence else f"rover {queue.vehicle}"
+    gateway = f"gateway {queue.gateway}" if queue.gateway else ""
+    about = ", ".join(filter(None, (gateway, silence_of(queue.heartbeat_age))))
+    rover = f"rover {queue.vehicle} ({about})" if about else f"rover {queue.vehicle}"
     return f"{rover}: {does}; {queue.waiting_count} waiting"
 
 

@@ -62,6 +62,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
         "paused": None if queue.paused is None else queue.paused.name.lower(),
         "halt_epoch": queue.halt_epoch,
         "heartbeat_age": _age(queue.heartbeat_age),
+        "gateway": queue.gateway or None,
         "waiting_count": queue.waiting_count,
         "capacity": queue.capacity,
         "counts": {state.name.lower(): count for state, count in queue.counts.items()},

@@ -90,6 +90,7 @@ class QueueStatus:
     which they run; tasks that wait for a time or another task come last. ``halt_epoch`` grows with
     each event that halts the rover. ``heartbeat_age``: seconds since the rover's last heartbeat
     reached the server; inf: none since the server started; None: the server does not say.
+    ``gateway`` is the one of a fleet that has the rover, "" if the server is alone.
     """
 
     vehicle: int
@@ -103,6 +104,7 @@ class QueueStatus:
     version: int
     halt_epoch: int = 0
     heartbeat_age: float | None = None
+    gateway: str = ""
 
     @property
     def waiting_count(self) -> int:
@@ -255,6 +257,7 @@ def queue_status_of(
         version=message.version,
         halt_epoch=message.halt_epoch,
         heartbeat_age=heartbeat_age_of(message),
+        gateway=_text(message._gateway_raw),
     )
 
 

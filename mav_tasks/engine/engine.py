@@ -98,7 +98,7 @@ class Engine:
             fleet=self._fleet,
             timers=timers,
             settings=settings,
-            is_shared=earlier.is_shared,
+            is_shared=bool(earlier.gateway),
         )
         deduplicator = self._deduplicator = SubmissionDeduplicator(registry)
         deduplicator.restore(earlier.tasks, now=now)
@@ -109,7 +109,8 @@ class Engine:
         )
         plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
         self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
-        displays, refusals = MessageRequests(gcs, vehicles, registry), Refusals(registry)
+        displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
+        refusals = Refusals(registry)
         modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
         control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
         self._publisher = Publisher(

@@ -55,7 +55,7 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
         "ended_well": restored.ended_well,
         "idle": restored.idle,
         "wall_offset": restored.wall_offset,
-        "is_shared": restored.is_shared,
+        "gateway": restored.gateway,
         "signing_lead": restored.signing_lead,
     }
 
@@ -81,7 +81,7 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         ended_well=values["ended_well"],
         idle=values["idle"],
         wall_offset=values["wall_offset"],
-        is_shared=values.get("is_shared", False),
+        gateway=values.get("gateway", ""),
         signing_lead=values.get("signing_lead", 0.0),
     )
 

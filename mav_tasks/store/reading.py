@@ -99,7 +99,6 @@ def read_restored(
             ended_well=ended_well,
             idle=idle,
             wall_offset=offset,
-            is_shared=vehicles is not None,
         )
 
 

@@ -66,7 +66,7 @@ class Fleet:
 
     def restore(self, restored: Restored, *, now: float) -> None:
         """Load an earlier run: hold the tasks that ran, pause queues that must not go on alone."""
-        if restored.is_shared:
+        if restored.gateway:
             self._registry.ids.share()
         else:
             self._registry.ids.count_from(restored.next_id)

@@ -20,9 +20,10 @@ class Restored:
     disarmed. ``plans`` by system id and kind are (id, source) as in PlanStored, ``parameters`` the
     last value of each by name, ``signatures`` and ``signed_until`` those of SignaturesSeen.
     ``ended_well``: the last run closed its store; ``idle`` is the seconds since it last wrote.
-    ``wall_offset`` is UTC minus monotonic time. ``is_shared``: several gateways use the store; this
-    one gets vehicles, their tasks and the ids of new tasks later, as inputs. ``signing_lead``: the
-    seconds by which it signs ahead of its clock to these vehicles, more than the gateway before.
+    ``wall_offset`` is UTC minus monotonic time. ``gateway``: the name of this server among those
+    that share the store; it gets vehicles, their tasks and the ids of new tasks later, as inputs;
+    "" if it shares nothing. ``signing_lead``: the seconds by which it signs ahead of its clock to
+    these vehicles, more than the gateway before.
     """
 
     tasks: tuple[Task, ...] = ()
@@ -41,5 +42,5 @@ class Restored:
     ended_well: bool = True
     idle: float = 0.0
     wall_offset: float = 0.0
-    is_shared: bool = False
+    gateway: str = ""
     signing_lead: float = 0.0

@@ -137,6 +137,7 @@ QUEUE = whole(
         "paused_words": or_null(TEXT),
         "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
         "heartbeat_age": or_null(NUMBER, "s since the rover's heartbeat"),
+        "gateway": or_null(TEXT, "gateway of a fleet that has the rover"),
         "waiting_count": said(INTEGER, "number of waiting tasks"),
         "capacity": said(INTEGER, "number of waiting tasks that there may be"),
         "counts": {

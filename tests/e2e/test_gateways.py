@@ -93,15 +93,18 @@ def test_a_gateway_takes_over_from_one_that_was_killed(fleet: Fleet) -> None:
     fleet.start("a")
     assert fleet.holder() == "a"
     fleet.start("b")
-    a = fleet.client("a")
+    a, b = fleet.client("a"), fleet.client("b")
     ran, waits = a.submit(Move(8.0)), a.submit(Move(0.5))
     fleet.until_state(ran.id, S.EXECUTING)
+    assert (a.queue().gateway, b.queue().gateway) == ("a", "a")
+    queue = mav_tasks("queue", server=f"udpout:127.0.0.1:{fleet.ports['b']}")
+    assert queue.lines[0].startswith("rover 1 (gateway a): task")
     fleet.processes["a"].end(signal.SIGKILL)
     fleet.processes["b"].wait_for("rover 1: found")
     fleet.processes["b"].wait_for(f"task {ran.id} held: interrupted")
     assert fleet.holder() == "b"
-    b = fleet.client("b")
     assert b.status(waits.id).state is S.QUEUED
+    assert b.queue().gateway == "b"
     new = b.submit(Move(0.25))
     assert new.id not in (ran.id, waits.id)
     release(b, ran.id)

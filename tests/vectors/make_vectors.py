@@ -66,7 +66,11 @@ STATUS_EXTENSION: list[Field] = [
     ("uint32_t", "series", 0),
     ("char", "repeat", 64),
 ]
-QUEUE_EXTENSION: list[Field] = [*HALT_EPOCH, ("uint32_t", "heartbeat_age", 0)]
+QUEUE_EXTENSION: list[Field] = [
+    *HALT_EPOCH,
+    ("uint32_t", "heartbeat_age", 0),
+    ("char", "gateway", 40),
+]
 TASK_TIMING: list[Field] = [
     *[("uint32_t", name, 0) for name in ("time_boot_ms", "task_id", "count", "late")],
     *[("float", name, 0) for name in ("rate", "p50", "p99", "longest")],
@@ -265,8 +269,9 @@ def _by_hand() -> list[dict[str, Any]]:
         "flags": 0,
         "halt_epoch": 12,
         "heartbeat_age": 0,
+        "gateway": "",
     }
-    silent = queue | {"heartbeat_age": 12_345}
+    silent = queue | {"heartbeat_age": 12_345, "gateway": "north"}
     timing = {
         "time_boot_ms": 1000,
         "task_id": 16777215,

@@ -32,7 +32,11 @@ MAX_INTERVAL_ID = 0xFFFF  # of MESSAGE_INTERVAL.message_id
 class MessageRequests:
     """The handler of REQUEST_MESSAGE and of message intervals."""
 
-    def __init__(self, gcs: GcsSide, vehicles: VehicleSide, registry: TaskRegistry) -> None:
+    def __init__(
+        self, gcs: GcsSide, vehicles: VehicleSide, registry: TaskRegistry, gateway: str
+    ) -> None:
+        """``gateway``: the name of this server in its fleet, "" if it is in none."""
+        self._gateway = gateway.encode()
         self._gcs = gcs
         self._vehicles = vehicles
         self._registry = registry
@@ -183,7 +187,9 @@ class MessageRequests:
         client.uses_dialect = True
         counts = self._registry.counts(tasks.vehicle)
         version = self._registry.recorded
-        status = translate.queue_status(tasks, counts, heard_at=heard_at, version=version, now=now)
+        status = translate.queue_status(
+            tasks, counts, heard_at=heard_at, gateway=self._gateway, version=version, now=now
+        )
         client.outlet.send(status, address)
 
     def _show_tasks(self, asked: CommandRequest, *, now: float) -> None:

@@ -177,11 +177,18 @@ def task_timing(
 
 
 def queue_status(
-    tasks: VehicleTasks, counts: list[int], *, heard_at: float | None, version: int, now: float
+    tasks: VehicleTasks,
+    counts: list[int],
+    *,
+    heard_at: float | None,
+    gateway: bytes,
+    version: int,
+    now: float,
 ) -> m.TaskQueueStatus:
     """Return the TASK_QUEUE_STATUS of a vehicle; ``counts`` are its tasks by TASK_STATE.
 
     ``heard_at``: time of its last heartbeat, None if it was not heard in this run.
+    ``gateway``: the name of this server in its fleet.
     """
     active = tasks.active
     age = NEVER if heard_at is None else min(max(1, round((now - heard_at) * 1000)), NEVER - 1)
@@ -196,6 +203,7 @@ def queue_status(
         flags=0,
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
         heartbeat_age=age,
+        gateway=gateway,
     )
 
 

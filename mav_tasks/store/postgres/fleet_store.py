@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
+from dataclasses import replace
 
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
@@ -45,7 +46,7 @@ class FleetStore(DurableStore):
             begun.callback(record.close)
             database.begin()
             release = begun.pop_all().close
-        self._fleet = database
+        self._fleet, self._gateway = database, gateway
         self._is_told = False  # that the lease has ended
         self._left = 0  # task ids, granted and not used
         super().__init__(
@@ -63,13 +64,14 @@ class FleetStore(DurableStore):
     def load(self) -> Restored:
         """Return what belongs to no vehicle; raise StoreError."""
         with closing(self._fleet.reader()) as reader:
-            return reading.read_restored(
+            restored = reading.read_restored(
                 reader,
                 offset=self._wall_offset(),
                 ended_well=True,
                 idle=0.0,
                 vehicles=frozenset(),
             )
+        return replace(restored, gateway=self._gateway)
 
     def load_vehicles(self, vehicles: frozenset[int]) -> None:
         """Ask for everything about vehicles; ``VehiclesLoaded`` is the answer. Never blocks."""

@@ -57,7 +57,7 @@ function make({ rover }) {
     if (element.className !== name) element.className = name;
     if (pick.getAttribute("aria-pressed") !== String(isChosen)) pick.setAttribute("aria-pressed", String(isChosen));
     sayParts(facts, factsOf(shown));
-    sayParts(ages, agesOf(shown));
+    sayParts(ages, agesOf(shown, queue));
     const isTrouble = shown.control !== "tasks" || (queue && queue.current && queue.current.state === "held");
     const mood = isCutOff() ? "says" : shown.control === "silent" || shown.control === "stopped" ? "says bad" : isTrouble ? "says warn" : "says";
     if (says.className !== mood) says.className = mood;
@@ -91,12 +91,13 @@ function factsOf(rover) {
   return parts;
 }
 
-function agesOf(rover) {
+function agesOf(rover, queue) {
   const link = linkAge(rover);
   const data = dataAge(rover);
   const parts = [isCutOff() ? "link unknown" : link === null ? "not heard since the server started" : link < OLD ? "link good" : `not heard for ${duration(link)}`];
   if (data === null) parts.push("no position");
   else parts.push(data < OLD ? `position ${data < 1 ? "< 1" : Math.round(data)} s old` : `position is ${duration(data)} old`);
+  if (queue && queue.gateway) parts.push(`gateway ${queue.gateway}`);
   return parts;
 }
 

@@ -52,7 +52,6 @@ def part_of(restored: Restored, vehicles: frozenset[int]) -> Restored:
         halted=some(restored.halted),
         disarmed=restored.disarmed & vehicles,
         plans=plans,
-        is_shared=True,
     )
 
 
@@ -128,9 +127,12 @@ class GatewayStore:
 
     name = place = "shared"
 
-    def __init__(self, shared: SharedStore, is_current: Callable[[], bool | None]) -> None:
+    def __init__(
+        self, shared: SharedStore, is_current: Callable[[], bool | None], gateway: str
+    ) -> None:
         self._shared = shared
         self._is_current = is_current
+        self._gateway = gateway
         self._count = 0
         self._outcomes: list[Outcome] = []
         self.events: list[Event] = []
@@ -139,7 +141,7 @@ class GatewayStore:
         self._waiting: list[Event] = []
 
     def load(self) -> Restored:
-        return Restored(is_shared=True)
+        return Restored(gateway=self._gateway)
 
     def journal(self) -> Iterator[tuple[int, Event]]:
         yield from enumerate(self.events, 1)
@@ -197,7 +199,7 @@ class Gateway:
 
     def _begin(self) -> None:
         """Begin with an engine that has no vehicle."""
-        self.store = GatewayStore(self.world.shared, self._is_current)
+        self.store = GatewayStore(self.world.shared, self._is_current, self.name)
         self.mail = FleetLink(self.world, self.name)
         self._told: tuple[tuple[int, str], ...] = ()
         self.server = InMemoryServer(

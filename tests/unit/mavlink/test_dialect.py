@@ -18,7 +18,7 @@ def test_task_status_is_as_the_contract_draws_it() -> None:
 
 
 def test_task_queue_status_is_as_the_contract_draws_it() -> None:
-    assert (m.TaskQueueStatus.id, m.TaskQueueStatus.unpacker.size) == (54001, 86)
+    assert (m.TaskQueueStatus.id, m.TaskQueueStatus.unpacker.size) == (54001, 126)
     assert m.TaskQueueStatus.ordered_fieldnames == [
         "time_boot_ms",
         "version",
@@ -30,6 +30,7 @@ def test_task_queue_status_is_as_the_contract_draws_it() -> None:
         "flags",
         "halt_epoch",
         "heartbeat_age",
+        "gateway",
     ]
     assert m.TaskQueueStatus.array_lengths[5] == STATES
 

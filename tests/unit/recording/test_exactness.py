@@ -56,7 +56,7 @@ TAKEN_OVER = Restored(
     tasks=(_REGISTRY.submit(draft(), now=0.1 + 0.2), _REGISTRY.submit(draft(), now=2.5)),
     paused={3: TaskReason.OPERATOR},
     halt_epochs={3: 9, 7: 2},
-    is_shared=True,
+    gateway="north",
 )
 INPUTS: list[Input | None] = [
     None,

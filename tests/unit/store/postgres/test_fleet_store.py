@@ -44,7 +44,7 @@ def url(postgres: PostgresServer) -> str:
 
 def test_a_gateway_begins_with_nothing_but_ids(url: str) -> None:
     with gateways(url, "a", "b") as (a, b):
-        assert (a.store.load().tasks, a.store.load().is_shared) == ((), True)
+        assert (a.store.load().tasks, a.store.load().gateway) == ((), "a")
         assert a.next(IdsGranted) == IdsGranted(1, 1000)
         assert b.next(IdsGranted) == IdsGranted(1001, 1000)
         a.store.append([submitted(number) for number in range(1, 502)])
@@ -79,7 +79,7 @@ def test_another_gateway_loads_what_one_has_stored_about_a_vehicle(url: str) -> 
         assert loaded.restored.tasks == tuple(t for t in registry.all() if t.vehicle == 1)
         assert loaded.restored.paused == {1: R.OPERATOR}
         assert loaded.restored.halt_epochs == {1: 7}
-        assert (loaded.restored.is_shared, loaded.restored.ended_well) == (True, False)
+        assert not loaded.restored.ended_well
 
 
 def test_of_finished_tasks_only_the_latest_are_loaded(
