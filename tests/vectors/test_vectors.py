@@ -83,6 +83,6 @@ def test_our_messages_have_the_sizes_of_the_contract() -> None:
     lengths = {v["message"]: len(bytes.fromhex(v["packet"])) for v in VECTORS}
     whole = {v["name"]: bytes.fromhex(v["packet"])[1] for v in VECTORS}
     assert whole["a text without room for a zero"] == 200
-    assert whole["a stopped queue of an older server"] == 79  # of 86: the last 7 bytes are 0
-    assert whole["a stopped queue of a silent rover"] == 84
+    assert whole["a stopped queue of an older server"] == 79  # of 126: the last ones are 0
+    assert whole["a stopped queue of a silent rover"] == 91  # to the end of the gateway's name
     assert lengths["TASK_STATUS"] == 10 + 200 + 2
