@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 from mav_tasks.engine.clients.elsewhere import BACK, TOWARDS
-from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, LeaseChanged, Peer
+from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, LeaseChanged, Peer, VehiclesGone
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Change, Member, Request
 from mav_tasks.fleet.standing import Effect, Standing
@@ -188,6 +188,7 @@ class Gateway:
         self._latest: int | None = None  # session; it may be over
         self.effects: list[Effect] = []
         self.got: list[tuple[float, int]] = []
+        self.let_go: list[tuple[float, int]] = []  # when the engine forgot each vehicle
         self.is_reached = True  # the database
         self.is_frozen = False
         self.is_dead = False
@@ -273,7 +274,8 @@ class Gateway:
             if self.session is None:
                 self.member.next_turn = max(self.member.next_turn, now + 0.1)
                 return
-        self.member.heard = set(self.engine.heard(now=now))
+        heard, _, self.member.strays = self.engine.reach(now=now)
+        self.member.heard = set(heard)
         request_or_none = self.member.request(now)
         if request_or_none is not None:
             delay = self.world.delay() if self.is_reached else GIVEN_UP
@@ -303,6 +305,13 @@ class Gateway:
             for vehicle in change.got:  # as after a restart of the server
                 self.world.observers[vehicle - 1].server_restarted()
             self.store.load_vehicles(change.got)
+        if change.lets_go:
+            asked = [vehicle for vehicle, _ in change.lets_go]
+            ours = self.engine.reach(now=now).ours
+            self.server.take_in(VehiclesGone(tuple(asked)), now=now)
+            gone = ours.intersection(asked) - self.engine.reach(now=now).ours
+            self.let_go += [(now, vehicle) for vehicle in sorted(gone)]
+            self.member.forgotten(gone)
 
     def _is_current(self) -> bool | None:
         if self.member.lease.standing in (Standing.OUT, Standing.EVICTED):
