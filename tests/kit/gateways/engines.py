@@ -303,7 +303,7 @@ class Gateway:
         if change.got:
             self.got += [(now, vehicle) for vehicle in sorted(change.got)]
             for vehicle in change.got:  # as after a restart of the server
-                self.world.observers[vehicle - 1].server_restarted()
+                self.world.observers[vehicle - self.world.first_id].server_restarted()
             self.store.load_vehicles(change.got)
         if change.lets_go:
             asked = [vehicle for vehicle, _ in change.lets_go]
@@ -332,7 +332,9 @@ class FleetWorld(World):
         self.settings: Settings | None = kw.get("settings")
         self.keys: tuple[Key, ...] | None = kw.get("keys")
         self.wall_offset: float | None = kw.get("wall_offset")
-        self.rover_names = tuple(f"rover{n}" for n in range(1, kw.get("rovers", 1) + 1))
+        self.first_id: int = kw.get("first_id", 1)
+        rovers = range(self.first_id, self.first_id + kw.get("rovers", 1))
+        self.rover_names = tuple(f"rover{number}" for number in rovers)
         super().__init__(seed=seed, **kw)
         for name in names[1:]:
             self.watched.to_vehicles.add(VEHICLE_LINK.replace("server", name))
@@ -379,6 +381,15 @@ class FleetWorld(World):
     def freeze(self, name: str) -> None:
         """SIGSTOP."""
         self.gateways[name].is_frozen = True
+
+    def cut(self, name: str, vehicle: int = 1) -> None:
+        """Let a vehicle out of the reach of a gateway."""
+        self.watched.cut.add(frozenset((VEHICLE_LINK.replace("server", name), f"rover{vehicle}")))
+
+    def mend(self, name: str, vehicle: int = 1) -> None:
+        """Let a vehicle into the reach of a gateway again."""
+        way = frozenset((VEHICLE_LINK.replace("server", name), f"rover{vehicle}"))
+        self.watched.cut.discard(way)
 
     def holder(self, vehicle: int = 1) -> Gateway:
         """Return the gateway that has a vehicle, once its engine serves it."""
