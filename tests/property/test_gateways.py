@@ -70,7 +70,7 @@ class Life:
         last = chance.uniform(0.05, 3.0)
         if not well(it):
             return
-        match chance.randrange(5):
+        match chance.randrange(6):
             case 0:
                 world.kill(it.name)
                 self._later(last, lambda: world.start(it.name))
@@ -83,6 +83,9 @@ class Life:
             case 3:
                 world.end(it.name)
                 self._later(last, lambda: world.start(it.name))
+            case 4:  # the rover drives out of its reach
+                world.cut(it.name)
+                self._later(3 * last, lambda: world.mend(it.name))
             case _:
                 world.database.restart()
                 world.database.is_up = False
