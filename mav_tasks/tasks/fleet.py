@@ -27,6 +27,8 @@ class Fleet:
         self._registry = registry
         self._settings = settings
         self._of: dict[int, VehicleTasks] = {}
+        #: return the tasks of a vehicle, None if nothing is known of it
+        self.get = self._of.get
         self.room = PendingTasks(registry, settings)
         self._was_driven: set[int] = set()
         self._halted: dict[int, LastHalt] = {}  # by command, before this run
@@ -63,7 +65,7 @@ class Fleet:
 
         A halt may still have to come true if it was not given before ``halted_before``.
         """
-        tasks = self._of.get(vehicle)
+        tasks = self.get(vehicle)
         if tasks is None:
             return True
         halts, active = tasks.halts, tasks.active

@@ -59,7 +59,11 @@ class Life:
         """Submit a move at any gateway until it is acknowledged; return its id."""
         nonce, tries = self.chance.randrange(1, 1 << 24), []
         for _ in range(60):
-            it = self.chance.choice([each for each in self.world.gateways.values() if well(each)])
+            those = [each for each in self.world.gateways.values() if well(each)]
+            if not those:
+                self.world.run(1.0)
+                continue
+            it = self.chance.choice(those)
             self.client.server = f"{it.name}:clients"
             tries.append(self.client.move(METRES, nonce=nonce))
             self.world.run(1.0)

@@ -152,18 +152,19 @@ def test_what_is_not_stored_keeps_the_rover(reach: Reach) -> None:
     reach.world.until(lambda: reach.is_at(reach.other), within=5)
 
 
-def test_a_rover_whose_tasks_another_rover_waits_for_stays(tmp_path: Path) -> None:
+@pytest.mark.parametrize("silent", [1, 2])
+def test_rovers_whose_tasks_wait_for_each_other_stay(tmp_path: Path, *, silent: int) -> None:
     reach = Reach(tmp_path, rovers=2)
     assert reach.world.holder(2) is reach.first
     client = reach.client(reach.first)
     ahead = client.command(MOVE, 1.0, 0, 0, 0, 0, 60, 5)  # starts in a minute
     reach.world.run(0.3)
     behind = client.command(MOVE, 1.0, 0, 0, 0, ahead.task_id, 0, 5, target=(2, 191))
-    reach.world.cut(reach.first.name)
+    reach.world.cut(reach.first.name, silent)
     reach.world.run(0.5)
     assert behind.result == ACCEPTED
     reach.world.run(14.0)
-    assert reach.world.database.holder(1) == reach.first.name
+    assert reach.world.database.holder(silent) == reach.first.name
     assert reach.task(behind.task_id).state is S.BLOCKED
 
 
@@ -223,12 +224,29 @@ def test_the_gateway_that_gave_it_up_sends_it_nothing_that_moves_or_asks(reach: 
 ROVER = 213
 
 
+@pytest.mark.patches_core
+def test_nothing_passes_to_a_rover_that_went_away(tmp_path: Path) -> None:
+    """Not even from whoever still knows the object that sends to it."""
+    reach = Reach(tmp_path)
+    engine = reach.first.engine
+    vehicle = next(iter(engine._vehicles.all))
+    reach.goes_to(reach.other)
+    engine.take_packets()
+    vehicle.requests.send_zero_and_hold()
+    left = engine.take_packets()
+    assert len(left) == 2
+    assert all(each.until < reach.world.now for each in left)
+    assert engine.figures.of(1, now=reach.world.now) is None
+    assert 1 not in engine.figures.all().vehicles
+    reach.world.check()
+
+
 def lived_in(reach: Reach) -> list[int]:
     """Let a rover and its clients do all kinds of things; return the ids of its tasks."""
     world, client = reach.world, reach.client(reach.world.holder(ROVER))
     done = reach.submit(0.3, nonce=0)
     reach.until_state(done, S.COMPLETED)
-    to = {"target": (ROVER, 191)}
+    to: dict[str, Any] = {"target": (ROVER, 191)}
     items = [Item(16, **at(2.0, 0.0)), Item(16, **at(2.0, 2.0))]
     upload = Upload(client, items, target=(ROVER, 1))
     world.until(lambda: upload.result is not None, within=5)
@@ -245,6 +263,7 @@ def lived_in(reach: Reach) -> list[int]:
     return [done, *(each.task_id for each in sent if each.result == ACCEPTED)]
 
 
+@pytest.mark.patches_core
 def test_nothing_is_left_of_a_rover_that_went_away(tmp_path: Path) -> None:
     settings = Settings(on_takeover="resume")
     reach = Reach(tmp_path, vehicle=ROVER, settings=settings)
@@ -262,6 +281,7 @@ def test_nothing_is_left_of_a_rover_that_went_away(tmp_path: Path) -> None:
     reach.world.check()
 
 
+@pytest.mark.patches_core
 def test_many_rounds_leave_no_more_than_one(tmp_path: Path) -> None:
     reach = Reach(tmp_path, vehicle=ROVER)
     lived_in(reach)
