@@ -6,11 +6,12 @@ Both last for one lease. When the fleet has ended that, ``serve`` begins again w
 import logging
 import select
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import inf
 
 from mav_tasks.clock import boot_time
-from mav_tasks.engine.inputs import FleetChanged, LeaseChanged
+from mav_tasks.engine.inputs import FleetChanged, LeaseChanged, VehiclesGone
+from mav_tasks.engine.snapshot import Reach
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.lease import Permit
 from mav_tasks.fleet.member import Change
@@ -39,6 +40,9 @@ class Gateway:
         self.name = settings.name
         self._carrier: Carrier | None = None
         self._early: list[News] = []  # that came before the engine was there
+        self._ours: frozenset[int] = frozenset()  # vehicles that the engine had
+        self._going: dict[int, str] = {}  # that it was asked to forget, and who hears them
+        self._gone: frozenset[int] = frozenset()  # that it has forgotten
         self._keeper = Keeper(where, settings.name, host=host)
         try:
             self._await_lease()
@@ -64,11 +68,26 @@ class Gateway:
         """Return the descriptor that is readable while ``take`` has something."""
         return self._keeper.fileno()
 
-    def hear(self, vehicles: frozenset[int]) -> None:
-        """Take which vehicles are heard: the gateway gets those that no other one has."""
-        self._keeper.hear(vehicles)
+    def hear(self, reach: Reach) -> None:
+        """Take which vehicles are heard: the gateway gets those that no other one has.
 
-    def take(self) -> Iterator[LeaseChanged | FleetChanged]:
+        What the engine was asked to forget, and has forgotten, is free.
+        """
+        self._keeper.hear(reach.heard, reach.strays)
+        forgotten = frozenset(self._going.keys() - reach.ours)
+        for vehicle in sorted(forgotten):
+            log.warning(
+                "gateway %s does not hear rover %s any more: gateway %s, which hears it, gets it",
+                self.name,
+                vehicle,
+                self._going[vehicle],
+            )
+        self._ours, self._going = reach.ours, {}
+        if forgotten:
+            self._gone |= forgotten
+            self._keeper.free(forgotten)
+
+    def take(self) -> Iterator[LeaseChanged | FleetChanged | VehiclesGone]:
         """Yield what has changed, and ask for the data of vehicles that this gateway has got."""
         early, self._early = self._early, []
         for news in (*early, *self._keeper.take()):
@@ -77,11 +96,13 @@ class Gateway:
                     yield _changed(news)
                 case Holders(pairs=pairs):
                     yield FleetChanged(pairs)
-                case Change(effects=effects, got=got):
+                case Change(effects=effects, got=got, lets_go=lets_go):
                     if got:
+                        self._gone -= got
                         log.info("gateway %s has got %s", self.name, _named(got))
                         self.store.load_vehicles(got)
                     self._tell(effects)
+                    yield from self._let_go(dict(lets_go))
                 case Trouble(words=None):
                     log.warning("gateway %s reaches the fleet's database again", self.name)
                 case Trouble(words=words):
@@ -96,6 +117,12 @@ class Gateway:
     def _begin_carrier(self, where: Address) -> Carrier:
         self._carrier = Carrier(where, self.name)
         return self._carrier
+
+    def _let_go(self, hearers: Mapping[int, str]) -> Iterator[VehiclesGone]:
+        vehicles = tuple(sorted(hearers.keys() & self._ours - self._gone))
+        if vehicles:
+            self._going |= {vehicle: hearers[vehicle] for vehicle in vehicles}
+            yield VehiclesGone(vehicles)
 
     def _tell(self, effects: tuple[Effect, ...]) -> None:
         if Effect.STOP in effects:

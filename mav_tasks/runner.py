@@ -32,6 +32,7 @@ from mav_tasks.engine.inputs import (
     Shutdown,
     WallClock,
 )
+from mav_tasks.engine.snapshot import Reach
 from mav_tasks.link_reader import DRAIN, LinkReader
 from mav_tasks.links.base import TEND_PERIOD, Link, PacedLink, PeerChange, PeerState, StreamLink
 from mav_tasks.links.policy import LinkPolicy
@@ -127,8 +128,8 @@ class Lease(Protocol):
         """Return what has changed."""
         ...
 
-    def hear(self, vehicles: frozenset[int]) -> None:
-        """Take which vehicles are heard."""
+    def hear(self, reach: Reach) -> None:
+        """Take which vehicles are heard, and which the engine has."""
 
 
 class Runner:
@@ -295,7 +296,7 @@ class Runner:
         if self._over is None or self._over.done():
             return
         loop.call_later(HEAR, self._hear, lease, loop)
-        lease.hear(self._pump.engine.heard(now=self._clock()))
+        lease.hear(self._pump.engine.reach(now=self._clock()))
 
     def _on_lease(self, lease: Lease) -> None:
         self._wake()

@@ -36,7 +36,7 @@ from mav_tasks.engine.missions.mission_server import MissionServers
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.engine.reception import Reception
-from mav_tasks.engine.snapshot import Snapshot, VehicleSnapshot
+from mav_tasks.engine.snapshot import Reach, Snapshot, VehicleSnapshot
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.control import Event as ControlEvent
 from mav_tasks.engine.vehicles.hands import Word
@@ -196,6 +196,8 @@ class Engine:
                 self._vehicles.lease.change(item, now=now)
             case inputs.VehiclesTaken(vehicles=vehicles, restored=restored):
                 self._take_over(vehicles, restored, now=now)
+            case inputs.VehiclesGone(vehicles=vehicles):
+                self._let_go(vehicles, now=now)
             case inputs.FleetChanged():
                 self._elsewhere.change(item, now=now)
             case inputs.IdsGranted(first=first, count=count):
@@ -273,9 +275,10 @@ class Engine:
             ),
         )
 
-    def heard(self, *, now: float) -> frozenset[int]:
-        """Return the vehicles that are heard, also those that another gateway has."""
-        return self._vehicles.heard(now=now)
+    def reach(self, *, now: float) -> Reach:
+        """Return which vehicles are heard, also those that another gateway has, and are ours."""
+        reach = self._vehicles.reach(now=now)
+        return reach._replace(strays=frozenset()) if self._submissions.gate else reach
 
     @property
     def stop_until(self) -> float:
@@ -291,6 +294,19 @@ class Engine:
         self._vehicles.take(vehicles, now=now)
         for vehicle in vehicles:
             self._reception.stop_taken(vehicle, now=now)
+
+    def _let_go(self, vehicles: Sequence[int], *, now: float) -> None:
+        """Forget vehicles that another gateway hears, unless something came between."""
+        strays = self.reach(now=now).strays
+        for vehicle in sorted(strays.intersection(vehicles)):
+            if self._fleet.room.is_tied(vehicle):
+                continue
+            self._vehicles.forget(vehicle)
+            tasks = self._fleet.forget(vehicle)
+            self._deduplicator.forget_vehicle(vehicle, tasks)
+            self._plans.forget(vehicle)
+            self._reception.forget(vehicle)
+            self._gcs.forget_vehicle(vehicle, tasks)
 
     def _tell_statuses(self, *, now: float) -> None:
         self._publisher.send_statuses(now=now)

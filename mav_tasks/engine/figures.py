@@ -78,9 +78,11 @@ class Figures:
             flooded=self._gates.left_out,
         )
 
-    def of(self, system_id: int, *, now: float) -> VehicleFigures:
-        """Return the figures of one of the vehicles that ``all`` names."""
-        tasks, vehicle = self._fleet.of(system_id), self._vehicles.look_at(system_id)
+    def of(self, system_id: int, *, now: float) -> VehicleFigures | None:
+        """Return the figures of a vehicle that ``all`` named, None if it has gone since."""
+        tasks, vehicle = self._fleet.get(system_id), self._vehicles.look_at(system_id)
+        if tasks is None:
+            return None
         motion = None if vehicle is None else vehicle.where.motion.latest()
         return VehicleFigures(
             vehicle=system_id,

@@ -143,6 +143,13 @@ class VehiclesTaken:
 
 
 @dataclass(frozen=True, slots=True)
+class VehiclesGone:
+    """Another gateway hears these vehicles of ours: forget those that ``Engine.reach`` permits."""
+
+    vehicles: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class FleetChanged:
     """Which vehicle the other gateways have: pairs of its system id and the gateway's name."""
 
@@ -189,6 +196,7 @@ Input = (
     | HaltNotStored
     | LeaseChanged
     | VehiclesTaken
+    | VehiclesGone
     | FleetChanged
     | IdsGranted
     | SettingsChanged

@@ -24,6 +24,13 @@ class Fence:
         self.is_shared = is_shared
         self.until = self.relays_until = inf
 
+    @classmethod
+    def shut(cls) -> "Fence":
+        """Return a fence that no packet passes."""
+        it = cls(is_shared=True)
+        it.until = it.relays_until = -inf
+        return it
+
 
 class PacketSender:
     """Sends to one endpoint of one link, and signs if the endpoint expects it."""
@@ -52,6 +59,14 @@ class PacketSender:
     def sibling(self, queue: list[Outgoing]) -> "PacketSender":
         """Return a sender to the same endpoint that fills another queue and does not sign."""
         return PacketSender(self.link, self.peer, queue, self._packer)
+
+    def shut(self) -> "PacketSender":
+        """Return a sender to the same endpoint whose packets never leave."""
+        return PacketSender(self.link, self.peer, self._queue, self._packer, None, Fence.shut())
+
+    def forget(self, system_id: int) -> None:
+        """Forget the numbers of a system, which another gateway sends from here on."""
+        self._sequence.forget(system_id)
 
     def send(
         self, message: Message, source: Address, *, first: bool = False, until: float = inf

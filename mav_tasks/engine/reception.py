@@ -124,10 +124,16 @@ class Reception:
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def stop_taken(self, vehicle: int, *, now: float) -> None:
-        """Obey the STOPs of our clients that came just before this gateway got a vehicle."""
+        """Obey the STOPs that came just before this gateway got a vehicle."""
         for received in self.elsewhere.stops_of(vehicle, now=now):
             self.gcs.hear_out(received, now=now)
             self._see_to(received, now=now)
+
+    def forget(self, vehicle: int) -> None:
+        """Forget a vehicle, which another gateway may have from here on."""
+        self.desks.forget(vehicle)
+        self.reports.forget(vehicle)
+        self.restarts.forget(vehicle)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
         if not self.door.may_pass(received, now=now) or self.elsewhere.takes(received, now=now):

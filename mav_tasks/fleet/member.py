@@ -2,6 +2,10 @@
 
 No I/O: ``request`` returns what to ask, one at a time; the caller passes each answer, or its
 absence, to ``answered`` or ``unanswered``.
+
+A vehicle that this gateway does not hear any more, but another one does, changes hands in order:
+``Change.lets_go`` asks the engine to forget it, ``forgotten`` says that the engine has, and only
+then the database is asked to free it. The engine may refuse, and is asked again later.
 """
 
 from dataclasses import dataclass, field
@@ -10,6 +14,8 @@ from mav_tasks.fleet.lease import Lease, Terms
 from mav_tasks.fleet.rivals import Eviction, Rival, Rivals
 from mav_tasks.fleet.standing import Effect, Standing
 
+#: s for which a gateway leaves a vehicle that it has freed to those that say they hear it
+LEFT_TO_OTHERS = 10.0
 RECHECK = 0.03  # s; how soon to look whether the session of a process that has ended is gone
 
 
@@ -27,10 +33,11 @@ class Join:
 
 @dataclass(frozen=True, slots=True)
 class Renew:
-    """Renew the lease, and read the rows of the others."""
+    """Renew the lease, say what is heard, and read the rows of the others."""
 
     name: str
     epoch: int
+    hears: frozenset[int] = frozenset()  # vehicles that this gateway does not hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +58,7 @@ class Take:
 
 @dataclass(frozen=True, slots=True)
 class Free:
-    """Free a vehicle, which this gateway has stopped and dropped."""
+    """Free a vehicle, which the engine of this gateway has forgotten."""
 
     by: Renew
     vehicle: int
@@ -74,11 +81,15 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What changed for this gateway: effects in their order, vehicles that it has got or lost."""
+    """What changed for this gateway: effects in their order, vehicles that it has got or lost.
+
+    ``lets_go``: vehicles to forget, if the engine can, each with the gateway that hears it.
+    """
 
     effects: tuple[Effect, ...] = ()
     got: frozenset[int] = frozenset()
     lost: frozenset[int] = frozenset()
+    lets_go: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass
@@ -88,9 +99,13 @@ class Member:
     name: str
     terms: Terms
     heard: set[int] = field(default_factory=set)  # vehicles with heartbeats on its own links
+    #: vehicles that it holds, and that the engine could forget: not heard for a while, idle
+    strays: frozenset[int] = frozenset()
     lease: Lease = field(init=False)
     rivals: Rivals = field(init=False)
     next_turn: float = 0.0  # when the next renewal, or attempt to join, is due
+    _forgotten: set[int] = field(default_factory=set)  # by the engine, but not freed yet
+    _freed: dict[int, float] = field(default_factory=dict)  # when, of those left to others
     _is_others_turn: bool = False  # of other requests, though a renewal is due: answers take long
 
     def __post_init__(self) -> None:
@@ -101,7 +116,7 @@ class Member:
         standing, is_due = self.lease.standing, now >= self.next_turn
         if standing in (Standing.OUT, Standing.EVICTED):
             return self._timed(Join(self.name, self._predecessor(now)), now) if is_due else None
-        me = Renew(self.name, self.lease.epoch)
+        me = Renew(self.name, self.lease.epoch, frozenset(self.heard - self.lease.vehicles))
         other = self._change(me, now) if standing is Standing.HOLDER else None
         if is_due and not (other and self._is_others_turn):
             self._is_others_turn = True
@@ -113,7 +128,9 @@ class Member:
         """Take an answer to a request that had been sent at ``sent``."""
         before = frozenset(self.lease.vehicles)
         self.rivals.read(row.rivals, now=now)
+        self._forgotten -= self.heard  # heard again in time: it stays, and is loaded again
         if isinstance(request, Join):
+            self._forgotten.clear()
             effects = [] if row.epoch == 0 else self.lease.joined(row.epoch, sent=sent, now=now)
         else:
             asked = request if isinstance(request, Renew) else request.by
@@ -124,14 +141,22 @@ class Member:
             else:
                 effects = self.lease.passed(now)
         if row.epoch == self.lease.epoch:
-            self.lease.vehicles = set(row.holds)
+            if isinstance(request, Free) and request.vehicle not in row.holds:
+                self._freed[request.vehicle] = now
+            self._forgotten &= row.holds
+            self.lease.vehicles = set(row.holds) - self._forgotten
         after = frozenset(self.lease.vehicles)
-        return Change(tuple(effects), after - before, before - after)
+        return Change(tuple(effects), after - before, before - after, self._to_let_go(now))
 
     def unanswered(self, now: float) -> Change:
         """The connection to the database was lost, with whatever was asked for."""
         self.rivals.lost()
         return Change(tuple(self.lease.passed(now)))
+
+    def forgotten(self, vehicles: frozenset[int]) -> None:
+        """The engine has forgotten these vehicles: free them, unless they are heard again."""
+        self._forgotten |= vehicles & self.lease.vehicles
+        self.lease.vehicles -= vehicles
 
     def peer_answered(self, name: str, *, now: float) -> None:
         """Another gateway's process has answered."""
@@ -150,8 +175,28 @@ class Member:
         """Return what to change in the database, if anything."""
         if evictions := self.rivals.evictions(now):
             return Evict(me, evictions[0])
-        free = self.heard - self.lease.vehicles - self.rivals.held()
+        if to_free := self._forgotten - self.heard:
+            return Free(me, min(to_free))
+        ours = self.lease.vehicles | self._forgotten
+        free = self.heard - ours - self.rivals.held() - self._left_to_others(now)
         return Take(me, frozenset(free)) if free else None
+
+    def _to_let_go(self, now: float) -> tuple[tuple[int, str], ...]:
+        """Return the vehicles that another gateway hears and this one does not."""
+        unheard = self.lease.vehicles & self.strays - self.heard
+        if not unheard or self.lease.standing is not Standing.HOLDER:
+            return ()
+        hearers = self.rivals.hearers(now)
+        return tuple((each, hearers[each]) for each in sorted(unheard & hearers.keys()))
+
+    def _left_to_others(self, now: float) -> set[int]:
+        """Return vehicles that it freed just now and that nobody has had since."""
+        for vehicle in self.rivals.held() & self._freed.keys():
+            del self._freed[vehicle]
+        recent = {each for each, at in self._freed.items() if now - at < LEFT_TO_OTHERS}
+        for vehicle in self._freed.keys() - recent:
+            del self._freed[vehicle]
+        return recent & self.rivals.hearers(now).keys()
 
     def _timed(self, request: Request, now: float) -> Request:
         """Return a request that shows the others' rows, and set when the next one is due."""

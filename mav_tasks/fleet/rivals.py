@@ -27,6 +27,7 @@ class Rival:
     renewals: int  # how often it has renewed in this epoch
     in_session: bool  # whether its session at the database is there
     holds: frozenset[int] = frozenset()  # vehicles
+    hears: frozenset[int] = frozenset()  # vehicles that it does not hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +112,15 @@ class Rivals:
         """Return which of them holds which vehicle."""
         return {vehicle: name for name, seen in self._seen.items() for vehicle in seen.row.holds}
 
+    def hearers(self, now: float) -> dict[int, str]:
+        """Return which of them hears which vehicle without holding it, and can take it now."""
+        return {
+            vehicle: name
+            for name, seen in self._seen.items()
+            if self._is_well(seen, now)
+            for vehicle in seen.row.hears
+        }
+
     def epochs(self) -> dict[str, int]:
         """Return the epoch of each row, by name."""
         return {name: seen.row.epoch for name, seen in self._seen.items()}
@@ -118,6 +128,12 @@ class Rivals:
     def is_one_ending(self) -> bool:
         """Return whether one's process has ended, as it seems, and its session is not gone yet."""
         return any(seen.is_refused and seen.row.in_session for seen in self._seen.values())
+
+    def _is_well(self, seen: Seen, now: float) -> bool:
+        """Return whether its renewals come: one that cannot renew could not take a vehicle."""
+        if seen.is_refused or not seen.row.in_session or seen.since is None:
+            return False
+        return now - seen.since < self.terms.term - self.terms.margin
 
     def _is_dead(self, seen: Seen, now: float) -> bool:
         if seen.is_refused and not seen.row.in_session:

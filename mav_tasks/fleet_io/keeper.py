@@ -10,8 +10,9 @@ between the question and its packet: only a fence at the vehicle itself can be a
 
 import re
 import selectors
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
+from queue import Empty, SimpleQueue
 from threading import Thread
 
 from mav_tasks.clock import boot_time
@@ -76,7 +77,8 @@ class Keeper:
         self._member = Member(name, terms or Terms())
         self._permit = Permit()
         self._holders = Holders()
-        self._heard: frozenset[int] = frozenset()
+        self._heard: tuple[frozenset[int], frozenset[int]] = frozenset(), frozenset()
+        self._forgotten: SimpleQueue[frozenset[int]] = SimpleQueue()
         self._selector = selectors.DefaultSelector()
         try:
             self._peers = Peers(self._selector, host, port)
@@ -118,12 +120,17 @@ class Keeper:
         """Return whether a packet that stops this vehicle may leave now."""
         return self._permit.may_stop(vehicle, boot_time())
 
-    def hear(self, vehicles: frozenset[int]) -> None:
+    def hear(self, vehicles: frozenset[int], strays: frozenset[int] = frozenset()) -> None:
         """Take which vehicles are heard on the gateway's own links: it takes those that are free.
 
-        It keeps those that it has.
+        It keeps those that it has, but ``Change.lets_go`` names those of the ``strays``, which are
+        not heard, that another gateway hears.
         """
-        self._heard = vehicles
+        self._heard = vehicles, strays
+
+    def free(self, vehicles: frozenset[int]) -> None:
+        """Free vehicles that the engine has forgotten; one that is heard again comes as ``got``."""
+        self._forgotten.put(vehicles)
 
     def take(self) -> list[News]:
         """Return what has changed, in its order; raise an exception of the thread."""
@@ -159,7 +166,11 @@ class Keeper:
     def _turn(self) -> None:
         """Do what is due, wait for what comes or is due next, and take that."""
         now = boot_time()
-        self._member.heard = set(self._heard)
+        heard, self._member.strays = self._heard
+        self._member.heard = set(heard)
+        with suppress(Empty):
+            while True:
+                self._member.forgotten(self._forgotten.get_nowait())
         self._tell(Change(tuple(self._member.lease.passed(now))))
         self._talk(now)
         if now >= self._ping_at:

@@ -13,7 +13,7 @@ and what an earlier session of this process has asked is over before a new one c
 import os
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mav_tasks.errors import StoreError
@@ -168,18 +168,17 @@ class LeaseDatabase:
     ) -> None:
         me = (self._number, epoch)
         match request:
-            case Renew():
+            case Renew(hears=hears):
                 # a crash of the database may forget it, and then all others count a whole term anew
                 session.execute("SELECT set_config('synchronous_commit', 'off', true)")
-                session.execute(_RENEW, me)
+                session.execute(_RENEW, (_array(hears), *me))
                 return
             case Evict(_, rival):
                 session.execute(_LOCK, (self.name, rival.name))
                 session.execute(_EVICT, (rival.name, rival.epoch, rival.renewals, *me))
             case Take(_, vehicles):
                 session.execute(_LOCK, (self.name, self.name))
-                listed = ",".join(map(str, sorted(vehicles)))
-                session.execute(_TAKE, (f"{{{listed}}}", *me))
+                session.execute(_TAKE, (_array(vehicles), *me))
             case Free(_, vehicle):
                 session.execute(_LOCK, (self.name, self.name))
                 session.execute(_FREE, (vehicle, *me))
@@ -190,13 +189,18 @@ class LeaseDatabase:
         rivals: list[Rival] = []
         endpoints: dict[str, Endpoint] = {}
         for row in rows:
-            name, epoch, renewals, in_session, vehicles, host, port = row
+            name, epoch, renewals, in_session, vehicles, hears, host, port = row
             if epoch == granted:
                 holds = frozenset(vehicles)
             else:
-                rivals.append(Rival(name, epoch, renewals, in_session, frozenset(vehicles)))
+                held, heard = frozenset(vehicles), frozenset(hears)
+                rivals.append(Rival(name, epoch, renewals, in_session, held, heard))
                 endpoints[name] = Endpoint(epoch, host, port)
         return Answer(Row(granted, holds, tuple(rivals)), endpoints)
+
+
+def _array(vehicles: Iterable[int]) -> str:
+    return f"{{{','.join(map(str, sorted(vehicles)))}}}"
 
 
 _LOCK = "SELECT 1 FROM gateways WHERE name IN (?, ?) ORDER BY number FOR UPDATE"
@@ -215,7 +219,7 @@ SELECT epoch FROM ended
 _JOIN = f"""
 WITH ended AS (
   UPDATE gateways SET epoch = nextval('gateway_epochs'), renewals = 0, backend = pg_backend_pid(),
-    host = ?, port = ?, machine = ?, pid = ?, since = ?
+    hears = '{{}}', host = ?, port = ?, machine = ?, pid = ?, since = ?
   WHERE number = ? AND (epoch = 0 OR (epoch, renewals) = (?, ?))
   RETURNING number, epoch
 ), {_FREE_ALL}"""
@@ -226,8 +230,8 @@ WITH ended AS (
   RETURNING number, epoch
 ), {_FREE_ALL}"""
 _RENEW = (
-    "UPDATE gateways SET renewals = renewals + 1, backend = pg_backend_pid()"
-    " WHERE number = ? AND epoch = ? RETURNING epoch"
+    "UPDATE gateways SET renewals = renewals + 1, hears = ?::bigint[],"
+    " backend = pg_backend_pid() WHERE number = ? AND epoch = ? RETURNING epoch"
 )
 _ASK = (
     "UPDATE gateways SET backend = pg_backend_pid() WHERE number = ? AND epoch = ? RETURNING epoch"
@@ -245,7 +249,7 @@ WHERE vehicle = ? AND gateway = gateways.number AND gateways.number = ? AND epoc
 """
 _READ = """
 SELECT name, epoch, renewals, pid_of_lock IS NOT NULL,
-  ARRAY(SELECT vehicle FROM holdings WHERE gateway = gateways.number), host, port
+  ARRAY(SELECT vehicle FROM holdings WHERE gateway = gateways.number), hears, host, port
 FROM gateways LEFT JOIN (
   SELECT objid, pid AS pid_of_lock FROM pg_locks
   WHERE locktype = 'advisory' AND granted AND objsubid = 1 AND classid = ?

@@ -15,6 +15,10 @@ class Router:
         """Note where a system is; a later place replaces an earlier one."""
         self._places[system_id] = place
 
+    def forget(self, system_id: int) -> None:
+        """Forget where a system is."""
+        self._places.pop(system_id, None)
+
     def place_of(self, system_id: int) -> Place | None:
         """Return where a system was heard."""
         return self._places.get(system_id)

@@ -44,6 +44,12 @@ class SequenceKeeper:
         self._offset[source] = ((offset or 0) + 1) & 0xFF
         return number
 
+    def forget(self, system_id: int) -> None:
+        """Forget the numbers of all sources in a system."""
+        for numbers in (self._next, self._offset):
+            for source in [each for each in numbers if each.system_id == system_id]:
+                del numbers[source]
+
     def _make_room(self, source: Address) -> None:
         for numbers in (self._next, self._offset):
             if source not in numbers and len(numbers) >= MOST:

@@ -237,6 +237,8 @@ class Collector:
             staged[vehicle] += 1
         for vehicle in system_ids:
             found = self._figures.of(vehicle, now=now)
+            if found is None:
+                continue
             for state, reason, count in found.tasks:
                 if (state, reason) == (TaskState.BLOCKED, TaskReason.DEPENDENCY):
                     first = min(count, staged[vehicle])

@@ -127,6 +127,9 @@ def input_of(line: Sequence[Any]) -> Input | None:
             vehicles, state, rows = values
             tasks = tuple(_TASKS.values(Task, rows, offset=0.0))
             return inputs.VehiclesTaken(tuple(vehicles), restored_of(state, tasks))
+        case "vehicles gone":
+            (vehicles,) = values
+            return inputs.VehiclesGone(tuple(vehicles))
         case "fleet":
             (holders,) = values
             return inputs.FleetChanged(tuple((vehicle, name) for vehicle, name in holders))
@@ -185,6 +188,8 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["halt not stored", now, vehicle]
         case inputs.LeaseChanged(move_until=move_until, stop_until=stop_until):
             return ["lease", now, move_until, stop_until]
+        case inputs.VehiclesGone(vehicles=vehicles):
+            return ["vehicles gone", now, vehicles]
         case inputs.FleetChanged(holders=holders):
             return ["fleet", now, holders]
         case inputs.IdsGranted(first=first, count=count):

@@ -121,6 +121,12 @@ class StreamRateLimiter:
             if message_id in WANTED:
                 self._ask(system_id, message_id, commands=commands)
 
+    def forget(self, system_id: int) -> None:
+        """Forget the client's wishes for a system."""
+        self._intervals.pop(system_id, None)
+        self.asked.pop(system_id, None)
+        self._last = {key: at for key, at in self._last.items() if key[0] != system_id}
+
     def interval_us(self, system_id: int, message_id: int) -> int:
         """Return the interval in force, in microseconds; STOPPED if none."""
         interval = self._interval(system_id, message_id)

@@ -4,7 +4,7 @@ Pushed on each state change, and streamed for active tasks at the interval that 
 for. It keeps ids only; what is sent is the state at the time of sending.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from math import inf
 
@@ -51,6 +51,11 @@ class TaskStatusSender:
         else:
             self._streams[vehicle] = _Stream(min(max(interval, SHORTEST), LONGEST), now)
         self._wake(now)
+
+    def forget(self, vehicle: int, tasks: Collection[int]) -> None:
+        """Forget a vehicle with its ``tasks``."""
+        self._streams.pop(vehicle, None)
+        self._changed = {each: None for each in self._changed if each not in tasks}
 
     def interval(self, vehicle: int) -> float | None:
         """Return the interval of a vehicle's stream, seconds; None: there is none."""

@@ -4,7 +4,7 @@ The rules are those of ``dialects/README.md``, "Duplicate detection". The tasks 
 that the rules need, so that a restart forgets nothing.
 """
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from math import hypot
@@ -173,6 +173,16 @@ class SubmissionDeduplicator:
         if goal is not None and goal.task_id == task.id:
             del client.goals[task.vehicle]
         client.packets.pop(task.marks.packet, None)
+
+    def forget_vehicle(self, vehicle: int, tasks: Container[TaskId]) -> None:
+        """Forget a vehicle with its ``tasks``: the next gateway that has it knows them."""
+        self._nonces = {key: each for key, each in self._nonces.items() if each not in tasks}
+        for client in self._clients.values():
+            client.goals.pop(vehicle, None)
+            for key in [each for each in client.of_command if each[0] == vehicle]:
+                del client.of_command[key]
+            packets = client.packets.items()
+            client.packets = {key: last for key, last in packets if last.task_id not in tasks}
 
     def _by_nonce(self, draft: Draft, *, now: float) -> Known | None:
         key = _key(draft.submitter, draft.marks.nonce)

@@ -1,5 +1,7 @@
 """Dependencies between tasks (``Terms.after``), and checks whether they can be met."""
 
+from collections.abc import Collection, Iterator
+
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
@@ -24,6 +26,10 @@ class Dependencies:
     def of(self, task_id: TaskId) -> tuple[TaskId, ...]:
         """Return the tasks that run after this one, in the order in which they were added."""
         return tuple(self._dependents.get(task_id, ()))
+
+    def pairs(self) -> Iterator[tuple[TaskId, Collection[TaskId]]]:
+        """Yield each task that is waited for, with those that run after it."""
+        yield from self._dependents.items()
 
     def add(self, task_id: TaskId, after: int) -> None:
         """Note that a task runs after another one."""

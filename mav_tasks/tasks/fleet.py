@@ -27,6 +27,8 @@ class Fleet:
         self._registry = registry
         self._settings = settings
         self._of: dict[int, VehicleTasks] = {}
+        #: return the tasks of a vehicle, None if nothing is known of it
+        self.get = self._of.get
         self.room = PendingTasks(registry, settings)
         self._was_driven: set[int] = set()
         self._halted: dict[int, LastHalt] = {}  # by command, before this run
@@ -57,6 +59,27 @@ class Fleet:
         """Return a vehicle's last halt if it is younger than UNSEEN; each is returned once."""
         halt = self._halted.pop(vehicle, None)
         return halt if halt is not None and now - halt.at <= UNSEEN else None
+
+    def may_forget(self, vehicle: int, *, halted_before: float) -> bool:
+        """Return whether no task of a vehicle runs, and no command has halted it just now.
+
+        A halt may still have to come true if it was not given before ``halted_before``.
+        """
+        tasks = self.get(vehicle)
+        if tasks is None:
+            return True
+        halts, active = tasks.halts, tasks.active
+        if halts.is_by_word and halts.at > halted_before:
+            return False
+        return active is None or active.state not in RUNNING
+
+    def forget(self, vehicle: int) -> set[TaskId]:
+        """Forget a vehicle and its tasks, which are stored; return the ids of these."""
+        self._of.pop(vehicle, None)
+        self._was_driven.discard(vehicle)
+        self._halted.pop(vehicle, None)
+        self.room.forget(vehicle)
+        return self._registry.forget(vehicle)
 
     def apply(self, settings: Settings) -> None:
         self._settings = settings

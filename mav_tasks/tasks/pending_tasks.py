@@ -14,7 +14,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.cron import utc_text
 from mav_tasks.tasks.dependencies import Dependencies
 from mav_tasks.tasks.events import SERVER, VehicleNoted
-from mav_tasks.tasks.lifecycle import WAITING, TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.queue import Entry, Rank, TaskQueue, rank_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.repetition import (
@@ -316,14 +316,42 @@ class PendingTasks:
         del self._waiters[task.id]
         self.queue(task.vehicle).discard(task.id)
         self._of_vehicle[task.vehicle] -= 1
-        owner = task.submitter.owner
+        self._leave_owner(task.submitter.owner)
+        self._part(task.id, task.terms.after)
+        self.woken.add(task.vehicle)
+
+    def is_tied(self, vehicle: int) -> bool:
+        """Return whether a task of a vehicle waits for another one's, or the other way round."""
+        for ahead_id, dependents in self._dependencies.pairs():
+            ahead = self._registry.get(ahead_id)
+            if ahead is None or ahead.state in TERMINAL:
+                continue
+            theirs = {self._registry[each].vehicle for each in dependents}
+            if vehicle in theirs and theirs != {ahead.vehicle}:
+                return True
+            if vehicle == ahead.vehicle and theirs != {vehicle}:
+                return True
+        return False
+
+    def forget(self, vehicle: int) -> None:
+        """Forget the waiting tasks of a vehicle, without ending them."""
+        gone = [each for each in self._waiters if self._registry[each].vehicle == vehicle]
+        for task_id in gone:
+            del self._waiters[task_id]
+            task = self._registry[task_id]
+            self._leave_owner(task.submitter.owner)
+            self._dependencies.forget(task_id, task.terms.after)
+        self.times.forget(set(gone))
+        self._queues.pop(vehicle, None)
+        self._of_vehicle.pop(vehicle, None)
+        self.woken.discard(vehicle)
+
+    def _leave_owner(self, owner: str) -> None:
         left = self._of_owner[owner] - 1
         if left:
             self._of_owner[owner] = left
         else:
             del self._of_owner[owner]
-        self._part(task.id, task.terms.after)
-        self.woken.add(task.vehicle)
 
     def end(
         self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float

@@ -49,6 +49,7 @@ class TaskRegistry:
         self._counts: dict[int, list[int]] = defaultdict(lambda: [0] * STATES)
         #: return a task, or None if the id is unknown or forgotten
         self.get: Callable[[int], Task | None] = cast("dict[int, Task]", self._tasks).get
+        self._last_of: dict[int, int] = {}  # the number of each vehicle's last event
         self._events: list[Event] = []
         self.recorded = 0  # number of the last event recorded
         self.durable = 0  # number of the last event known to be durable
@@ -115,6 +116,7 @@ class TaskRegistry:
         self._counts[task.vehicle][state] += 1
         self._note_live(task)
         self.record(TaskSubmitted(task, now))
+        self._last_of[task.vehicle] = self.recorded
         self._last_event[task.id] = self.recorded
         return task
 
@@ -251,11 +253,31 @@ class TaskRegistry:
     def record(self, event: Event) -> None:
         """Append an event to the journal."""
         self.recorded += 1
+        if vehicle := getattr(event, "vehicle", 0):
+            self._last_of[vehicle] = self.recorded
         self._events.append(event)
 
     def is_durable(self, task_id: TaskId) -> bool:
         """Return whether the task's last submission, state change or modification is durable."""
         return self._last_event[task_id] <= self.durable
+
+    def is_all_durable(self, vehicle: int) -> bool:
+        """Return whether all events of a vehicle are durable."""
+        return self._last_of.get(vehicle, 0) <= self.durable
+
+    def forget(self, vehicle: int) -> set[TaskId]:
+        """Forget a vehicle and its tasks, which are durable; return the ids of these."""
+        gone = {task.id: task for task in self._tasks.values() if task.vehicle == vehicle}
+        for task_id, task in gone.items():
+            del self._tasks[task_id]
+            del self._last_event[task_id]
+            self.unplanned.pop(task_id, None)  # the next gateway goes on with its series
+            if task.state not in TERMINAL:
+                self._forget_live(task)
+        self._finished = deque(each for each in self._finished if each not in gone)
+        self._counts.pop(vehicle, None)
+        self._last_of.pop(vehicle, None)
+        return set(gone)
 
     def take_events(self) -> list[Event]:
         """Return the events since the last call, in order of their numbers."""

@@ -1,6 +1,6 @@
 """Start times and deadlines of waiting tasks, in monotonic time."""
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from heapq import heapify, heappop, heappush
 from math import inf
 
@@ -53,6 +53,13 @@ class Times:
         if deadline is not None:
             heappush(self._deadlines, (deadline, task.id))
             self._look()
+
+    def forget(self, tasks: Container[TaskId]) -> None:
+        """Forget the times of these tasks."""
+        for heap in (self._starts, self._deadlines):
+            heap[:] = [entry for entry in heap if entry[1] not in tasks]
+            heapify(heap)
+        self._look()
 
     def _look(self) -> None:
         first_start = self._starts[0][0] if self._starts else inf

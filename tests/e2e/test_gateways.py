@@ -2,7 +2,7 @@
 
 import signal
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskReason, TaskState
 from tests.kit.commands import mav_tasks
+from tests.kit.gateways.serving import Watcher, serving, wait_for_holder, wrong_motions
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, free_udp_ports, process, wait_until
 
@@ -207,6 +208,31 @@ def test_a_stop_of_all_is_acknowledged_by_each_gateway_for_its_rover(fleet: Flee
     assert [b.queue(vehicle=rover).paused for rover in (1, 2)] == [TaskReason.STOPPED] * 2
     for task in tasks:
         fleet.until_state(task.id, S.KILLED)
+
+
+def test_a_rover_that_drives_out_of_reach_goes_on_at_the_gateway_that_hears_it(
+    postgres: PostgresServer, tmp_path: Path
+) -> None:
+    with serving(postgres, tmp_path, "ab") as it, closing(Watcher(it.url)) as watcher:
+        first = wait_for_holder(watcher)
+        (other,) = set(it.processes) - {first}
+        with it.client(first) as client:
+            ran, waits = client.submit(Move(6.0)), client.submit(Move(0.5))
+            wait_until(lambda: it.states()[ran.id] is S.EXECUTING, within=20, what=it.said)
+            it.taps[first].is_cut = True
+            assert wait_for_holder(watcher, other_than=first) == other
+            it.processes[first].wait_for(f"gateway {other}, which hears it, gets it")
+            it.taps[first].is_cut = False  # it is heard in both places: it stays
+            wait_until(lambda: it.states()[waits.id] is S.COMPLETED, within=60, what=it.said)
+            assert it.states()[ran.id] is S.COMPLETED
+            near = client.submit(Move(0.25))
+            wait_until(lambda: it.states()[near.id] is S.COMPLETED, within=30, what=it.said)
+        it.taps[other].is_cut = True  # and back
+        assert wait_for_holder(watcher, other_than=other) == first
+        with it.client(other) as client:
+            last = client.submit(Move(0.25))
+            wait_until(lambda: it.states()[last.id] is S.COMPLETED, within=30, what=it.said)
+        assert wrong_motions(it.motions, watcher.seen) == []
 
 
 def speed(truth: Path) -> float:

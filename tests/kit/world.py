@@ -105,11 +105,13 @@ class World(VirtualWorld):
         rover_key: Key | None = None,
         realism: Realism = EXACT,
         heading: float = 0.0,
+        first_id: int = 1,
     ) -> None:
         """Create a world; ``records`` is a folder for a record of each server.
 
-        Rovers start at a ``heading`` in degrees. With ``rover_key`` they sign, and accept only
-        signed packets. The other arguments are InMemoryServer's.
+        Rovers start at a ``heading`` in degrees, and have system ids from ``first_id`` on. With
+        ``rover_key`` they sign, and accept only signed packets. The other arguments are
+        InMemoryServer's.
         """
         self._policies, self._keys, self._wall_offset = policies, keys, wall_offset
         self.seed = seed
@@ -121,8 +123,9 @@ class World(VirtualWorld):
         self.rovers: list[Vehicle] = []
         self.rover_parties: list[RoverParty] = []
         self.observers: list[Observer] = []
-        for number in range(1, rovers + 1):
-            start = Pose(east=3.0 * (number - 1), yaw=radians(heading))
+        numbers = range(first_id, first_id + rovers)
+        for number in numbers:
+            start = Pose(east=3.0 * (number - first_id), yaw=radians(heading))
             vehicle = make_vehicle(
                 body(start),
                 system_id=number,
@@ -150,7 +153,7 @@ class World(VirtualWorld):
             party = RoverParty(vehicle, link)
             self.rover_parties.append(party)
             self.join(party)
-        names = tuple(f"rover{number}" for number in range(1, rovers + 1))
+        names = tuple(f"rover{number}" for number in numbers)
         self._names, self._settings = names, settings
         self._records = records
         self.recorders: list[Decisions] = []
@@ -441,6 +444,8 @@ class ObservedNet(MemoryNet):
         self._sent_at: dict[bytes, float] = {}  # rovers' motion reports, newest last
         #: whether rovers receive heartbeat requests; else they send heartbeats at 1 Hz only
         self.shows_on_request = True
+        #: pairs of links between which nothing passes, in either direction
+        self.cut: set[frozenset[str]] = set()
         #: returns whether to lose (source, target, datagram)
         self.loses: Callable[[str, str, bytes], bool] = lambda *_: False
         #: called with (client, datagram) when the server reads it
@@ -460,6 +465,8 @@ class ObservedNet(MemoryNet):
                 del self._sent_at[next(iter(self._sent_at))]
         hidden = not self.shows_on_request and asks_for_heartbeat(data)
         if hidden or self.loses(source, target, data):
+            return
+        if self.cut and frozenset((source, target)) in self.cut:
             return
         super().send(source, target, data)
 

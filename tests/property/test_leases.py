@@ -76,6 +76,7 @@ def life(seed: int) -> World:
 
 @pytest.mark.parametrize("first", range(0, 1_000, SEEDS_AT_ONCE))
 def test_no_gateway_moves_what_another_one_holds_and_all_are_held_again(first: int) -> None:
+    freed = 0
     for seed in range(first, first + SEEDS_AT_ONCE):
         world = life(seed)
         assert not world.wrong, f"seed {seed}: {world.wrong[:3]}"
@@ -86,6 +87,10 @@ def test_no_gateway_moves_what_another_one_holds_and_all_are_held_again(first: i
             it = world.processes[holder]
             lease = it.member.lease
             assert lease.may_move(vehicle, world.local(it)), f"seed {seed}: {vehicle}, {lease}"
+            assert vehicle in it.served, f"seed {seed}: {vehicle}, {it.served}"
+            assert vehicle in it.member.heard, f"seed {seed}: {vehicle}, {it.member.heard}"
+        freed += world.freed
+    assert freed > 0
 
 
 def test_the_table_has_a_way_back_and_lets_nobody_move_what_it_does_not_hold() -> None:

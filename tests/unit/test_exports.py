@@ -27,7 +27,7 @@ def public(thing: object) -> list[str]:
 @pytest.mark.patches_core
 def test_the_engine_has_five_methods_and_four_views() -> None:
     methods = ["handle", "handle_deadline", "next_deadline", "take_events", "take_packets"]
-    views = ["snapshot", "parameters", "heard", "stop_until"]
+    views = ["snapshot", "parameters", "reach", "stop_until"]
     assert public(Engine) == sorted([*methods, *views])
 
 
@@ -39,7 +39,7 @@ def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
 
 
 def test_time_comes_in_as_a_keyword() -> None:
-    for name in ("handle", "handle_deadline", "snapshot", "heard"):
+    for name in ("handle", "handle_deadline", "snapshot", "reach"):
         now = inspect.signature(getattr(Engine, name)).parameters["now"]
         assert (now.kind, now.default) == (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.empty)
 
@@ -58,6 +58,7 @@ def test_what_can_come_into_the_engine() -> None:
         "HaltNotStored",
         "LeaseChanged",
         "VehiclesTaken",
+        "VehiclesGone",
         "FleetChanged",
         "IdsGranted",
         "SettingsChanged",

@@ -37,7 +37,7 @@ class Elsewhere:
         self._vehicles = vehicles
         self.is_shared = vehicles.lease.is_shared
         self._holders: Mapping[int, str] = {}
-        self._stops: list[tuple[float, Received]] = []  # the latest of our clients, and when
+        self._stops: list[tuple[float, Received]] = []  # the latest, and when
         self._clients: dict[int, tuple[str, Peer]] = {}  # by number
         self._numbers: dict[tuple[str, Peer], int] = {}
         self._last = 0  # number
@@ -51,7 +51,8 @@ class Elsewhere:
         for vehicle, gateway in change.holders:
             if before.get(vehicle) != gateway:
                 for received in self.stops_of(vehicle, now=now):
-                    self._pass_on(gateway, received)
+                    if received.client.key[0] != FLEET_LINK:  # their own gateway passes them on
+                        self._pass_on(gateway, received)
 
     def stops_of(self, vehicle: int, *, now: float) -> list[Received]:
         """Return the STOPs for a vehicle that came just now, when nobody may have had it."""
@@ -65,10 +66,12 @@ class Elsewhere:
     def takes(self, received: Received, *, now: float) -> bool:
         """Pass a packet on if it is for others; return whether it is for another one alone."""
         message = received.message
-        if not self.is_shared or message is None or received.client.key[0] == FLEET_LINK:
+        if not self.is_shared or message is None:
             return False
         if is_stop(message):
             self._stops = [*self._stops[-MOST_STOPS:], (now, received)]
+        if received.client.key[0] == FLEET_LINK:
+            return False
         target = getattr(message, "target_system", None)
         if target == EVERYBODY or isinstance(message, m.Heartbeat):
             for gateway in sorted(set(self._holders.values())):

@@ -1,6 +1,6 @@
 """One client: an endpoint on a client link, what it was sent and what it requested."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from math import inf
 
 from mav_tasks.engine.clients.rights import NOTHING, Rights
@@ -175,6 +175,23 @@ class GcsClient:
             if len(self._addresses) >= MAX_ADDRESSES:
                 del self._addresses[next(iter(self._addresses))]
             self._addresses[source] = None
+
+    def forget(self, system_id: int, tasks: Collection[int]) -> None:
+        """Forget a vehicle with its ``tasks``; what the client itself said stays known.
+
+        It is introduced again if it comes back.
+        """
+        self.introduced.discard(system_id)
+        self._informed.discard(system_id)
+        self.listed_at.pop(system_id, None)
+        self._followed = {each: None for each in self._followed if each not in tasks}
+        for source in [each for each in self.left_out if each.system_id == system_id]:
+            del self.left_out[source]
+        told = self._refusals_told.items()
+        self._refusals_told = {key: at for key, at in told if key[0].system_id != system_id}
+        self.thinner.forget(system_id)
+        self.statuses.forget(system_id, tasks)
+        self.outlet.forget(system_id)
 
     def is_reached_by(self, target: Address) -> bool:
         """Whether a message for this target reaches an address at this endpoint."""

@@ -4,7 +4,7 @@ Any bytes may come in here; only a packet with a good CRC makes its sender a cli
 returns a client's packet as a value; the engine acts on it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from math import inf
 from typing import NamedTuple
 
@@ -198,6 +198,12 @@ class GcsSide:
         """Continue the sequence numbers of this packet's source, to every client."""
         for client in self.clients:
             client.outlet.continue_numbers(packet)
+
+    def forget_vehicle(self, system_id: int, tasks: Collection[int]) -> None:
+        """Forget a vehicle with its ``tasks``, for every client."""
+        for client in self.clients:
+            client.forget(system_id, tasks)
+        self.plan_statuses()
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT to every client."""

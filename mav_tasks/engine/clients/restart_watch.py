@@ -19,6 +19,11 @@ class RestartWatch:
     def __init__(self) -> None:
         self._last: dict[Address, tuple[int, float]] = {}
 
+    def forget(self, system_id: int) -> None:
+        """Forget all sources in a system."""
+        for source in [each for each in self._last if each.system_id == system_id]:
+            del self._last[source]
+
     def begins_anew(self, packet: Packet, *, now: float) -> bool:
         """Return whether the sender of a packet has restarted just before it."""
         last = self._last.pop(packet.source, None)

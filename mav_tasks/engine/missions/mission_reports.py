@@ -85,6 +85,10 @@ class MissionReports:
         self._claims = settings.claim
         self._timer.set(self._next_at if self._claims else inf)
 
+    def forget(self, vehicle: int) -> None:
+        """Forget a vehicle: its next gateway reports."""
+        self._last.pop(vehicle, None)
+
     def replaces(self, packet: Packet) -> bool:
         """Whether a vehicle's packet is withheld, because the server reports on missions."""
         return self._claims and packet.message_id in REPLACED

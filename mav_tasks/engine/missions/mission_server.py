@@ -59,6 +59,10 @@ class _Desk:
         self.sender = MissionSender()
         self._timer = timers.timer(Turn.UPLOADS, partial(ask_again, self))
 
+    def close(self, timers: Timers) -> None:
+        """End all transfers."""
+        timers.forget(self._timer)
+
     def plan(self) -> None:
         """Set the timer to the upload's next repeated request or time-out."""
         due = self.uploads.receiver.next_deadline()
@@ -147,6 +151,11 @@ class MissionServers:
         self._uploads.flush(desk.uploads, vehicle, now=now)
         desk.plan()
         return True
+
+    def forget(self, vehicle: int) -> None:
+        """End the transfers of a vehicle's plans: clients begin again at its next gateway."""
+        for key in [each for each in self._desks if each[0] == vehicle]:
+            self._desks.pop(key).close(self._timers)
 
     def _is_refused(
         self,

@@ -80,6 +80,13 @@ class Plans:
             stored = self._stored[system_id, kind] = Stored(plan_id, unpacked(source))
             self._apply_bounds(system_id, kind, stored.items)
 
+    def forget(self, vehicle: int) -> None:
+        """Forget a vehicle's plans, which are stored."""
+        for kind in STORED:
+            self._stored.pop((vehicle, kind), None)
+        self._first.pop(vehicle, None)
+        self._started.pop(vehicle, None)
+
     def stored(self, vehicle: int, kind: int) -> Stored:
         """Return a vehicle's mission, fence or rally points."""
         return self._stored.get((vehicle, kind), NOTHING)

@@ -32,6 +32,15 @@ class DeadlineHeap:
         """Note that a vehicle may be changing."""
         self.touched[vehicle.system_id] = vehicle
 
+    def forget(self, system_id: int) -> None:
+        """Forget a vehicle, which this gateway does not have any more."""
+        self.touched.pop(system_id, None)
+        self._awaiting.pop(system_id, None)
+        if (timer := self._due.pop(system_id, None)) is not None:
+            self._timers.forget(timer)
+        if self._words.pop(system_id, ()):
+            self._join_words()
+
     def plan(self) -> None:
         """Set the timers of the changed vehicles."""
         for system_id, vehicle in self.touched.items():
@@ -72,6 +81,9 @@ class DeadlineHeap:
         words = vehicle.requests.emergency_stop_packets if vehicle.control.is_engaged else ()
         if words != self._words.get(vehicle.system_id, ()):
             self._words[vehicle.system_id] = words
-            self.emergency_stop_packets = tuple(
-                word for words in self._words.values() for word in words
-            )
+            self._join_words()
+
+    def _join_words(self) -> None:
+        self.emergency_stop_packets = tuple(
+            word for words in self._words.values() for word in words
+        )

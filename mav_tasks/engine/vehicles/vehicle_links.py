@@ -143,6 +143,15 @@ class VehicleLinks:
         self.router.learn(system_id, place)
         self._budgets.clear()
 
+    def forget(self, system_id: int) -> None:
+        """Forget a vehicle, which this gateway does not have any more; its endpoint stays."""
+        place = self.router.place_of(system_id)
+        self.router.forget(system_id)
+        for rival in [each for each in self._rivals if each[0] == system_id]:
+            del self._rivals[rival]
+        self._budgets.clear()
+        self._forget_if_empty(place)
+
     def may_arm(self, name: str) -> bool:
         """Return whether we may arm vehicles on a link of this name."""
         arming = self._settings.arming

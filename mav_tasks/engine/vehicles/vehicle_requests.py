@@ -96,6 +96,10 @@ class VehicleRequests:
         self._outlet = outlet
         self._last_words = self._prepare_last_words()
 
+    def shut(self) -> None:
+        """Send the vehicle nothing any more: another gateway may have it."""
+        self.move_to(self._outlet.shut())
+
     def receive(self, ack: m.CommandAck, *, component: int, now: float) -> None:
         """Process an answer of the vehicle."""
         self._sender.receive(ack, component=component, now=now)

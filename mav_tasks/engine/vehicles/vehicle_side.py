@@ -13,6 +13,7 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import Outgoing, Peer
 from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.engine.snapshot import Reach
 from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.deadline_heap import DeadlineHeap
@@ -37,6 +38,9 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 NANO = 1e9  # TIMESYNC is in ns
 ASKED = 64  # TIMESYNC requests, one a second and link, whose answers are still accepted
 OLD_NEWS = 0.3  # s after a stall of this process, in which packets may have waited to be read
+#: s without a heartbeat, or since it was taken without any, after which another gateway may get a
+#: vehicle: longer than a restart of its radio; and s for which a halt is sent to a silent vehicle
+GONE = 5.0
 LAST_BEAT = 1.2  # s; heartbeats come each second
 MOST_NOTES = 256
 MOST_NAMED = 5  # tasks named in one text
@@ -126,7 +130,8 @@ class VehicleSide:
         self.look_at = self._vehicles.get
         #: what may be sent to them now
         self.lease = LeaseWatch(timers, self._change_of_lease, is_shared=is_shared)
-        self._ours: set[int] | None = set() if is_shared else None  # None: all
+        #: those that it has, and since when; None: all
+        self._ours: dict[int, float] | None = {} if is_shared else None
         self._others: dict[int, _Beat] = {}  # the last heartbeat of each that is not ours
         #: the links and endpoints
         self.links = VehicleLinks(
@@ -186,16 +191,48 @@ class VehicleSide:
         """
         assert self._ours is not None, "a server without a fleet has all vehicles"
         for vehicle in vehicles:
-            self._ours.add(vehicle)
+            self._ours[vehicle] = now
             beat = self._others.pop(vehicle, None)
             if beat is not None and now - beat.at <= LAST_BEAT:
                 self._meet(*beat[:4], now=now)
 
-    def heard(self, *, now: float) -> frozenset[int]:
-        """Return the vehicles whose heartbeats come, whether this gateway has them or not."""
+    def reach(self, *, now: float) -> Reach:
+        """Return the vehicles that are heard, those that this gateway has, and can forget."""
         since = now - self._settings.watch.heartbeat_lost
-        ours = {each.system_id for each in self.all if each.is_heard(now=now)}
-        return frozenset(ours | {each for each, beat in self._others.items() if beat.at >= since})
+        heard = {each.system_id for each in self.all if each.is_heard(now=now)}
+        heard |= {each for each, beat in self._others.items() if beat.at >= since}
+        ours = self._ours or {}
+        strays = {each for each in ours if each not in heard and self.is_stray(each, now=now)}
+        return Reach(frozenset(heard), frozenset(ours), frozenset(strays))
+
+    def is_stray(self, system_id: int, *, now: float) -> bool:
+        """Return whether a vehicle that this gateway has is silent, idle, and stored as it is.
+
+        Zeros and HOLD are still sent to it, because it has not shown HOLD, if a task was driving
+        it: they go on for ever, and keep nobody from it. Its next gateway stops it, too.
+        """
+        if self._ours is None or system_id not in self._ours:
+            return False
+        vehicle = self._vehicles.get(system_id)
+        heard_at = self._ours[system_id] if vehicle is None else vehicle.heard_at
+        if now - heard_at < max(GONE, self._settings.watch.heartbeat_lost):
+            return False
+        return self._registry.is_all_durable(system_id) and self._fleet.may_forget(
+            system_id, halted_before=now - GONE
+        )
+
+    def forget(self, system_id: int) -> None:
+        """Forget a vehicle, which another gateway may have from here on."""
+        assert self._ours is not None, "a server without a fleet has all vehicles"
+        del self._ours[system_id]
+        vehicle = self._vehicles.pop(system_id, None)
+        if vehicle is not None:
+            vehicle.requests.shut()  # whoever still knows this object
+        self.links.forget(system_id)
+        self.deadline_heap.forget(system_id)
+        self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
+        if self._answer is not None and self._answer.system_id == system_id:
+            self._answer = None
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle that has a task of a revoked key, even if another key's task drives.

@@ -106,6 +106,9 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
             " ADD COLUMN lead_utc DOUBLE PRECISION NOT NULL DEFAULT 0"
         ),
     ),
+    (  # vehicles that a gateway hears and does not hold: their gateway may free them
+        "ALTER TABLE gateways ADD COLUMN hears BIGINT[] NOT NULL DEFAULT '{}'",
+    ),
 )
 
 

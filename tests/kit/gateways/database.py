@@ -14,6 +14,7 @@ class Gateway:
     session: int  # that joined, or has asked since
     renewals: int = 0
     holds: set[int] = field(default_factory=set)
+    hears: frozenset[int] = frozenset()
 
 
 @dataclass
@@ -62,8 +63,9 @@ class Database:
             return self._row(None)
         mine.session = self.sessions[name]
         match request:
-            case Renew():
+            case Renew(hears=hears):
                 mine.renewals += 1
+                mine.hears = hears
             case Evict(_, rival):
                 if self._is_as_read(rival):
                     del self.rows[rival.name]
@@ -88,6 +90,7 @@ class Database:
                 row.renewals,
                 self.sessions.get(name) == row.session,
                 frozenset(row.holds),
+                row.hears,
             )
             for name, row in self.rows.items()
             if row is not mine

@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 from mav_tasks.engine.clients.elsewhere import BACK, TOWARDS
-from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, LeaseChanged, Peer
+from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, LeaseChanged, Peer, VehiclesGone
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Change, Member, Request
 from mav_tasks.fleet.standing import Effect, Standing
@@ -190,6 +190,7 @@ class Gateway:
         self._latest: int | None = None  # session; it may be over
         self.effects: list[Effect] = []
         self.got: list[tuple[float, int]] = []
+        self.let_go: list[tuple[float, int]] = []  # when the engine forgot each vehicle
         self.is_reached = True  # the database
         self.is_frozen = False
         self.is_dead = False
@@ -275,7 +276,8 @@ class Gateway:
             if self.session is None:
                 self.member.next_turn = max(self.member.next_turn, now + 0.1)
                 return
-        self.member.heard = set(self.engine.heard(now=now))
+        heard, _, self.member.strays = self.engine.reach(now=now)
+        self.member.heard = set(heard)
         request_or_none = self.member.request(now)
         if request_or_none is not None:
             delay = self.world.delay() if self.is_reached else GIVEN_UP
@@ -303,8 +305,15 @@ class Gateway:
         if change.got:
             self.got += [(now, vehicle) for vehicle in sorted(change.got)]
             for vehicle in change.got:  # as after a restart of the server
-                self.world.observers[vehicle - 1].server_restarted()
+                self.world.observers[vehicle - self.world.first_id].server_restarted()
             self.store.load_vehicles(change.got)
+        if change.lets_go:
+            asked = [vehicle for vehicle, _ in change.lets_go]
+            ours = self.engine.reach(now=now).ours
+            self.server.take_in(VehiclesGone(tuple(asked)), now=now)
+            gone = ours.intersection(asked) - self.engine.reach(now=now).ours
+            self.let_go += [(now, vehicle) for vehicle in sorted(gone)]
+            self.member.forgotten(gone)
 
     def _is_current(self) -> bool | None:
         if self.member.lease.standing in (Standing.OUT, Standing.EVICTED):
@@ -325,7 +334,9 @@ class FleetWorld(World):
         self.settings: Settings | None = kw.get("settings")
         self.keys: tuple[Key, ...] | None = kw.get("keys")
         self.wall_offset: float | None = kw.get("wall_offset")
-        self.rover_names = tuple(f"rover{n}" for n in range(1, kw.get("rovers", 1) + 1))
+        self.first_id: int = kw.get("first_id", 1)
+        rovers = range(self.first_id, self.first_id + kw.get("rovers", 1))
+        self.rover_names = tuple(f"rover{number}" for number in rovers)
         super().__init__(seed=seed, **kw)
         for name in names[1:]:
             self.watched.to_vehicles.add(VEHICLE_LINK.replace("server", name))
@@ -372,6 +383,15 @@ class FleetWorld(World):
     def freeze(self, name: str) -> None:
         """SIGSTOP."""
         self.gateways[name].is_frozen = True
+
+    def cut(self, name: str, vehicle: int = 1) -> None:
+        """Let a vehicle out of the reach of a gateway."""
+        self.watched.cut.add(frozenset((VEHICLE_LINK.replace("server", name), f"rover{vehicle}")))
+
+    def mend(self, name: str, vehicle: int = 1) -> None:
+        """Let a vehicle into the reach of a gateway again."""
+        way = frozenset((VEHICLE_LINK.replace("server", name), f"rover{vehicle}"))
+        self.watched.cut.discard(way)
 
     def holder(self, vehicle: int = 1) -> Gateway:
         """Return the gateway that has a vehicle, once its engine serves it."""

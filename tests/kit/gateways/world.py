@@ -8,7 +8,7 @@ from random import Random
 
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Change, Join, Member, Request
-from mav_tasks.fleet.standing import Effect
+from mav_tasks.fleet.standing import Effect, Standing
 from tests.kit.gateways.database import Database
 
 TICK = 0.05  # s, of a gateway's loop: set-points at 20 Hz
@@ -33,6 +33,9 @@ class Process:
     reaches_database: bool = True
     is_reached_by_peers: bool = True
     effects: list[Effect] = field(default_factory=list)
+    served: set[int] = field(default_factory=set)  # vehicles that its engine has
+    forgotten: set[int] = field(default_factory=set)  # by its engine
+    lives: int = 0  # of its engine
 
 
 @dataclass
@@ -48,6 +51,7 @@ class World:
     by_epoch: dict[int, Process] = field(default_factory=dict)  # whose address is in the row
     wrong: list[str] = field(default_factory=list)
     motions: int = 0
+    freed: int = 0  # times that an engine gave a vehicle up
     slow: float = 0.01  # share of messages that take far too long
     _events: list[tuple[float, int, Callable[[], None]]] = field(default_factory=list)
     _count: "count[int]" = field(default_factory=count)
@@ -110,7 +114,11 @@ class World:
             return
         member, now = it.member, self.local(it)
         it.effects += member.lease.passed(now)
+        member.strays = frozenset(it.served - member.heard)
+        is_holder = member.lease.standing is Standing.HOLDER and now < member.lease.trusted_until
         for vehicle in range(1, self.vehicles + 1):
+            if is_holder and vehicle in it.served:
+                self._judge(it, vehicle, "serves")
             if member.lease.may_move(vehicle, now):
                 self.motions += 1
                 self._judge(it, vehicle, "moves")
@@ -175,6 +183,37 @@ class World:
 
     def _take(self, it: Process, change: Change) -> None:
         it.effects += change.effects
+        if Effect.DROP in change.effects:
+            it.served.clear()
+            it.forgotten.clear()
+            it.lives += 1
+        life = it.lives
+        if change.got:
+            it.forgotten -= change.got
+            self.at(self._delay(), lambda: self._serve(it, life, change.got))
+        asked = it.served.intersection(each for each, _ in change.lets_go) - it.forgotten
+        if asked:
+            self.at(self._delay(), lambda: self._forget(it, life, asked))
+
+    def _serve(self, it: Process, life: int, vehicles: frozenset[int]) -> None:
+        """The engine gets the data of vehicles."""
+        if it.lives == life:
+            it.served |= vehicles
+
+    def _forget(self, it: Process, life: int, vehicles: set[int]) -> None:
+        """The engine forgets the vehicles that it still does not hear; a while later it shows."""
+        if it.frozen_until > self.now:
+            self.at(it.frozen_until - self.now, lambda: self._forget(it, life, vehicles))
+        elif it.lives == life:
+            gone = frozenset(vehicles & it.served - it.member.heard)
+            it.served -= gone
+            it.forgotten |= gone
+            self.at(self.random.uniform(0.0, PING), lambda: self._free(it, life, gone))
+
+    def _free(self, it: Process, life: int, vehicles: frozenset[int]) -> None:
+        if it.lives == life and not it.is_dead:
+            self.freed += len(vehicles)
+            it.member.forgotten(vehicles)
 
     def _ping(self, it: Process) -> None:
         if it.is_dead:

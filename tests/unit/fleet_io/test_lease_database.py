@@ -60,8 +60,9 @@ def chosen(chance: random.Random, name: str, model: Database) -> Request:
         return Eviction(of, epoch + wrong[0], renewals + wrong[1])
 
     mine = model.rows.get(name)
-    me = Renew(name, (mine.epoch if mine else 1) + chance.choice((*[0] * 8, 1, -1)))
+    epoch = (mine.epoch if mine else 1) + chance.choice((*[0] * 8, 1, -1))
     vehicles = frozenset(chance.sample(range(1, 8), chance.randint(1, 4)))
+    me = Renew(name, epoch or 9, vehicles)  # a member never asks with 0, which is nobody's epoch
     match chance.randrange(10):
         case 0 | 1:
             return Join(name, eviction(name) if chance.random() < 0.5 else None)

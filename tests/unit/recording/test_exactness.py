@@ -24,6 +24,7 @@ from mav_tasks.engine.inputs import (
     SettingsChanged,
     Shutdown,
     StoreFailed,
+    VehiclesGone,
     VehiclesTaken,
     WallClock,
 )
@@ -75,6 +76,7 @@ INPUTS: list[Input | None] = [
     IdsGranted(1000, 2),
     FleetChanged(((3, "a"), (7, "b"))),
     VehiclesTaken((3, 7), TAKEN_OVER),
+    VehiclesGone((3, 7)),
     SettingsChanged(Settings(clients=Clients(priorities={"255/190": 7}, stream_interval=0))),
     WallClock(-0.0),
     Shutdown(),
