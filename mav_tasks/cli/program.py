@@ -11,7 +11,7 @@ from typer.core import TyperCommand
 
 from mav_tasks.cli.lazy import beginning_with
 
-LONGEST = 5.0  # s for the help of another program
+LONGEST = 15.0  # s for the help of another program, which a busy machine may need
 PASSED_ON = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 

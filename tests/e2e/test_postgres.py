@@ -63,7 +63,7 @@ def test_without_its_database_the_server_refuses_new_tasks_and_nothing_else(
             what="a task to be accepted again",
         )
         task = taken.result_param2
-        wait_for(link, "STATUSTEXT", f"'Task {task} done' in STATUSTEXT.text", within=20)
+        running.server.wait_for(f"task {task} completed", within=40)
         running.server.wait_for("the store works again")
     with tables(url) as connection:
         found = connection.execute("SELECT id FROM tasks ORDER BY id").fetchall()
