@@ -243,7 +243,7 @@ ROVER = 213
 
 @pytest.mark.patches_core
 def test_nothing_passes_to_a_rover_that_went_away(tmp_path: Path) -> None:
-    """Not even from whoever still knows the object that sends to it."""
+    """Not even from a part that still has the object that sends to it."""
     reach = Reach(tmp_path)
     engine = reach.first.engine
     vehicle = next(iter(engine._vehicles.all))

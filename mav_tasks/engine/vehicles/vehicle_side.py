@@ -227,7 +227,7 @@ class VehicleSide:
         del self._ours[system_id]
         vehicle = self._vehicles.pop(system_id, None)
         if vehicle is not None:
-            vehicle.requests.shut()  # whoever still knows this object
+            vehicle.requests.shut()  # another part may still have this object
         self.links.forget(system_id)
         self.deadline_heap.forget(system_id)
         self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
