@@ -29,7 +29,7 @@ class Cron:
     def next(self, after: float) -> int | None:
         """Return the first time after a moment, both in UTC seconds.
 
-        None: there is none within HORIZON.
+        None: no time within HORIZON fits.
         """
         try:
             moment = datetime.fromtimestamp(int(after // 1), _zone(self.zone))
@@ -45,7 +45,7 @@ class Cron:
 
 
 def parse_cron(text: str) -> Cron:
-    """Return the expression in a text. Raise ValueError if it is none."""
+    """Return the expression in a text. Raise ValueError if it is not one."""
     parts = text.split()
     fields, zone = parts[:FIELDS], " ".join(parts[FIELDS:]) or "UTC"
     if len(fields) != FIELDS:
@@ -76,7 +76,7 @@ def utc_text(utc: float) -> str:
 
 
 def _zone(name: str) -> tzinfo:
-    """Return a time zone. Raise ZoneInfoNotFoundError or ValueError if there is none.
+    """Return a time zone. Raise ZoneInfoNotFoundError or ValueError if it is not known.
 
     Its rules are read from the system once, and are constants from then on.
     """

@@ -256,7 +256,7 @@ class PendingTasks:
             del self._registry.unplanned[task_id]
 
     def _is_continued(self, task: Task, *, now: float) -> bool:
-        """Add the run after a task, or say why there is none; return False if there is no id."""
+        """Add the run after a task, or say why its series ends; return False without a task id."""
         why_not = why_series_ends(task)
         run = None if why_not else next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
         if run is None:

@@ -70,7 +70,7 @@ def repeating(task: Task, repeat: str, *, now: float, wall_offset: float) -> Ter
     """Return a task's terms with a repetition; ``repeat`` is canonical, "" for none.
 
     With an expression a task that waits starts at the expression's next time, instead of its own.
-    Raise ValueError if there is none. ``wall_offset`` is UTC minus monotonic time, s.
+    Raise ValueError if the expression has no time. ``wall_offset`` is UTC minus monotonic time, s.
     """
     terms = task.terms
     if not repeat:

@@ -2,7 +2,7 @@
 
 import select
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -45,13 +45,6 @@ def hanging(url: str) -> Iterator[Hang]:
         connection.execute("SELECT * FROM meta FOR UPDATE")
         yield Hang(watching)
         connection.execute("ROLLBACK")
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 class Gateway:

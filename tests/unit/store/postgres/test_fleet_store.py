@@ -22,6 +22,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import MAX_TASK_ID, TaskId
 from tests.kit.postgres import PostgresServer, connected
+from tests.kit.processes import wait_until
 from tests.kit.tcp_proxy import TcpProxy
 from tests.unit.store.postgres.gateways import (
     PATIENCE,
@@ -31,7 +32,6 @@ from tests.unit.store.postgres.gateways import (
     hanging,
     ids_in,
     of_vehicle,
-    until,
 )
 from tests.unit.store.samples import FOR_EVER, OFFSET, opened, submitted
 from tests.unit.tasks.samples import draft
@@ -161,7 +161,7 @@ def test_a_write_in_flight_is_over_before_an_eviction_ends(url: str) -> None:
         thread = threading.Thread(target=evict)
         with hanging(url) as hang:
             a.store.append([submitted(1)])
-            until(hang.is_waited_for)
+            wait_until(hang.is_waited_for, within=PATIENCE)
             renewed = a.leases.execute(Renew("a", a.epoch))  # is not kept waiting by the write
             assert renewed.row.epoch == a.epoch
             thread.start()
@@ -229,9 +229,9 @@ def test_a_commit_whose_answer_was_lost_is_not_made_twice(
         a.kept(1)
         with hanging(url) as hang:
             a.store.append([submitted(2)])
-            until(hang.is_waited_for)
+            wait_until(hang.is_waited_for, within=PATIENCE)
             proxy.fall_silent()
-        until(lambda: ids_in(url) == [1, 2])
+        wait_until(lambda: ids_in(url) == [1, 2], within=PATIENCE)
         a.kept(2)
         a.store.append([submitted(3)])
         a.kept(3)

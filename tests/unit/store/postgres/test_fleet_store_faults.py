@@ -38,7 +38,6 @@ from tests.unit.store.postgres.gateways import (
     hanging,
     ids_in,
     of_vehicle,
-    until,
 )
 from tests.unit.store.samples import FOR_EVER, OFFSET, opened, submitted
 
@@ -152,10 +151,10 @@ def test_a_lost_session_that_still_commits_leaves_nothing_twice(
         threads = [threading.Thread(target=write, args=(each,)) for each in (old, new)]
         with hanging(url) as hang:
             threads[0].start()
-            until(hang.is_waited_for)
+            wait_until(hang.is_waited_for, within=PATIENCE)
             new.reopen()
             threads[1].start()
-            until(lambda: hang.waiting() == 2)
+            wait_until(lambda: hang.waiting() == 2, within=PATIENCE)
         for each in threads:
             each.join(PATIENCE)
         (failure,) = failures
