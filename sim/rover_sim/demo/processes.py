@@ -10,6 +10,8 @@ from pathlib import Path
 STOP_LIMIT = 5.0  # s, for a process to end after SIGTERM
 #: how a process ends after Ctrl-C, which a terminal sends to all of them
 INTERRUPTED = (130, -signal.SIGINT)
+#: and if SIGTERM comes while it is already ending after Ctrl-C
+ENDED = (0, *INTERRUPTED, -signal.SIGTERM)
 
 
 class DemoError(Exception):
@@ -43,7 +45,7 @@ def process(command: list[str], log: Path) -> Iterator[Callable[[], None]]:
             except subprocess.TimeoutExpired:
                 running.kill()
                 running.wait()
-    if running.returncode not in (0, *INTERRUPTED):
+    if running.returncode not in ENDED:
         raise DemoError(f"{' '.join(command[1:3])} ended with {running.returncode}")
 
 
