@@ -243,6 +243,10 @@ class OffboardControl:
         """Whoever armed the vehicle has done with it: it is disarmed when we hand it back."""
         self.we_armed = self._news.armed
 
+    def regain(self) -> None:
+        """Count a vehicle as in control that shows our mode, armed: an earlier run drives it."""
+        self.phase = Phase.CONTROL
+
     def hand_over(self) -> None:
         """Somebody else goes on from the hand-back, and HOLD asked for again would undo it.
 

@@ -164,6 +164,7 @@ class Observer:
     _moved_last: bool = False
     _brakes: bool = False  # zeros have followed motion, and nothing since
     _stop_due: tuple[float, set[str]] | None = None
+    _is_met: bool = False  # a new server found it in our mode, and set-points brake it before HOLD
     _last_source: tuple[float, tuple[int, int]] | None = None
     _course: float | None = None  # rad, of the last zero-speed setpoint that arrived
     _course_at: float = -1e9  # when that course changed
@@ -292,6 +293,10 @@ class Observer:
         self._check_stop(now)
         assert not self.violations, "\n".join(self.violations)
 
+    @property
+    def _due_at_stop(self) -> set[str]:
+        return {"zero"} if self._is_met else {"zero", "HOLD"}
+
     # queries
 
     def sent_since(self, at: float) -> list[str]:
@@ -310,7 +315,7 @@ class Observer:
             self.stopped, self.taken_over, self.stopped_at = True, False, now
             self._wishes.stopped()
             if self.mode >= 0:  # else it is stopped when it is found
-                self._stop_due = (now, {"zero", "HOLD"})
+                self._stop_due = (now, self._due_at_stop)
         elif message.command == PAUSE_CONTINUE:
             is_continue = param1 == 1.0
             if param1 == 0.0:
@@ -340,8 +345,10 @@ class Observer:
 
     def _see_heartbeat(self, now: float, message: Any) -> None:
         armed, mode = bool(message.base_mode & 128), int(message.custom_mode)
+        if self.mode < 0:
+            self._is_met = armed and mode == self.ways.ours
         if self.stopped and self.mode < 0:
-            self._stop_due = (now, {"zero", "HOLD"})  # it is found now
+            self._stop_due = (now, self._due_at_stop)  # it is found now
         if self.armed and not armed and now - self._disarm_at > OWN_REQUEST:
             self._take_over(now, zeros=1)  # its kept setpoint must not drive it when armed
             self._disarmed_at = now  # nor where it was taken over
@@ -410,6 +417,7 @@ class Observer:
         self._check_rate(now, moves=moves)
         if moves:
             self._check_motion(now)
+            self._is_met = False
         else:
             if self._moved_last or now - self._setpoint_at > GAP:
                 self._zeros_since = now
@@ -464,7 +472,7 @@ class Observer:
     def _see_mode_asked(self, now: float, wanted: int) -> None:
         ways = self.ways
         if wanted == ways.hold:
-            self._hold_at = now
+            self._hold_at, self._is_met = now, False
             is_for_stick = self._is_held_for_sticks(now) or self._is_held_since_stick
             if now == self._sticks_at or is_for_stick:
                 self._stick_hold_at = now

@@ -63,6 +63,8 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.STAY:
             control.ask_to_stay(now=now)
             requests.flush(now=now)
+        case Effect.REGAIN:
+            pilot.regain(now=now)
         case Effect.LOSE:
             tasks.stopping_after_kill = False
             control.lose()

@@ -74,6 +74,10 @@ class MotionGuard:
     def apply(self, watch: Watch) -> None:
         self._watch = watch
 
+    def told_to_move(self, *, now: float) -> None:
+        """Note that it was told to move just now, if not by this run."""
+        self._told_to_move_at = now
+
     def is_fresh(self, *, now: float) -> bool:
         """Return whether there is fresh data on how the vehicle moves."""
         motion = self._motion.latest()
@@ -100,7 +104,7 @@ class MotionGuard:
             if too_fast:
                 found.append(Found(Measure.STOP_TASK, too_fast))
         if told.moves:
-            self._told_to_move_at = now
+            self.told_to_move(now=now)
             self.ladder.end()
         elif told.is_ours and told.armed and not told.still:
             self.ladder.begin(now=now)

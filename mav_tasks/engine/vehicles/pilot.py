@@ -4,6 +4,7 @@ It checks that the vehicle obeys. A finding about a task is an event for the con
 """
 
 from collections.abc import Callable
+from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.vehicles.control import Event
@@ -46,6 +47,7 @@ class Pilot:
         #: checks that it moves as it was told to
         self.guard = MotionGuard(parts.where.motion, parts.settings.watch)
         self._is_closing = False
+        self._regained_at = -inf  # s, when it was met driving
         self._is_back_home = False  # its last task returned home: disarm it even if others wait
 
     def __repr__(self) -> str:
@@ -103,7 +105,8 @@ class Pilot:
         """
         parts = self._parts
         self._face(now=now)
-        brakes = brakes and parts.persona.brakes_by_setpoints and self.guard.is_fresh(now=now)
+        is_better = parts.persona.brakes_by_setpoints or self._may_be_a_car(now=now)
+        brakes = brakes and is_better and self.guard.is_fresh(now=now)
         longest = parts.settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
         parts.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
         self.guard.ladder.begin(now=now)
@@ -119,6 +122,22 @@ class Pilot:
         """Watch from here on that it comes to stand."""
         self.guard.ladder.begin(now=now)
         self._send_at_once(now=now)
+
+    def regain(self, *, now: float) -> None:
+        """Brake a vehicle by set-points from here on: it still drives on those of an earlier run.
+
+        Whether it steers as a car is not known yet: it is asked.
+        """
+        self._regained_at = now
+        self._parts.control.regain()
+        self._parts.requests.ask_for_parameters()
+        self.guard.told_to_move(now=now)
+        self.watch(now=now)
+
+    def _may_be_a_car(self, *, now: float) -> bool:
+        """Return whether it was met driving just now, and has not said yet how it turns."""
+        is_known = self._parts.requests.turning.turning is not None
+        return now - self._regained_at <= BRAKES_FOR and not is_known
 
     def brakes_against_stick(self, *, now: float) -> bool:
         """Return whether set-points stop it before HOLD is asked for, although a stick is held.

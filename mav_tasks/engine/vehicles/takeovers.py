@@ -12,6 +12,7 @@ from mav_tasks.engine.vehicles.authority import Before
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.hands import BUTTONS, Word
 from mav_tasks.engine.vehicles.joint_control import JointControl
+from mav_tasks.engine.vehicles.motion_guard import NEARLY_STANDS
 from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.tasks.events import VehicleSeen
@@ -64,7 +65,10 @@ class Takeovers:
             if halt.reason in (R.STOPPED, R.DISARMED):
                 armed = parts.monitor.armed
                 parts.armings.outdate_earlier(armed=armed, until=self._may_show_until, now=now)
-        if halt is not None and parts.monitor.armed and not parts.is_manual:
+        is_disarmed = halt is not None and halt.reason is R.DISARMED
+        if (was_driven or halt is not None) and not is_disarmed and self._drives_on(now=now):
+            event = Event.COME_BACK_DRIVING
+        elif halt is not None and parts.monitor.armed and not parts.is_manual:
             event = Event.COME_BACK_HALTED
         elif not was_driven:
             event = Event.COME_BACK
@@ -76,6 +80,15 @@ class Takeovers:
         is_parked = mode == persona.hold_mode and parts.monitor.armed
         if is_parked and not parts.tasks.terms.may_be_armed:  # by somebody before this run
             self._taken(Event.PARKED, "", now=now)
+
+    def _drives_on(self, *, now: float) -> bool:
+        """Return whether a vehicle that is met now is seen to drive on by set-points."""
+        parts, motion = self._parts, self._parts.where.motion.latest()
+        is_fresh = motion is not None and now - motion.at <= parts.settings.watch.motion_fresh
+        is_ours = parts.monitor.armed and parts.monitor.custom_mode == parts.persona.control_mode
+        is_taken = parts.tasks.paused in TAKEN
+        moves = motion is not None and motion.speed > NEARLY_STANDS
+        return is_ours and not is_taken and is_fresh and moves
 
     def look(self, *, was_mode: int, was_armed: bool, before: Before, now: float) -> None:
         """Detect what a heartbeat shows that is new; ``before`` is the state before it."""

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from math import inf
-from typing import NamedTuple
 
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.inputs import Outgoing, Peer
@@ -19,6 +18,7 @@ from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.deadline_heap import DeadlineHeap
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
+from mav_tasks.engine.vehicles.strangers import MOTION, Beat, Moved, Strangers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
@@ -41,7 +41,6 @@ OLD_NEWS = 0.3  # s after a stall of this process, in which packets may have wai
 #: s without a heartbeat, or since it was taken without any, after which another gateway may get a
 #: vehicle: longer than a restart of its radio; and s for which a halt is sent to a silent vehicle
 GONE = 5.0
-LAST_BEAT = 1.2  # s; heartbeats come each second
 MOST_NOTES = 256
 MOST_NAMED = 5  # tasks named in one text
 
@@ -74,16 +73,6 @@ USED = frozenset(
 )
 NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
 DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
-
-
-class _Beat(NamedTuple):
-    """A heartbeat, and where and when it came."""
-
-    link: str
-    peer: Peer
-    packet: Packet
-    message: m.Heartbeat
-    at: float
 
 
 class VehicleSide:
@@ -132,7 +121,7 @@ class VehicleSide:
         self.lease = LeaseWatch(timers, self._change_of_lease, is_shared=is_shared)
         #: those that it has, and since when; None: all
         self._ours: dict[int, float] | None = {} if is_shared else None
-        self._others: dict[int, _Beat] = {}  # the last heartbeat of each that is not ours
+        self._strangers = Strangers()
         #: the links and endpoints
         self.links = VehicleLinks(
             self._vehicles,
@@ -192,15 +181,15 @@ class VehicleSide:
         assert self._ours is not None, "a server without a fleet has all vehicles"
         for vehicle in vehicles:
             self._ours[vehicle] = now
-            beat = self._others.pop(vehicle, None)
-            if beat is not None and now - beat.at <= LAST_BEAT:
+            beat = self._strangers.take_beat(vehicle, now=now)
+            if beat is not None:
                 self._meet(*beat[:4], now=now)
 
     def reach(self, *, now: float) -> Reach:
         """Return the vehicles that are heard, those that this gateway has, and can forget."""
         since = now - self._settings.watch.heartbeat_lost
         heard = {each.system_id for each in self.all if each.is_heard(now=now)}
-        heard |= {each for each, beat in self._others.items() if beat.at >= since}
+        heard |= self._strangers.heard_since(since)
         ours = self._ours or {}
         strays = {each for each in ours if each not in heard and self.is_stray(each, now=now)}
         return Reach(frozenset(heard), frozenset(ours), frozenset(strays))
@@ -306,10 +295,12 @@ class VehicleSide:
             return None
         vehicle = self.get(packet.system_id)
         if vehicle is None:
+            if isinstance(message, MOTION) and packet.component_id == AUTOPILOT:
+                self._strangers.note_motion(packet.system_id, Moved(link, peer, message, now))
             if not isinstance(message, m.Heartbeat):
                 return None
             if self._ours is not None and packet.system_id not in self._ours:
-                self._note_other(_Beat(link, peer, packet, message, now))
+                self._note_other(Beat(link, peer, packet, message, now))
                 return None
             vehicle = self._meet(link, peer, packet, message, now=now)
             if vehicle is None:
@@ -368,10 +359,10 @@ class VehicleSide:
             else:
                 vehicle.joint.on(Event.LEASE_ENDS, Word(), now=now)
 
-    def _note_other(self, beat: "_Beat") -> None:
+    def _note_other(self, beat: Beat) -> None:
         """Note a vehicle that this gateway hears, but does not have: it may get it."""
         if self._persona_of(beat.packet, beat.message, now=beat.at) is not None:
-            self._others[beat.packet.system_id] = beat
+            self._strangers.note_beat(beat)
 
     def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
         """Send a heartbeat and a TIMESYNC request to each endpoint of a link, each second."""
@@ -412,6 +403,8 @@ class VehicleSide:
         self.deadline_heap.mark_dirty(vehicle)
         self._registry.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
         number = packet.system_id
+        for moved in self._strangers.take_motion(number, link_name, peer, now=now):
+            vehicle.recall(moved.message, at=moved.at)
         was_driven = self._fleet.was_driven(number)
         halt = self._fleet.last_halt(number, now=now)
         vehicle.come_back(was_driven=was_driven, halt=halt, now=now)

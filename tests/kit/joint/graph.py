@@ -9,7 +9,7 @@ from itertools import product
 from typing import Any
 
 from mav_tasks.engine.vehicles.control import STANDS, TABLE, Event
-from mav_tasks.engine.vehicles.joint_state import Grip, Queue, State, Work
+from mav_tasks.engine.vehicles.joint_state import Driver, Grip, Queue, State, Work
 from tests.kit.joint.model import FREE, MAKES, START, Known, forget, happens, others_do, passes
 
 #: per event, the conditions of its rows that the graph leaves open
@@ -66,6 +66,9 @@ def can_happen(event: Event, state: State) -> bool:
             return state.queue is not Queue.STOPPED
         case Event.COME_BACK | Event.COME_BACK_DRIVEN | Event.COME_BACK_LED_AWAY:
             return state.grip is Grip.FREE and not has_task
+        case Event.COME_BACK_DRIVING:
+            is_met = state.grip is Grip.FREE and state.driver is Driver.NOBODY
+            return is_met and not has_task and state.armed
         case Event.COME_BACK_HALTED:
             return state.grip is Grip.FREE and not has_task and state.armed
         case Event.CLOSE | Event.LEAVE:

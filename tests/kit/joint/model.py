@@ -374,6 +374,7 @@ RESULTS: dict[Effect, Callable[[State], Iterator[State]]] = {
     F.LET_GO: _let_go,
     F.STEP: _stepped,
     F.WAKE: _stepped,
+    F.REGAIN: lambda state: iter((state._replace(grip=Grip.DRIVING),)),
     F.LOSE: lambda state: iter((state._replace(grip=Grip.FREE),)),
     F.FORGET_GO_TO: _without(Waits.GO_TO),
     F.FORGET_START: _without(Waits.START),

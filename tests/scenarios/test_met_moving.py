@@ -1,0 +1,198 @@
+"""A server, or a gateway, that meets a rover while it drives brakes it by set-points before HOLD.
+
+In HOLD an ArduPilot car rolls on for 3 m, and a PX4 car drives a loop of 5 m (measured on real
+ones); by set-points each stands within 1.2 m.
+"""
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.frames import Frame
+from rover_sim.personas import Mode, Persona
+from tests.kit.car import Car
+from tests.kit.client import ACCEPTED
+from tests.kit.gateways.engines import FleetWorld
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import PROMPT, World
+from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_restart import REMAINDER, UTC, release, restart
+
+AWAY = 0.4  # s, of a server that a supervisor starts again at once
+
+CARS = {
+    "ArduPilot car": PROMPT.on(Frame.ACKERMANN),
+    "PX4 car": PROMPT_PX4.on(Frame.ACKERMANN),
+}
+OTHERS = {"ArduPilot": PROMPT, "PX4": PROMPT_PX4}
+EVERY = {**OTHERS, **CARS}
+
+personas = pytest.mark.parametrize("persona", EVERY.values(), ids=EVERY.keys())
+cars = pytest.mark.parametrize("persona", CARS.values(), ids=CARS.keys())
+others = pytest.mark.parametrize("persona", OTHERS.values(), ids=OTHERS.keys())
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "tasks.sqlite3"
+
+
+def driving(make_world: MakeWorld, path: Path, persona: Persona) -> World:
+    """Return a world in which a task drives at 1 m/s."""
+    store = PromptSqliteStore(path, wall_offset=UTC)
+    world = make_world(persona=persona, body=partial(Car, radius=1.2), store=store)
+    world.client.move(20, speed=1.0)
+    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
+    return world
+
+
+def in_control_mode(world: World) -> bool:
+    return world.rover.autopilot.mode is Mode.GUIDED  # OFFBOARD
+
+
+def phase_of(world: World) -> str:
+    """Return the phase of the server's control, "" before it has met the rover."""
+    found = world.server.engine.snapshot(now=world.now).vehicles
+    return found[0].control if found else ""
+
+
+class Met:
+    """What a rover did from the moment in which a new server met it."""
+
+    def __init__(self, world: World, path: Path, *, away: float = AWAY) -> None:
+        self.world = world
+        restart(world, path, away=away, settles=0.0)
+        assert world.truth.forward_speed > 0.9
+        self.began, self.north = world.now, world.truth.north
+        self.slow_at: float | None = None
+        self.held_at: float | None = None
+        world.watch(self._look)
+
+    def _look(self, now: float) -> None:
+        if self.slow_at is None and abs(self.world.truth.forward_speed) < 0.15:
+            self.slow_at = now
+        if self.held_at is None and "HOLD" in self.world.observer.sent_since(self.began):
+            self.held_at = now
+
+    def stands(self, *, within: float = 3.0) -> None:
+        """Run until it has stopped and got HOLD, in this order, and stands."""
+        self.world.until(lambda: self.held_at is not None and self.world.stands(), within=within)
+        assert self.slow_at is not None
+        assert self.held_at is not None
+        assert self.slow_at <= self.held_at
+        assert self.world.truth.north - self.north < 2.2  # up to 1 s until its next heartbeat
+
+
+@personas
+def test_it_is_braked_and_gets_hold_when_it_stands(
+    make_world: MakeWorld, path: Path, persona: Persona
+) -> None:
+    world = driving(make_world, path, persona)
+    met = Met(world, path)
+    met.stands()
+    assert world.state(1) == (S.HELD, R.OUTCOME_UNKNOWN)
+    world.run(3)
+    assert not in_control_mode(world)
+    assert world.stands()
+    release(world, 1, REMAINDER)
+    world.client.proceed()
+    world.until_idle(tasks=1, within=60)
+    assert world.state(1)[0] is S.COMPLETED
+    assert abs(world.truth.north - 20.0) < 0.3
+
+
+@cars
+def test_stop_just_after_it_was_met_brakes_it_in_the_same_way(
+    make_world: MakeWorld, path: Path, persona: Persona
+) -> None:
+    world = driving(make_world, path, persona)
+    met = Met(world, path)
+    world.until(lambda: phase_of(world) == "CONTROL", within=1.5)
+    stop = world.client.stop()
+    world.run(0.1)
+    assert stop.result == ACCEPTED
+    assert phase_of(world) == "STOPPING"
+    met.stands()
+    assert world.paused() is R.STOPPED
+    assert world.state(1)[0] is S.KILLED
+    world.run(2)
+    assert not in_control_mode(world)
+
+
+@others
+def test_one_that_was_stopped_just_before_is_braked_too(
+    make_world: MakeWorld, path: Path, persona: Persona
+) -> None:
+    """The server died in the moment of the STOP, and nothing of that came to the rover.
+
+    Whether it steers as a car the new server does not know yet.
+    """
+    world = driving(make_world, path, persona)
+    world.watched.loses = lambda _source, target, _data: target == "rover1"
+    stop = world.client.stop()
+    world.run(0.1)
+    assert stop.result == ACCEPTED
+    met = Met(world, path, away=0.2)
+    world.watched.loses = lambda *_: False
+    met.stands()
+    assert world.paused() is R.STOPPED
+
+
+@personas
+def test_without_a_position_it_gets_hold_at_once(
+    make_world: MakeWorld, path: Path, persona: Persona
+) -> None:
+    """By set-points alone nobody would see whether it stops."""
+    world = driving(make_world, path, persona)
+    restart(world, path, away=AWAY, settles=0.0)
+    # from here on only its heartbeats come
+    world.watched.loses = lambda source, _target, data: source == "rover1" and data[7] != 0
+    began = world.now
+    world.until(lambda: "HOLD" in world.observer.sent_since(began), within=1.5)
+    assert phase_of(world) == "RELEASING"
+    world.until(lambda: not in_control_mode(world), within=1.0)
+
+
+def test_who_switches_it_to_manual_meanwhile_has_it(make_world: MakeWorld, path: Path) -> None:
+    world = driving(make_world, path, PROMPT)
+    Met(world, path)
+    world.until(lambda: phase_of(world) == "CONTROL", within=1.5)
+    world.operator_mode(Mode.MANUAL)
+    at = world.now
+    world.run(3)
+    assert phase_of(world) == "IDLE"
+    assert world.rover.autopilot.mode is Mode.MANUAL
+    assert "HOLD" not in world.observer.sent_since(at + 1.1)  # after its next heartbeat
+
+
+@personas
+@pytest.mark.parametrize("on_takeover", ["hold", "resume"])
+def test_a_gateway_that_gets_it_brakes_it_in_the_same_way(
+    tmp_path: Path, persona: Persona, on_takeover: str
+) -> None:
+    body = partial(Car, radius=1.2)
+    settings = Settings(on_takeover=on_takeover)
+    world = FleetWorld(tmp_path, persona=persona, body=body, settings=settings)
+    clients = {"server": world.client}
+    clients["b"] = world.add_client("client b", system_id=254, server="b:clients")
+    first = world.holder()
+    world.run(4.0)
+    clients[first.name].move(20, speed=1.0)
+    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
+    world.kill(first.name)
+    at, north = world.now, world.truth.north
+    world.until(lambda: abs(world.truth.forward_speed) < 0.15, within=3)
+    took = [now for each in world.gateways.values() for now, _ in each.got if now > at]
+    assert len(took) == 1
+    assert world.truth.north - north < (took[0] - at) + 0.9
+    assert in_control_mode(world)  # HOLD has not stopped it
+    world.until(lambda: world.stands() and not in_control_mode(world), within=3)
+    if on_takeover == "resume":
+        world.until(lambda: world.truth.forward_speed > 0.9, within=10)
+        world.until(lambda: abs(world.truth.north - 20.0) < 0.2 and world.stands(), within=40)
+    world.check()
