@@ -44,7 +44,7 @@ class VehicleView:
     turning: Turning = Turning.ON_SPOT
     turns_by_course: bool = False  # it turns on the spot to a commanded course
     turning_radius: float = DEFAULT_TURNING_RADIUS  # m, if it is STEERED
-    is_unknown: bool = False  # it has not said yet whether it is the vehicle of its tasks
+    is_unknown: bool = False  # not known yet: which vehicle it is, or who else controls it
     is_not_ready: bool = False  # arming was refused, but may succeed later
     why_not_ready: str = ""  # in the vehicle's own recent words
     is_untouched: bool = False  # it is being taken, but no request was sent yet

@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.clients.signatures import FENCE_LINK_ID
+from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.mavlink.signing import Key, signed, timestamp_at
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -20,6 +21,7 @@ from tests.kit.gateways.engines import FleetWorld, Gateway
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import at
+from tests.scenarios.test_takeover import packed
 
 #: s without a holder after a process has ended, and after one fell silent (the issue's goals)
 AFTER_DEATH, AFTER_SILENCE = 0.3, 1.5
@@ -175,6 +177,40 @@ def test_a_stop_while_nobody_has_the_rover_is_in_force_as_soon_as_somebody_has(
     assert fleet.task(task).state is S.KILLED
     assert sent.result == ACCEPTED
     fleet.world.until(fleet.world.stands, within=5)
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_no_task_starts_on_a_taken_rover_before_the_gateway_has_listened(
+    fleet: Fleet, *, other: bool
+) -> None:
+    """A second controller sends set-points to the rover, and its radio is heard here, too."""
+    fleet.world.kill(fleet.first.name)
+    taken = fleet.world.holder()
+    took = taken.got[-1][0]
+    link = VEHICLE_LINK.replace("server", taken.name)
+    shown = fleet.world.now + 0.9
+
+    def sends(now: float) -> None:
+        nonlocal shown
+        if other and now >= shown:
+            shown += 0.9
+            fleet.world.net.send("stranger", link, packed(setpoint(0.5), 9, 9))
+        if "arm" in fleet.world.observer.sent_since(took):
+            armed_at.append(now)
+
+    armed_at: list[float] = []
+    fleet.world.watch(sends)
+    sent = fleet.clients[taken.name].move(2.0)
+    fleet.world.run(0.3)
+    assert sent.result == ACCEPTED
+    if other:
+        fleet.world.run(10.0)
+        assert fleet.task(sent.task_id).state is S.QUEUED
+        assert "arm" not in fleet.world.observer.sent_since(took)
+    else:
+        fleet.world.until(lambda: fleet.task(sent.task_id).state is S.COMPLETED, within=20)
+        assert armed_at
+        assert 1.0 <= armed_at[0] - took < 4.0
 
 
 def test_what_was_pre_empted_goes_on_after_a_takeover(tmp_path: Path) -> None:

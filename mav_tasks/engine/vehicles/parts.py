@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
+from math import inf
 
 from mav_tasks.engine.vehicles.armings import Armings
 from mav_tasks.engine.vehicles.authority import Authority
@@ -56,6 +57,8 @@ class Parts:
     start_mark: StartMark = field(default_factory=StartMark)
     #: its heartbeats as clients see them
     shown: ShownHeartbeat = field(default_factory=ShownHeartbeat)
+    #: s, until when it is only listened to: another controller may show itself
+    listens_until: float = -inf
     #: handles a mode change that a person, or a restart, has caused; no task starts before that
     undecided: Callable[[float], None] | None = None
 
@@ -81,11 +84,13 @@ class Parts:
         ours = self.control.arming_asked_at
         return self.monitor.armed and not self.armings.do_not_count(ours=ours, now=now)
 
-    @property
-    def _is_unknown(self) -> bool:
-        """Whether it has not said which vehicle it is, or may just have restarted."""
+    def _is_unknown(self, *, now: float) -> bool:
+        """Return whether it has not said which vehicle it is, or who else controls it.
+
+        It may also have just restarted.
+        """
         unidentified = self.tasks.terms.has_uid and not self.requests.is_identified
-        return unidentified or self.undecided is not None
+        return unidentified or self.undecided is not None or now < self.listens_until
 
     def note(self, text: str, *, now: float) -> None:
         """Report a text about the vehicle."""
@@ -157,7 +162,7 @@ class Parts:
             turning=persona.turning,
             turns_by_course=persona.turns_by_course,
             turning_radius=persona.turning_radius or self.settings.driving.turning_radius,
-            is_unknown=self._is_unknown,
+            is_unknown=self._is_unknown(now=now),
             drives_on=drives_on,
             is_ours=self.lease.is_trusted,
         )

@@ -41,6 +41,9 @@ OLD_NEWS = 0.3  # s after a stall of this process, in which packets may have wai
 #: s without a heartbeat, or since it was taken without any, after which another gateway may get a
 #: vehicle: longer than a restart of its radio; and s for which a halt is sent to a silent vehicle
 GONE = 5.0
+#: s in which no task starts on a vehicle that this gateway has got: set-points of another
+#: controller, who sends several a second, show that it is there
+LISTENS = 1.0
 MOST_NOTES = 256
 MOST_NAMED = 5  # tasks named in one text
 
@@ -398,6 +401,8 @@ class VehicleSide:
             may_arm=self.links.may_arm(link_name),
             now=now,
         )
+        if self._ours is not None:
+            vehicle.parts.listens_until = now + LISTENS
         self._vehicles[packet.system_id] = vehicle
         self.links.learn(packet.system_id, (link_name, peer))
         self.deadline_heap.mark_dirty(vehicle)
