@@ -119,6 +119,7 @@ class Observer:
     ways: Ways = ARDUPILOT_WAYS
     #: for tests that stop the server's clock
     expects_gaps: bool = False
+    longest_gap: float = FRESH  # s without set-points, after which motion may go on
     expects_late_modes: bool = False  # from before a halt: zeros go with the HOLD that undoes them
     #: for worlds with several inputs per step, whose order is unknown
     batches: bool = False
@@ -441,7 +442,7 @@ class Observer:
 
     def _check_rate(self, now: float, *, moves: bool) -> None:
         gap = now - self._setpoint_at if self._moved_last else 0.0
-        if gap > FRESH and moves:
+        if gap > self.longest_gap and moves:
             self._violation(now, f"gap of {gap:.3f} s, then motion")
         elif gap > GAP and not self.expects_gaps:
             self._violation(now, f"gap of {gap:.3f} s while driving")
