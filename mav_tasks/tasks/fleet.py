@@ -166,6 +166,9 @@ class Fleet:
                 now=now,
             )
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)
+            reason, halted_at = restored.halted.get(vehicle, (R.NONE, 0.0))
+            if paused is R.STOPPED and reason is R.STOPPED:
+                self.of(vehicle).was_stopped(at=halted_at, now=now)
 
     def _interrupted(self, task: Task, state: TaskState, *, now: float) -> Task:
         if task.state is state:

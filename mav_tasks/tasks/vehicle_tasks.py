@@ -5,6 +5,7 @@ It knows no protocol: ``step`` returns what the vehicle must be made to do.
 
 from collections.abc import Container, Iterable
 from dataclasses import replace
+from math import inf
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
@@ -302,15 +303,30 @@ class VehicleTasks(Lineup):
             self.room.ended(killed, now=now)
         return killed
 
-    def _repeat_nothing(self, reason: TaskReason, *, actor: str, now: float) -> None:
-        """End each series: its waiting run ends, one that has started does not repeat."""
+    def was_stopped(self, *, at: float, now: float) -> None:
+        """End each series that was there at a STOP of an earlier run.
+
+        That run has done so, but its last events may not have been stored.
+        """
+        self._repeat_nothing(R.STOP, actor=SERVER, now=now, since=at)
+
+    def _repeat_nothing(
+        self, reason: TaskReason, *, actor: str, now: float, since: float = inf
+    ) -> None:
+        """End each series: its waiting run ends, one that has started does not repeat.
+
+        One that was submitted after ``since`` goes on.
+        """
         for task in self.registry.runs_of(self.vehicle):
+            if task.submitted_at > since:
+                continue
             if task.state in WAITING:
                 self.room.end(task, S.KILLED, reason, actor=actor, now=now)
             else:
                 self.registry.repeat_no_more(task.id, actor=actor, now=now)
         for task in self.registry.unplanned_of(self.vehicle):  # between two runs
-            self.registry.repeat_no_more(task.id, actor=actor, now=now)
+            if task.submitted_at <= since:
+                self.registry.repeat_no_more(task.id, actor=actor, now=now)
 
     # time
 

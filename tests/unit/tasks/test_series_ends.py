@@ -6,12 +6,15 @@ import pytest
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import TaskModified, VehicleNoted
+from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Move
+from mav_tasks.tasks.lifecycle import WAITING
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.repetition import repeating
+from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import Draft, Task, Terms
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from tests.unit.tasks.samples import SOMEBODY
@@ -91,3 +94,34 @@ def test_a_killed_run_says_once_that_its_series_has_ended() -> None:
     series.room.plan_runs(now=120.0)
     texts = [each.text for each in series.registry.take_events() if isinstance(each, VehicleNoted)]
     assert [f"will not repeat task {run.id}" in words for words in texts] == [True]
+
+
+@pytest.mark.parametrize("between", [False, True])
+@pytest.mark.parametrize(
+    ("halted", "repeats"),
+    [((R.STOPPED, 113.0), False), ((R.STOPPED, 99.0), True), ((R.OPERATOR, 113.0), True)],
+    ids=["by the STOP", "not by an older one", "nor by a pause"],
+)
+def test_after_a_crash_that_kept_the_stop_alone_its_series_have_ended(
+    halted: tuple[R, float], *, repeats: bool, between: bool
+) -> None:
+    """On a full disk the STOP is in the halt record only, and the end of the series is not."""
+    series = Series()
+    if not between:
+        series.plan()
+    registry = TaskRegistry()
+    registry.ids.share()
+    fleet = Fleet(registry, Settings())
+    stored = Restored(
+        tasks=series.registry.all(),
+        paused={ROVER: R.STOPPED},
+        halted={ROVER: halted},
+        wall_offset=OFFSET,
+        gateway="a",
+    )
+    fleet.restore(stored, now=114.0)
+    registry.ids.grant(70, 10)
+    fleet.room.plan_runs(now=114.0)
+    runs = [task for task in registry.all() if task.id != series.first and task.state in WAITING]
+    assert [bool(task.terms.repeat) for task in runs] == [True] * repeats
+    assert fleet.of(ROVER).paused is R.STOPPED
