@@ -268,7 +268,8 @@ class Executor:
             return view.STAND
         creeps = now - self._taking_since > CREEPS_FOR and motion.speed < CREEPS
         if not seen.still and not creeps:  # the start heading must be measured at rest
-            if now - self._since > 2 * self._settings.watch.start_timeout:
+            # not since it began to start: it may have waited until the vehicle was ready to arm
+            if now - self._taking_since > 2 * self._settings.watch.start_timeout:
                 return self._becomes(Becomes(S.FAILED, R.START_TIMEOUT), now=now)
             return view.STAND
         progress = self.drive.begin(task, seen, motion, now=now)

@@ -12,7 +12,7 @@ from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import position, wait_reason
 from mav_tasks.tasks.task import Pose, TaskId
-from mav_tasks.tasks.view import DemandKind, ModeKind
+from mav_tasks.tasks.view import DemandKind, ModeKind, VehicleView
 from tests.unit.tasks.rig import SETTINGS, TICK, Rig, View, at, idle, in_control
 from tests.unit.tasks.samples import idle_vehicle, ours
 
@@ -143,6 +143,34 @@ class TestStarting:
         rig.submit()
         rig.steps(idle, seconds=SETTINGS.watch.start_timeout + 1.0)
         assert rig.story() == [(1, S.STARTING, R.NONE), (1, S.FAILED, R.START_TIMEOUT)]
+
+    def test_waits_for_standstill_also_after_a_long_wait_for_arming(self) -> None:
+        """An ArduPilot that was just switched on refuses to arm for 35 s, and then sways."""
+        rig = Rig()
+        rig.submit()
+        rig.step(idle)
+        rig.steps(
+            lambda now: replace(idle(now), refusal=R.ARM_REFUSED, is_not_ready=True), seconds=32.0
+        )
+        assert rig.state(1) is S.STARTING
+        rig.step(idle)
+        rig.steps(lambda now: ours(at=now, still=False), seconds=2.0)
+        assert rig.state(1) is S.STARTING
+        rig.steps(in_control, seconds=1.0)
+        assert rig.state(1) is S.EXECUTING
+
+    def test_ends_if_the_vehicle_does_not_come_to_stand(self) -> None:
+        rig = Rig()
+        rig.submit()
+        rig.step(idle)
+
+        def rolls(now: float) -> VehicleView:
+            seen = ours(at=now)
+            assert seen.motion is not None
+            return replace(seen, motion=replace(seen.motion, forward=0.5))
+
+        rig.steps(rolls, seconds=2 * SETTINGS.watch.start_timeout + 1.0)
+        assert rig.story()[-1] == (1, S.FAILED, R.START_TIMEOUT)
 
     @pytest.mark.parametrize("reason", [R.MODE_REFUSED, R.ARM_REFUSED])
     def test_ends_when_the_vehicle_refuses(self, reason: TaskReason) -> None:
