@@ -32,6 +32,8 @@ from mav_tasks.settings import Watch
 STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirmed yet
 RELEASE_REPEAT = 1.0  # s, the same of a hand-back
 STAND_UNSEEN = 3.0  # s of zeros after which a vehicle that cannot show that it stands gets HOLD
+#: s, the same for one that was met driving: its first positions are asked for only then
+REGAINED_UNSEEN = 0.6
 ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 3.7 s
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
 #: times, that one is asked which shows the very mode still that it was to leave: nobody has acted
@@ -243,9 +245,10 @@ class OffboardControl:
         """Whoever armed the vehicle has done with it: it is disarmed when we hand it back."""
         self.we_armed = self._news.armed
 
-    def regain(self) -> None:
+    def regain(self, *, now: float) -> None:
         """Count a vehicle as in control that shows our mode, armed: an earlier run drives it."""
         self.phase = Phase.CONTROL
+        self._release_until = now + REGAINED_UNSEEN
 
     def hand_over(self) -> None:
         """Somebody else goes on from the hand-back, and HOLD asked for again would undo it.

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -23,6 +24,9 @@ from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_restart import REMAINDER, UTC, release, restart
 
+COMMAND_LONG = 76
+SET_INTERVAL = (511).to_bytes(2, "little")  # where COMMAND_LONG has its command
+POSITIONS = (30, 32)  # ATTITUDE, LOCAL_POSITION_NED
 AWAY = 0.4  # s, of a server that a supervisor starts again at once
 
 CARS = {
@@ -59,6 +63,19 @@ def phase_of(world: World) -> str:
     """Return the phase of the server's control, "" before it has met the rover."""
     found = world.server.engine.snapshot(now=world.now).vehicles
     return found[0].control if found else ""
+
+
+class AskedFor:
+    """Loses the positions on one link until a message is requested there."""
+
+    def __init__(self, link: str) -> None:
+        self._link = link
+        self._is_asked = False
+
+    def __call__(self, source: str, target: str, data: bytes) -> bool:
+        if source == self._link and data[7] == COMMAND_LONG and data[38:40] == SET_INTERVAL:
+            self._is_asked = True
+        return target == self._link and not self._is_asked and data[7] in POSITIONS
 
 
 class Met:
@@ -144,17 +161,23 @@ def test_one_that_was_stopped_just_before_is_braked_too(
 
 
 @personas
-def test_without_a_position_it_gets_hold_at_once(
+def test_without_a_position_it_gets_hold_soon(
     make_world: MakeWorld, path: Path, persona: Persona
 ) -> None:
-    """By set-points alone nobody would see whether it stops."""
+    """Nobody sees whether set-points stop it; a PX4 stands by its heading, which nobody knows."""
     world = driving(make_world, path, persona)
-    restart(world, path, away=AWAY, settles=0.0)
     # from here on only its heartbeats come
     world.watched.loses = lambda source, _target, data: source == "rover1" and data[7] != 0
-    began = world.now
-    world.until(lambda: "HOLD" in world.observer.sent_since(began), within=1.5)
-    assert phase_of(world) == "RELEASING"
+    restart(world, path, away=AWAY, settles=0.0)
+    at = world.now
+    words = ["RELEASING"] if persona.autopilot == PROMPT_PX4.autopilot else ["CONTROL", "RELEASING"]
+    since: dict[str, float] = {}  # by phase
+    world.watch(lambda now: since.update({phase_of(world): since.get(phase_of(world), now)}))
+    world.until(lambda: "RELEASING" in since, within=1.8)
+    assert [phase for phase in since if phase] == words
+    assert "HOLD" in world.observer.sent_since(at)
+    blind = since["RELEASING"] - since.get("CONTROL", since["RELEASING"])
+    assert blind == pytest.approx(0.6 if "CONTROL" in words else 0.0, abs=0.06)
     world.until(lambda: not in_control_mode(world), within=1.0)
 
 
@@ -171,10 +194,12 @@ def test_who_switches_it_to_manual_meanwhile_has_it(make_world: MakeWorld, path:
 
 
 @personas
+@pytest.mark.parametrize("streams", [True, False], ids=["with streams", "without"])
 @pytest.mark.parametrize("on_takeover", ["hold", "resume"])
 def test_a_gateway_that_gets_it_brakes_it_in_the_same_way(
-    tmp_path: Path, persona: Persona, on_takeover: str
+    tmp_path: Path, persona: Persona, on_takeover: str, *, streams: bool
 ) -> None:
+    """A real ArduPilot streams positions on each link only if they were requested there."""
     body = partial(Car, radius=1.2)
     settings = Settings(on_takeover=on_takeover)
     world = FleetWorld(tmp_path, persona=persona, body=body, settings=settings)
@@ -182,6 +207,9 @@ def test_a_gateway_that_gets_it_brakes_it_in_the_same_way(
     clients["b"] = world.add_client("client b", system_id=254, server="b:clients")
     first = world.holder()
     world.run(4.0)
+    others = [name for name in world.gateways if name != first.name]
+    if not streams and persona.autopilot == PROMPT.autopilot:
+        world.watched.loses = AskedFor(VEHICLE_LINK.replace("server", others[0]))
     clients[first.name].move(20, speed=1.0)
     world.until(lambda: world.truth.forward_speed > 0.9, within=20)
     world.kill(first.name)

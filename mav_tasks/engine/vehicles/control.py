@@ -68,7 +68,7 @@ class Event(Enum):
     LANDED = auto()  # a client has landed it: disarm it once no task is left
     LEAVE_MANUAL = auto()  # a client starts a mission while nobody uses the sticks
     COME_BACK = auto()  # a vehicle of an earlier run is found; that run left it standing
-    COME_BACK_DRIVING = auto()  # the same, left driving, and it is seen to follow set-points still
+    COME_BACK_DRIVING = auto()  # the same, left driving; by all that is seen it drives on
     COME_BACK_DRIVEN = auto()  # the same, left driving, and it may still follow set-points
     COME_BACK_HALTED = auto()  # the same, told to stand just before that run ended
     COME_BACK_LED_AWAY = auto()  # left driving, and in a mode that does not follow set-points
@@ -87,7 +87,7 @@ class Effect(Enum):
     ZERO_KEPT = auto()  # one zero if it may keep a velocity of ours: armed, it would drive off
     ZERO_AND_HOLD = auto()  # once each, and nothing after them
     STAY = auto()  # ask for HOLD although it shows HOLD
-    REGAIN = auto()  # it still follows the set-points of an earlier run: it is in our control
+    REGAIN = auto()  # it follows the set-points of an earlier run still: it is in our control
     LOSE = auto()  # send nothing more of ours, not even to stop it
     # earlier requests must not take effect later
     FORGET_GO_TO = auto()  # that a "go to" may undo a HOLD

@@ -11,6 +11,7 @@ from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.motion_guard import Found, Measure, MotionGuard, Told
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
+from mav_tasks.services.offboard import REGAINED_UNSEEN
 from mav_tasks.services.orders import Posture, Speeds
 from mav_tasks.services.phase import Phase
 from mav_tasks.settings import Settings
@@ -106,7 +107,8 @@ class Pilot:
         parts = self._parts
         self._face(now=now)
         is_better = parts.persona.brakes_by_setpoints or self._may_be_a_car(now=now)
-        brakes = brakes and is_better and self.guard.is_fresh(now=now)
+        is_seen = self.guard.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
+        brakes = brakes and is_better and is_seen
         longest = parts.settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
         parts.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
         self.guard.ladder.begin(now=now)
@@ -129,7 +131,7 @@ class Pilot:
         Whether it steers as a car is not known yet: it is asked.
         """
         self._regained_at = now
-        self._parts.control.regain()
+        self._parts.control.regain(now=now)
         self._parts.requests.ask_for_parameters()
         self.guard.told_to_move(now=now)
         self.watch(now=now)

@@ -66,7 +66,7 @@ class Takeovers:
                 armed = parts.monitor.armed
                 parts.armings.outdate_earlier(armed=armed, until=self._may_show_until, now=now)
         is_disarmed = halt is not None and halt.reason is R.DISARMED
-        if (was_driven or halt is not None) and not is_disarmed and self._drives_on(now=now):
+        if (was_driven or halt is not None) and not is_disarmed and self._may_drive_on(now=now):
             event = Event.COME_BACK_DRIVING
         elif halt is not None and parts.monitor.armed and not parts.is_manual:
             event = Event.COME_BACK_HALTED
@@ -81,14 +81,19 @@ class Takeovers:
         if is_parked and not parts.tasks.terms.may_be_armed:  # by somebody before this run
             self._taken(Event.PARKED, "", now=now)
 
-    def _drives_on(self, *, now: float) -> bool:
-        """Return whether a vehicle that is met now is seen to drive on by set-points."""
+    def _may_drive_on(self, *, now: float) -> bool:
+        """Return whether set-points of an earlier run may still drive a vehicle that is met now.
+
+        A gateway that did not have it gets few positions: an ArduPilot streams on each link only
+        what was requested there. One that stands by its heading cannot be braked without it.
+        """
         parts, motion = self._parts, self._parts.where.motion.latest()
-        is_fresh = motion is not None and now - motion.at <= parts.settings.watch.motion_fresh
         is_ours = parts.monitor.armed and parts.monitor.custom_mode == parts.persona.control_mode
-        is_taken = parts.tasks.paused in TAKEN
-        moves = motion is not None and motion.speed > NEARLY_STANDS
-        return is_ours and not is_taken and is_fresh and moves
+        if not is_ours or parts.tasks.paused in TAKEN:
+            return False
+        if motion is None or now - motion.at > parts.settings.watch.motion_fresh:
+            return not parts.persona.stands_by_course
+        return motion.speed > NEARLY_STANDS
 
     def look(self, *, was_mode: int, was_armed: bool, before: Before, now: float) -> None:
         """Detect what a heartbeat shows that is new; ``before`` is the state before it."""
