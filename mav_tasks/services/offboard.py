@@ -33,7 +33,7 @@ STOP_REPEAT = 0.5  # s, between the HOLD requests of a STOP that is not confirme
 RELEASE_REPEAT = 1.0  # s, the same of a hand-back
 STAND_UNSEEN = 3.0  # s of zeros after which a vehicle that cannot show that it stands gets HOLD
 #: s, the same for one that was met driving: its first positions are asked for only then
-REGAINED_UNSEEN = 0.6
+REGAINED_UNSEEN = 1.0
 ROLLS_OUT = 5.0  # s more, while it gets slower: the longest stop by zeros took 3.7 s
 RELEASE_LIMIT = 3.0  # s, after which a vehicle outside our mode need not show HOLD any more
 #: times, that one is asked which shows the very mode still that it was to leave: nobody has acted

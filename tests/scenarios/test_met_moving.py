@@ -173,11 +173,11 @@ def test_without_a_position_it_gets_hold_soon(
     words = ["RELEASING"] if persona.autopilot == PROMPT_PX4.autopilot else ["CONTROL", "RELEASING"]
     since: dict[str, float] = {}  # by phase
     world.watch(lambda now: since.update({phase_of(world): since.get(phase_of(world), now)}))
-    world.until(lambda: "RELEASING" in since, within=1.8)
+    world.until(lambda: "RELEASING" in since, within=2.2)
     assert [phase for phase in since if phase] == words
     assert "HOLD" in world.observer.sent_since(at)
     blind = since["RELEASING"] - since.get("CONTROL", since["RELEASING"])
-    assert blind == pytest.approx(0.6 if "CONTROL" in words else 0.0, abs=0.06)
+    assert blind == pytest.approx(1.0 if "CONTROL" in words else 0.0, abs=0.06)
     world.until(lambda: not in_control_mode(world), within=1.0)
 
 

@@ -171,6 +171,7 @@ class Vehicle:
     def come_back(self, *, was_driven: bool, halt: LastHalt | None, now: float) -> None:
         """Handle the first heartbeat of a vehicle of an earlier run: see ``Takeovers``."""
         self._takeovers.come_back(was_driven=was_driven, halt=halt, now=now)
+        self._ask_for_rates(now=now)
         self.pilot.plan_tick(now=now)
 
     def receive(self, message: m.Message, component_id: int, *, now: float) -> None:
