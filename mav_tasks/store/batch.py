@@ -50,6 +50,7 @@ class Batch:
         self.changed: dict[int, tuple[Any, ...]] = {}  # state, changed_at, changed, id
         self.modified: dict[int, tuple[Any, ...]] = {}  # modified, id
         self.advanced: dict[int, tuple[Any, ...]] = {}  # advanced, id
+        self.run_after: dict[int, tuple[int, int]] = {}  # the task before it, 0: none; id
         self.withdrawn: list[tuple[int]] = []
         self.plans: dict[tuple[int, int], tuple[Any, ...]] = {}  # vehicle, kind, plan_id, source
         self.parameters: dict[str, tuple[Any, ...]] = {}  # name, value
@@ -74,6 +75,8 @@ class Batch:
             if type(event) is TaskSubmitted:
                 task = event.task
                 self.next_id = following(task.id)
+                if task.terms.after:
+                    self.run_after[task.id] = (task.terms.after, task.id)
                 self.tasks.append(
                     (task.id, number, task.vehicle, task.state, event.at + offset, body)
                 )
@@ -98,6 +101,8 @@ class Batch:
                 self.changed[event.task_id] = (event.new, utc, body, event.task_id)
             case TaskModified():
                 self.modified[event.task_id] = (body, event.task_id)
+                if event.before is None or event.before.after != event.terms.after:
+                    self.run_after[event.task_id] = (event.terms.after, event.task_id)
             case TaskAdvanced():
                 self.advanced[event.task_id] = (body, event.task_id)
             case TaskWithdrawn():

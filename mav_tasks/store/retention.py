@@ -23,21 +23,24 @@ class Trimmer:
         self._retention = retention
         self._swept = 0  # number of the last journal row examined
 
-    def step(self, connection: Connection, *, utc: float) -> bool:
-        """Delete some rows that are too old or too many; return whether there may be more."""
-        deleted = self._delete_tasks(connection, utc)
+    def step(self, connection: Connection, *, utc: float, kept: str = "") -> bool:
+        """Delete some rows that are too old or too many; return whether there may be more.
+
+        ``kept``: a condition of tasks that stay, in SQL; "": there are none.
+        """
+        deleted = self._delete_tasks(connection, utc, f"NOT {kept}" if kept else "TRUE")
         others = self._delete_others(connection)
         return self._sweep(connection, utc) or deleted >= STEP or others >= SWEEP
 
-    def _delete_tasks(self, connection: Connection, utc: float) -> int:
+    def _delete_tasks(self, connection: Connection, utc: float, free: str) -> int:
         ids: list[tuple[int]] = []
         if self._retention.max_age is not None:
-            ids = _oldest(connection, STEP, before=utc - self._retention.max_age)
+            ids = _oldest(connection, STEP, before=utc - self._retention.max_age, free=free)
         if self._retention.max_count is not None:
             (count,) = connection.execute(f"SELECT count(*) FROM tasks WHERE {_OVER}").fetchone()
             excess = min(count - self._retention.max_count, STEP)
             if excess > len(ids):
-                ids = _oldest(connection, excess, before=inf)
+                ids = _oldest(connection, excess, before=inf, free=free)
         if ids:
             connection.executemany("DELETE FROM journal WHERE task_id = ?", ids)
             connection.executemany("DELETE FROM tasks WHERE id = ?", ids)
@@ -80,8 +83,9 @@ class Trimmer:
         return True
 
 
-def _oldest(connection: Connection, most: int, *, before: float) -> list[tuple[int]]:
+def _oldest(connection: Connection, most: int, *, before: float, free: str) -> list[tuple[int]]:
     return connection.execute(
-        f"SELECT id FROM tasks WHERE {_OVER} AND changed_at < ? ORDER BY changed_at, id LIMIT ?",
+        f"SELECT id FROM tasks WHERE {_OVER} AND changed_at < ? AND {free}"
+        " ORDER BY changed_at, id LIMIT ?",
         (before, most),
     ).fetchall()

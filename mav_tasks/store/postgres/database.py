@@ -15,6 +15,7 @@ from mav_tasks.store.batch_writing import find_format, write_batch
 from mav_tasks.store.codec import dumps
 from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
+from mav_tasks.store.postgres.dependencies import IS_EXPECTED, write_dependencies
 from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
 from mav_tasks.store.postgres.ownership import Ownership
 from mav_tasks.store.postgres.reader import PostgresReader
@@ -44,7 +45,8 @@ def inserts(base: str = "") -> dict[str, str]:
             # ids wrap around: without retention an old task may still have the id
             " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
             " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
-            " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL"
+            " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL,"
+            " run_after = NULL"
         ),
         "journal": (
             "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
@@ -145,6 +147,7 @@ class PostgresDatabase:
         """Make a batch durable, as a whole or not at all."""
         with self._fenced():
             write_batch(self._session, batch, insert=self._insert, utc=utc)
+            write_dependencies(self._session, batch)
         self.last_number = batch.last
 
     def is_certain(self) -> bool:
@@ -160,7 +163,7 @@ class PostgresDatabase:
         """Delete some expired rows; return whether there may be more."""
         with self._cause(), self._session.transaction():
             self._ownership.fence(self._session)
-            return trimmer.step(self._session, utc=utc)
+            return trimmer.step(self._session, utc=utc, kept=IS_EXPECTED)
 
     def close(self, *, utc: float | None) -> None:
         """End the session; record a clean end at ``utc``, or none if None."""

@@ -12,6 +12,7 @@ from mav_tasks.store.batch_writing import find_format, write_rows
 from mav_tasks.store.halt_record import Register, Word
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.database import PostgresDatabase, inserts
+from mav_tasks.store.postgres.dependencies import IS_EXPECTED, write_dependencies
 from mav_tasks.store.postgres.gateway_ownership import LIMITS, GatewayOwnership
 from mav_tasks.store.retention import Trimmer
 
@@ -58,6 +59,7 @@ class FleetDatabase(PostgresDatabase):
                 (batch.last,),
             )
             write_rows(session, batch, insert=self._insert)
+            write_dependencies(session, batch)
         self.last_number = batch.last
 
     def trim(self, trimmer: Trimmer, *, utc: float) -> bool:
@@ -79,7 +81,7 @@ class FleetDatabase(PostgresDatabase):
             self._lease.fence(self._session)
             query = "SELECT pg_try_advisory_xact_lock(?)"
             ((is_ours,),) = self._session.execute(query, (TRIM_LOCK,)).fetchall()
-            return bool(is_ours) and trimmer.step(self._session, utc=utc)
+            return bool(is_ours) and trimmer.step(self._session, utc=utc, kept=IS_EXPECTED)
 
     def close(self, *, utc: float | None) -> None:  # noqa: ARG002  others go on writing
         """End the session."""

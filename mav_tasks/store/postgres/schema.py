@@ -109,6 +109,10 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (  # vehicles that a gateway hears and does not hold: their gateway may free them
         "ALTER TABLE gateways ADD COLUMN hears BIGINT[] NOT NULL DEFAULT '{}'",
     ),
+    (  # the task before it, perhaps another gateway's: dependencies.py
+        "ALTER TABLE tasks ADD COLUMN run_after BIGINT",
+        "CREATE INDEX expected ON tasks (run_after) WHERE run_after IS NOT NULL",
+    ),
 )
 
 

@@ -241,11 +241,11 @@ class Looking(Trimmer):
         self._url = url
         self.steps = 0
 
-    def step(self, connection: Connection, *, utc: float) -> bool:
+    def step(self, connection: Connection, *, utc: float, kept: str = "") -> bool:
         with connected(self._url) as other:
             other.execute("SELECT 1 FROM meta FOR UPDATE NOWAIT")
         self.steps += 1
-        return super().step(connection, utc=utc)
+        return super().step(connection, utc=utc, kept=kept)
 
 
 def test_a_gateway_that_deletes_expired_rows_keeps_no_other_from_writing(url: str) -> None:
@@ -261,9 +261,9 @@ def test_a_gateway_that_deletes_expired_rows_keeps_no_other_from_writing(url: st
 
 def test_one_gateway_at_a_time_deletes_expired_rows(url: str) -> None:
     class Trimming(Trimmer):
-        def step(self, connection: Connection, *, utc: float) -> bool:
+        def step(self, connection: Connection, *, utc: float, kept: str = "") -> bool:
             assert not other.trim(Looking(url), utc=utc)  # it does not even look
-            return super().step(connection, utc=utc)
+            return super().step(connection, utc=utc, kept=kept)
 
     with gateways(url, "a", "b") as (a, b):
         first, other = (FleetDatabase(address.parse(url), g.name, g.epoch) for g in (a, b))
