@@ -40,6 +40,7 @@ class Gateway:
         self.name = settings.name
         self._carrier: Carrier | None = None
         self._early: list[News] = []  # that came before the engine was there
+        self._expected: frozenset[int] = frozenset()  # tasks that the store was asked about
         self._ours: frozenset[int] = frozenset()  # vehicles that the engine had
         self._going: dict[int, str] = {}  # that it was asked to forget, and who hears them
         self._gone: frozenset[int] = frozenset()  # that it has forgotten
@@ -86,6 +87,12 @@ class Gateway:
         if forgotten:
             self._gone |= forgotten
             self._keeper.free(forgotten)
+
+    def expect(self, tasks: frozenset[int]) -> None:
+        """Ask the store about tasks of other gateways, if this is another object than before."""
+        if tasks is not self._expected:
+            self._expected = tasks
+            self.store.watch_tasks(tasks)
 
     def take(self) -> Iterator[LeaseChanged | FleetChanged | VehiclesGone]:
         """Yield what has changed, and ask for the data of vehicles that this gateway has got."""

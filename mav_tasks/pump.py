@@ -21,6 +21,7 @@ from mav_tasks.store import (
     NotKept,
     Outcome,
     Store,
+    TaskStates,
     VehiclesLoaded,
 )
 from mav_tasks.tasks.events import Event, ServerStopped
@@ -103,6 +104,8 @@ class Pump:
                 return inputs.IdsGranted(first, count)
             case VehiclesLoaded(vehicles=vehicles, restored=restored):
                 return inputs.VehiclesTaken(vehicles, restored)
+            case TaskStates(states=states):
+                return inputs.TasksElsewhere(states)
             case HaltNotKept(vehicle=vehicle, text=text):
                 log.error("%s", text)
                 return HaltNotStored(vehicle)

@@ -131,6 +131,9 @@ class Lease(Protocol):
     def hear(self, reach: Reach) -> None:
         """Take which vehicles are heard, and which the engine has."""
 
+    def expect(self, tasks: frozenset[int]) -> None:
+        """Take ``Engine.expected``; another object means that the answers must come again."""
+
 
 class Runner:
     """Runs an engine on real links until a signal ends it."""
@@ -405,6 +408,8 @@ class Runner:
         if self._pump.is_over or self._pump.is_evicted:
             self._finish(EVICTED if self._pump.is_evicted else 0)
             return
+        if self._lease is not None:
+            self._lease.expect(self._pump.engine.expected)
         self._rearm(self._loop)
 
     def _rearm(self, loop: asyncio.AbstractEventLoop) -> None:

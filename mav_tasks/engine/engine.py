@@ -23,6 +23,7 @@ from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
+from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
 from mav_tasks.engine.commands.mode_requests import ModeRequests
@@ -102,7 +103,9 @@ class Engine:
         )
         deduplicator = self._deduplicator = SubmissionDeduplicator(registry)
         deduplicator.restore(earlier.tasks, now=now)
-        submissions = Submissions(gcs, registry, deduplicator, timers, settings)
+        questions = self._questions = DependencyQuestions(self._fleet.room, timers)
+        self._expected: frozenset[int] = frozenset()
+        submissions = Submissions(gcs, registry, deduplicator, questions, timers, settings)
         self._submissions = submissions
         self._parameters = ParameterServer(
             gcs, vehicles, registry, submissions, settings=configured, kept=earlier.parameters
@@ -177,6 +180,8 @@ class Engine:
                 (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
             case inputs.KeysChanged():
                 gone = self.signatures.change_keys(item)
+                if gone:
+                    self._questions.keys_revoked(now=now)
                 self._vehicles.pause_tasks_of(gone, now=now)
                 for link, peer in self._gcs.forget_unknown():
                     self._passing.end(link, peer, now=now)
@@ -200,6 +205,9 @@ class Engine:
                 self._let_go(vehicles, now=now)
             case inputs.FleetChanged():
                 self._elsewhere.change(item, now=now)
+            case inputs.TasksElsewhere(states=states):
+                with self._fleet.room.told(dict(states), now=now):
+                    self._questions.answered(now=now)
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.SettingsChanged(settings=settings):
@@ -278,7 +286,16 @@ class Engine:
     def reach(self, *, now: float) -> Reach:
         """Return which vehicles are heard, also those that another gateway has, and are ours."""
         reach = self._vehicles.reach(now=now)
-        return reach._replace(strays=frozenset()) if self._submissions.gate else reach
+        is_busy = self._submissions.gate or self._questions
+        return reach._replace(strays=frozenset()) if is_busy else reach
+
+    @property
+    def expected(self) -> frozenset[int]:
+        """Return the tasks of others of which ``TasksElsewhere`` must tell how they stand.
+
+        It is another object after each change: then it must tell that of all of them again.
+        """
+        return self._expected
 
     @property
     def stop_until(self) -> float:
@@ -299,10 +316,8 @@ class Engine:
         """Forget vehicles that another gateway hears, unless something came between."""
         strays = self.reach(now=now).strays
         for vehicle in sorted(strays.intersection(vehicles)):
-            if self._fleet.room.is_tied(vehicle):
-                continue
             self._vehicles.forget(vehicle)
-            tasks = self._fleet.forget(vehicle)
+            tasks = self._fleet.forget(vehicle, now=now)
             self._deduplicator.forget_vehicle(vehicle, tasks)
             self._plans.forget(vehicle)
             self._reception.forget(vehicle)
@@ -342,6 +357,10 @@ class Engine:
             self._registry.record(times)
         if self._registry.unplanned:
             room.plan_runs(now=now)
+        if self._expected or room.expected or self._questions:
+            expected = room.expected | self._questions.expected
+            if expected != self._expected:
+                self._expected = frozenset(expected)
         events = self._registry.take_events()
         if events:
             self._publisher.publish(events, now=now)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.restored import Restored
 
 Peer = Hashable  # an endpoint on a link; only the link knows what it is
@@ -157,6 +158,13 @@ class FleetChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class TasksElsewhere:
+    """How tasks stand by the fleet's store that ``Engine.expected`` names; None: no such task."""
+
+    states: tuple[tuple[int, TaskState | None], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class IdsGranted:
     """The next ``count`` task ids from ``first`` on are this gateway's, besides earlier ones."""
 
@@ -198,6 +206,7 @@ Input = (
     | VehiclesTaken
     | VehiclesGone
     | FleetChanged
+    | TasksElsewhere
     | IdsGranted
     | SettingsChanged
     | WallClock

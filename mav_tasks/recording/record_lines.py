@@ -35,6 +35,7 @@ from mav_tasks.mavlink.signing import Key
 from mav_tasks.recording.surroundings import restored_of, restored_to_json, settings_of
 from mav_tasks.store.codec import Decoder, Encoder, format_of
 from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.task import Task
 
 FORMAT = 2
@@ -133,6 +134,10 @@ def input_of(line: Sequence[Any]) -> Input | None:
         case "fleet":
             (holders,) = values
             return inputs.FleetChanged(tuple((vehicle, name) for vehicle, name in holders))
+        case "tasks elsewhere":
+            (states,) = values
+            known = ((task, None if state is None else TaskState(state)) for task, state in states)
+            return inputs.TasksElsewhere(tuple(known))
         case _ if kind in _SIMPLE:
             return _SIMPLE[kind](*values)
         case _:
@@ -192,6 +197,8 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["vehicles gone", now, vehicles]
         case inputs.FleetChanged(holders=holders):
             return ["fleet", now, holders]
+        case inputs.TasksElsewhere(states=states):
+            return ["tasks elsewhere", now, states]
         case inputs.IdsGranted(first=first, count=count):
             return ["ids", now, first, count]
         case inputs.WallClock(offset=offset):

@@ -8,6 +8,7 @@ from mav_tasks.store.base import (
     NotKept,
     Outcome,
     Store,
+    TaskStates,
     VehiclesLoaded,
     Which,
 )
@@ -22,6 +23,7 @@ __all__ = [
     "NotKept",
     "Outcome",
     "Store",
+    "TaskStates",
     "VehiclesLoaded",
     "Which",
 ]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.restored import Restored
 
 
@@ -50,13 +51,20 @@ class VehiclesLoaded:
 
 
 @dataclass(frozen=True, slots=True)
+class TaskStates:
+    """How tasks stand that another gateway may change; None: there is no such task."""
+
+    states: tuple[tuple[int, TaskState | None], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Evicted:
     """The fleet has ended this gateway's lease: it can store nothing any more."""
 
     text: str
 
 
-Outcome = Kept | NotKept | HaltNotKept | IdsGranted | VehiclesLoaded | Evicted
+Outcome = Kept | NotKept | HaltNotKept | IdsGranted | VehiclesLoaded | TaskStates | Evicted
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,13 +73,15 @@ class Fleet:
             return False
         return active is None or active.state not in RUNNING
 
-    def forget(self, vehicle: int) -> set[TaskId]:
+    def forget(self, vehicle: int, *, now: float) -> set[TaskId]:
         """Forget a vehicle and its tasks, which are stored; return the ids of these."""
         self._of.pop(vehicle, None)
         self._was_driven.discard(vehicle)
         self._halted.pop(vehicle, None)
         self.room.forget(vehicle)
-        return self._registry.forget(vehicle)
+        tasks = self._registry.forget(vehicle)
+        self.room.forgotten(now=now)
+        return tasks
 
     def apply(self, settings: Settings) -> None:
         self._settings = settings
@@ -91,6 +93,7 @@ class Fleet:
         """Load an earlier run: hold the tasks that ran, pause queues that must not go on alone."""
         if restored.gateway:
             self._registry.ids.share()
+            self.room.share()
         else:
             self._registry.ids.count_from(restored.next_id)
         is_unclean = self._settings.on_restart == "pause" and not restored.ended_well

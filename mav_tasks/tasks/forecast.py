@@ -96,6 +96,8 @@ class Forecast:
 
     def _is_blocked(self, task: Task) -> bool:
         """Return whether a due task waits for another one, and note the dependency."""
+        if self._tasks.room.is_expecting(task):
+            return True
         ahead = self._registry.get(task.terms.after) if task.terms.after else None
         if ahead is None or ahead.state in TERMINAL or ahead.id in self._done:
             return False

@@ -6,7 +6,8 @@ directly or through others.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from mav_tasks.errors import Rejection
@@ -37,6 +38,7 @@ class _Waiter:
     came_at: float  # when it began to compete with others: submission, or start time
     own: Rank
     rank: Rank  # its own, or that of a more urgent dependent
+    is_met: bool = False  # its dependency: that has completed, also if nobody knows it any more
 
 
 class PendingTasks:
@@ -61,6 +63,10 @@ class PendingTasks:
     def apply(self, settings: Settings) -> None:
         """Apply new settings; tasks that already wait keep their order."""
         self._settings = settings
+
+    def share(self) -> None:
+        """Take that tasks may run after those of other gateways' vehicles."""
+        self._dependencies.is_shared = True
 
     def queue(self, vehicle: int) -> TaskQueue:
         """Return the queue of a vehicle's ready tasks."""
@@ -117,7 +123,8 @@ class PendingTasks:
         return self._add(draft, now=now)
 
     def _add(self, draft: Draft, *, now: float) -> Task:
-        state = self._state_by(draft.terms, now=now)
+        is_met = self._dependencies.has_completed(draft.terms.after)
+        state = self._state_by(draft.terms, is_met=is_met, now=now)
         task = self._registry.submit(draft, state=state, now=now)
         self._enter(task, draft.submitter.owner, now=now)
         if state is S.QUEUED:  # wakes nobody: it is not durable yet
@@ -137,7 +144,7 @@ class PendingTasks:
         ready: dict[int, list[Entry]] = {}
         others: list[Task] = []
         for task in waiting:
-            if task.state is S.QUEUED and self._state_by(task.terms, now=now) is S.QUEUED:
+            if task.state is S.QUEUED and self._wanted(task, now=now) is S.QUEUED:
                 ready.setdefault(task.vehicle, []).append(self._entry(task))
             else:
                 others.append(task)
@@ -151,26 +158,34 @@ class PendingTasks:
                 self.ended(task.id, now=now)
             else:
                 self._settle(task, now=now)
+        self._look_again(now=now)
 
     def _enter(self, task: Task, owner: str, *, now: float) -> None:
         own = _own_rank(self._settings, task, now)
         self._waiters[task.id] = _Waiter(now, own, own)
         self._of_vehicle[task.vehicle] = self._of_vehicle.get(task.vehicle, 0) + 1
         self._of_owner[owner] = self._of_owner.get(owner, 0) + 1
-        terms = task.terms
         self.times.note(task)
-        if terms.after:
-            self._dependencies.add(task.id, terms.after)
+        if task.terms.after:
+            self._depend(task)
             self._lift(task.id)
+
+    def _depend(self, task: Task) -> None:
+        """Note what a waiting task runs after, unless that has completed."""
+        after, known = task.terms.after, self._dependencies
+        is_met = known.has_completed(after) or known.was_met(task)
+        self._waiters[task.id].is_met = is_met
+        if after and not is_met:
+            known.add(task.id, after)
 
     # changes of state
 
     def _settle(self, task: Task, *, now: float) -> Task:
         """Move a waiting task to the state and queue that its terms require now."""
-        wanted = self._state_by(task.terms, now=now)
+        wanted = self._wanted(task, now=now)
         if task.state is S.SCHEDULED and wanted is not S.SCHEDULED and task.terms.repeat:
             task = self._moved_on(task, now=now)  # the clock may have passed more than one run
-            wanted = self._state_by(task.terms, now=now)
+            wanted = self._wanted(task, now=now)
             self.times.note(task)
         if task.state is S.SCHEDULED and wanted is not S.SCHEDULED:
             waiter = self._waiters[task.id]
@@ -192,11 +207,15 @@ class PendingTasks:
         rank = self._waiters[task.id].rank
         return Entry(task.id, rank, task.terms.priority, task.terms.is_preemptive)
 
-    def _state_by(self, terms: Terms, *, now: float) -> TaskState:
+    def _wanted(self, task: Task, *, now: float) -> TaskState:
+        return self._state_by(task.terms, is_met=self._waiters[task.id].is_met, now=now)
+
+    def _state_by(self, terms: Terms, *, is_met: bool, now: float) -> TaskState:
         has_start = terms.start_at is not None or terms.start_utc is not None
         if has_start and self.times.start(terms) > now:
             return S.SCHEDULED
-        if terms.is_staged or (terms.after and self._dependencies.is_waited_for(terms.after)):
+        after = 0 if is_met else terms.after
+        if terms.is_staged or (after and self._dependencies.is_waited_for(after)):
             return S.BLOCKED
         return S.QUEUED
 
@@ -225,7 +244,7 @@ class PendingTasks:
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change the terms of a waiting task. Raise Rejection if its dependency cannot complete."""
         if terms.after and terms.after != task.terms.after:
-            self._dependencies.check(terms.after)
+            self._dependencies.check_here(terms.after)
             self._dependencies.check_cycle(task, terms.after)
         before = task.terms.after
         if task.terms.is_staged and not terms.is_staged:
@@ -234,8 +253,7 @@ class PendingTasks:
         self.times.note(task)
         if before != terms.after:
             self._part(task.id, before)
-            if terms.after:
-                self._dependencies.add(task.id, terms.after)
+            self._depend(task)
         self._rerank(task)
         self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
@@ -320,31 +338,22 @@ class PendingTasks:
         self._part(task.id, task.terms.after)
         self.woken.add(task.vehicle)
 
-    def is_tied(self, vehicle: int) -> bool:
-        """Return whether a task of a vehicle waits for another one's, or the other way round."""
-        for ahead_id, dependents in self._dependencies.pairs():
-            ahead = self._registry.get(ahead_id)
-            if ahead is None or ahead.state in TERMINAL:
-                continue
-            theirs = {self._registry[each].vehicle for each in dependents}
-            if vehicle in theirs and theirs != {ahead.vehicle}:
-                return True
-            if vehicle == ahead.vehicle and theirs != {vehicle}:
-                return True
-        return False
-
     def forget(self, vehicle: int) -> None:
-        """Forget the waiting tasks of a vehicle, without ending them."""
+        """Forget the waiting tasks of a vehicle, without ending them; call ``forgotten`` later."""
         gone = [each for each in self._waiters if self._registry[each].vehicle == vehicle]
         for task_id in gone:
             del self._waiters[task_id]
             task = self._registry[task_id]
             self._leave_owner(task.submitter.owner)
-            self._dependencies.forget(task_id, task.terms.after)
+            self._part(task_id, task.terms.after)
         self.times.forget(set(gone))
         self._queues.pop(vehicle, None)
         self._of_vehicle.pop(vehicle, None)
         self.woken.discard(vehicle)
+
+    def forgotten(self, *, now: float) -> None:
+        """Take that the registry has forgotten the tasks of a vehicle."""
+        self._look_again(now=now)
 
     def _leave_owner(self, owner: str) -> None:
         left = self._of_owner[owner] - 1
@@ -365,9 +374,7 @@ class PendingTasks:
         """Withdraw a submission that did not become durable, and fail its dependents."""
         self.leave(task)
         self._registry.withdraw(task.id, now=now)
-        for dependent in self._dependencies.take(task.id):
-            self._fail(dependent, now=now)
-            self.ended(dependent, now=now)
+        self._part_all(task.id, completed=False, now=now)
 
     def clear(self, vehicle: int, reason: TaskReason, *, actor: str, now: float) -> None:
         """Cancel all waiting tasks of a vehicle."""
@@ -380,20 +387,59 @@ class PendingTasks:
 
     def ended(self, task_id: TaskId, *, now: float) -> None:
         """Settle the dependents of a task that completed, or fail those of a task that did not."""
+        ended = self._registry.get(task_id)
+        if ended is not None:
+            self._part_all(task_id, completed=ended.state is S.COMPLETED, now=now)
+
+    def _part_all(self, task_id: TaskId, *, completed: bool, now: float) -> None:
+        """Settle the dependents of a task that is over, or fail them and their dependents."""
         over = [task_id]
         while over:
-            ended = self._registry.get(over.pop())
-            if ended is None:
-                continue
-            for dependent in self._dependencies.take(ended.id):
+            for dependent in self._dependencies.take(over.pop()):
                 task = self._waiting(dependent)
                 if task is None:
                     continue
-                if ended.state is S.COMPLETED:
+                if completed:
+                    self._waiters[dependent].is_met = True
                     self._settle(task, now=now)
                 else:
                     self._fail(dependent, now=now)
                     over.append(dependent)
+
+    # tasks of vehicles that other gateways have
+
+    @property
+    def expected(self) -> set[int]:
+        """The tasks that ours run after and that are not ours: the fleet's store knows them."""
+        return self._dependencies.expected
+
+    def is_in_question(self, task_id: int) -> bool:
+        """Return whether only the fleet's store can say whether a task exists."""
+        return self._dependencies.is_in_question(task_id)
+
+    def is_expecting(self, task: Task) -> bool:
+        """Return whether a waiting task runs after one that is not ours."""
+        waiter = self._waiters.get(task.id)
+        is_met = waiter is None or waiter.is_met
+        return not is_met and task.terms.after in self._dependencies.expected
+
+    @contextmanager
+    def told(self, states: Mapping[int, TaskState | None], *, now: float) -> Iterator[None]:
+        """Take how tasks stand by the fleet's store; in the block submissions may name them.
+
+        None: there is no such task. If ours run after it, it was withdrawn: they fail.
+        """
+        for task_id in sorted(self._dependencies.expected & states.keys()):
+            state = states[task_id]
+            if state is None or state in TERMINAL:
+                self._part_all(TaskId(task_id), completed=state is S.COMPLETED, now=now)
+        self._dependencies.told = states
+        yield
+        self._dependencies.told = {}
+
+    def _look_again(self, *, now: float) -> None:
+        for task_id in self._dependencies.look_again():  # it ended while another gateway had it
+            self.ended(task_id, now=now)
 
     def _fail(self, task_id: TaskId, *, now: float) -> None:
         self.leave(self._registry[task_id])

@@ -170,19 +170,21 @@ def test_what_is_not_stored_keeps_the_rover(reach: Reach) -> None:
 
 
 @pytest.mark.parametrize("silent", [1, 2])
-def test_rovers_whose_tasks_wait_for_each_other_stay(tmp_path: Path, *, silent: int) -> None:
+def test_rovers_whose_tasks_wait_for_each_other_can_part(tmp_path: Path, *, silent: int) -> None:
     reach = Reach(tmp_path, rovers=2)
     assert reach.world.holder(2) is reach.first
     client = reach.client(reach.first)
-    ahead = client.command(MOVE, 1.0, 0, 0, 0, 0, 60, 5)  # starts in a minute
+    ahead = client.command(MOVE, 1.0, 0, 0, 0, 0, 30, 5)  # starts in half a minute
     reach.world.run(0.3)
     behind = client.command(MOVE, 1.0, 0, 0, 0, ahead.task_id, 0, 5, target=(2, 191))
     reach.world.cut(reach.first.name, silent)
     reach.world.run(0.5)
     assert behind.result == ACCEPTED
     reach.world.run(14.0)
-    assert reach.world.database.holder(silent) == reach.first.name
+    assert reach.world.database.holder(silent) == reach.other.name
     assert reach.task(behind.task_id).state is S.BLOCKED
+    reach.until_state(ahead.task_id, S.COMPLETED)
+    reach.until_state(behind.task_id, S.COMPLETED)
 
 
 @pytest.mark.parametrize("far", [False, True])

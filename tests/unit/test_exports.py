@@ -25,9 +25,9 @@ def public(thing: object) -> list[str]:
 
 
 @pytest.mark.patches_core
-def test_the_engine_has_five_methods_and_four_views() -> None:
+def test_the_engine_has_five_methods_and_five_views() -> None:
     methods = ["handle", "handle_deadline", "next_deadline", "take_events", "take_packets"]
-    views = ["snapshot", "parameters", "reach", "stop_until"]
+    views = ["snapshot", "parameters", "reach", "expected", "stop_until"]
     assert public(Engine) == sorted([*methods, *views])
 
 
@@ -60,6 +60,7 @@ def test_what_can_come_into_the_engine() -> None:
         "VehiclesTaken",
         "VehiclesGone",
         "FleetChanged",
+        "TasksElsewhere",
         "IdsGranted",
         "SettingsChanged",
         "WallClock",

@@ -103,10 +103,8 @@ class Commands:
         except Rejection as refusal:
             if self._is_tried_again(asked, now=now):
                 asked.answer(MavResult.CANCELLED, refusal.reason)
-            elif client.may_be_refused(now=now):
-                self._registry.record(asked.refuse(refusal, now=now))
-            else:  # a flood of refusals fills neither disk nor network
-                asked.answer(result_of(refusal.reason), refusal.reason)
+            else:
+                self._submissions.refuse(asked, refusal, now=now)
         note_halt(asked, before=epoch)
 
     def _of_unheard(

@@ -1,18 +1,21 @@
 """Submissions of tasks: deduplicated, queued, and acknowledged once durable."""
 
 from collections.abc import Hashable
+from functools import partial
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
 from mav_tasks.engine.commands.ability import driven
 from mav_tasks.engine.commands.command_request import CommandRequest
+from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
 from mav_tasks.engine.commands.goals import parse_command
 from mav_tasks.engine.commands.ordering import (
     AGAIN,
     has_left_before_halt,
     why_older,
 )
+from mav_tasks.engine.commands.translate import result_of
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.engine.timers import Timers
@@ -56,12 +59,15 @@ class Submissions:
         gcs: GcsSide,
         registry: TaskRegistry,
         deduplicator: SubmissionDeduplicator,
+        questions: DependencyQuestions,
         timers: Timers,
         settings: Settings,
     ) -> None:
         self._gcs = gcs
         self._registry = registry
         self._deduplicator = deduplicator
+        #: holds submissions that run after a task of another gateway's vehicle
+        self.questions = questions
         #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         self.gate.knows(Submitted, self._accept, self._withdraw)
@@ -113,6 +119,9 @@ class Submissions:
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
+        again, refuse = partial(self._submit_late, asked), partial(self.refuse, asked)
+        if self.questions.hold(draft.terms.after, again, refuse, now=now):
+            return
         waits = bool(vehicle.tasks.paused)  # then nothing moves before a command to continue
         if has_left_before_halt(asked, anybodys=not waits, now=now):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
@@ -129,6 +138,20 @@ class Submissions:
         self._await_commit(asked, task, now=now)
         if words:
             asked.tell(words, MavSeverity.INFO, now=now)
+
+    def _submit_late(self, asked: CommandRequest, *, now: float) -> None:
+        """Submit what was held back, by the state of the vehicle now."""
+        try:
+            self.submit(asked, now=now)
+        except Rejection as refusal:
+            self.refuse(asked, refusal, now=now)
+
+    def refuse(self, asked: CommandRequest, refusal: Rejection, *, now: float) -> None:
+        """Answer a refused command; record it, and tell the client the words."""
+        if asked.client.may_be_refused(now=now):
+            self._registry.record(asked.refuse(refusal, now=now))
+        else:  # a flood of refusals fills neither disk nor network
+            asked.answer(result_of(refusal.reason), refusal.reason)
 
     def run_now(self, asked: CommandRequest, draft: Draft, *, now: float) -> None:
         """Submit an immediate task. Raise Rejection if it is refused."""

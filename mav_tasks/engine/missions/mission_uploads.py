@@ -137,6 +137,16 @@ class MissionUploads:
         except Rejection as refusal:
             self._refuse(desk, vehicle, refusal, now=now)
 
+    def _decide_late(
+        self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
+    ) -> None:
+        """Decide about an upload that was held back."""
+        if self._answers.client(upload.sender) is None:
+            gone = Rejection(R.WRONG_STATE, "the client has gone")
+            self._refuse(desk, vehicle, gone, now=now)
+        else:
+            self._decide(desk, vehicle, upload, now=now)
+
     def _check_not_begun(self, vehicle: Vehicle) -> None:
         task = self._plans.task(vehicle)
         if task is not None and task.state in ACTIVE:
@@ -166,6 +176,10 @@ class MissionUploads:
             self.flush(desk, vehicle, now=now)
             words = f"repeated plan, no new task: see task {known}"
             self._answers.tell(sender, vehicle, words, now=now)
+            return
+        again = partial(self._decide_late, desk, vehicle, upload)
+        refuse = partial(self._refuse, desk, vehicle)
+        if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
             return
         halts = vehicle.tasks.halts
         if not is_staged and upload.begun_at < halts.at:

@@ -14,6 +14,7 @@ from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.fleet_database import FleetDatabase
 from mav_tasks.store.postgres.fleet_loader import BLOCK, FleetLoader
 from mav_tasks.store.postgres.local_path import local_path
+from mav_tasks.store.postgres.task_watch import TaskWatch
 from mav_tasks.tasks.events import Event, TaskSubmitted
 from mav_tasks.tasks.restored import Restored
 
@@ -58,6 +59,7 @@ class FleetStore(DurableStore):
             release=release,
         )
         self._loader = FleetLoader(where, gateway, epoch, self._mail, wall_offset=wall_offset)
+        self._watch = TaskWatch(where, gateway, self._mail)
         self._is_asked = False
         self._ask_for_ids()
 
@@ -76,6 +78,13 @@ class FleetStore(DurableStore):
     def load_vehicles(self, vehicles: frozenset[int]) -> None:
         """Ask for everything about vehicles; ``VehiclesLoaded`` is the answer. Never blocks."""
         self._loader.ask(vehicles)
+
+    def watch_tasks(self, ids: frozenset[int]) -> None:
+        """Ask how tasks stand, and for changes from now on; these alone. Never blocks.
+
+        ``TaskStates`` are the answers: one for each task after each call, and later when it ends.
+        """
+        self._watch.ask(ids)
 
     def append(self, events: Sequence[Event]) -> None:
         """Queue events to be made durable, without blocking; raise ValueError after ``close``."""
@@ -104,6 +113,7 @@ class FleetStore(DurableStore):
         """Write the remaining events, and end the sessions."""
         if self._is_open:
             self._loader.close(within=LOADER_LIMIT)
+            self._watch.close(within=LOADER_LIMIT)
         super().close()
 
     def _ask_for_ids(self) -> None:

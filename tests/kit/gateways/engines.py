@@ -3,12 +3,20 @@
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from random import Random
 from typing import Any
 
 from mav_tasks.engine.clients.elsewhere import BACK, TOWARDS
-from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, LeaseChanged, Peer, VehiclesGone
+from mav_tasks.engine.inputs import (
+    FLEET_LINK,
+    FleetChanged,
+    LeaseChanged,
+    Peer,
+    TasksElsewhere,
+    VehiclesGone,
+)
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Change, Member, Request
 from mav_tasks.fleet.standing import Effect, Standing
@@ -19,7 +27,8 @@ from mav_tasks.mavlink.signing import Key
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
 from mav_tasks.store import Evicted, IdsGranted, Kept, Outcome, Store, VehiclesLoaded
-from mav_tasks.tasks.events import Event
+from mav_tasks.tasks.events import Event, TaskChanged, TaskModified, TaskSubmitted, TaskWithdrawn
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.signing_lead import MOST_LEAD, STEP
 from mav_tasks.tasks.task import Task
@@ -31,6 +40,7 @@ BLOCK = 1_000  # task ids
 CARRIED = 0.01  # s, for which a packet is under way between gateways
 GIVEN_UP = 0.4  # s, for which an answer is awaited
 PING = 0.1  # s
+LOOK = 2.0  # s between two looks at other gateways' tasks, task_watch.PERIOD
 SESSION_ENDS = 0.02  # s after the death of its process
 
 
@@ -92,6 +102,8 @@ class SharedStore:
     def __init__(self, path: Path) -> None:
         self.store = PromptSqliteStore(path, wall_offset=0.0)
         self._next_id = 1
+        #: called when something was stored that other gateways are notified of
+        self.notify: Callable[[], None] = lambda: None
         self.leads: dict[int, float] = {}
 
     def block(self) -> IdsGranted:
@@ -109,6 +121,8 @@ class SharedStore:
         """Make events durable."""
         self.store.append(events)
         self.store.take_outcomes()
+        if any(map(_is_news, events)):
+            self.notify()
 
     def part(self, vehicles: frozenset[int]) -> Restored:
         """Return what is stored about some vehicles."""
@@ -117,6 +131,18 @@ class SharedStore:
     def tasks(self) -> tuple[Task, ...]:
         """Return all stored tasks."""
         return self.store.load().tasks
+
+
+def _is_news(event: Event) -> bool:
+    match event:
+        case TaskChanged(new=new):
+            return new in TERMINAL
+        case TaskSubmitted(task=task):
+            return task.terms.after > 0
+        case TaskModified() | TaskWithdrawn():
+            return True
+        case _:
+            return False
 
 
 class GatewayStore:
@@ -192,6 +218,7 @@ class Gateway:
         self.got: list[tuple[float, int]] = []
         self.let_go: list[tuple[float, int]] = []  # when the engine forgot each vehicle
         self.is_reached = True  # the database
+        self.is_looking = True  # at other gateways' tasks
         self.is_frozen = False
         self.is_dead = False
         self._asked: tuple[Request, float, float] | None = None  # when, and when it is answered
@@ -203,6 +230,9 @@ class Gateway:
         self.store = GatewayStore(self.world.shared, self._is_current, self.name)
         self.mail = FleetLink(self.world, self.name)
         self._told: tuple[tuple[int, str], ...] = ()
+        self._expected: frozenset[int] = frozenset()
+        self._seen: dict[int, TaskState | None] = {}
+        self._look_at = inf
         self.server = InMemoryServer(
             self.world.net,
             vehicles=self.world.rover_names,
@@ -235,7 +265,11 @@ class Gateway:
         own = self.server.next_deadline()
         mail = self.mail.next_arrival()
         due = [] if mail is None else [mail]
-        due += [self._ping_at, self.member.next_turn if self._asked is None else self._asked[2]]
+        due += [
+            self._look_at,
+            self._ping_at,
+            self.member.next_turn if self._asked is None else self._asked[2],
+        ]
         lease = self.member.lease.next_deadline()
         return max(self.world.now, min([*due, *(at for at in (own, lease) if at is not None)]))
 
@@ -255,6 +289,35 @@ class Gateway:
         self.server.turn(now=now)
         if self.pump.is_evicted:
             self._begin()
+        self._watch_tasks(now)
+
+    def notified(self) -> None:
+        """Look at other gateways' tasks soon."""
+        if self._expected:
+            self._look_at = min(self._look_at, self.world.now + self.world.delay())
+
+    def _watch_tasks(self, now: float) -> None:
+        """Do as task_watch does."""
+        expected = self.engine.expected
+        if expected is not self._expected:
+            self._expected, self._seen = expected, {}
+            self._look_at = now + self.world.delay() if expected else inf
+        if now < self._look_at:
+            return
+        self._look_at = now + LOOK
+        if not (self.is_reached and self.is_looking and self.world.database.is_up):
+            return
+        states = {int(task.id): task.state for task in self.world.shared.tasks()}
+        seen = {each: states.get(each) for each in sorted(expected)}
+        news = {
+            each: state
+            for each, state in seen.items()
+            if each not in self._seen
+            or ((state is None or state in TERMINAL) and state is not self._seen[each])
+        }
+        self._seen = seen
+        if news:
+            self.server.take_in(TasksElsewhere(tuple(news.items())), now=now)
 
     def _talk(self, now: float) -> None:
         database = self.world.database
@@ -329,6 +392,9 @@ class FleetWorld(World):
         self, folder: Path, *, names: Sequence[str] = ("server", "b"), seed: int = 0, **kw: Any
     ) -> None:
         self.database, self.shared = Database(), SharedStore(folder / "shared.sqlite3")
+        self.shared.notify = self._notify
+        #: how many of the notifications about tasks do not arrive
+        self.lost_notices = 0.0
         self.random = Random(seed)
         self.gateways: dict[str, Gateway] = {}
         self.settings: Settings | None = kw.get("settings")
@@ -410,6 +476,11 @@ class FleetWorld(World):
         """Return whether a gateway's engine has met a vehicle."""
         found = it.engine.snapshot(now=self.now).vehicles
         return vehicle in [each.system_id for each in found]
+
+    def _notify(self) -> None:
+        for it in self.gateways.values():
+            if not it.is_dead and self.random.random() >= self.lost_notices:
+                it.notified()
 
     def delay(self) -> float:
         """Return how long the database takes for an answer."""

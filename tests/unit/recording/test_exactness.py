@@ -24,6 +24,7 @@ from mav_tasks.engine.inputs import (
     SettingsChanged,
     Shutdown,
     StoreFailed,
+    TasksElsewhere,
     VehiclesGone,
     VehiclesTaken,
     WallClock,
@@ -44,7 +45,7 @@ from mav_tasks.recording.surroundings import (
 from mav_tasks.settings import Clients, Retention, Settings
 from mav_tasks.store.codec import Decoder
 from mav_tasks.tasks.events import ServerStopped, VehicleHomeSet, VehicleSeen
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
@@ -75,6 +76,7 @@ INPUTS: list[Input | None] = [
     LeaseChanged(0.1 + 0.2, inf),
     IdsGranted(1000, 2),
     FleetChanged(((3, "a"), (7, "b"))),
+    TasksElsewhere(((3, TaskState.EXECUTING), (7, None))),
     VehiclesTaken((3, 7), TAKEN_OVER),
     VehiclesGone((3, 7)),
     SettingsChanged(Settings(clients=Clients(priorities={"255/190": 7}, stream_interval=0))),

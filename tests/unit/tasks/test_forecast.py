@@ -22,7 +22,7 @@ from mav_tasks.tasks.goal import (
     SingleGoal,
     Wait,
 )
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.outlook import estimate
 from mav_tasks.tasks.task import Pose, Progress, Task, Terms
 from tests.unit.tasks.rig import BY, Rig, idle, in_control
@@ -129,6 +129,17 @@ class TestForecast:
         assert times_of(rig, before) == pytest.approx((101.5, 123.0))
         assert times_of(rig, last) == pytest.approx((123.0, 134.5))  # as urgent as ``then``
         assert times_of(rig, then) == pytest.approx((134.5, 137.0))
+
+    def test_when_one_ends_that_another_gateway_has_is_not_foreseen(self) -> None:
+        rig = Rig().executing(Wait(100.0))
+        rig.fleet.room.share()
+        with rig.fleet.room.told({500: TaskState.EXECUTING}, now=rig.now):
+            now = rig.submit(Wait(10.0), terms=Terms(after=500))
+            later = rig.submit(Wait(10.0), terms=Terms(after=500, start_at=rig.now + 50.0))
+        then = rig.submit(Wait(1.0), terms=Terms(after=now.id))
+        other = rig.submit(Wait(1.0))
+        assert all(isnan(times_of(rig, each)[1]) for each in (now, later, then))
+        assert times_of(rig, other) == pytest.approx((101.5, 104.0))
 
     def test_one_with_a_start_time_waits_for_it_and_for_its_turn(self) -> None:
         rig = Rig().executing(Wait(100.0))

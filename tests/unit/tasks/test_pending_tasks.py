@@ -20,9 +20,11 @@ DAY = 86_400.0
 class Rig:
     """A room, and a registry that is durable at once."""
 
-    def __init__(self, *, queueing: Queueing | None = None) -> None:
+    def __init__(self, *, queueing: Queueing | None = None, is_shared: bool = False) -> None:
         self.registry = TaskRegistry()
         self.room = PendingTasks(self.registry, Settings(queueing=queueing or Queueing()))
+        if is_shared:
+            self.room.share()
         self.now = 100.0
 
     def submit(self, *, vehicle: int = 1, **terms: object) -> TaskId:
@@ -151,6 +153,144 @@ class TestDependencies:
         third = rig.submit(after=second, vehicle=2)
         rig.room.withdraw(rig.registry[first], now=rig.now)
         assert [rig.state(t) for t in (second, third)] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 2
+
+
+class TestDependenciesElsewhere:
+    """Tasks of a gateway that run after those of other gateways' vehicles: 500 and above."""
+
+    @staticmethod
+    def behind(rig: Rig, state: TaskState = S.EXECUTING, **terms: object) -> TaskId:
+        """Submit a task that runs after one elsewhere, which is in this state."""
+        with rig.room.told({500: state}, now=rig.now):
+            return rig.submit(after=500, **terms)  # type: ignore[arg-type]
+
+    @staticmethod
+    def tell(rig: Rig, state: TaskState | None) -> None:
+        with rig.room.told({500: state}, now=rig.now):
+            pass
+
+    def test_only_the_store_of_a_fleet_knows_them(self) -> None:
+        assert not Rig().room.is_in_question(500)
+        rig = Rig(is_shared=True)
+        assert rig.room.is_in_question(500)
+        assert not rig.room.is_in_question(rig.submit())
+        self.behind(rig)
+        assert not rig.room.is_in_question(500)  # one that waits for it shows that it exists
+
+    def test_one_runs_after_the_other(self) -> None:
+        rig = Rig(is_shared=True)
+        task = self.behind(rig)
+        assert (rig.state(task)[0], rig.room.expected) == (S.BLOCKED, {500})
+        self.tell(rig, S.HELD)
+        assert (rig.state(task)[0], rig.room.take_woken()) == (S.BLOCKED, set())
+        self.tell(rig, S.COMPLETED)
+        assert (rig.state(task)[0], rig.order()) == (S.QUEUED, [task])
+        assert (rig.room.expected, rig.room.take_woken()) == (set(), {1})
+
+    @pytest.mark.parametrize("state", [S.FAILED, S.CANCELLED, S.KILLED, S.EXPIRED, None])
+    def test_the_failure_or_withdrawal_of_one_fails_all_that_follow(
+        self, state: TaskState | None
+    ) -> None:
+        rig = Rig(is_shared=True)
+        task = self.behind(rig)
+        last = rig.submit(after=task, vehicle=2)
+        self.tell(rig, state)
+        assert [rig.state(each) for each in (task, last)] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 2
+        assert rig.room.expected == set()
+
+    def test_what_is_over_is_waited_for_no_more_or_never(self) -> None:
+        rig = Rig(is_shared=True)
+        assert rig.state(self.behind(rig, S.COMPLETED))[0] is S.QUEUED
+        for state, reason in ((S.KILLED, R.DEPENDENCY_FAILED), (None, R.UNKNOWN_DEPENDENCY)):
+            with rig.room.told({500: state}, now=rig.now):
+                assert refusal(rig, after=500) is reason
+        assert refusal(rig, after=500) is R.UNKNOWN_DEPENDENCY  # nobody has been asked
+        assert rig.room.expected == set()
+
+    def test_a_scheduled_one_remembers_that_it_need_not_wait(self) -> None:
+        rig = Rig(is_shared=True)
+        early, late = self.behind(rig, start_at=105.0), self.behind(rig, start_at=110.0)
+        rig.pass_to(106.0)
+        self.tell(rig, S.COMPLETED)
+        assert [rig.state(each)[0] for each in (early, late)] == [S.QUEUED, S.SCHEDULED]
+        rig.pass_to(110.0)
+        assert rig.state(late)[0] is S.QUEUED
+
+    def test_what_leaves_is_asked_about_no_more(self) -> None:
+        rig = Rig(is_shared=True)
+        task = self.behind(rig)
+        rig.modify(task, after=0)
+        assert (rig.state(task)[0], rig.room.expected) == (S.QUEUED, set())
+
+    @pytest.mark.parametrize("state", [S.BLOCKED, S.SCHEDULED, S.QUEUED])
+    def test_after_a_takeover_it_waits_unless_it_was_ready(self, state: TaskState) -> None:
+        rig = Rig(is_shared=True)
+        rig.submit()
+        task = replace(
+            rig.registry[TaskId(1)],
+            state=state,
+            terms=Terms(after=500, start_at=300.0 if state is S.SCHEDULED else None),
+        )
+        again = Rig(is_shared=True)
+        again.registry.restore([task], next_id=5)
+        again.room.restore([task], now=150.0)
+        again.pass_to(300.0)
+        is_ready = state is S.QUEUED
+        assert again.state(1)[0] is (S.QUEUED if is_ready else S.BLOCKED)
+        assert again.room.expected == (set() if is_ready else {500})
+        self.tell(again, S.COMPLETED)
+        assert again.state(1)[0] is S.QUEUED
+
+    @pytest.mark.parametrize(
+        ("state", "then"),
+        [
+            (S.EXECUTING, (S.BLOCKED, R.NONE)),
+            (S.COMPLETED, (S.QUEUED, R.NONE)),
+            (S.CANCELLED, (S.FAILED, R.DEPENDENCY_FAILED)),
+        ],
+    )
+    def test_one_that_comes_to_this_gateway_is_no_longer_asked_about(
+        self, state: TaskState, then: tuple[TaskState, TaskReason]
+    ) -> None:
+        rig = Rig(is_shared=True)
+        task = self.behind(rig)
+        taken = replace(rig.registry[task], id=TaskId(500), vehicle=2, state=state, terms=Terms())
+        rig.registry.restore([taken])
+        rig.room.restore([taken], now=rig.now)
+        assert (rig.state(task), rig.room.expected) == (then, set())
+
+    def test_one_that_leaves_this_gateway_is_asked_about_from_then_on(self) -> None:
+        rig = Rig(is_shared=True)
+        ahead = rig.submit(vehicle=2, priority=1)
+        waits, goes = rig.submit(after=ahead), rig.submit(vehicle=2, after=ahead, priority=9)
+        rig.room.forget(2)
+        rig.registry.forget(2)
+        rig.room.forgotten(now=rig.now)
+        assert (rig.state(waits)[0], rig.room.expected) == (S.BLOCKED, {ahead})
+        assert rig.registry.get(goes) is None
+        with rig.room.told({ahead: S.COMPLETED}, now=rig.now):
+            pass
+        assert rig.state(waits)[0] is S.QUEUED
+
+    def test_a_waiting_task_is_not_put_behind_what_others_may_change(self) -> None:
+        rig = Rig(is_shared=True)
+        first = rig.submit()
+        behind = self.behind(rig)
+        for after, reason in ((501, R.UNKNOWN_DEPENDENCY), (behind, R.CYCLE)):
+            with pytest.raises(Rejection) as refused:
+                rig.modify(first, after=after)
+            assert refused.value.reason == reason
+        self.tell(rig, S.COMPLETED)
+        rig.modify(first, after=behind)
+        assert rig.state(first)[0] is S.BLOCKED
+
+    def test_urgency_goes_with_those_that_leave(self) -> None:
+        rig = Rig(is_shared=True)
+        needed, other = rig.submit(priority=1), rig.submit(priority=5)
+        rig.submit(vehicle=2, after=needed, priority=9)
+        assert rig.order() == [needed, other]
+        rig.room.forget(2)
+        assert rig.order() == [other, needed]
 
 
 class TestUrgency:

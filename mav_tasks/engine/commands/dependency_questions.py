@@ -1,0 +1,96 @@
+"""Holds submissions back that run after a task which only the fleet's store knows.
+
+That is a task of a vehicle that another gateway has, or one that does not exist.
+``Engine.expected`` names it until the store has answered (``TasksElsewhere``); then the submission
+is handled again, by the state of its vehicle at that time. So a halt that came meanwhile counts.
+"""
+
+from collections import deque
+from math import inf
+from typing import NamedTuple, Protocol
+
+from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.errors import Rejection
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.pending_tasks import PendingTasks
+
+WITHIN = 1.0  # s for the answer; clients wait longer for theirs
+MOST = 256  # submissions
+
+R = TaskReason
+
+
+class GoOn(Protocol):
+    """Handles a submission again."""
+
+    def __call__(self, *, now: float) -> None: ...
+
+
+class Refuse(Protocol):
+    """Refuses a submission."""
+
+    def __call__(self, refusal: Rejection, /, *, now: float) -> None: ...
+
+
+class _Held(NamedTuple):
+    after: int
+    until: float
+    go_on: GoOn
+    refuse: Refuse
+
+
+class DependencyQuestions:
+    """The submissions that wait for an answer, in the order in which they came."""
+
+    def __init__(self, room: PendingTasks, timers: Timers) -> None:
+        self._room = room
+        self._held: deque[_Held] = deque()
+        self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up_late)
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    @property
+    def expected(self) -> set[int]:
+        """The tasks that are asked about."""
+        return {held.after for held in self._held}
+
+    def hold(self, after: int, go_on: GoOn, refuse: Refuse, *, now: float) -> bool:
+        """Hold a submission back if that is necessary; return whether it is held.
+
+        Raise Rejection if too many are.
+        """
+        if not after or not self._room.is_in_question(after):
+            return False
+        if len(self._held) >= MOST:
+            raise Rejection(R.RATE_LIMITED, f"run after {after}: too many such submissions wait")
+        self._held.append(_Held(after, now + WITHIN, go_on, refuse))
+        self._plan()
+        return True
+
+    def answered(self, *, now: float) -> None:
+        """Handle those whose task is no longer in question."""
+        held, self._held = self._held, deque()
+        for each in held:
+            if self._room.is_in_question(each.after):
+                self._held.append(each)
+            else:
+                each.go_on(now=now)
+        self._plan()
+
+    def keys_revoked(self, *, now: float) -> None:
+        """Refuse all: the rights of one may have been those of a key that is no longer valid."""
+        held, self._held = self._held, deque()
+        for each in held:
+            each.refuse(Rejection(R.STALE, "a key was revoked meanwhile: send it again"), now=now)
+        self._plan()
+
+    def _give_up_late(self, *, now: float) -> None:
+        while self._held and self._held[0].until <= now:
+            after, _, _, refuse = self._held.popleft()
+            words = f"run after {after}: the fleet's database does not say in time whether"
+            refuse(Rejection(R.STORE_UNAVAILABLE, f"{words} that task exists"), now=now)
+        self._plan()
+
+    def _plan(self) -> None:
+        self._timer.set(self._held[0].until if self._held else inf)
