@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 
@@ -34,10 +35,10 @@ AT_ONCE = 6
 class Life:
     """One fleet, and what happens to it."""
 
-    def __init__(self, folder: Path, seed: int) -> None:
+    def __init__(self, folder: Path, seed: int, *, on_takeover: str = "resume", **kw: Any) -> None:
         self.chance = Random(seed)
-        settings = Settings(on_takeover="resume", on_restart="continue")
-        self.world = FleetWorld(folder, names=NAMES, seed=seed, settings=settings)
+        settings = Settings(on_takeover=on_takeover, on_restart="continue")
+        self.world = FleetWorld(folder, names=NAMES, seed=seed, settings=settings, **kw)
         self.world.watched.to_clients.clear()  # words wait at gateways that pass them on
         for observer in self.world.observers:
             observer.expects_gaps = True  # a gateway that failed leaves one
