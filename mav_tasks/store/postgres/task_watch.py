@@ -86,7 +86,10 @@ class TaskWatch:
             log.warning("gateway %s cannot see tasks of other gateways: %s", self._gateway, words)
 
     def _wait(self, seconds: float | None, *fds: int) -> None:
-        select.select([self._fd, *fds], [], [], seconds)
+        poll = select.poll()  # not select(): its numbers end at 1,023
+        for fd in (self._fd, *fds):
+            poll.register(fd, select.POLLIN)
+        poll.poll(None if seconds is None else max(0.0, 1000 * seconds))
 
     def _take_questions(self) -> bool:
         """Take the latest question; return whether there was one. It is answered in full."""
