@@ -50,6 +50,7 @@ class Executor:
         self._resumes_by_itself = False
         self._lost_at: Pose | None = None  # the last pose before the loss
         self._was_silent = False  # heartbeats were lost, too
+        self._is_unbegun = False  # another gateway had not begun to move the vehicle
         self._untaken_in: ModeKind | None = None  # mode at the loss, if we had sent nothing
         self._meter: TimingMeter | None = None  # while EXECUTING
         #: intervals between setpoints of all tasks of this run, s
@@ -92,7 +93,7 @@ class Executor:
         """Make a task the active one, in the state that it has."""
         self.task_id = task.id
         self._executed_before = task.progress.execution_time
-        self._resumes_by_itself = False
+        self._resumes_by_itself = self._is_unbegun = False
 
     def take_over(self, task: Task, *, now: float) -> None:
         """Make a task the active one that another gateway drove; it resumes by itself."""
@@ -100,6 +101,7 @@ class Executor:
         self._since = self._lost_until = now
         self._lost_at, self._was_silent, self._untaken_in = None, False, None
         self._resumes_by_itself = True
+        self._is_unbegun = not has_moved(task)
 
     def give_up(self) -> None:
         """Drop the active task in the state that it has, to make room for another."""
@@ -332,6 +334,7 @@ class Executor:
             lost = R.POSITION_LOST
         if lost:
             self._lost_at, self._was_silent = None if motion is None else motion.pose, False
+            self._is_unbegun = False
             self._untaken_in = seen.mode if seen.is_untouched and not seen.armed else None
             self.pause(lost, actor=SERVER, now=now)
         return bool(lost)
@@ -351,7 +354,7 @@ class Executor:
         if seen.armed:
             ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD)
         else:  # in the mode that it had when it was lost, before we took it
-            ours = seen.mode is self._untaken_in
+            ours = self._is_unbegun or seen.mode is self._untaken_in
         task = self._active(S.PAUSED)
         if not ours or start_blocker(seen, watch=watch, now=now, goal=goal_of(task)):
             self._lost_until = now

@@ -26,6 +26,7 @@ from tests.scenarios.test_takeover import packed
 #: s without a holder after a process has ended, and after one fell silent (the issue's goals)
 AFTER_DEATH, AFTER_SILENCE = 0.3, 1.5
 CONTINUE, RELEASE, REMAINDER = 54004, 54013, 1
+COMMAND_LONG, ARM = 76, (400).to_bytes(2, "little")  # where COMMAND_LONG has its command
 
 
 class Fleet:
@@ -351,6 +352,36 @@ def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
     else:
         fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=40)
         assert abs(fleet.world.truth.north - 5.0) < 0.1
+    fleet.world.check()
+
+
+@pytest.mark.parametrize("disarmed_by", ["nobody", "a person"])
+def test_a_task_that_had_not_armed_its_rover_goes_on_after_a_takeover(
+    tmp_path: Path, disarmed_by: str
+) -> None:
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
+    if disarmed_by == "a person":
+        first = fleet.submit(1.0)
+        fleet.drives(first)
+        fleet.world.operator_arm(False)
+        fleet.world.run(2.0)
+    else:  # the requests to arm it are lost
+        fleet.world.watched.loses = lambda _source, target, data: (
+            target == "rover1" and data[7] == COMMAND_LONG and data[38:40] == ARM
+        )
+    task = fleet.submit(1.0)
+    if disarmed_by == "nobody":
+        fleet.world.until(lambda: fleet.task(task).state is S.STARTING, within=2)
+        assert not fleet.world.rover.autopilot.armed
+    fleet.world.kill(fleet.first.name)
+    fleet.world.watched.loses = lambda *_: False
+    assert fleet.world.holder() is fleet.other
+    if disarmed_by == "nobody":
+        fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=20)
+        assert abs(fleet.world.truth.north - 1.0) < 0.1
+    else:
+        fleet.world.run(10.0)
+        assert not fleet.world.rover.autopilot.armed
     fleet.world.check()
 
 
