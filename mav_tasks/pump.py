@@ -18,6 +18,7 @@ from mav_tasks.store import (
     HaltNotKept,
     IdsGranted,
     Kept,
+    NonceTaken,
     NotKept,
     Outcome,
     Store,
@@ -102,6 +103,8 @@ class Pump:
                 return None
             case IdsGranted(first=first, count=count):
                 return inputs.IdsGranted(first, count)
+            case NonceTaken(task_id=task_id, known=known, payload=payload):
+                return inputs.NonceTaken(task_id, known, payload)
             case VehiclesLoaded(vehicles=vehicles, restored=restored):
                 return inputs.VehiclesTaken(vehicles, restored)
             case TaskStates(states=states):

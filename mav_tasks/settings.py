@@ -286,6 +286,12 @@ class Queueing:
         "minimum running time of a task before another one may interrupt it",
         parameter=(11, "TSK_PREEMPT_S"),
     )
+    least_battery_percent: int = setting(
+        20,
+        _count(0, 100, "%"),
+        "charge below which the server chooses no rover for a task that any rover may drive",
+        parameter=(21, "TSK_MIN_BATT"),
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.battery import charge_of
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.persona import Persona, persona_of
 from mav_tasks.services.prearm_check import passes_checks
@@ -21,7 +22,6 @@ ASK_AGAIN = 0.6  # s between requests to a vehicle's task server until it answer
 
 DEGREE = 1e7  # of MAVLink's integers
 UNKNOWN_VOLTAGE = 65535
-UNKNOWN_BATTERY = -1
 
 POSITIONS = frozenset({m.LocalPositionNed.id, m.GlobalPositionInt.id})
 #: telemetry messages whose latest packet is kept
@@ -95,7 +95,7 @@ class VehicleView:
             latitude=None if on_earth is None else on_earth.lat / DEGREE,
             longitude=None if on_earth is None else on_earth.lon / DEGREE,
             position_age=None if self._placed_at is None else now - self._placed_at,
-            battery=None if system is None else _battery_of(system),
+            battery=None if system is None else charge_of(system),
             voltage=None if system is None else _voltage_of(system),
             is_ready=None if system is None else passes_checks(system),
         )
@@ -219,12 +219,6 @@ class FleetView:
         for view in due:
             view.ask_at = now + ASK_AGAIN
         return [view.system_id for view in due]
-
-
-def _battery_of(message: m.SysStatus) -> float | None:
-    """Return the charge that is left, 0 to 1; None: unknown."""
-    percent = message.battery_remaining
-    return None if percent == UNKNOWN_BATTERY else min(max(percent / 100, 0.0), 1.0)
 
 
 def _voltage_of(message: m.SysStatus) -> float | None:

@@ -23,6 +23,8 @@ from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
+from mav_tasks.engine.commands.any_rover import AnyRover
+from mav_tasks.engine.commands.assignments import Assignments
 from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
@@ -32,6 +34,7 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing
+from mav_tasks.engine.missions.any_uploads import AnyUploads
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionServers
 from mav_tasks.engine.missions.plans import Plans
@@ -116,6 +119,15 @@ class Engine:
         refusals = Refusals(registry)
         modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
         control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
+        assignments = self._assignments = Assignments(
+            vehicles, self._fleet, registry, timers, settings, is_open=lambda: submissions.is_open
+        )
+        assignments.watch(earlier.tasks, now=now)
+        room = self._fleet.room
+        self._any = AnyRover(vehicles, registry, room, submissions, assignments, displays, settings)
+        self._any_plans = AnyUploads(
+            gcs, vehicles, registry, submissions, assignments, timers, settings
+        )
         self._publisher = Publisher(
             gcs, vehicles, registry, displays, submissions, rates, timers, now=now
         )
@@ -131,12 +143,15 @@ class Engine:
             door=self._door,
             elsewhere=self._elsewhere,
             broadcasts=Broadcasts(vehicles, packer),
-            commands=Commands(vehicles, registry, submissions, plans, modes, control, displays),
+            commands=Commands(
+                vehicles, registry, submissions, plans, modes, control, displays, self._any
+            ),
             control=control,
             modes=modes,
             displays=displays,
             setup=SetupSigning(self.signatures, vehicles),
             desks=MissionServers(gcs, vehicles, registry, submissions, plans, timers),
+            any_plans=self._any_plans,
             operator=self._operator,
             parameters=self._parameters,
             passing=self._passing,
@@ -210,6 +225,9 @@ class Engine:
                     self._questions.answered(now=now)
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
+            case inputs.NonceTaken():
+                self._any_plans.nonce_taken(item, now=now)
+                self._any.nonce_taken(item, now=now)
             case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
                 self.not_in_force = self._parameters.not_in_force
@@ -306,6 +324,7 @@ class Engine:
         """Serve vehicles that this gateway has got, with their tasks and plans."""
         self._fleet.take_over(restored, now=now)
         self._deduplicator.restore(restored.tasks, now=now)
+        self._assignments.watch(restored.tasks, now=now)
         self._plans.restore(restored.plans)
         self.signatures.take_lead(restored.signing_lead)
         self._vehicles.take(vehicles, now=now)
@@ -319,6 +338,7 @@ class Engine:
             self._vehicles.forget(vehicle)
             tasks = self._fleet.forget(vehicle, now=now)
             self._deduplicator.forget_vehicle(vehicle, tasks)
+            self._assignments.forget(vehicle, tasks)
             self._plans.forget(vehicle)
             self._reception.forget(vehicle)
             self._gcs.forget_vehicle(vehicle, tasks)
@@ -365,6 +385,7 @@ class Engine:
         if events:
             self._publisher.publish(events, now=now)
             self._reports.publish(events, now=now)
+            self._assignments.publish(events, now=now)
             self._journal += events
         if self._telling.at <= now:
             self._publisher.send_statuses(now=now)
@@ -381,6 +402,9 @@ class Engine:
         self._gcs.apply(settings)
         self._vehicles.apply(settings)
         self._submissions.apply(settings)
+        self._assignments.apply(settings)
+        self._any.apply(settings)
+        self._any_plans.apply(settings)
         self._reports.apply(settings)
         self._operator.apply(settings)
 

@@ -173,6 +173,19 @@ class IdsGranted:
 
 
 @dataclass(frozen=True, slots=True)
+class NonceTaken:
+    """The store has refused a task of ours: the fleet had one with its nonce before.
+
+    That is ``known``; its ``payload`` tells whether it is the same submission. This comes before
+    the ``Committed`` of our task.
+    """
+
+    task_id: int
+    known: int
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsChanged:
     """New settings are in force."""
 
@@ -208,6 +221,7 @@ Input = (
     | FleetChanged
     | TasksElsewhere
     | IdsGranted
+    | NonceTaken
     | SettingsChanged
     | WallClock
     | Shutdown

@@ -131,9 +131,10 @@ SETPOINT = Schema(
 TASK_CHANGE = Schema(
     "mav_tasks.TaskChange",
     _object(
-        "A task was submitted, restored from the store, moved to another state, or modified",
+        "A task was submitted, restored from the store, moved to another state, modified,"
+        " or assigned to a rover by the server",
         timestamp=_TIME,
-        event=_plain("string", "submitted, restored, changed, modified or withdrawn"),
+        event=_plain("string", "submitted, restored, changed, modified, assigned or withdrawn"),
         rover=_plain("integer", "system id"),
         task=_plain("integer", "task id"),
         version=_plain("integer", "counts the changes of the task"),

@@ -10,6 +10,7 @@ from mav_tasks.mcap_export.views import Seen, log, timestamp
 from mav_tasks.tasks.events import (
     SERVER,
     Event,
+    TaskAssigned,
     TaskChanged,
     TaskModified,
     TaskProgressed,
@@ -70,6 +71,14 @@ class TaskViews:
                     "priority": event.terms.priority,
                 }
                 yield self._change("modified", event.task_id, time, actor=event.actor, words=words)
+            case TaskAssigned():
+                known = self._known(event.task_id, event.vehicle)
+                known |= {
+                    "rover": event.vehicle,
+                    "version": event.version,
+                    "old": known["state"],
+                }
+                yield self._change("assigned", event.task_id, time, actor=SERVER, words=words)
             case TaskWithdrawn():
                 self._known(event.task_id, event.vehicle)
                 yield self._change("withdrawn", event.task_id, time, actor=SERVER, words=words)

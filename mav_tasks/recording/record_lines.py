@@ -156,6 +156,7 @@ _SIMPLE: Mapping[str, Callable[..., Input]] = {
     "halt not stored": inputs.HaltNotStored,
     "lease": inputs.LeaseChanged,
     "ids": inputs.IdsGranted,
+    "nonce taken": inputs.NonceTaken,
     "wall clock": inputs.WallClock,
     "shutdown": inputs.Shutdown,
 }
@@ -201,6 +202,8 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["tasks elsewhere", now, states]
         case inputs.IdsGranted(first=first, count=count):
             return ["ids", now, first, count]
+        case inputs.NonceTaken(task_id=task_id, known=known, payload=payload):
+            return ["nonce taken", now, task_id, known, payload]
         case inputs.WallClock(offset=offset):
             return ["wall clock", now, offset]
         case inputs.Shutdown():

@@ -60,10 +60,11 @@ class Answer(NamedTuple):
     result: int
     result_param2: int
     source: Address
+    result_param1: int = 0  # the ack's field ``progress``
 
     def ack(self, to: Address) -> CommandAck:
-        system, component = to
-        return CommandAck(self.command, self.result, 0, self.result_param2, system, component)
+        first, second = self.result_param1, self.result_param2
+        return CommandAck(self.command, self.result, first, second, *to)
 
 
 class Pending:

@@ -58,13 +58,27 @@ class TaskStates:
 
 
 @dataclass(frozen=True, slots=True)
+class NonceTaken:
+    """A submission to any vehicle was not stored: the fleet has task ``known`` with its nonce.
+
+    ``payload`` is that task's. It comes before the Kept of the submission.
+    """
+
+    task_id: int
+    known: int
+    payload: str
+
+
+@dataclass(frozen=True, slots=True)
 class Evicted:
     """The fleet has ended this gateway's lease: it can store nothing any more."""
 
     text: str
 
 
-Outcome = Kept | NotKept | HaltNotKept | IdsGranted | VehiclesLoaded | TaskStates | Evicted
+Outcome = (
+    Kept | NotKept | HaltNotKept | IdsGranted | NonceTaken | VehiclesLoaded | TaskStates | Evicted
+)
 
 
 @dataclass(frozen=True, slots=True)

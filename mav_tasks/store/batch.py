@@ -10,6 +10,7 @@ from mav_tasks.tasks.events import (
     QueueContinued,
     QueuePaused,
     TaskAdvanced,
+    TaskAssigned,
     TaskChanged,
     TaskModified,
     TaskProgressed,
@@ -23,7 +24,7 @@ from mav_tasks.tasks.events import (
 )
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
-from mav_tasks.tasks.task import following
+from mav_tasks.tasks.task import Task, following
 
 
 class Batch:
@@ -51,6 +52,9 @@ class Batch:
         self.modified: dict[int, tuple[Any, ...]] = {}  # modified, id
         self.advanced: dict[int, tuple[Any, ...]] = {}  # advanced, id
         self.run_after: dict[int, tuple[int, int]] = {}  # the task before it, 0: none; id
+        self.assigned: dict[int, tuple[Any, ...]] = {}  # vehicle, assigned, id
+        #: of submissions to any vehicle: by key, system, component and nonce -> payload, task id
+        self.nonces: dict[tuple[Any, ...], tuple[str, int]] = {}
         self.withdrawn: list[tuple[int]] = []
         self.plans: dict[tuple[int, int], tuple[Any, ...]] = {}  # vehicle, kind, plan_id, source
         self.parameters: dict[str, tuple[Any, ...]] = {}  # name, value
@@ -80,6 +84,7 @@ class Batch:
                 self.tasks.append(
                     (task.id, number, task.vehicle, task.state, event.at + offset, body)
                 )
+                self._note_nonce(task)
             else:
                 self._note(event, number, body, event.at + offset)
 
@@ -91,6 +96,12 @@ class Batch:
             sender = (time.key, time.link_id, time.system_id, time.component_id)
             self.signatures[sender] = time.timestamp or None
         self.signed_until = max(self.signed_until, event.signed_until)
+
+    def _note_nonce(self, task: Task) -> None:
+        if task.choice and task.marks.nonce:
+            who, marks = task.submitter, task.marks
+            place = who.key, who.system_id, who.component_id, marks.nonce
+            self.nonces[place] = marks.payload, task.id
 
     def _note(self, event: Event, number: int, body: str, utc: float) -> None:
         task_id = getattr(event, "task_id", None)
@@ -105,8 +116,12 @@ class Batch:
                     self.run_after[event.task_id] = (event.terms.after, event.task_id)
             case TaskAdvanced():
                 self.advanced[event.task_id] = (body, event.task_id)
+            case TaskAssigned(before=before) if before:
+                self.assigned[event.task_id] = (event.vehicle, body, event.task_id)
             case TaskWithdrawn():
                 self.withdrawn.append((event.task_id,))
+                kept = self.nonces.items()
+                self.nonces = {place: of for place, of in kept if of[1] != event.task_id}
             case QueuePaused():
                 self.vehicles["paused", event.vehicle] = event.reason
             case QueueContinued():

@@ -52,13 +52,14 @@ def write_rows(connection: Connection, batch: Batch, *, insert: Insert) -> None:
         ("UPDATE tasks SET state = ?, changed_at = ?, changed = ? WHERE id = ?", batch.changed),
         ("UPDATE tasks SET modified = ? WHERE id = ?", batch.modified),
         ("UPDATE tasks SET advanced = ? WHERE id = ?", batch.advanced),
+        ("UPDATE tasks SET vehicle = ?, assigned = ? WHERE id = ?", batch.assigned),
         (_PLAN, batch.plans),
         (_PARAMETER, batch.parameters),
     ):
         if rows:  # an executemany without rows still takes time
             connection.executemany(statement, list(rows.values()))
     if batch.withdrawn:
-        _withdraw(connection, batch.withdrawn)
+        withdraw(connection, batch.withdrawn)
     for (column, vehicle), value in batch.vehicles.items():
         connection.execute(
             f"INSERT INTO vehicles (vehicle, {column}) VALUES (?, ?)"
@@ -85,7 +86,7 @@ def find_format(connection: Connection) -> int:
     return int(found[0])
 
 
-def _withdraw(connection: Connection, ids: Sequence[tuple[int]]) -> None:
+def withdraw(connection: Connection, ids: Sequence[tuple[int]]) -> None:
     """Delete tasks, but keep their submissions in the journal."""
     connection.executemany(
         "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"

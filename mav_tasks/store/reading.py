@@ -17,6 +17,7 @@ from mav_tasks.store.connection import Connection
 from mav_tasks.store.event_database import Reader
 from mav_tasks.tasks.events import (
     TaskAdvanced,
+    TaskAssigned,
     TaskChanged,
     TaskModified,
     TaskSubmitted,
@@ -31,10 +32,10 @@ CHUNK = 1_000  # rows whose JSON is parsed in one call
 MOST_OVER = 1_000  # finished tasks of each vehicle that a gateway loads when it gets them
 
 #: the fields that an event has in common with Task, besides the new state; in the order of the
-#: columns (changed, modified, advanced) that keep the last event of each kind
+#: columns (changed, modified, advanced, assigned) that keep the last event of each kind
 _OF_TASK = {
     kind: tuple({f.name for f in fields(kind)} & {f.name for f in fields(Task)})
-    for kind in (TaskChanged, TaskModified, TaskAdvanced)
+    for kind in (TaskChanged, TaskModified, TaskAdvanced, TaskAssigned)
 }
 
 
@@ -58,7 +59,7 @@ def read_restored(
             "SELECT next_id, signed_until FROM meta"
         ).fetchone()
         found = connection.execute(
-            f"SELECT submitted, changed, modified, advanced FROM tasks {live_or_late}"
+            f"SELECT submitted, changed, modified, advanced, assigned FROM tasks {live_or_late}"
             " ORDER BY number"
         )
         tasks: list[Task] = []
@@ -144,7 +145,7 @@ class Rows:
 
 
 def _changed(task: Task, rows: Rows, texts: Sequence[str | None], offset: float) -> Task:
-    latest: list[TaskChanged | TaskModified | TaskAdvanced] = []
+    latest: list[TaskChanged | TaskModified | TaskAdvanced | TaskAssigned] = []
     for kind, text in zip(_OF_TASK, texts, strict=True):
         if text is not None:
             latest += rows.values(kind, [text], offset)

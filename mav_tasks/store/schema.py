@@ -61,6 +61,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE vehicles ADD COLUMN halt_reason INTEGER",
         "ALTER TABLE vehicles ADD COLUMN halted_utc REAL",
     ),
+    ("ALTER TABLE tasks ADD COLUMN assigned TEXT",),  # the last vehicle, if it was chosen again
 )
 
 

@@ -60,8 +60,9 @@ class _Last:
 
 @dataclass(slots=True)
 class _Client:
-    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)  # by vehicle, command
-    goals: dict[int, _Last] = field(default_factory=dict)  # by vehicle
+    #: by the vehicle that was named, or ANY; and by command
+    of_command: dict[tuple[int, int], _Last] = field(default_factory=dict)
+    goals: dict[int, _Last] = field(default_factory=dict)  # by that vehicle
     packets: dict[str, _Last] = field(default_factory=dict)
     at: float = 0.0
 
@@ -91,6 +92,7 @@ class SubmissionDeduplicator:
     ) -> Known | None:
         """Return the task that a submission repeats, or None if it is new.
 
+        A draft for any vehicle has ANY for its vehicle.
         ``origin`` is the vehicle's, to compare places in different frames. Raise
         Rejection(NONCE_REUSED) if the nonce was used for something else.
         """
@@ -137,13 +139,14 @@ class SubmissionDeduplicator:
         client.at = at
         if marks.nonce and not isinstance(task.goal, GoTo):
             return  # its nonce alone identifies it
-        draft = Draft(task.vehicle, task.command, task.goal, submitter, task.terms, marks)
+        vehicle = task.submitted_to
+        draft = Draft(vehicle, task.command, task.goal, submitter, task.terms, marks)
         last = _Last(task.id, draft, at)
         if isinstance(task.goal, GoTo):
-            client.goals[task.vehicle] = last
+            client.goals[vehicle] = last
         if marks.nonce:
             return
-        client.of_command[task.vehicle, task.command] = last
+        client.of_command[vehicle, task.command] = last
         if marks.packet:
             client.packets[marks.packet] = last
             if len(client.packets) > PACKETS:
@@ -166,21 +169,25 @@ class SubmissionDeduplicator:
         client = self._clients.get(task.submitter)
         if client is None:
             return
-        last = client.of_command.get((task.vehicle, task.command))
+        vehicle = task.submitted_to
+        last = client.of_command.get((vehicle, task.command))
         if last is not None and last.task_id == task.id:
-            del client.of_command[task.vehicle, task.command]
-        goal = client.goals.get(task.vehicle)
+            del client.of_command[vehicle, task.command]
+        goal = client.goals.get(vehicle)
         if goal is not None and goal.task_id == task.id:
-            del client.goals[task.vehicle]
+            del client.goals[vehicle]
         client.packets.pop(task.marks.packet, None)
 
     def forget_vehicle(self, vehicle: int, tasks: Container[TaskId]) -> None:
         """Forget a vehicle with its ``tasks``: the next gateway that has it knows them."""
         self._nonces = {key: each for key, each in self._nonces.items() if each not in tasks}
         for client in self._clients.values():
-            client.goals.pop(vehicle, None)
-            for key in [each for each in client.of_command if each[0] == vehicle]:
-                del client.of_command[key]
+            for place, goal in tuple(client.goals.items()):
+                if place == vehicle or goal.task_id in tasks:  # submitted to any vehicle
+                    del client.goals[place]
+            for key, last in tuple(client.of_command.items()):
+                if key[0] == vehicle or last.task_id in tasks:
+                    del client.of_command[key]
             packets = client.packets.items()
             client.packets = {key: last for key, last in packets if last.task_id not in tasks}
 
@@ -192,8 +199,7 @@ class SubmissionDeduplicator:
             self._nonces.pop(key, None)
             return None
         if task.marks.payload != draft.marks.payload:
-            words = f"nonce {draft.marks.nonce} was used for another task"
-            raise Rejection(TaskReason.NONCE_REUSED, words)
+            raise reused(draft.marks.nonce)
         return Known(task_id, Rule.NONCE)
 
     def _forget_nonces(self) -> None:
@@ -206,6 +212,11 @@ class SubmissionDeduplicator:
             del self._clients[submitter]
         while len(self._clients) >= MANY_CLIENTS:
             del self._clients[next(iter(self._clients))]
+
+
+def reused(nonce: int) -> Rejection:
+    """Return the refusal of a nonce that another submission has."""
+    return Rejection(TaskReason.NONCE_REUSED, f"nonce {nonce} was used for another task")
 
 
 def _is_long_over(task: Task, *, now: float) -> bool:

@@ -163,6 +163,26 @@ class TaskModified:
 
 
 @dataclass(frozen=True, slots=True)
+class TaskAssigned:
+    """The server chose the vehicle of a task that any vehicle may drive; ``choice`` says why.
+
+    ``before`` is the vehicle that it was assigned to before, 0 for none. A task that has begun is
+    not assigned again.
+    """
+
+    task_id: TaskId
+    vehicle: int
+    version: int
+    before: int
+    choice: str
+    at: float
+
+    def __str__(self) -> str:
+        since = f", no longer to rover {self.before}" if self.before else ""
+        return f"rover {self.vehicle}: task {self.task_id} assigned to it{since}: {self.choice}"
+
+
+@dataclass(frozen=True, slots=True)
 class TaskWaits:
     """A vehicle's next task cannot start, for a new reason.
 
@@ -370,6 +390,7 @@ Event = (
     | StepReached
     | PlanStored
     | TaskModified
+    | TaskAssigned
     | TaskWaits
     | TaskWithdrawn
     | SubmissionRefused

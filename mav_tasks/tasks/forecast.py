@@ -12,7 +12,7 @@ from mav_tasks.tasks.driving.estimate import SETTLING, UNKNOWN, Estimate, Known,
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Task, TaskId
+from mav_tasks.tasks.task import Pose, Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 S = TaskState
@@ -32,6 +32,7 @@ class Forecast:
         self._now = now
         self._known = known_of(tasks)
         self._times: dict[TaskId, Times] | None = None  # None: not computed yet
+        self._empty: Estimate | None = None  # None: not reached
         self._ready: list[tuple[Rank, TaskId]] = []
         self._due: list[tuple[float, TaskId]] = []  # seconds from now
         self._dependents: dict[int, list[Task]] = {}
@@ -47,9 +48,20 @@ class Forecast:
             self._play(self._times)
         return self._times.get(task.id, (nan, nan))
 
+    def when_empty(self) -> Estimate:
+        """Return in how many seconds, and where, all tasks are over that need not wait for a time.
+
+        UNKNOWN if nothing can run, or there are too many.
+        """
+        if self._times is None:
+            self._times = {}
+            self._play(self._times)
+        return self._empty or UNKNOWN
+
     def _play(self, times: dict[TaskId, Times]) -> None:
         self._line_up(times)
         clock, pose = self._when_free()
+        self._note_empty(clock, pose)
         while not isnan(clock) and (self._ready or self._due) and len(times) < FORESEEN:
             if not self._ready:
                 clock = max(clock, self._due[0][0])
@@ -66,6 +78,12 @@ class Forecast:
             self._done.add(task.id)
             for dependent in self._dependents.pop(task.id, []):
                 self._let_go(dependent)
+            self._note_empty(clock, pose)
+
+    def _note_empty(self, clock: float, pose: Pose | None) -> None:
+        """Note when no task is ready for the first time."""
+        if self._empty is None and not self._ready:
+            self._empty = Estimate(clock, pose)
 
     def _line_up(self, times: dict[TaskId, Times]) -> None:
         """Sort the waiting tasks into ready, due later, and dependent."""

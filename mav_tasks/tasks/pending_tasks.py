@@ -258,6 +258,17 @@ class PendingTasks:
         self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
 
+    def assign(self, task: Task, vehicle: int, *, choice: str, now: float) -> None:
+        """Give a waiting task to another vehicle, in whose queue it keeps its rank."""
+        is_ready = task.id in self.queue(task.vehicle)
+        self.queue(task.vehicle).discard(task.id)
+        self._of_vehicle[task.vehicle] -= 1
+        self._of_vehicle[vehicle] = self._of_vehicle.get(vehicle, 0) + 1
+        self.woken |= {task.vehicle, vehicle}
+        task = self._registry.assign(task.id, vehicle, choice=choice, now=now)
+        if is_ready:
+            self._line_up(task)
+
     # series
 
     def plan_runs(self, *, now: float) -> None:
@@ -282,7 +293,9 @@ class PendingTasks:
             self._note(task, f"will not repeat task {task.id}: {why_not}", now=now)
             return True
         terms = replace(run.terms, after=0, is_staged=False)
-        draft = Draft(task.vehicle, task.command, task.goal, task.submitter, terms)
+        draft = Draft(
+            task.vehicle, task.command, task.goal, task.submitter, terms, choice=task.choice
+        )
         try:
             added = self._add(draft, now=now)
         except Rejection:

@@ -14,6 +14,7 @@ from mav_tasks.tasks.events import (
     Event,
     StepReached,
     TaskAdvanced,
+    TaskAssigned,
     TaskChanged,
     TaskModified,
     TaskProgressed,
@@ -21,7 +22,13 @@ from mav_tasks.tasks.events import (
     TaskWithdrawn,
 )
 from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, check_transition
+from mav_tasks.tasks.lifecycle import (
+    TERMINAL,
+    WAITING,
+    TaskReason,
+    TaskState,
+    check_transition,
+)
 from mav_tasks.tasks.repetition import why_series_ends
 from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.task_ids import TaskIds
@@ -111,11 +118,14 @@ class TaskRegistry:
             submitted_at=now,
             terms=draft.terms,
             state=state,
+            choice=draft.choice,
         )
         self._tasks[task.id] = task
         self._counts[task.vehicle][state] += 1
         self._note_live(task)
         self.record(TaskSubmitted(task, now))
+        if task.choice and not task.is_made:
+            self.record(TaskAssigned(task.id, task.vehicle, task.version, 0, task.choice, now))
         self._last_of[task.vehicle] = self.recorded
         self._last_event[task.id] = self.recorded
         return task
@@ -181,6 +191,21 @@ class TaskRegistry:
         modified = TaskModified(task_id, task.vehicle, task.version, terms, actor, now, old.terms)
         self.record(modified)
         self._last_event[task_id] = self.recorded
+        return task
+
+    def assign(self, task_id: TaskId, vehicle: int, *, choice: str, now: float) -> Task:
+        """Give a waiting task to another vehicle; ``choice`` says why."""
+        old = self._tasks[task_id]
+        assert old.state in WAITING, f"{old} has begun"
+        self._forget_live(old)
+        version = old.version + 1
+        task = replace(old, vehicle=vehicle, choice=choice, version=version)
+        self._tasks[task_id] = task
+        self._note_live(task)
+        self._counts[old.vehicle][old.state] -= 1
+        self._counts[vehicle][task.state] += 1
+        self.record(TaskAssigned(task_id, vehicle, version, old.vehicle, choice, now))
+        self._last_of[old.vehicle] = self._last_event[task_id] = self.recorded
         return task
 
     def advance(self, task_id: TaskId, progress: Progress, *, now: float) -> None:

@@ -11,6 +11,8 @@ TaskId = NewType("TaskId", int)
 #: the largest that a float parameter can carry (``mavlink.float_param``): 34 years at one task/s
 MAX_TASK_ID = 0x3F7FFFFF
 MAX_NONCE = MAX_TASK_ID
+#: in place of a vehicle's system id: the server chooses one
+ANY = 0
 
 
 def following(task_id: int) -> TaskId:
@@ -167,7 +169,10 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """A parsed submission that has no id yet. ``command`` is the MAV_CMD number."""
+    """A parsed submission that has no id yet. ``command`` is the MAV_CMD number.
+
+    ``vehicle`` is ANY before the server has chosen one; ``choice`` says why it chose it.
+    """
 
     vehicle: int
     command: int
@@ -175,6 +180,7 @@ class Draft:
     submitter: Submitter
     terms: Terms = Terms()
     marks: Marks = Marks()
+    choice: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +218,8 @@ class Task:
     """One task, the result of its events; ``version`` counts its changes.
 
     ``timing`` covers its setpoints up to the last time it left EXECUTING. ``changed_at`` is when
-    its state last changed, monotonic seconds, None if it never did.
+    its state last changed, monotonic seconds, None if it never did. ``choice`` says why the server
+    chose its vehicle; "" if the submitter named it.
     """
 
     id: TaskId
@@ -229,6 +236,7 @@ class Task:
     progress: Progress = Progress()
     timing: Timing | None = None
     changed_at: float | None = None
+    choice: str = ""
 
     @property
     def priority(self) -> int:
@@ -239,3 +247,8 @@ class Task:
     def is_made(self) -> bool:
         """Whether the server made it, as a later run of a series."""
         return self.terms.series not in (0, self.id)
+
+    @property
+    def submitted_to(self) -> int:
+        """The vehicle that its submitter named, or ANY."""
+        return ANY if self.choice else self.vehicle

@@ -23,6 +23,7 @@ class Faults:
     outside_fence: bool = False  # outside the autopilot's own fence, which is enabled meanwhile
     refuse_arm: bool = False  # even if forced
     refuse_mode: bool = False  # from clients; the operator's switch works
+    battery: int = 100  # percent that SYS_STATUS reports; -1: not known
     withheld: frozenset[int] = frozenset()  # ids of messages that are not sent
 
 

@@ -128,9 +128,10 @@ class Telemetry:
         enabled = present
         if self._flight.faults.outside_fence and self._persona.also_healthy & GEOFENCE:
             enabled, healthy = enabled | GEOFENCE, healthy & ~GEOFENCE
+        left = self._flight.faults.battery
         return m.SysStatus(
-            present, enabled, healthy, 100, 12600, 500, 100, 0, 0, 0, 0, 0, 0
-        )  # load 10 %, 12.6 V, 5 A, 100 %
+            present, enabled, healthy, 100, 12600, 500, left, 0, 0, 0, 0, 0, 0
+        )  # load 10 %, 12.6 V, 5 A
 
     def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:
         armed = self._flight.armed

@@ -62,6 +62,7 @@ def test_what_can_come_into_the_engine() -> None:
         "FleetChanged",
         "TasksElsewhere",
         "IdsGranted",
+        "NonceTaken",
         "SettingsChanged",
         "WallClock",
         "Shutdown",
@@ -105,7 +106,14 @@ def test_every_setting_is_known_by_name() -> None:
         "Links": ["clients", "push", "vehicles", "insecure", "keys", "unsigned"],
         "Log": ["format", "level"],
         "Metrics": ["listen"],
-        "Queueing": ["capacity", "quota", "aging", "preemption_gap", "preemption_rest"],
+        "Queueing": [
+            "capacity",
+            "quota",
+            "aging",
+            "preemption_gap",
+            "preemption_rest",
+            "least_battery_percent",
+        ],
         "Recording": ["tlog", "tlog_size", "tlog_files", "decisions", "decisions_size"],
         "Retention": ["max_age", "max_count"],
         "Roles": [

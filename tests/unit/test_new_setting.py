@@ -14,7 +14,7 @@ ADDED = """\
         Number(1, 9, "deg/s", DEGREE),
         "rate of a slow turn",
         at_most="driving.turn_rate_deg",
-        parameter=(21, "TSK_CREEP"),
+        parameter=(22, "TSK_CREEP"),
         options=(Option("--creep", "RATE"), Option("--fast", sets=9, help="Creep fast.")),
     )
 """

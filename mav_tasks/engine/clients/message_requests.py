@@ -195,18 +195,23 @@ class MessageRequests:
     def _show_tasks(self, asked: CommandRequest, *, now: float) -> None:
         client, vehicle, reader = asked.client, asked.vehicle, asked.packet.source
         task_id = translate.task_id_of(asked.command)
-        if task_id == 0:
-            ids, of = self._page(vehicle.tasks, asked.command), vehicle.system_id
-        else:
-            task = self._registry.get(task_id)
-            if task is None:
-                raise Rejection(R.NOT_FOUND, f"no task {asked.command.params[1]:g}")
-            client.follow(task_id)
-            ids, of = [task.id], task.vehicle
-        owner = self._vehicles.look_at(of)
+        if task_id:
+            self.show_task(client, asked.packet, task_id, now=now)
+            return
+        ids, address = self._page(vehicle.tasks, asked.command), vehicle.server_address
+        self._show_statuses(client, ids, vehicle.tasks, address, reader=reader, now=now)
+
+    def show_task(self, client: GcsClient, packet: Packet, task_id: int, *, now: float) -> None:
+        """Send a task's TASK_STATUS, and each later change; raise Rejection if there is no task."""
+        client.uses_dialect = True
+        task = self._registry.get(task_id)
+        if task is None:
+            raise Rejection(R.NOT_FOUND, f"no task {task_id}")
+        client.follow(task_id)
+        owner = self._vehicles.look_at(task.vehicle)
         if owner is not None:
-            address = owner.server_address
-            self._show_statuses(client, ids, owner.tasks, address, reader=reader, now=now)
+            tasks, address = owner.tasks, owner.server_address
+            self._show_statuses(client, [task.id], tasks, address, reader=packet.source, now=now)
 
     def _page(self, tasks: VehicleTasks, command: Command) -> list[TaskId]:
         """Return the waiting or finished tasks for a request without a task id."""

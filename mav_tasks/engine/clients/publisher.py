@@ -22,6 +22,7 @@ from mav_tasks.services.heartbeat import INTERVAL, component_heartbeat
 from mav_tasks.tasks.events import (
     Event,
     TaskAdvanced,
+    TaskAssigned,
     TaskChanged,
     TaskModified,
     TaskSubmitted,
@@ -97,7 +98,9 @@ class Publisher:
                 vehicle = self._vehicles.get(system_id)
                 if vehicle is not None:
                     self._gcs.tell(text, severity, vehicle.server_address, now=now)
-            if isinstance(event, TaskChanged | TaskModified | TaskAdvanced | TaskWaits):
+            if isinstance(
+                event, TaskChanged | TaskModified | TaskAssigned | TaskAdvanced | TaskWaits
+            ):
                 self.note_change(event.task_id)
 
     def warn_of_loss(self, system_id: int, *, now: float) -> None:

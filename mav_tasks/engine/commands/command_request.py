@@ -67,6 +67,11 @@ class CommandRequest:
         return Address(ours.system_id, target.component_id)
 
     @property
+    def refusing(self) -> Address:
+        """The component in whose name the text of a refusal is sent."""
+        return self.vehicle.server_address
+
+    @property
     def answers_to(self) -> Hashable:
         """Key of requests that one answer is enough for."""
         return self.client.key, type(self), self.command.command, self.answering
@@ -101,7 +106,7 @@ class CommandRequest:
         if result is None:
             result = translate.result_of(refusal.reason)
         self.answer(result, refusal.reason)
-        self.client.tell_refusal(refusal.text, self.vehicle.server_address, now=now)
+        self.client.tell_refusal(refusal.text, self.refusing, now=now)
         reason = TaskReason(refusal.reason)
         return SubmissionRefused(
             self.vehicle.system_id, self.command.command, reason, refusal.text, self.actor, now

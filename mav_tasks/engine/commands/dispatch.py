@@ -12,6 +12,7 @@ from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER
+from mav_tasks.engine.commands.any_rover import AnyRover
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import (
     GOALS,
@@ -71,6 +72,7 @@ class Commands:
     _modes: ModeRequests
     _control: TaskControl
     _displays: MessageRequests
+    _any: AnyRover
 
     def __post_init__(self) -> None:
         self._submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
@@ -82,6 +84,9 @@ class Commands:
             self._stop(client, packet, command, now=now)
             return
         system_id = command.target.system_id
+        if self._any.is_addressed(system_id):
+            self._any.receive(client, packet, command, now=now)
+            return
         vehicle = self._vehicles.get(system_id or min(self._vehicles.by_id, default=0))
         if vehicle is None:
             self._of_unheard(client, packet, command, now=now)

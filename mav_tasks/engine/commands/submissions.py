@@ -15,6 +15,7 @@ from mav_tasks.engine.commands.ordering import (
     has_left_before_halt,
     why_older,
 )
+from mav_tasks.engine.commands.reach import check_reach
 from mav_tasks.engine.commands.translate import result_of
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import TASK_COMMANDS
@@ -25,7 +26,7 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
-from mav_tasks.tasks.goal import GoTo, describe
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
@@ -111,7 +112,7 @@ class Submissions:
         client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
         goal, words = driven(wish.goal, vehicle.parts.persona, system_id=vehicle.system_id)
         if isinstance(goal, GoTo):
-            _check_reach(vehicle, goal)
+            check_reach(vehicle, goal)
         draft = Draft(
             vehicle.system_id, command.command, goal, asked.submitter, wish.terms, wish.marks
         )
@@ -135,7 +136,7 @@ class Submissions:
             ends_driving_of=None if is_ours else client.key,
             now=now,
         )
-        self._await_commit(asked, task, now=now)
+        self.await_commit(asked, task, now=now)
         if words:
             asked.tell(words, MavSeverity.INFO, now=now)
 
@@ -158,12 +159,12 @@ class Submissions:
         asked.vehicle.joint.end_driving_of(asked.client.key, now=now)
         if not self._is_repeat(asked, draft, confirmation=0, now=now):
             task = self.take_in(asked.rights, asked.vehicle, draft, runs_now=True, now=now)
-            self._await_commit(asked, task, now=now)
+            self.await_commit(asked, task, now=now)
 
     def submit_draft(self, asked: CommandRequest, draft: Draft, *, now: float) -> Task:
         """Submit a task that a command implies. Raise Rejection if it is refused."""
         task = self.take_in(asked.rights, asked.vehicle, draft, now=now)
-        self._await_commit(asked, task, now=now)
+        self.await_commit(asked, task, now=now)
         return task
 
     def submit_plan(self, rights: Rights, vehicle: Vehicle, draft: Draft, *, now: float) -> Task:
@@ -219,9 +220,19 @@ class Submissions:
         if current is not None and current.state in WAITING:
             vehicle.tasks.room.withdraw(current, now=now)
 
+    def retract(self, task: Task) -> list[CommandRequest]:
+        """Forget a submission that the store has refused; return the requests to answer."""
+        self._deduplicator.forget(task)
+        return self._undecided.pop(task.id, [])
+
     def held(self, vehicle: Vehicle, submitter: Submitter) -> None:
         """Note that a client halted a vehicle: a return that it requests next is a new task."""
         self._deduplicator.held(submitter, vehicle.system_id)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether new submissions are accepted."""
+        return not (self._is_closing or self._store_is_away)
 
     def check_open(self) -> None:
         """Raise Rejection while new submissions are refused."""
@@ -230,7 +241,8 @@ class Submissions:
         if self._store_is_away:
             raise Rejection(R.STORE_UNAVAILABLE, "the store is unavailable: not accepted")
 
-    def _await_commit(self, asked: CommandRequest, task: Task, *, now: float) -> None:
+    def await_commit(self, asked: CommandRequest, task: Task, *, now: float) -> None:
+        """Acknowledge a new task once it is durable."""
         self._deduplicator.remember(task, at=now, now=now)
         self._undecided[task.id] = [asked]
         self.gate.hold(Submitted(asked, task), now=now)
@@ -238,8 +250,10 @@ class Submissions:
     def _accept(self, submitted: Submitted, *, now: float) -> None:
         """Acknowledge a durable submission with the task's id, and tell all clients."""
         asked, task = submitted
+        if task.id not in self._undecided:
+            return  # retracted, and answered
         for each in self._undecided.pop(task.id):
-            _acknowledge(each, task.id)
+            acknowledge(each, task.id)
         self._tell_queued(asked, task, now=now)
 
     def _tell_queued(self, asked: CommandRequest, task: Task, *, now: float) -> None:
@@ -255,7 +269,7 @@ class Submissions:
             held = "a task" if tasks.held is None else f"task {tasks.held.id}"
             words = f"Task {task.id} waits, press a Held button: {held} is held. {goal}"
         else:
-            words, is_blocked = f"Task {task.id} queued: {goal}", False
+            words, is_blocked = f"Task {task.id} queued: {goal}{chosen_words(task)}", False
         for client in self._gcs.clients:
             is_told_otherwise = client is not asked.client or client.uses_dialect
             is_calm = is_told_otherwise or not is_blocked
@@ -264,6 +278,8 @@ class Submissions:
 
     def _withdraw(self, submitted: Submitted, *, now: float) -> None:
         asked, task = submitted
+        if task.id not in self._undecided:
+            return
         askers = self._undecided.pop(task.id)
         was_for_now = asked.vehicle.tasks.immediate == task.id
         self.take_back(asked.vehicle, task, now=now)
@@ -280,19 +296,25 @@ class Submissions:
         """Whether a submission came before; if so, answer it."""
         # only to compare places
         origin = asked.vehicle.where.frame.origin if isinstance(draft.goal, GoTo) else None
-        known = self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
+        known = self.known(draft, confirmation=confirmation, origin=origin, now=now)
         if known is not None:
-            self._answer_repeat(asked, known, now=now)
+            self.answer_repeat(asked, known, now=now)
         return known is not None
 
-    def _answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
+    def known(
+        self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float
+    ) -> Known | None:
+        """Return the task that a submission repeats, or None: see ``SubmissionDeduplicator``."""
+        return self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
+
+    def answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
         """Give a repeated submission the answer of the first, once that has one."""
         if known.task_id in self._undecided:
             askers = self._undecided[known.task_id]
             if asked.answers_to not in {each.answers_to for each in askers}:
                 askers.append(asked)
             return
-        _acknowledge(asked, known.task_id)
+        acknowledge(asked, known.task_id)
         task = self._registry.get(known.task_id)
         # one click in QGroundControl sends a command and an item: not a repeat to be told
         is_other_message = task is not None and task.command != asked.command.command
@@ -311,18 +333,12 @@ def _priority_of(submitter: Submitter, settings: Settings) -> int:
     return priorities.get(submitter.place, by_address)
 
 
-def _check_reach(vehicle: Vehicle, goal: GoTo) -> None:
-    """Raise Rejection for a place too far away, by a typing error, or outside the fence."""
-    far = vehicle.where.distance_to(goal)
-    longest = vehicle.parts.settings.driving.max_distance
-    if far is not None and far > longest:
-        words = f"the place is {far / 1000:.1f} km away, more than {longest / 1000:g} km"
-        raise Rejection(R.BAD_PARAMETER, words)
-    if not vehicle.where.is_within_fence(goal):
-        raise Rejection(R.OUTSIDE_FENCE, "the place is outside the fence")
+def chosen_words(task: Task) -> str:
+    """Return why the server chose the task's rover, to end a text; "" if it did not choose."""
+    return f". Rover {task.vehicle} chosen: {task.choice}" if task.choice else ""
 
 
-def _acknowledge(asked: CommandRequest, task_id: TaskId) -> None:
+def acknowledge(asked: CommandRequest, task_id: TaskId) -> None:
     """Acknowledge with the task's id; a client that reads TASK_STATUS gets that, with its nonce."""
     asked.answer(MavResult.ACCEPTED, task_id)
     if asked.client.uses_dialect:

@@ -20,6 +20,7 @@ from mav_tasks.tasks.events import (
     Event,
     QueueContinued,
     QueuePaused,
+    TaskAssigned,
     TaskChanged,
     TaskWaits,
     VehicleNoted,
@@ -52,6 +53,7 @@ RESULT_OF: dict[int, MavResult] = {
     R.NO_POSITION: MavResult.TEMPORARILY_REJECTED,
     R.DISARMED: MavResult.TEMPORARILY_REJECTED,
     R.LOSS_FAILSAFE: MavResult.TEMPORARILY_REJECTED,
+    R.NOT_READY: MavResult.TEMPORARILY_REJECTED,
     R.VEHICLE_SILENT: MavResult.FAILED,
 }
 
@@ -234,6 +236,9 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
         case TaskChanged(new=TaskState.PAUSED | TaskState.KILLED | TaskState.CANCELLED as new):
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(event.reason)}"
             return event.vehicle, _severity(event.reason), text
+        case TaskAssigned(before=before, choice=choice) if before:  # else ``Submissions`` tells
+            text = f"Task {event.task_id} is now rover {event.vehicle}'s: {choice}"
+            return event.vehicle, MavSeverity.WARNING, text
         case TaskWaits(task_id=task_id, reason=reason):
             words = f": {event.words}" if event.words else ""
             text = f"Task {task_id} waits: {WAITS_FOR.get(reason) or words_of(reason)}{words}"

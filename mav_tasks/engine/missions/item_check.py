@@ -24,12 +24,10 @@ from mav_tasks.tasks.lifecycle import TaskReason
 R = TaskReason
 
 
-class ItemCheck:
+class PlanCheck:
     """The item check of uploads to one address, one upload after the other."""
 
-    def __init__(self, vehicle: Vehicle, component: int) -> None:
-        self._vehicle = vehicle
-        self._is_at_autopilot = component == AUTOPILOT
+    def __init__(self) -> None:
         self._read_by: tuple[int, MissionParseOptions] | None = (
             None  # item count and options of ``_read``
         )
@@ -37,7 +35,7 @@ class ItemCheck:
         self._refusal: Rejection | None = None
 
     def __repr__(self) -> str:
-        return f"ItemCheck({len(self._read)} items read)"
+        return f"{type(self).__name__}({len(self._read)} items read)"
 
     def take_refusal(self) -> Rejection | None:
         """Return why an item was refused since the last call, or None."""
@@ -66,17 +64,16 @@ class ItemCheck:
         """Return the plan of a whole upload. Raise Rejection if it makes none."""
         count = len(items)
         steps = tuple(self._step(item, seq, count=count) for seq, item in enumerate(items))
-        wanted = plan_of(items, steps, has_home=self._manner.has_home, now=now)
-        forbidden = self._vehicle.where.leg_over_fence(steps)
-        if forbidden is not None:
-            words = f"item {wanted.plan.item_number(forbidden)}: a jump to it crosses the fence"
-            raise Rejection(R.OUTSIDE_FENCE, words)
-        return wanted
+        return plan_of(items, steps, has_home=self._manner.has_home, now=now)
 
     @property
     def _manner(self) -> MissionParseOptions:
-        persona, driving = self._vehicle.persona, self._vehicle.parts.settings.driving
-        return MissionParseOptions.of(persona, is_staged=self._is_at_autopilot, driving=driving)
+        """How the items are parsed."""
+        raise NotImplementedError
+
+    def _check_place(self, step: GoTo, seq: int) -> None:
+        """Raise Rejection for a place that may not be part of a plan."""
+        raise NotImplementedError
 
     def _step(self, item: Item, seq: int, *, count: int) -> Step:
         manner = self._manner
@@ -90,6 +87,29 @@ class ItemCheck:
         if seq <= len(read):
             read[seq:] = [(item, step)]
         return step
+
+
+class ItemCheck(PlanCheck):
+    """The item check of uploads for one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, component: int) -> None:
+        super().__init__()
+        self._vehicle = vehicle
+        self._is_at_autopilot = component == AUTOPILOT
+
+    def plan_of(self, items: tuple[Item, ...], *, now: float) -> ParsedMission:
+        """Return the plan of a whole upload. Raise Rejection if it makes none."""
+        wanted = super().plan_of(items, now=now)
+        forbidden = self._vehicle.where.leg_over_fence(wanted.plan.steps)
+        if forbidden is not None:
+            words = f"item {wanted.plan.item_number(forbidden)}: a jump to it crosses the fence"
+            raise Rejection(R.OUTSIDE_FENCE, words)
+        return wanted
+
+    @property
+    def _manner(self) -> MissionParseOptions:
+        persona, driving = self._vehicle.persona, self._vehicle.parts.settings.driving
+        return MissionParseOptions.of(persona, is_staged=self._is_at_autopilot, driving=driving)
 
     def _check_place(self, step: GoTo, seq: int) -> None:
         """Raise Rejection for a place too far away, outside the fence, or reached across it."""

@@ -5,6 +5,7 @@ from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
 from mav_tasks.services.mission_receiver import Sender, ToClient
 from mav_tasks.tasks.events import SubmissionRefused
@@ -45,12 +46,26 @@ class MissionAnswers:
         self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, message_id: int, now: float
     ) -> None:
         """Tell the client why a request was refused, and record it; ``message_id`` 0: an upload."""
+        by, number = vehicle.server_address, vehicle.system_id
+        self.refused_at(sender, by, number, refusal, message_id=message_id, now=now)
+
+    def refused_at(
+        self,
+        sender: Sender,
+        by: Address,
+        vehicle: int,
+        refusal: Rejection,
+        *,
+        message_id: int,
+        now: float,
+    ) -> None:
+        """Do the same in the name of ``by``; ``vehicle``: a system id, or ANY."""
         client = self.client(sender)
         if client is not None and not client.may_be_refused(now=now):
             return  # a flood of refusals fills neither disk nor network
         if client is not None:
-            client.tell_refusal(refusal.text, vehicle.server_address, now=now)
+            client.tell_refusal(refusal.text, by, now=now)
         reason, actor = TaskReason(refusal.reason), str(sender.address)
         self._registry.record(
-            SubmissionRefused(vehicle.system_id, -message_id, reason, refusal.text, actor, now)
+            SubmissionRefused(vehicle, -message_id, reason, refusal.text, actor, now)
         )

@@ -15,7 +15,7 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.fence_items import fence_for_vehicle, fence_of
-from mav_tasks.engine.missions.item_check import ItemCheck
+from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.missions.plans import MISSION, Plans, Stored
@@ -57,7 +57,7 @@ def refusal_of(result: int, words: str) -> Rejection:
 class UploadSession:
     """The receiver of uploads to one address, and their item check."""
 
-    def __init__(self, check: ItemCheck, form: RequestForm) -> None:
+    def __init__(self, check: PlanCheck, form: RequestForm) -> None:
         self.check = check
         self.receiver = MissionReceiver(check=check, form=form)
 

@@ -27,6 +27,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.battery import charge_of
 from mav_tasks.services.command_sender import Standing
 from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.identity import identity_of
@@ -100,6 +101,8 @@ class Vehicle:
         self._last_beat = (0, -inf)  # number and time of the last heartbeat
         self._overtaken: tuple[m.Heartbeat | None, float] = (None, -inf)  # the last such heartbeat
         self._was_heard = True
+        #: the charge that is left, 0 to 1; None: not known
+        self.battery: float | None = None
         #: recent packets that let the vehicle go, from all endpoints
         self.go_words = GoWords()
         self._says = SelfDescription(parts)
@@ -208,6 +211,7 @@ class Vehicle:
             news = self.parts.failsafes.receive_text(sender, message, now=now)
             self._takeovers.learn(news, now=now)
         elif isinstance(message, m.SysStatus):
+            self.battery = charge_of(message)
             news = self.parts.failsafes.receive_status(message, now=now)
             self._takeovers.learn(news, now=now)
         elif isinstance(message, m.ParamValue):
@@ -336,6 +340,10 @@ class Vehicle:
         self.requests.handle_deadline(now=now)
         self.requests.flush(now=now)
         self._ask_for_rates(now=now)
+
+    def view(self, *, now: float) -> VehicleView:
+        """Return a snapshot of the vehicle for the task domain."""
+        return self._view(now)
 
     def _view(self, now: float) -> VehicleView:
         return self.parts.view(drives_on=self._says.may_drive_on, now=now)

@@ -113,6 +113,15 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE tasks ADD COLUMN run_after BIGINT",
         "CREATE INDEX expected ON tasks (run_after) WHERE run_after IS NOT NULL",
     ),
+    (  # tasks that any vehicle may drive: fleet_nonces.py
+        "ALTER TABLE tasks ADD COLUMN assigned TEXT",
+        (
+            "CREATE TABLE nonces (key TEXT NOT NULL, system_id INTEGER NOT NULL,"
+            " component_id INTEGER NOT NULL, nonce BIGINT NOT NULL, payload TEXT NOT NULL,"
+            " task_id BIGINT NOT NULL, PRIMARY KEY (key, system_id, component_id, nonce))"
+        ),
+        "CREATE INDEX of_nonce ON nonces (task_id)",
+    ),
 )
 
 

@@ -23,6 +23,7 @@ from mav_tasks.tasks.events import (
     StepReached,
     SubmissionRefused,
     TaskAdvanced,
+    TaskAssigned,
     TaskChanged,
     TaskModified,
     TaskProgressed,
@@ -75,6 +76,10 @@ SAMPLES: list[tuple[Event, dict[str, object]]] = [
     (StepReached(ID, 1, 2, True, AT, 3), {"task": 17, "step": 2, "performs": True, "item": 3}),
     (PlanStored(1, 0, 5, "source", "a", AT), {"kind": 0, "plan_id": 5, "actor": "a"}),
     (TaskModified(ID, 1, 2, Terms(priority=9), "a", AT), {"task": 17, "actor": "a", "version": 2}),
+    (
+        TaskAssigned(ID, 2, 3, 1, "rover 1: silent; free", AT),
+        {"task": 17, "before": 1, "choice": "rover 1: silent; free", "version": 3},
+    ),
     (TaskWaits(ID, 1, TaskReason.DISARMED, AT), {"task": 17, "reason": "disarmed"}),
     (TaskWithdrawn(ID, 1, AT), {"task": 17}),
     (REFUSED, {"command": 54000, "reason": "queue_full", "text": "it is full"}),

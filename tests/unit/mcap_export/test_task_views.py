@@ -7,6 +7,7 @@ from mav_tasks.mcap_export.task_views import TaskViews
 from mav_tasks.tasks.events import (
     Event,
     QueuePaused,
+    TaskAssigned,
     TaskChanged,
     TaskModified,
     TaskProgressed,
@@ -79,6 +80,20 @@ def test_a_modified_task_has_its_new_label_from_then_on() -> None:
         2,
     )
     assert (other["state"], other["label"]) == ("starting", "home")
+
+
+def test_an_assigned_task_is_of_its_new_rover_from_then_on() -> None:
+    views = TaskViews()
+    assigned = TaskAssigned(TaskId(3), 2, 2, 1, "rover 1: silent; free", 1.0)
+    starts = changed(TaskState.QUEUED, TaskState.STARTING, TaskReason.NONE, 3)
+    _, one, other = changes(views, TaskSubmitted(TASK, 0.0), assigned, starts)
+    assert (one["event"], one["rover"], one["version"], one["state"]) == (
+        "assigned",
+        2,
+        2,
+        "queued",
+    )
+    assert other["rover"] == 2
 
 
 def test_a_run_begins_with_the_tasks_of_the_run_before() -> None:

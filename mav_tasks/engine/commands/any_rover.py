@@ -1,0 +1,213 @@
+"""Handles commands to the server's own address: tasks for any rover, and their status.
+
+A task command to (250, 191), the address of the server, is a submission for any of its rovers. It
+is parsed and recognised as a repeat before a rover is chosen, so that a copy of a command is never
+a task of another rover. The answers come from that address; an accepting one names the rover, and
+the texts and the status of the task come from that rover's task server.
+"""
+
+from dataclasses import replace
+
+from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.message_requests import MessageRequests
+from mav_tasks.engine.commands.assignments import Assignments, check_any, driven_by
+from mav_tasks.engine.commands.command_request import CommandRequest
+from mav_tasks.engine.commands.goals import GOALS, parse_command
+from mav_tasks.engine.commands.ordering import AGAIN, has_left_before_halt
+from mav_tasks.engine.commands.submissions import GIVEN_UP, NONCE, Submissions, acknowledge
+from mav_tasks.engine.commands.translate import message_id_of, result_of, task_id_of
+from mav_tasks.engine.commands.words import row_said
+from mav_tasks.engine.inputs import NonceTaken
+from mav_tasks.engine.policy import is_task_command
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.services.command_receiver import Answer, Command, Pending
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.deduplicator import Known, reused
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.pending_tasks import PendingTasks
+from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.task import ANY, Draft, TaskId
+
+R = TaskReason
+
+#: commands that mean something only for a rover that the sender knows
+_OF_ONE_ROVER = (MavCmd.DO_REPOSITION, MavCmd.NAV_SET_YAW_SPEED, MavCmd.NAV_RETURN_TO_LAUNCH)
+SUBMITTED = frozenset(GOALS) - frozenset(_OF_ONE_ROVER)
+
+
+class AnyRequest(CommandRequest):
+    """A submission for any rover, once its rover is known; answered by the server's address."""
+
+    def __init__(
+        self, client: GcsClient, vehicle: Vehicle, packet: Packet, pending: Pending, ours: Address
+    ) -> None:
+        super().__init__(client, vehicle, packet, pending)
+        self._ours = _addressed(pending.command, ours)
+
+    @property
+    def answering(self) -> Address:
+        """The address that was addressed."""
+        return self._ours
+
+    @property
+    def refusing(self) -> Address:
+        """The same: a refusal is no rover's."""
+        return self._ours
+
+    def answer(self, result: MavResult, result_param2: int = 0) -> None:
+        """Send the COMMAND_ACK; an accepting one names the rover in result_param1."""
+        rover = self.vehicle.system_id if result is MavResult.ACCEPTED else 0
+        number = self.command.command
+        self.pending.answer = Answer(number, result, result_param2, self._ours, rover)
+        self.client.answer(self.pending.answer, self.packet.source)
+
+
+class AnyRover:
+    """The receiver of commands to the server's own address."""
+
+    def __init__(
+        self,
+        vehicles: VehicleSide,
+        registry: TaskRegistry,
+        room: PendingTasks,
+        submissions: Submissions,
+        assignments: Assignments,
+        displays: MessageRequests,
+        settings: Settings,
+    ) -> None:
+        self._vehicles = vehicles
+        self._registry = registry
+        self._room = room
+        self._submissions = submissions
+        self._assignments = assignments
+        self._displays = displays
+        self.apply(settings)
+
+    def __repr__(self) -> str:
+        return f"AnyRover({self._assignments!r})"
+
+    def apply(self, settings: Settings) -> None:
+        self._driving = settings.driving
+
+    def is_addressed(self, system_id: int) -> bool:
+        """Return whether a target_system is the server itself, and no rover."""
+        return system_id == self._vehicles.our_address.system_id
+
+    def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
+        """Execute or refuse a command to the server; others than these get no answer."""
+        is_shown = command.command == MavCmd.REQUEST_MESSAGE and task_id_of(command) > 0
+        is_shown = is_shown and message_id_of(command) == m.TaskStatus.id
+        if not (is_shown or command.command in SUBMITTED or is_task_command(command.command)):
+            return
+        if command.target.component_id not in (0, self._vehicles.our_address.component_id):
+            return
+        receiver = client.sender(packet.source).commands
+        known = receiver.same_packet(packet.raw, now=now)
+        if known is not None:
+            if known.answer is not None:
+                client.answer(known.answer, packet.source)
+            return
+        pending = receiver.remember(command, packet.raw, now=now)
+        try:
+            if is_shown:
+                self._show(client, packet, pending, now=now)
+            else:
+                self._submit(client, packet, pending, now=now)
+        except Rejection as refusal:
+            self._refuse(client, packet, pending, refusal, now=now)
+
+    def nonce_taken(self, taken: NonceTaken, *, now: float) -> None:
+        """Answer with the task that the fleet had with this nonce, and undo ours."""
+        task = self._registry.get(taken.task_id)
+        if task is None:  # not stored in time, and withdrawn already
+            return
+        self._room.withdraw(task, now=now)
+        for asked in self._submissions.retract(task):
+            if taken.payload == task.marks.payload:
+                acknowledge(asked, TaskId(taken.known))
+            else:
+                self._registry.record(asked.refuse(reused(task.marks.nonce), now=now))
+
+    def _submit(self, client: GcsClient, packet: Packet, pending: Pending, *, now: float) -> None:
+        command = pending.command
+        if command.command not in SUBMITTED:
+            raise Rejection(R.BAD_PARAMETER, f"command {command.command} must name one rover")
+        row = row_said(command)
+        client.rights.require(row.role, f"send {row.name}")
+        if client.waited > GIVEN_UP:
+            raise Rejection(R.STALE, "delayed by the server: send it again")
+        wish = parse_command(command, packet.raw, self._driving, now=now)
+        is_ours = is_task_command(command.command)
+        client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
+        check_any(wish.goal)
+        draft = Draft(ANY, command.command, wish.goal, client.who, wish.terms, wish.marks)
+        confirmation = command.confirmation
+        known = self._submissions.known(draft, confirmation=confirmation, origin=None, now=now)
+        if known is not None:
+            self._answer_repeat(client, packet, pending, known, now=now)
+            return
+        self._submissions.check_open()
+        choice = self._assignments.choose(wish.goal, now=now)
+        vehicle = self._vehicles.get(choice.vehicle)
+        assert vehicle is not None, "it was chosen among them"
+        asked = AnyRequest(client, vehicle, packet, pending, self._vehicles.our_address)
+        if has_left_before_halt(asked, anybodys=True, now=now):
+            raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
+        goal = driven_by(vehicle, wish.goal)
+        draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)
+        task = self._submissions.take_in(asked.rights, vehicle, draft, now=now)
+        self._submissions.await_commit(asked, task, now=now)
+
+    def _answer_repeat(
+        self, client: GcsClient, packet: Packet, pending: Pending, known: Known, *, now: float
+    ) -> None:
+        task = self._registry.get(known.task_id)
+        vehicle = None if task is None else self._vehicles.look_at(task.vehicle)
+        if vehicle is not None:
+            asked = AnyRequest(client, vehicle, packet, pending, self._vehicles.our_address)
+            self._submissions.answer_repeat(asked, known, now=now)
+            return
+        rover = 0 if task is None else task.vehicle  # of an earlier run, not heard yet
+        self._answer(client, packet, pending, MavResult.ACCEPTED, known.task_id, rover)
+
+    def _show(self, client: GcsClient, packet: Packet, pending: Pending, *, now: float) -> None:
+        """Send the status of a task, whichever rover has it."""
+        self._displays.show_task(client, packet, task_id_of(pending.command), now=now)
+        self._answer(client, packet, pending, MavResult.ACCEPTED, 0, 0)
+
+    def _refuse(
+        self, client: GcsClient, packet: Packet, pending: Pending, refusal: Rejection, *, now: float
+    ) -> None:
+        self._answer(client, packet, pending, result_of(refusal.reason), int(refusal.reason), 0)
+        if not client.may_be_refused(now=now):  # a flood of refusals fills no disk and no network
+            return
+        client.tell_refusal(refusal.text, self._vehicles.our_address, now=now)
+        reason, actor = TaskReason(refusal.reason), str(client.who)
+        number = pending.command.command
+        self._registry.record(SubmissionRefused(ANY, number, reason, refusal.text, actor, now))
+
+    def _answer(
+        self,
+        client: GcsClient,
+        packet: Packet,
+        pending: Pending,
+        result: MavResult,
+        result_param2: int,
+        rover: int,
+    ) -> None:
+        ours = _addressed(pending.command, self._vehicles.our_address)
+        number = pending.command.command
+        pending.answer = Answer(number, result, result_param2, ours, rover)
+        client.answer(pending.answer, packet.source)
+
+
+def _addressed(command: Command, ours: Address) -> Address:
+    """Return the address that answers a command: the one that it named."""
+    return Address(ours.system_id, command.target.component_id or ours.component_id)

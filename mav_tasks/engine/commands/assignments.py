@@ -1,0 +1,228 @@
+"""Assigns the tasks that any vehicle may drive: at their submission, and again before they begin.
+
+A task moves to another vehicle if its own fails before it has begun the task: if it is silent, has
+stopped by its own failsafe or after a task that failed, or is low on battery, for GRACE seconds.
+What a person halts stays where it is: after a STOP, a pause or a takeover the operator decides.
+Nothing moves while this gateway's lease is not trusted. A task that has begun never moves.
+``tasks/choice.py`` has the rule of the choice.
+"""
+
+from collections.abc import Callable, Container, Iterable
+from math import inf, nan
+
+from mav_tasks.engine.commands.ability import Ability, as_driven
+from mav_tasks.engine.commands.reach import check_reach
+from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.vehicles.facts import client_driving
+from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
+from mav_tasks.errors import Rejection
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.choice import DISABLED, Candidate, Choice, choose, is_low
+from mav_tasks.tasks.driving.estimate import UNKNOWN
+from mav_tasks.tasks.driving.legs import distance
+from mav_tasks.tasks.driving.mission_sequencer import present_goal
+from mav_tasks.tasks.events import Event, TaskSubmitted
+from mav_tasks.tasks.fleet import Fleet
+from mav_tasks.tasks.forecast import Forecast
+from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Plan, SingleGoal, Step
+from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
+from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
+from mav_tasks.tasks.view import VehicleView
+
+R = TaskReason
+
+LOOK = 1.0  # s between two looks at the vehicles of waiting tasks
+#: s for which a vehicle must have failed: longer than a radio takes to come back
+GRACE = 5.0
+MOST_AT_ONCE = 10  # tasks assigned again in one look; the others a second later: it takes time
+#: ready tasks of a vehicle up to which their end is computed for a choice, which holds up setpoints
+FORESEEN = 50
+
+
+class Assignments:
+    """The choice of vehicles, and the tasks that may still move."""
+
+    def __init__(
+        self,
+        vehicles: VehicleSide,
+        fleet: Fleet,
+        registry: TaskRegistry,
+        timers: Timers,
+        settings: Settings,
+        *,
+        is_open: Callable[[], bool],
+    ) -> None:
+        """``is_open`` returns whether new tasks are accepted; otherwise none moves, either."""
+        self._vehicles = vehicles
+        self._fleet = fleet
+        self._registry = registry
+        self._is_open = is_open
+        self._timer = timers.timer(Turn.TASKS, self._look)
+        self._may_move: dict[TaskId, None] = {}
+        self._failing: dict[int, float] = {}  # by vehicle: since when
+        self.apply(settings)
+
+    def __repr__(self) -> str:
+        return f"Assignments({len(self._may_move)} tasks, failing: {self._failing})"
+
+    def apply(self, settings: Settings) -> None:
+        self._least_battery = settings.queueing.least_battery_percent / 100
+
+    def choose(self, goal: Goal, *, now: float) -> Choice:
+        """Return the vehicle for a new task. Raise Rejection if none can drive it."""
+        vehicles = self._vehicles.all
+        candidates = [self._candidate(each, goal, driven_by, now=now) for each in vehicles]
+        return choose(candidates, least_battery=self._least_battery)
+
+    def publish(self, events: Iterable[Event], *, now: float) -> None:
+        """Look after new tasks; the later runs of a series are made by the server."""
+        tasks = [each.task for each in events if isinstance(each, TaskSubmitted)]
+        if tasks:
+            self.watch(tasks, now=now)
+
+    def watch(self, tasks: Iterable[Task], *, now: float) -> None:
+        """Let tasks move to other vehicles if their own fail before they begin."""
+        chosen = [task.id for task in tasks if task.choice and task.state in WAITING]
+        if chosen:
+            self._may_move.update(dict.fromkeys(chosen))
+            self._timer.bring_forward(now + LOOK)
+
+    def forget(self, vehicle: int, tasks: Container[TaskId]) -> None:
+        """Forget a vehicle with its ``tasks``: they go to its next gateway with it."""
+        self._failing.pop(vehicle, None)
+        self._may_move = {each: None for each in self._may_move if each not in tasks}
+
+    def _look(self, *, now: float) -> None:
+        """Look after the tasks that may move, each second while there are any."""
+        found = map(self._registry.get, self._may_move)
+        tasks = [task for task in found if task is not None and task.state in WAITING]
+        self._may_move = dict.fromkeys(task.id for task in tasks)
+        self._timer.set(now + LOOK if tasks else inf)
+        if not self._vehicles.lease.is_trusted or not self._is_open():
+            self._failing.clear()
+            return
+        whys = {each: self._why_failed(each, now=now) for each in {t.vehicle for t in tasks}}
+        self._failing = {each: self._failing.get(each, now) for each, why in whys.items() if why}
+        over = {each for each, since in self._failing.items() if now - since >= GRACE}
+        movable = [task for task in tasks if task.vehicle in over and self._is_movable(task)]
+        for task in movable[:MOST_AT_ONCE]:
+            self._assign_again(task, whys[task.vehicle], now=now)
+
+    def _is_movable(self, task: Task) -> bool:
+        """Return whether a task may move now: it is stored, and nobody has called for it."""
+        tasks = self._fleet.get(task.vehicle)
+        is_called_for = tasks is not None and tasks.immediate == task.id
+        return self._registry.is_durable(task.id) and not is_called_for
+
+    def _assign_again(self, task: Task, why: str, *, now: float) -> None:
+        """Give a task to another vehicle; it stays if no other one can drive it."""
+        candidates = [
+            self._candidate(each, task.goal, _driven_alike, now=now)
+            for each in self._vehicles.all
+            if each.system_id != task.vehicle
+        ]
+        try:
+            choice = choose(candidates, least_battery=self._least_battery)
+        except Rejection:
+            return
+        words = f"rover {task.vehicle}: {why}; {choice.words}"
+        self._fleet.room.assign(task, choice.vehicle, choice=words, now=now)
+
+    def _why_failed(self, system_id: int, *, now: float) -> str:
+        """Return why a vehicle cannot begin its tasks, or "" if it can, or if a person waits."""
+        tasks, vehicle = self._fleet.get(system_id), self._vehicles.look_at(system_id)
+        if tasks is None or tasks.is_held_ahead:
+            return ""
+        if tasks.paused and (tasks.paused not in DISABLED or tasks.halts.is_by_word):
+            return ""
+        if vehicle is None:  # not heard in this run
+            return "silent" if self._vehicles.has_listened(now=now) else ""
+        if not vehicle.is_heard(now=now):
+            return "silent"
+        if tasks.paused:
+            return words_of(tasks.paused)
+        if is_low(vehicle.battery, least_battery=self._least_battery):
+            return f"battery {vehicle.battery:.0%}"
+        return ""
+
+    def _candidate(
+        self, vehicle: Vehicle, goal: Goal, driven: Callable[[Vehicle, Goal], Goal], *, now: float
+    ) -> Candidate:
+        """Return what a vehicle offers for a task; ``driven``: as it would drive it."""
+        tasks, view = vehicle.tasks, vehicle.view(now=now)
+        inability = ""
+        try:
+            present = present_goal(driven(vehicle, goal), Progress())
+        except Rejection as refusal:
+            inability, present = refusal.text, None
+        empty = UNKNOWN
+        if len(tasks.queue) <= FORESEEN:
+            empty = Forecast(tasks, self._registry, now=now).when_empty()
+        capacity = vehicle.parts.settings.queueing.capacity
+        return Candidate(
+            vehicle.system_id,
+            is_heard=vehicle.is_heard(now=now),
+            paused=tasks.paused,
+            is_held_ahead=tasks.is_held_ahead,
+            is_driven_by_client=client_driving(vehicle.parts, now=now) is not None,
+            blocker=R.NONE if present is None else tasks.blocker(view, present, now=now),
+            is_full=tasks.room.count(vehicle.system_id) >= capacity,
+            inability=inability,
+            battery=vehicle.battery,
+            free_in=empty.seconds,
+            distance=_way_to(goal, empty.pose, view),
+            speed=tasks.terms.driving.speed,
+            waiting=len(tasks.queue),
+        )
+
+
+def check_any(goal: Goal) -> None:
+    """Raise Rejection for a place that is another one for each vehicle."""
+    for step in _steps_of(goal):
+        if isinstance(step, GoTo) and isinstance(step.place, LocalPlace):
+            words = "metres from a local origin are another place for each rover: name the rover"
+            raise Rejection(R.BAD_FRAME, f"{words}, or give latitude and longitude")
+        if isinstance(step, GoTo) and step.place is None:
+            raise Rejection(R.BAD_PARAMETER, "each rover has its own home: name the rover")
+
+
+def driven_by(vehicle: Vehicle, goal: Goal) -> Goal:
+    """Return a goal as a vehicle drives it. Raise Rejection if it cannot, or must not go there."""
+    ability = Ability.of(vehicle.persona, rover="it")
+    steps = [each for each in _steps_of(goal) if isinstance(each, GoTo)]
+    for step in steps:
+        check_reach(vehicle, step)
+    if not isinstance(goal, Plan):
+        return as_driven(goal, ability)
+    if vehicle.where.leg_over_fence(goal.steps) is not None:
+        raise Rejection(R.OUTSIDE_FENCE, "the path crosses the fence")
+    driven = (
+        as_driven(step, ability) if isinstance(step, SingleGoal) else step for step in goal.steps
+    )
+    return Plan(tuple(driven), goal.source, goal.first, goal.has_home, goal.has_options)
+
+
+def _driven_alike(vehicle: Vehicle, goal: Goal) -> Goal:
+    """Return a goal that a vehicle drives as it is. Raise Rejection if it does not.
+
+    A waiting task has been adapted to its vehicle; adapted once more, it might be another task.
+    """
+    if driven_by(vehicle, goal) != goal:
+        raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, "it would drive it differently")
+    return goal
+
+
+def _steps_of(goal: Goal) -> tuple[Step, ...]:
+    return goal.steps if isinstance(goal, Plan) else (goal,)
+
+
+def _way_to(goal: Goal, pose: Pose | None, view: VehicleView) -> float:
+    """Return the metres from a pose to where a task begins; 0 if it begins there; NaN: unknown."""
+    first = next((step for step in _steps_of(goal) if isinstance(step, SingleGoal)), None)
+    if not isinstance(first, GoTo):
+        return 0.0
+    place = local_place(first.place, view.origin)
+    return nan if pose is None or place is None else distance(pose, place)

@@ -1,0 +1,328 @@
+"""Tasks for any rover: which one the server chooses, what it says, and when it chooses again."""
+
+from typing import Any
+
+import pytest
+
+from mav_tasks.engine.commands.assignments import GRACE
+from mav_tasks.settings import Queueing, Settings
+from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.geo import DEFAULT_ORIGIN
+from tests.kit.client import ACCEPTED, ACK, DENIED, FAILED, MOVE, TEMPORARILY_REJECTED, Sent
+from tests.kit.mission import Item, Upload
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
+
+ANY = (250, 191)
+LOST = 3.5  # s; see Watch.heartbeat_lost
+WAYPOINT, OPTIONS, REQUEST, CANCEL = 16, 54014, 512, 54010
+
+
+def submit(world: World, metres: float = 0.5, **kw: Any) -> Sent:
+    """Submit a move for any rover."""
+    sent = world.client.move(metres, target=ANY, **kw)
+    world.run(0.1)
+    return sent
+
+
+def go_to(world: World, north: float, east: float, *, nonce: int = 0) -> Upload:
+    """Upload a plan of one place for any rover."""
+    x, y = DEFAULT_ORIGIN.to_global(north, east)
+    items = [Item(WAYPOINT, x, y, param1=0.01, param4=0.0)]
+    items += [Item(OPTIONS, nonce, 0, 5.0, 0.0, 0.0, 0.0, frame=2)] if nonce else []
+    upload = Upload(world.client, items, target=ANY)
+    world.until(lambda: upload.result is not None, within=5)
+    return upload
+
+
+def rover_in(sent: Sent) -> int:
+    """Return the rover that an ack names."""
+    assert sent.ack is not None, "not acknowledged"
+    return int(sent.ack.progress)
+
+
+def rover_of(world: World, task_id: int) -> int:
+    return world.task(task_id).vehicle
+
+
+def test_the_ack_and_the_status_say_which_rover_was_chosen(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    sent = submit(world, nonce=7)
+    assert sent.answer == (ACCEPTED, 1)
+    ack = list(world.client.of_id(ACK))[-1]
+    assert (ack.source, rover_in(sent)) == (ANY, 1)
+    status = next(p for p in world.client.of_id(54000))
+    assert status.source == (1, 191)
+    assert "Task 1 queued: move 0.5 m. Rover 1 chosen: free, battery 100%" in "".join(
+        world.client.texts()
+    )
+    world.until_state(1, S.COMPLETED)
+
+
+def test_a_busy_rover_is_passed_over_for_a_free_one(make_world: MakeWorld) -> None:
+    world = make_world(rovers=3)
+    tasks = [submit(world, 4.0, nonce=number).task_id for number in (1, 2, 3, 4)]
+    assert [rover_of(world, task) for task in tasks] == [1, 2, 3, 1]
+    (*_, last) = world.events(TaskAssigned)
+    assert (last.vehicle, last.before, last.task_id) == (1, 0, tasks[3])
+    assert last.choice.startswith("free in ")
+    assert "rover 2: begins in" in last.choice
+
+
+def test_the_nearest_free_rover_goes_to_a_place(make_world: MakeWorld) -> None:
+    world = make_world(rovers=3)  # at 0, 3 and 6 m east
+    upload = go_to(world, 0.0, 5.0)
+    assert (upload.result, rover_of(world, upload.opaque_id)) == (0, 3)
+    (event,) = world.events(TaskAssigned)
+    assert event.choice.startswith("free, 1 m away")
+    world.until_state(upload.opaque_id, S.COMPLETED)
+    assert abs(world.rovers[2].truth.east - 5.0) < 0.1
+
+
+def test_a_far_free_rover_is_better_than_a_near_busy_one(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    busy = world.client.move(10.0, target=(2, 191))
+    world.until(lambda: world.state(1)[0] is S.EXECUTING, within=10)
+    upload = go_to(world, 0.0, 3.5)
+    assert busy.result == ACCEPTED
+    assert rover_of(world, upload.opaque_id) == 1
+
+
+def test_an_equal_nonce_means_the_same_task_whatever_has_happened_since(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(rovers=2)
+    first = submit(world, 3.0, nonce=77)
+    again = submit(world, 3.0, nonce=77)  # rover 2 would be free now
+    assert again.task_id == first.task_id
+    assert rover_in(again) == 1
+    other = submit(world, 1.0, nonce=77)
+    assert other.answer == (DENIED, R.NONCE_REUSED)
+    plan = go_to(world, 0.0, 5.0, nonce=78)
+    assert go_to(world, 0.0, 5.0, nonce=78).opaque_id == plan.opaque_id
+    assert len(world.events(TaskSubmitted)) == 2
+
+
+def test_without_a_nonce_a_repeat_is_recognised_as_for_a_named_rover(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(rovers=2)
+    for _ in range(2):
+        world.client.move(3.0, target=ANY)  # one ack is for both
+    world.run(1.0)
+    world.client.move(3.0, target=ANY)
+    world.run(0.1)
+    assert world.client.acks_of(MOVE) == [(ACCEPTED, 1)] * 2
+    assert len(world.events(TaskSubmitted)) == 1
+
+
+def test_a_refusal_names_why_each_rover_cannot(make_world: MakeWorld) -> None:
+    world = make_world(rovers=3)
+    world.client.stop(target=(1, 191))
+    world.client.pause(target=(2, 191))
+    world.rovers[2].autopilot.set_faults(Faults(battery=12))
+    world.run(2.0)
+    sent = submit(world)
+    assert sent.answer == (TEMPORARILY_REJECTED, R.STOPPED)
+    (event,) = world.events(SubmissionRefused)
+    assert event.text == (
+        "no rover can: rover 1: STOP in force; rover 2: queue paused (operator);"
+        " rover 3: battery 12%, less than 20%"
+    )
+    assert event.vehicle == 0
+    assert event.text in "".join(world.client.texts())
+    plan = go_to(world, 0.0, 1.0)
+    assert plan.result != 0
+    assert len(world.events(SubmissionRefused)) == 2
+
+
+def test_the_bound_of_the_battery_is_a_setting(make_world: MakeWorld) -> None:
+    settings = Settings(queueing=Queueing(least_battery_percent=10))
+    world = make_world(rovers=2, settings=settings)
+    world.rovers[0].autopilot.set_faults(Faults(battery=9))
+    world.rovers[1].autopilot.set_faults(Faults(battery=10))
+    world.run(2.0)
+    assert rover_of(world, submit(world).task_id) == 2
+
+
+def test_an_unknown_battery_counts_as_good(make_world: MakeWorld) -> None:
+    world = make_world()
+    world.rover.autopilot.set_faults(Faults(battery=-1))
+    world.run(2.0)
+    assert submit(world).result == ACCEPTED
+
+
+def test_places_that_depend_on_the_rover_are_refused(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    local = world.client.command_int(WAYPOINT, x=1000, y=0, frame=1, target=ANY)
+    home = Upload(world.client, [Item(20)], target=ANY)
+    world.run(1.0)
+    assert local.answer == (DENIED, R.BAD_FRAME)
+    assert home.result == 5  # MAV_MISSION_INVALID
+    assert not world.events(TaskSubmitted)
+
+
+def test_other_commands_must_name_a_rover(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = submit(world, 5.0, nonce=1).task_id
+    cancel = world.client.command(CANCEL, task, target=ANY)
+    mode = world.client.command(176, 1, 15, target=ANY)
+    world.run(0.2)
+    assert cancel.answer == (DENIED, R.BAD_PARAMETER)
+    assert mode.ack is None
+
+
+def test_the_status_of_a_task_can_be_requested_without_its_rover(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = submit(world, nonce=1).task_id
+    world.client.received.clear()
+    known = world.client.command(REQUEST, 54000, task, target=ANY)
+    unknown = world.client.command(REQUEST, 54000, 99, target=ANY)
+    world.run(0.1)
+    assert known.result == ACCEPTED
+    assert next(packet.source for packet in world.client.of_id(54000)) == (1, 191)
+    assert world.client.acks_of(REQUEST)[-1] == (DENIED, R.NOT_FOUND)
+    assert unknown.times_sent == 1
+
+
+# choosing again
+
+
+def queued_behind(world: World, rover: int) -> int:
+    """Let a rover drive for long, and put a task for any rover behind that; return its id."""
+    for each in range(1, len(world.rovers) + 1):
+        metres = 3.0 if each == rover else 10.0
+        world.client.move(metres, nonce=1000 + each, target=(each, 191))
+    world.run(2.0)
+    task = submit(world, 0.5, nonce=9).task_id
+    assert rover_of(world, task) == rover
+    return task
+
+
+def test_a_lost_rover_loses_the_task_that_it_has_not_begun(make_world: MakeWorld) -> None:
+    world = make_world(rovers=3)
+    task = queued_behind(world, 2)
+    world.rovers[1].autopilot.set_faults(Faults(silent=True))
+    lost_at = world.now
+    world.until(lambda: rover_of(world, task) != 2, within=15)
+    assert LOST + GRACE - 1.1 < world.now - lost_at < LOST + GRACE + 2.2
+    (*_, event) = world.events(TaskAssigned)
+    assert (event.before, event.vehicle, event.version) == (2, 1, 2)
+    assert event.choice.startswith("rover 2: silent; free in ")
+    assert any("is now rover 1's: rover 2: silent" in text for text in world.client.texts())
+    world.until_state(task, S.COMPLETED, within=60)
+    again = submit(world, 0.5, nonce=9)
+    assert again.task_id == task  # whichever rover it went to
+    assert rover_in(again) == 1
+
+
+def test_a_radio_that_comes_back_in_time_changes_nothing(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = queued_behind(world, 2)
+    world.rovers[1].autopilot.set_faults(Faults(silent=True))
+    world.run(LOST + GRACE - 2.0)
+    world.rovers[1].autopilot.set_faults(Faults())
+    world.run(10.0)
+    assert rover_of(world, task) == 2
+
+
+def test_a_low_battery_moves_the_task(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = queued_behind(world, 2)
+    world.client.move(30.0, nonce=3, priority=9, target=(2, 191))  # it does not come to its turn
+    world.rovers[1].autopilot.set_faults(Faults(battery=5))
+    world.until(lambda: rover_of(world, task) == 1, within=15)
+    assert world.events(TaskAssigned)[-1].choice.startswith("rover 2: battery 5%; ")
+
+
+@pytest.mark.parametrize("halt", ["stop", "pause", "hold", "disarm"])
+def test_what_a_person_halts_keeps_its_tasks(make_world: MakeWorld, halt: str) -> None:
+    world = make_world(rovers=2)
+    task = queued_behind(world, 2)
+    match halt:
+        case "stop":
+            world.client.stop(target=(2, 191))
+        case "pause":
+            world.client.pause(target=(2, 191))
+        case "hold":
+            world.client.mode(4, target=(2, 1))
+        case _:
+            world.client.arm(False, target=(2, 1))
+    world.run(1.0)
+    world.rovers[1].autopilot.set_faults(Faults(silent=True, battery=5))
+    world.run(30.0)
+    assert rover_of(world, task) == 2
+    assert world.state(task)[0] is S.QUEUED
+
+
+def test_a_task_that_has_begun_never_moves(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = submit(world, 5.0, nonce=1).task_id
+    world.until_state(task, S.EXECUTING)
+    world.rovers[0].autopilot.set_faults(Faults(silent=True, deaf=True))
+    world.run(30.0)
+    assert rover_of(world, task) == 1
+    assert len(world.events(TaskAssigned)) == 1
+
+
+def test_without_another_rover_the_task_stays(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = queued_behind(world, 2)
+    world.client.stop(target=(1, 191))
+    world.rovers[1].autopilot.set_faults(Faults(silent=True))
+    world.run(20.0)
+    assert rover_of(world, task) == 2
+    world.client.proceed(target=(1, 191))
+    world.run(10.0)
+    assert rover_of(world, task) == 1
+
+
+def test_a_task_of_a_named_rover_never_moves(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    world.client.move(3.0, nonce=1)
+    named = world.client.move(0.5, nonce=2)
+    world.run(2.0)
+    world.rovers[0].autopilot.set_faults(Faults(silent=True))
+    world.run(30.0)
+    assert rover_of(world, named.task_id) == 1
+    assert not world.events(TaskAssigned)
+
+
+def test_the_dependents_of_a_moved_task_wait_for_it(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = queued_behind(world, 2)
+    after = world.client.command(MOVE, 0.3, 0, 0, 5, task, 0, 5, target=(1, 191))
+    world.run(0.2)
+    world.rovers[1].autopilot.set_faults(Faults(silent=True))
+    world.until(lambda: rover_of(world, task) == 1, within=15)
+    world.until_state(after.task_id, S.COMPLETED, within=90)
+    assert world.state(task)[0] is S.COMPLETED
+
+
+def test_a_restarted_server_knows_where_the_task_went(make_world: MakeWorld, tmp_path: Any) -> None:
+    store = PromptSqliteStore(tmp_path / "tasks.sqlite3", wall_offset=0.0)
+    world = make_world(rovers=3, store=store)
+    task = queued_behind(world, 2)
+    world.rovers[1].autopilot.set_faults(Faults(silent=True))
+    world.until(lambda: rover_of(world, task) == 1, within=15)
+    choice = world.task(task).choice
+    world.end_server()
+    restored = store.load()
+    found = {int(each.id): each for each in restored.tasks}
+    assert (found[task].vehicle, found[task].choice, found[task].version) == (1, choice, 2)
+    world.start_server(store, restored)
+    world.run(4.0)
+    again = world.client.move(0.5, nonce=9, target=ANY)
+    world.run(0.2)
+    assert again.task_id == task
+
+
+def test_a_server_without_a_rover_says_so(make_world: MakeWorld) -> None:
+    world = World()
+    sent = world.client.move(1.0, target=ANY)
+    world.run(0.05)
+    assert sent.answer == (FAILED, R.VEHICLE_SILENT)
