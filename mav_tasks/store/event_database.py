@@ -3,6 +3,7 @@
 from contextlib import AbstractContextManager
 from typing import Protocol
 
+from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.connection import Connection
 from mav_tasks.store.retention import Trimmer
@@ -59,6 +60,12 @@ class EventDatabase(Protocol):
 
     def write(self, batch: Batch, *, utc: float) -> None:
         """Make a batch durable, as a whole or not at all."""
+
+    def refused(self, batch: Batch) -> list[NonceTaken]:
+        """Return the submissions of a durable batch that were refused: others had their nonces.
+
+        Several servers may write a database; only that then knows all nonces.
+        """
 
     def is_certain(self) -> bool:
         """Return whether a batch that failed, and is there after ``reopen``, is durable."""

@@ -11,7 +11,7 @@ from threading import Thread
 
 from mav_tasks.clock import boot_time
 from mav_tasks.mailbox import Mailbox
-from mav_tasks.store.base import Kept, NotKept, Outcome
+from mav_tasks.store.base import Kept, NonceTaken, NotKept, Outcome
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
@@ -54,6 +54,7 @@ class Writer:
         self._give_up_at: float | None = None
         self._is_closing = False
         self._must_reopen = False
+        self._refused: list[NonceTaken] = []  # of the last batch
         self._reported_at: float | None = None  # None: nothing is wrong
         self._trim_at = time.monotonic()
         self._thread = Thread(target=self._run, name="store", daemon=True)
@@ -152,6 +153,8 @@ class Writer:
                 return False
             time.sleep(RETRY)
         self._reported_at = None
+        for refused in self._refused:
+            self._mail.put(refused)
         if batch.next_id:
             with suppress(OSError):  # only needed after an older file was restored
                 self._record.note_next_id(batch.next_id, number=batch.last)
@@ -166,6 +169,7 @@ class Writer:
                 self._database.write(batch, utc=self.utc())
             elif not self._database.is_certain():  # the failed commit is in the WAL
                 return False
+            self._refused = self._database.refused(batch)
         except Exception as error:  # noqa: BLE001 - raised again if it is a bug
             self._note_failure(error)
             return False

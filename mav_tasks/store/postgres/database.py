@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from mav_tasks.errors import StoreError
+from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_batch
 from mav_tasks.store.codec import dumps
@@ -46,7 +47,7 @@ def inserts(base: str = "") -> dict[str, str]:
             " ON CONFLICT (id) DO UPDATE SET number = excluded.number, vehicle = excluded.vehicle,"
             " state = excluded.state, changed_at = excluded.changed_at, epoch = excluded.epoch,"
             " submitted = excluded.submitted, changed = NULL, modified = NULL, advanced = NULL,"
-            " run_after = NULL"
+            " run_after = NULL, assigned = NULL"
         ),
         "journal": (
             "INSERT INTO journal (number, utc, kind, task_id, vehicle, body)"
@@ -149,6 +150,10 @@ class PostgresDatabase:
             write_batch(self._session, batch, insert=self._insert, utc=utc)
             write_dependencies(self._session, batch)
         self.last_number = batch.last
+
+    def refused(self, batch: Batch) -> list[NonceTaken]:  # noqa: ARG002
+        """Return []: one server knows all nonces itself."""
+        return []
 
     def is_certain(self) -> bool:
         """Commit once more; return True: a batch that was there before is durable, too.

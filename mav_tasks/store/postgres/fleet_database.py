@@ -7,12 +7,14 @@ all gateways are in the order of the commits, and a reader that has seen one has
 
 from collections.abc import Sequence
 
+from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_rows
 from mav_tasks.store.halt_record import Register, Word
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.database import PostgresDatabase, inserts
 from mav_tasks.store.postgres.dependencies import IS_EXPECTED, write_dependencies
+from mav_tasks.store.postgres.fleet_nonces import claim, forget, refused
 from mav_tasks.store.postgres.gateway_ownership import LIMITS, GatewayOwnership
 from mav_tasks.store.retention import Trimmer
 
@@ -60,7 +62,13 @@ class FleetDatabase(PostgresDatabase):
             )
             write_rows(session, batch, insert=self._insert)
             write_dependencies(session, batch)
+            claim(session, batch, utc=utc)
         self.last_number = batch.last
+
+    def refused(self, batch: Batch) -> list[NonceTaken]:
+        """Return the submissions of a durable batch that another gateway's had come before."""
+        with self._cause():
+            return refused(self._session, batch)
 
     def trim(self, trimmer: Trimmer, *, utc: float) -> bool:
         """Delete some expired rows, unless another gateway is doing that.
@@ -81,6 +89,8 @@ class FleetDatabase(PostgresDatabase):
             self._lease.fence(self._session)
             query = "SELECT pg_try_advisory_xact_lock(?)"
             ((is_ours,),) = self._session.execute(query, (TRIM_LOCK,)).fetchall()
+            if is_ours:
+                forget(self._session)
             return bool(is_ours) and trimmer.step(self._session, utc=utc, kept=IS_EXPECTED)
 
     def close(self, *, utc: float | None) -> None:  # noqa: ARG002  others go on writing

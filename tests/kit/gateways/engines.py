@@ -26,7 +26,15 @@ from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
-from mav_tasks.store import Evicted, IdsGranted, Kept, Outcome, Store, VehiclesLoaded
+from mav_tasks.store import (
+    Evicted,
+    IdsGranted,
+    Kept,
+    NonceTaken,
+    Outcome,
+    Store,
+    VehiclesLoaded,
+)
 from mav_tasks.tasks.events import Event, TaskChanged, TaskModified, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from mav_tasks.tasks.restored import Restored
@@ -105,6 +113,8 @@ class SharedStore:
         #: called when something was stored that other gateways are notified of
         self.notify: Callable[[], None] = lambda: None
         self.leads: dict[int, float] = {}
+        #: of tasks for any rover
+        self.nonces: dict[tuple[str, int, int, int], Task] = {}
 
     def block(self) -> IdsGranted:
         """Return the next ids."""
@@ -117,12 +127,32 @@ class SharedStore:
             self.leads[vehicle] = min(MOST_LEAD, self.leads.get(vehicle, 0.0) + STEP)
         return max(self.leads[vehicle] for vehicle in vehicles)
 
-    def keep(self, events: Sequence[Event]) -> None:
-        """Make events durable."""
-        self.store.append(events)
+    def keep(self, events: Sequence[Event]) -> list[NonceTaken]:
+        """Make events durable; refuse tasks for any rover whose nonce others have."""
+        taken = [
+            found
+            for event in events
+            if isinstance(event, TaskSubmitted) and (found := self._claim(event.task)) is not None
+        ]
+        refused = {each.task_id for each in taken}
+        self.store.append(
+            [e for e in events if not (isinstance(e, TaskSubmitted) and e.task.id in refused)]
+        )
         self.store.take_outcomes()
         if any(map(_is_news, events)):
             self.notify()
+        return taken
+
+    def _claim(self, task: Task) -> NonceTaken | None:
+        if not (task.choice and task.marks.nonce):
+            return None
+        who = task.submitter
+        key = who.key, who.system_id, who.component_id, task.marks.nonce
+        first = self.nonces.setdefault(key, task)
+        if first is task or not any(each.id == first.id for each in self.tasks()):
+            self.nonces[key] = task
+            return None
+        return NonceTaken(task.id, first.id, first.marks.payload)
 
     def part(self, vehicles: frozenset[int]) -> Restored:
         """Return what is stored about some vehicles."""
@@ -179,7 +209,7 @@ class GatewayStore:
         is_current = self._is_current()
         if self.is_reached and self._waiting and is_current is not None:
             if is_current:
-                self._shared.keep(self._waiting)
+                self._outcomes += self._shared.keep(self._waiting)
                 self.events += self._waiting
                 self._count += len(self._waiting)
                 self._outcomes.append(Kept(self._count))
