@@ -9,10 +9,12 @@ import typer
 from mav_tasks.cli.lazy import completing
 from mav_tasks.cli.times import parse_duration, parse_moment
 from mav_tasks.errors import UsageError
+from mav_tasks.tasks.task import ANY
 
 DEFAULT_SERVER = "udpout:127.0.0.1:14560"
 PRIORITY = 5
 NEVER = "never"  # of --every
+MOST_ROVERS = 255  # system ids
 
 StartIn = Annotated[
     str, typer.Option("--in", metavar="DURATION", help="Start after this delay: 30s, 5m, 1h30m.")
@@ -82,7 +84,10 @@ class Reach:
     vehicle: Annotated[
         int | None,
         typer.Option(
-            min=1, max=255, metavar="N", help="System id of the rover, if the server has several."
+            min=1,
+            max=MOST_ROVERS,
+            metavar="N",
+            help="System id of the rover, if the server has several.",
         ),
     ] = None
     timeout: Annotated[
@@ -98,6 +103,30 @@ class Common(Reach):
     """Options for reaching the server and showing its answers."""
 
     json: Json = False
+
+
+def rover_or_any(text: str) -> int:
+    """Return a system id, or ANY for the word "any". Raise BadParameter for another text."""
+    if text == "any":
+        return ANY
+    if text.isdecimal() and 1 <= int(text) <= MOST_ROVERS:
+        return int(text)
+    raise typer.BadParameter(f"{text!r} is not in the range 1<=x<={MOST_ROVERS}, nor any.")
+
+
+@dataclass(frozen=True, slots=True)
+class AnyCommon(Common):
+    """The same for new tasks, for which the server may choose the rover."""
+
+    vehicle: Annotated[
+        int | None,
+        typer.Option(
+            parser=rover_or_any,
+            metavar="N|any",
+            help="System id of the rover, if the server has several; any: the server chooses the"
+            " one that would begin first.",
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,12 @@ import typer
 from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.lazy import group
-from mav_tasks.cli.options import Common, TaskOptions, Wait
-from mav_tasks.cli.session import opened, read, values_checked
+from mav_tasks.cli.options import AnyCommon, Common, TaskOptions, Wait
+from mav_tasks.cli.session import ChoiceHeard, opened, read, rover_of, values_checked
 from mav_tasks.cli.submit import tell_submitted
 from mav_tasks.errors import Refused, UsageError
 from mav_tasks.plan_files import PlanFile, format_plan, read_plan, write_plan
+from mav_tasks.tasks.task import ANY
 
 STANDARD_OUTPUT = "-"
 
@@ -50,7 +51,7 @@ rally = group("Upload rally points.")
 async def upload_mission(
     file: FileIn,
     terms: TaskOptions,
-    common: Common,
+    common: AnyCommon,
     stage: Annotated[
         bool, typer.Option("--stage", help="Do not queue it; start it later with 'mission start'.")
     ] = False,
@@ -61,14 +62,16 @@ async def upload_mission(
         raise UsageError(
             "--stage: only --wait goes with it; a staged mission takes no other task option"
         )
-    plan = read_plan(file)
+    if stage and common.vehicle == ANY:
+        raise UsageError("--stage: a mission is staged at one rover: name it with --vehicle N")
+    plan, heard = read_plan(file), ChoiceHeard()
     async with opened(common) as client:
-        with values_checked():
+        with values_checked(), client.listening(heard.listen):
             if stage:
                 task = await client.stage_mission(plan)
             else:
-                task = await client.submit_mission(plan, **wished)
-        hint = " waits: mav-tasks mission start" if stage else ""
+                task = await client.submit_mission(plan, vehicle=rover_of(common), **wished)
+        hint = " waits: mav-tasks mission start" if stage else heard.hint(task)
         await tell_submitted(client, task, common, is_awaited=terms.wait, hint=hint)
 
 

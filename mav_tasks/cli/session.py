@@ -2,12 +2,16 @@
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from typing import Any
+from typing import Any, Literal
 
 from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
+from mav_tasks.client.values import News, Text
 from mav_tasks.errors import NoAnswer, UsageError
+from mav_tasks.tasks.task import ANY
+
+CHOSEN = " chosen: "  # in the text of a new task (``engine/commands/submissions.py``)
 
 
 def read(terms: TaskOptions) -> dict[str, Any]:
@@ -37,7 +41,7 @@ async def unfound(common: Reach) -> AsyncIterator[Client]:
         from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415  # only to sign
 
         key = key_to_sign_with(common.sign, common.keys)
-    client = Client(common.server, vehicle=common.vehicle, timeout=common.timeout, key=key)
+    client = Client(common.server, vehicle=common.vehicle or None, timeout=common.timeout, key=key)
     client.open()
     try:
         yield client
@@ -58,6 +62,31 @@ def values_checked() -> Iterator[None]:
         yield
     except ValueError as error:
         raise UsageError(str(error)) from error
+
+
+class ChoiceHeard:
+    """Hears why the server chose the rover of a new task for any rover."""
+
+    def __init__(self) -> None:
+        self._texts: list[str] = []
+
+    def listen(self, news: News) -> None:
+        """Keep a text of a task server."""
+        if isinstance(news, Text):
+            self._texts.append(news.words)
+
+    def hint(self, task: Task) -> str:
+        """Return why, to end a line about a task; "" if nothing was heard, or it was named."""
+        for words in self._texts:
+            about, _, why = words.partition(CHOSEN)
+            if why and about.startswith(f"Task {task.id} "):
+                return f": {why}"
+        return ""
+
+
+def rover_of(common: Common) -> Literal["any"] | None:
+    """Return the argument ``vehicle`` of the library for a new task; None: the client's rover."""
+    return "any" if common.vehicle == ANY else None
 
 
 def is_alone(client: Client, common: Common) -> bool:

@@ -9,9 +9,9 @@ import typer
 from mav_tasks.cli import output, words
 from mav_tasks.cli.command import NUMBERS, NumbersCommand, command
 from mav_tasks.cli.lazy import group
-from mav_tasks.cli.options import Common, TaskOptions
+from mav_tasks.cli.options import AnyCommon, Common, TaskOptions
 from mav_tasks.cli.places import parse_place
-from mav_tasks.cli.session import is_alone, opened, read, values_checked
+from mav_tasks.cli.session import ChoiceHeard, is_alone, opened, read, rover_of, values_checked
 from mav_tasks.cli.times import parse_duration
 from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
@@ -45,7 +45,7 @@ async def move(
         float, typer.Argument(metavar="METRES", help="Distance; negative: backwards.")
     ],
     terms: TaskOptions,
-    common: Common,
+    common: AnyCommon,
     speed: Speed = None,
 ) -> None:
     """Drive straight along the heading."""
@@ -57,7 +57,7 @@ async def move(
 async def rotate(
     angle: Annotated[float, typer.Argument(metavar="DEGREES", help="Angle; positive: clockwise.")],
     terms: TaskOptions,
-    common: Common,
+    common: AnyCommon,
     rate: Rate = None,
 ) -> None:
     """Turn on the spot by an angle."""
@@ -73,7 +73,7 @@ async def drive(
     ],
     duration: Annotated[str, typer.Argument(metavar="DURATION", help="How long, for example 5s.")],
     terms: TaskOptions,
-    common: Common,
+    common: AnyCommon,
 ) -> None:
     """Drive at a constant velocity for some time."""
     seconds = parse_duration("DURATION", duration)
@@ -90,7 +90,7 @@ async def goto(
         str, typer.Argument(metavar="EAST|LON", help="Metres, or degrees with --global.")
     ],
     terms: TaskOptions,
-    common: Common,
+    common: AnyCommon,
     is_global: Annotated[
         bool, typer.Option("--global", help="The numbers are latitude and longitude.")
     ] = False,
@@ -123,7 +123,7 @@ async def face(
         float, typer.Argument(metavar="DEGREES", help="Heading, clockwise from north.")
     ],
     terms: TaskOptions,
-    common: Common,
+    common: AnyCommon,
     rate: Rate = None,
 ) -> None:
     """Turn on the spot to a heading."""
@@ -137,7 +137,7 @@ async def wait(
         str, typer.Argument(metavar="DURATION", help="How long, for example 30s or 5m.")
     ],
     terms: TaskOptions,
-    common: Common,
+    common: AnyCommon,
 ) -> None:
     """Stand still for some time."""
     await _submit([Wait(parse_duration("DURATION", duration))], terms, common)
@@ -145,17 +145,18 @@ async def wait(
 
 @app.command()
 @command
-async def home(terms: TaskOptions, common: Common, speed: Speed = None) -> None:
+async def home(terms: TaskOptions, common: AnyCommon, speed: Speed = None) -> None:
     """Return to the rover's home."""
     await _submit([GoTo(None, speed=speed)], terms, common)
 
 
 async def _submit(goals: Sequence[Goal], terms: TaskOptions, common: Common) -> None:
-    wished = read(terms)
+    wished, heard = read(terms), ChoiceHeard()
     async with opened(common) as client:
-        with values_checked(), in_typed_words():
-            task = await client.submit(goals, **wished)
-        await tell_submitted(client, task, common, is_awaited=terms.wait)
+        with values_checked(), in_typed_words(), client.listening(heard.listen):
+            task = await client.submit(goals, vehicle=rover_of(common), **wished)
+        hint = heard.hint(task)
+        await tell_submitted(client, task, common, is_awaited=terms.wait, hint=hint)
 
 
 async def tell_submitted(

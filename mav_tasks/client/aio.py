@@ -6,7 +6,7 @@ from contextlib import contextmanager, suppress
 from datetime import datetime
 from math import nan
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 from weakref import WeakValueDictionary
 
 from mav_tasks import plan_files
@@ -28,7 +28,7 @@ from mav_tasks.client.values import (
     queue_status_of,
 )
 from mav_tasks.client.watch import Followed
-from mav_tasks.client.wire import Goal, TaskOptions
+from mav_tasks.client.wire import SERVER, Goal, TaskOptions
 from mav_tasks.errors import ClientError, MavTasksError, NoAnswer, Refused
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink import messages as m
@@ -66,6 +66,9 @@ EPOCHS = 1 << 24  # integers that a float32 holds exactly
 PAGE = 16  # tasks that one request returns
 NO_HISTORY = "the server does not list finished tasks: it is older than this client"
 OVERTAKEN = "a later STOP or pause overtook this request: repeat it if you still mean it"
+#: in place of a rover: the server chooses one
+AnyRover = Literal["any"]
+
 RELEASES: dict[Release, float] = {"again": 0.0, "remainder": 1.0, "skip": 2.0}
 
 
@@ -187,7 +190,7 @@ class Client:
         delay: float = 0.0,
         deadline: float = 0.0,
         at: datetime | None = None,
-        vehicle: int | None = None,
+        vehicle: int | AnyRover | None = None,
         nonce: int = 0,
         label: str = "",
         every: float | str = 0.0,
@@ -201,6 +204,9 @@ class Client:
         1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
         ``label``: a name of up to 24 bytes, shown with the task.
 
+        ``vehicle``: "any" lets the server choose the rover that would begin first. It may choose
+        again until the task begins: see ``Task.vehicle``. Places must be global then.
+
         ``every``: the task repeats, so many seconds from one start to the next (10 to 16,777,215),
         or at the times of a cron expression in UTC, or in the time zone after it: "0 6 * * 1-5
         Europe/Zurich". Then ``deadline`` counts from each start. With an expression there is no
@@ -208,7 +214,7 @@ class Client:
         """
         check_label(label)
         repeat = _repeat_of(every, delay, at)
-        system_id = self._which(vehicle)
+        target = self._task_server(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
         within = 0.0 if repeat else deadline  # else counted from each start, and set afterwards
@@ -217,10 +223,10 @@ class Client:
         if not goals:
             raise ValueError("no goals: nothing to do")
         if len(goals) == 1 and isinstance(goals[0], Move | Rotate | Drive):
-            task = await self._submit_command(goals[0], terms, system_id, mark)
+            task = await self._submit_command(goals[0], terms, target, mark)
         else:
             items = (*wire.items_of_goals(goals), wire.options_of(terms, nonce=mark))
-            task = await self._submit_plan(items, system_id, mark)
+            task = await self._submit_plan(items, target, mark)
             deadline -= within  # which its options carried
         await self._complete(task, repeat=repeat, deadline=deadline, at=at, label=label, nonce=mark)
         return task
@@ -464,7 +470,7 @@ class Client:
         delay: float = 0.0,
         deadline: float = 0.0,
         at: datetime | None = None,
-        vehicle: int | None = None,
+        vehicle: int | AnyRover | None = None,
         nonce: int = 0,
         check: int = 0,
         label: str = "",
@@ -479,13 +485,13 @@ class Client:
         check_label(label)
         wire.check_check(check)
         repeat = _repeat_of(every, delay, at)
-        system_id = self._which(vehicle)
+        target = self._task_server(vehicle)
         mark = self._submissions.nonce(nonce)
         wait = UNTIL_REPEATED if _is_cron(repeat) else self._submissions.delay(delay, at, mark)
         within = 0.0 if repeat else deadline
         terms = TaskOptions(priority, _id_of(after), wait, within)
         items = (*items_of(plan), wire.options_of(terms, nonce=mark, check=check))
-        task = await self._submit_plan(items, system_id, mark)
+        task = await self._submit_plan(items, target, mark)
         await self._complete(
             task, repeat=repeat, deadline=deadline - within, at=at, label=label, nonce=mark
         )
@@ -500,7 +506,7 @@ class Client:
         items = items_of(plan)
         if self._has_home_item(system_id):
             items = wire.with_home(items)
-        return await self._submit_plan(items, system_id, None, component=AUTOPILOT)
+        return await self._submit_plan(items, Address(system_id, AUTOPILOT), None)
 
     async def start_mission(self, *, epoch: int | None = None, vehicle: int | None = None) -> Task:
         """Start the staged mission, or the last one again, as a new task.
@@ -692,35 +698,54 @@ class Client:
         self,
         goal: Move | Rotate | Drive,
         terms: TaskOptions,
-        vehicle: int,
+        target: Address,
         mark: int,
     ) -> Task:
-        message = wire.command_of(goal, terms, target=(vehicle, AUTOPILOT), nonce=mark)
+        to = target if target == SERVER else Address(target.system_id, AUTOPILOT)
+        message = wire.command_of(goal, terms, target=to, nonce=mark)
         task_id = await self._ask.ask(
             message,
-            f"rover {vehicle}",
+            "the task server" if target == SERVER else f"rover {target.system_id}",
             fits=lambda ack: (
                 not self._submissions.is_anothers(ack.result_param2, mark, now=self._now)
             ),
             nonce=mark,
             is_told_apart=True,
         )
-        return self._submitted_as(task_id, vehicle, mark)
+        return await self._submitted_to(target, task_id, mark)
 
     async def _submit_plan(
-        self,
-        items: tuple[Item, ...],
-        vehicle: int,
-        mark: int | None,
-        *,
-        component: int | None = None,
+        self, items: tuple[Item, ...], target: Address, mark: int | None
     ) -> Task:
-        view = self._open.session.fleet.get(vehicle)
+        task_id = await self._ask.upload(target, items, MavMissionType.MISSION, nonce=mark or 0)
+        return await self._submitted_to(target, task_id, mark or 0)
+
+    async def _submitted_to(self, target: Address, task_id: int, nonce: int) -> Task:
+        if target != SERVER:
+            return self._submitted_as(task_id, target.system_id, nonce)
+        self._submissions.note(task_id, nonce, now=self._now)
+        return self._submitted_as(task_id, await self._rover_of(task_id, nonce), nonce)
+
+    async def _rover_of(self, task_id: int, nonce: int) -> int:
+        """Return the rover that the server, or another gateway of its fleet, chose for a task."""
+        for each in (SERVER.system_id, *self._open.session.fleet.served()):
+            try:
+                return (await self._ask.status(task_id, each)).vehicle
+            except Refused as refused:
+                if refused.reason != TaskReason.NOT_FOUND:
+                    raise
+        words = f"task {task_id} is stored, but no gateway shows it yet: submit it again"
+        raise NoAnswer(words, nonce=nonce)
+
+    def _task_server(self, vehicle: int | AnyRover | None) -> Address:
+        """Return where a rover's tasks are submitted."""
+        if vehicle == "any":
+            return SERVER
+        system_id = self._which(vehicle)
+        view = self._open.session.fleet.get(system_id)
         assert view is not None, "it was looked up by its server"
         assert view.server_component is not None, "the same"
-        target = Address(vehicle, component or view.server_component)
-        task_id = await self._ask.upload(target, items, MavMissionType.MISSION, nonce=mark or 0)
-        return self._submitted_as(task_id, vehicle, mark or 0)
+        return Address(system_id, view.server_component)
 
     async def _complete(
         self,

@@ -36,7 +36,7 @@ class Task:
 
     @property
     def vehicle(self) -> int:
-        """The system id of its rover."""
+        """The system id of its rover. A task for any rover may get another one before it begins."""
         return self._followed.vehicle
 
     @property
@@ -73,17 +73,19 @@ class Task:
 
         The final status is the last one. A slow reader gets only the latest status.
         """
-        with self._client.streaming(self.vehicle, interval):
-            told: TaskStatus | None = None
-            while True:
-                status = self.status
-                if status is not None and status is not told:
-                    told = status
-                    yield status
-                if self._followed.is_over:
-                    return
-                if self.status is told:
-                    await self._news()
+        told: TaskStatus | None = None
+        while True:
+            rover = self.vehicle
+            with self._client.streaming(rover, interval):
+                while self.vehicle == rover:
+                    status = self.status
+                    if status is not None and status is not told:
+                        told = status
+                        yield status
+                    if self._followed.is_over:
+                        return
+                    if self.status is told:
+                        await self._news()
 
     async def refresh(self) -> TaskStatus:
         """Request and return the status. Raise Refused (NOT_FOUND) if the server lacks the task."""

@@ -24,6 +24,7 @@ from mav_tasks.client.values import (
     task_timing_of,
 )
 from mav_tasks.client.watch import Followed, Watch
+from mav_tasks.client.wire import SERVER
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder, Packer, target_of
@@ -321,6 +322,7 @@ class Session:
         vehicle, component = text.sender
         view = self.fleet.get(vehicle)
         is_ours = view is not None and view.server_component in (None, component)
+        is_ours |= text.sender == SERVER
         if is_ours and text.severity == MavSeverity.WARNING:
             for refused in self._refused:
                 if refused.vehicle in (0, vehicle):
@@ -331,9 +333,13 @@ class Session:
 
 
 def request_message(vehicle: int, message_id: int, *params: float) -> m.CommandLong:
-    """Return the REQUEST_MESSAGE command for a message of a vehicle's task server."""
+    """Return the REQUEST_MESSAGE command for a message of a vehicle's task server.
+
+    SERVER's system id instead of a vehicle's: a task of any vehicle.
+    """
     filled = (*params, *(0.0,) * (6 - len(params)))
-    return m.CommandLong(vehicle, AUTOPILOT, MavCmd.REQUEST_MESSAGE, 0, float(message_id), *filled)
+    component = SERVER.component_id if vehicle == SERVER.system_id else AUTOPILOT
+    return m.CommandLong(vehicle, component, MavCmd.REQUEST_MESSAGE, 0, float(message_id), *filled)
 
 
 def _reply(ack: m.CommandAck, words: str) -> Reply:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
-from mav_tasks.client.aio import DEFAULT_LINK, FIND_WITHIN, SCRIPT, STOP_WITHIN, Client
+from mav_tasks.client.aio import DEFAULT_LINK, FIND_WITHIN, SCRIPT, STOP_WITHIN, AnyRover, Client
 from mav_tasks.client.blocking import BlockingClient, BlockingTask, Portal, called, id_of
 from mav_tasks.client.handle import Release
 from mav_tasks.client.plan_sources import Plan
@@ -31,7 +31,7 @@ class SyncTask(BlockingTask):
 
     @property
     def vehicle(self) -> int:
-        """The system id of its rover."""
+        """The system id of its rover. A task for any rover may get another one before it begins."""
         return self._aio.vehicle
 
     @property
@@ -173,7 +173,7 @@ class SyncClient(BlockingClient):
         delay: float = 0.0,
         deadline: float = 0.0,
         at: datetime | None = None,
-        vehicle: int | None = None,
+        vehicle: int | AnyRover | None = None,
         nonce: int = 0,
         label: str = "",
         every: float | str = 0.0,
@@ -186,6 +186,9 @@ class SyncClient(BlockingClient):
         the submission until it is answered; the server creates one task per ``nonce`` (1 to
         1,065,353,215; 0: a random one). After NoAnswer, submit again with the error's nonce.
         ``label``: a name of up to 24 bytes, shown with the task.
+
+        ``vehicle``: "any" lets the server choose the rover that would begin first. It may choose
+        again until the task begins: see ``Task.vehicle``. Places must be global then.
 
         ``every``: the task repeats, so many seconds from one start to the next (10 to 16,777,215),
         or at the times of a cron expression in UTC, or in the time zone after it: "0 6 * * 1-5
@@ -348,7 +351,7 @@ class SyncClient(BlockingClient):
         delay: float = 0.0,
         deadline: float = 0.0,
         at: datetime | None = None,
-        vehicle: int | None = None,
+        vehicle: int | AnyRover | None = None,
         nonce: int = 0,
         check: int = 0,
         label: str = "",

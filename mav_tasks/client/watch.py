@@ -80,6 +80,7 @@ class Watch:
         if before is not None and status.version < before.version:
             return None  # a newer status arrived first
         followed.status = status
+        followed.vehicle = status.vehicle  # a task of any rover may move to another one
         followed.patience = SILENT if status.is_active else min(followed.patience, SILENT_WAITING)
         followed.ask_at = now + followed.patience
         if status.is_over:

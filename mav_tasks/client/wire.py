@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import degrees, isfinite
 
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.plan_files.values import PlanItem
@@ -31,6 +32,9 @@ from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_NONCE, MAX_PRIORITY, MAX_
 #: the goals that a client can submit; angles in radians
 Goal = Move | Rotate | Drive | GoTo | Face | Wait
 Command = m.CommandLong | m.CommandInt
+
+#: the address of the task server itself, where it takes tasks for any of its rovers
+SERVER = Address(250, 191)
 
 LOCAL_SCALE = 1e4  # x and y in a local frame are in units of 0.1 mm
 LARGEST = 0x7FFFFFFE  # largest x and y; INT32_MAX means "not given"
