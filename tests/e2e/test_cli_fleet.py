@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.kit.commands import called
-from tests.kit.processes import free_udp_ports, frozen, process
+from tests.kit.processes import free_udp_ports, frozen, process, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -144,3 +144,59 @@ def test_a_server_that_does_not_answer_is_not_ready() -> None:
     done = called("ready", "--within", "0.3", server=f"udpout:127.0.0.1:{nowhere}")
     assert (done.status, done.output) == (3, "")
     assert "no task server answered" in done.error
+
+
+def places(server: str) -> list[tuple[float, float]]:
+    """Return where each rover is, once the command has waited long enough to be told."""
+    found: list[tuple[float, float]] = []
+
+    def are_told() -> bool:
+        rovers = called("vehicles", "--json", server=server).objects
+        found[:] = [(rover["latitude"], rover["longitude"]) for rover in rovers]
+        return None not in [number for place in found for number in place]
+
+    wait_until(are_told, within=20)
+    return found
+
+
+def test_any_rover_is_the_free_one_and_then_the_nearest_one(server: str) -> None:
+    first = called("submit", "move", "3", "--vehicle", "any", server=server)
+    assert re.match(r"rover 1: task \d+: free, battery 100% \(rover 2: begins in ", first.lines[0])
+    second = ("submit", "move", "0.3", "--vehicle", "any", "--nonce", "4711", "--json")
+    (task,) = called(*second, server=server).objects
+    assert task["vehicle"] == 2
+    (same,) = called(*second, server=server).objects
+    assert (same["id"], same["vehicle"]) == (task["id"], 2)
+    busy = called("submit", "wait", "1s", "--vehicle", "any", "--wait", server=server)
+    assert busy.status == 0
+    number = re.search(r"task (\d+)", first.lines[0])
+    assert number is not None
+    assert called("status", number[1], "--wait", server=server).status == 0
+    for rover, (latitude, longitude) in enumerate(places(server), 1):
+        there = (str(latitude), str(longitude), "--global", "--vehicle", "any", "--wait", "--json")
+        *_, done = called("submit", "goto", *there, server=server).objects
+        assert (done["vehicle"], done["state"]) == (rover, "completed")
+
+
+def test_if_no_rover_can_the_command_line_says_of_each_one_why(server: str) -> None:
+    assert called("pause", "--vehicle", "1", server=server).status == 0
+    assert called("stop", "--vehicle", "2", server=server).status == 0
+    done = called("submit", "move", "1", "--vehicle", "any", server=server)
+    assert (done.status, done.error) == (
+        1,
+        "mav-tasks: no rover can: rover 1: queue paused (operator); rover 2: STOP in force\n",
+    )
+    mission = called("submit", "face", "90", "--vehicle", "any", server=server)
+    assert (mission.status, mission.error) == (done.status, done.error)
+    local = called("submit", "goto", "1", "1", "--local", "--vehicle", "any", server=server)
+    assert "name the rover, or give latitude and longitude" in local.error
+    assert called("resume", "--all", server=server).status == 0
+
+
+def test_any_is_for_new_tasks_only(server: str) -> None:
+    for command in (("queue",), ("stop",), ("cancel", "1")):
+        done = called(*command, "--vehicle", "any", server=server)
+        assert (done.status, "--vehicle" in done.error) == (2, True)
+    staged = called("mission", "upload", "x.plan", "--stage", "--vehicle", "any", server=server)
+    assert staged.status == 2
+    assert "name it with --vehicle N" in staged.error

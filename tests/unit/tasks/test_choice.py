@@ -42,8 +42,10 @@ def test_the_nearest_free_rover_is_chosen_and_the_words_compare_it_with_the_othe
     low = Candidate(3, battery=0.15)
     assert chosen(far, near, low) == (
         2,
-        "free, 12 m away, battery 81%"
-        " (rover 1: begins in 30 s; rover 3: battery 15%, less than 20%)",
+        (
+            "free, 12 m away, battery 81%"
+            " (rover 1: begins in 30 s; rover 3: battery 15%, less than 20%)"
+        ),
     )
 
 
