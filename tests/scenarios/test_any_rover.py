@@ -239,6 +239,33 @@ def test_a_low_battery_moves_the_task(make_world: MakeWorld) -> None:
     assert world.events(TaskAssigned)[-1].choice.startswith("rover 2: battery 5%; ")
 
 
+def failsafe_of_rover_2(world: World) -> int:
+    """Let rover 2 stop by its own failsafe before a task of any rover; return the task's id."""
+    task = queued_behind(world, 2)
+    world.rovers[1].autopilot.set_faults(Faults(gps_lost=True))
+    second = 1
+    world.until(
+        lambda: world.server.engine.snapshot(now=world.now).vehicles[second].paused is R.FAILSAFE,
+        within=10,
+    )
+    return task
+
+
+def test_a_rover_that_its_own_failsafe_has_stopped_loses_the_task(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = failsafe_of_rover_2(world)
+    world.until(lambda: rover_of(world, task) == 1, within=GRACE + 2.2)
+    assert world.events(TaskAssigned)[-1].choice.startswith("rover 2: rover's failsafe; ")
+
+
+def test_after_a_failsafe_a_pause_keeps_the_task_where_it_is(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = failsafe_of_rover_2(world)
+    world.client.pause(target=(2, 191))
+    world.run(20.0)
+    assert rover_of(world, task) == 2
+
+
 @pytest.mark.parametrize("halt", ["stop", "pause", "hold", "disarm"])
 def test_what_a_person_halts_keeps_its_tasks(make_world: MakeWorld, halt: str) -> None:
     world = make_world(rovers=2)

@@ -48,6 +48,22 @@ def many_rovers(make_world: MakeWorld, folder: Path) -> World:
     return world
 
 
+def any_rover(make_world: MakeWorld, folder: Path) -> World:
+    world = make_world(records=folder, rovers=2)
+    for number, metres in ((1, 8.0), (2, 4.0)):
+        world.client.move(metres, target=(number, 191), nonce=number)
+    world.run(2.0)
+    for _ in range(2):
+        world.client.move(0.5, target=(250, 191), nonce=3)
+        world.run(0.5)
+    world.client.command_int(16, **at(1.0, 1.0), frame=1, target=(250, 191))
+    world.rovers[1].autopilot.set_faults(Faults(silent=True))
+    world.until(lambda: world.task(3).vehicle == 1, within=20)
+    world.rovers[1].autopilot.set_faults(Faults())
+    world.until_state(3, S.COMPLETED, within=60)
+    return world
+
+
 def plans(make_world: MakeWorld, folder: Path) -> World:
     world = make_world(records=folder, persona=PROMPT_PX4)
     items = [Item(16, **at(0.0, 0.0), frame=0), Item(16, **at(1.0, 0.0)), Item(16, **at(1.0, 1.0))]
@@ -131,6 +147,7 @@ WORLDS: dict[str, Callable[[MakeWorld, Path], World]] = {
     for each in (
         one_rover,
         many_rovers,
+        any_rover,
         plans,
         stop_and_takeover,
         parameters,
