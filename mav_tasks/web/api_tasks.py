@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from mav_tasks.client.aio import AnyRover
 from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.values import TaskStatus
@@ -60,6 +61,11 @@ def own_of(status: TaskStatus) -> int:
     return status.series or status.id
 
 
+def _named_by(call: Call) -> int | AnyRover:
+    """Return the rover that the path names, or "any"."""
+    return call.vehicle if "vehicle" in call.path else "any"
+
+
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
     client, live = services.client, services.live
@@ -68,7 +74,7 @@ def operations(services: Services) -> list[Operation]:
         task = await submit(
             client,
             plan,
-            vehicle=call.vehicle,
+            vehicle=_named_by(call),
             terms=call.body,
             headers=call.headers,
             by=call.identity.name,
@@ -76,7 +82,7 @@ def operations(services: Services) -> list[Operation]:
         services.own(task.id, call.identity)
         if places:
             live.remember_places(task.id, places)
-        live.hurry(call.vehicle)
+        live.hurry(task.vehicle)
         return live.task_form(await task.refresh())
 
     async def submit_task(call: Call) -> Any:
@@ -137,8 +143,31 @@ def operations(services: Services) -> list[Operation]:
             raise not_found("the web process has no store: start it with --store")
         return {"entries": await services.entries(task=call.task, limit=1000)}
 
-    one, rover = "/tasks/{task}", "/vehicles/{vehicle}"
+    one, rover, any_rover = "/tasks/{task}", "/vehicles/{vehicle}", "/vehicles/any"
     return [
+        Operation(
+            "POST",
+            f"{any_rover}/tasks",
+            "Submit goals as one task of the rover that would begin it first; it may get another"
+            " rover before it begins",
+            submit_task,
+            may="submit",
+            body=[GOALS, *TERMS],
+            answer="Task",
+            status=201,
+            headers=KEYED,
+        ),
+        Operation(
+            "POST",
+            f"{any_rover}/missions",
+            "Submit a mission file as one task of the rover that would begin it first",
+            submit_mission,
+            may="mission",
+            body=[*FILE, *TERMS],
+            answer="Task",
+            status=201,
+            headers=KEYED,
+        ),
         Operation(
             "POST",
             f"{rover}/tasks",

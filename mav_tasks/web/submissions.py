@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-from mav_tasks.client.aio import Client
+from mav_tasks.client.aio import AnyRover, Client
 from mav_tasks.client.goal_form import goal_of, goal_schema
 from mav_tasks.client.handle import Task
 from mav_tasks.client.idempotency import LONGEST, numbers_of
@@ -82,7 +82,7 @@ async def submit(
     client: Client,
     plan: Plan,
     *,
-    vehicle: int,
+    vehicle: int | AnyRover,
     terms: Mapping[str, Any],
     headers: Mapping[str, str],
     by: str,

@@ -162,6 +162,17 @@ def test_one_key_makes_one_task(page: Web) -> None:
     assert second["id"] != first["id"]
 
 
+def test_a_task_of_any_rover_names_the_chosen_one(page: Web) -> None:
+    move = {"goals": [{"kind": "move", "distance": 0.2}]}
+    first = page.post("/vehicles/any/tasks", move, idempotency_key="of any")
+    again = page.post("/vehicles/any/tasks", move, idempotency_key="of any")
+    assert first["vehicle"] == 1
+    assert again["id"] == first["id"]
+    waypoint = "QGC WPL 110\n0\t1\t0\t93\t0.1\t0\t0\t0\t0\t0\t0\t1\n"
+    mission = {"name": "x.waypoints", "text": waypoint}
+    assert page.post("/vehicles/any/missions", mission)["vehicle"] == 1
+
+
 def test_why_a_task_waits_and_what_helps(page: Web) -> None:
     page.post("/vehicles/1/pause", {})
     task = move(page, 0.3)
