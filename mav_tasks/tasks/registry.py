@@ -288,7 +288,11 @@ class TaskRegistry:
 
     def is_all_durable(self, vehicle: int) -> bool:
         """Return whether all events of a vehicle are durable."""
-        return self._last_of.get(vehicle, 0) <= self.durable
+        return self.last_event_of(vehicle) <= self.durable
+
+    def last_event_of(self, vehicle: int) -> int:
+        """Return the number of a vehicle's last event, 0 for none in this run."""
+        return self._last_of.get(vehicle, 0)
 
     def forget(self, vehicle: int) -> set[TaskId]:
         """Forget a vehicle and its tasks, which are durable; return the ids of these."""

@@ -19,7 +19,7 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.choice import DISABLED, Candidate, Choice, choose, is_low
-from mav_tasks.tasks.driving.estimate import UNKNOWN
+from mav_tasks.tasks.driving.estimate import UNKNOWN, Estimate
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.events import Event, TaskSubmitted
@@ -30,6 +30,7 @@ from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Plan, SingleGoal, Step
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
+from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
 R = TaskReason
@@ -39,7 +40,7 @@ LOOK = 1.0  # s between two looks at the vehicles of waiting tasks
 GRACE = 5.0
 MOST_AT_ONCE = 10  # tasks assigned again in one look; the others a second later: it takes time
 #: ready tasks of a vehicle up to which their end is computed for a choice, which holds up setpoints
-FORESEEN = 50
+FORESEEN = 20
 
 
 class Assignments:
@@ -63,6 +64,8 @@ class Assignments:
         self._timer = timers.timer(Turn.TASKS, self._look)
         self._may_move: dict[TaskId, None] = {}
         self._failing: dict[int, float] = {}  # by vehicle: since when
+        #: by vehicle: as of a time, and of its last event
+        self._foreseen: dict[int, tuple[tuple[float, int], Estimate]] = {}
         self.apply(settings)
 
     def __repr__(self) -> str:
@@ -93,6 +96,7 @@ class Assignments:
     def forget(self, vehicle: int, tasks: Container[TaskId]) -> None:
         """Forget a vehicle with its ``tasks``: they go to its next gateway with it."""
         self._failing.pop(vehicle, None)
+        self._foreseen.pop(vehicle, None)
         self._may_move = {each: None for each in self._may_move if each not in tasks}
 
     def _look(self, *, now: float) -> None:
@@ -158,9 +162,7 @@ class Assignments:
             present = present_goal(driven(vehicle, goal), Progress())
         except Rejection as refusal:
             inability, present = refusal.text, None
-        empty = UNKNOWN
-        if len(tasks.queue) <= FORESEEN:
-            empty = Forecast(tasks, self._registry, now=now).when_empty()
+        empty = self._when_empty(tasks, now=now)
         capacity = vehicle.parts.settings.queueing.capacity
         return Candidate(
             vehicle.system_id,
@@ -177,6 +179,17 @@ class Assignments:
             speed=tasks.terms.driving.speed,
             waiting=len(tasks.queue),
         )
+
+    def _when_empty(self, tasks: VehicleTasks, *, now: float) -> Estimate:
+        """Return when and where a vehicle's tasks are over; computed once for each batch."""
+        if len(tasks.queue) > FORESEEN:
+            return UNKNOWN
+        as_of = now, self._registry.last_event_of(tasks.vehicle)
+        known = self._foreseen.get(tasks.vehicle)
+        if known is None or known[0] != as_of:
+            empty = Forecast(tasks, self._registry, now=now).when_empty()
+            known = self._foreseen[tasks.vehicle] = as_of, empty
+        return known[1]
 
 
 def check_any(goal: Goal) -> None:
