@@ -160,7 +160,8 @@ def places(server: str) -> list[tuple[float, float]]:
 
 
 def test_any_rover_is_the_free_one_and_then_the_nearest_one(server: str) -> None:
-    first = called(*"submit move 3 --vehicle any".split(), server=server)
+    submit = "submit move 3 --vehicle any"
+    first = called(*submit.split(), server=server)
     assert re.match(r"rover 1: task \d+: free, battery 100% \(rover 2: begins in ", first.lines[0])
     second = ("submit", "move", "0.3", "--vehicle", "any", "--nonce", "4711", "--json")
     (task,) = called(*second, server=server).objects

@@ -273,6 +273,8 @@ def lived_in(reach: Reach) -> list[int]:
         client.move(3.0, nonce=71, **to),
         client.move(1.0, **to),
         client.command(MOVE, 1.5, 0, 0, 0, done, 30, 5, **to),
+        client.move(1.2, nonce=72, target=(250, 191)),  # any rover: there is only this one
+        client.move(1.3, target=(250, 191)),
     ]
     world.run(1.0)
     client.command(SET_INTERVAL, 32, 200_000, target=(ROVER, 1))

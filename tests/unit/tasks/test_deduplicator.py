@@ -20,7 +20,7 @@ from mav_tasks.tasks.goal import GlobalPlace, Goal, GoTo, LocalPlace, Move
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Draft, Marks, Submitter, Task
+from mav_tasks.tasks.task import ANY, Draft, Marks, Submitter, Task
 from tests.unit.tasks.samples import SOMEBODY
 
 EPSILON = 1e-6
@@ -221,3 +221,38 @@ def test_clients_that_come_and_go_do_not_add_up() -> None:
         one = replace(SOMEBODY, endpoint=f"127.0.0.1:{number}")
         rig.submit(rig.draft("a", submitter=one), now=number * 1e-3)
     assert len(rig.memory._clients) <= MANY_CLIENTS
+
+
+class TestAnyVehicle:
+    """A submission to any vehicle, which the task's vehicle does not tell from a repeat."""
+
+    def submitted(self, rig: Rig, *, nonce: int, now: float = 0.0) -> Task:
+        draft = rig.draft(nonce=nonce, vehicle=ANY)
+        assert rig.known(draft, now=now) is None
+        task = rig.registry.submit(replace(draft, vehicle=2, choice="free"), now=now)
+        rig.memory.remember(task, at=now, now=now)
+        return task
+
+    @pytest.mark.parametrize("nonce", [0, 5])
+    def test_a_repeat_is_known_before_a_vehicle_is_chosen(self, nonce: int) -> None:
+        rig = Rig()
+        task = self.submitted(rig, nonce=nonce)
+        known = rig.known(rig.draft(nonce=nonce, vehicle=ANY), now=1.0)
+        assert known is not None
+        assert known.task_id == task.id
+        rig.memory.forget(task)
+        assert rig.known(rig.draft(nonce=nonce, vehicle=ANY), now=1.0) is None
+
+    def test_an_equal_command_to_a_named_vehicle_is_another_one(self) -> None:
+        rig = Rig()
+        self.submitted(rig, nonce=0)
+        assert rig.known(rig.draft(vehicle=2), now=1.0) is None
+
+    def test_it_is_forgotten_with_the_vehicle_that_has_it(self) -> None:
+        rig = Rig()
+        kept, gone = self.submitted(rig, nonce=5), self.submitted(rig, nonce=0)
+        rig.memory.forget_vehicle(2, {gone.id})
+        assert rig.known(rig.draft(vehicle=ANY), now=1.0) is None
+        known = rig.known(rig.draft(nonce=5, vehicle=ANY), now=1.0)
+        assert known is not None
+        assert known.task_id == kept.id

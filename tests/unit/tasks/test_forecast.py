@@ -188,6 +188,23 @@ class TestForecast:
         assert times_of(rig, task) == pytest.approx((nan, ended_at - rig.now), nan_ok=True)
         assert rig.now - ended_at > 60.0
 
+    def test_the_queue_is_empty_when_all_are_done_that_need_not_wait_for_a_time(self) -> None:
+        rig = Rig().executing(Wait(100.0))
+        rig.submit(Move(3.0))
+        rig.submit(Wait(10.0), terms=Terms(after=2))
+        rig.modify(rig.submit(Wait(10.0)).id, start_at=rig.now + 5_000.0)
+        empty = Forecast(rig.tasks, rig.registry, now=rig.now).when_empty()
+        assert empty.seconds == pytest.approx(101.5 + SETTLING + THREE_METRES + 11.5)
+        assert empty.pose is not None
+        assert empty.pose.north == pytest.approx(3.0)
+        rig.tasks.pause(TaskReason.OPERATOR, actor=BY, now=rig.now)
+        assert isnan(Forecast(rig.tasks, rig.registry, now=rig.now).when_empty().seconds)
+
+    def test_an_idle_queue_is_empty_now(self) -> None:
+        rig = Rig()
+        rig.step(idle)
+        assert Forecast(rig.tasks, rig.registry, now=rig.now).when_empty().seconds == 0.0
+
     def test_without_a_forecast_nothing_is_reckoned_for_what_waits(self) -> None:
         rig = Rig().executing(Wait(100.0))
         waiting = rig.submit(Wait(10.0))

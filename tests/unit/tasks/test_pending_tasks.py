@@ -385,3 +385,54 @@ def test_inherited_urgency_is_restored_whatever_the_order_of_ids() -> None:
     again.registry.restore(before, next_id=4)
     again.room.restore(before, now=150.0)
     assert again.order() == rig.order() == [second, third]
+
+
+class TestAssigning:
+    """A waiting task that gets another vehicle."""
+
+    def assign(self, rig: Rig, task_id: TaskId, vehicle: int) -> Task:
+        rig.room.assign(rig.registry[task_id], vehicle, choice="why", now=rig.now)
+        return rig.registry[task_id]
+
+    def test_it_keeps_its_rank_in_the_queue_of_the_other_vehicle(self) -> None:
+        rig = Rig()
+        moved = rig.submit(priority=7)
+        others = [rig.submit(vehicle=2, priority=priority) for priority in (8, 6)]
+        rig.room.take_woken()
+        task = self.assign(rig, moved, 2)
+        assert (task.vehicle, task.choice, task.version) == (2, "why", 2)
+        assert rig.order(2) == [others[0], moved, others[1]]
+        assert (rig.order(1), rig.room.count(1), rig.room.count(2)) == ([], 0, 3)
+        assert rig.room.take_woken() == {1, 2}
+        assert rig.registry.counts(1)[S.QUEUED] == 0
+        assert rig.registry.counts(2)[S.QUEUED] == 3
+        rig.finish(moved, S.COMPLETED)
+        assert rig.room.count(2) == 2
+
+    def test_one_that_is_not_ready_comes_to_the_other_queue_when_it_is(self) -> None:
+        rig = Rig()
+        first = rig.submit(vehicle=3)
+        tasks = [rig.submit(start_at=200.0), rig.submit(after=first)]
+        for task in tasks:
+            self.assign(rig, task, 2)
+        assert rig.order(2) == []
+        rig.finish(first, S.COMPLETED)
+        rig.pass_to(200.0)
+        assert (rig.order(1), rig.order(2)) == ([], [tasks[1], tasks[0]])
+
+    def test_it_is_durable_again_only_when_that_is_stored(self) -> None:
+        rig = Rig()
+        task = rig.submit()
+        rig.registry.durable = rig.registry.recorded
+        self.assign(rig, task, 2)
+        assert not rig.registry.is_durable(task)
+        assert not rig.registry.is_all_durable(1)
+        assert not rig.registry.is_all_durable(2)
+
+    def test_a_task_that_has_begun_is_never_assigned(self) -> None:
+        rig = Rig()
+        task = rig.submit()
+        rig.room.leave(rig.registry[task])
+        rig.registry.change(task, S.STARTING, reason=R.NONE, actor="server", now=rig.now)
+        with pytest.raises(AssertionError):
+            rig.registry.assign(task, 2, choice="why", now=rig.now)
