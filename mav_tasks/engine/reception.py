@@ -122,7 +122,10 @@ class Reception:
 
     def _kind_of(self, message: m.Message | None) -> Kind:
         target = getattr(message, "target_system", 0)
-        vehicle = self.vehicles.look_at(target) if target else next(iter(self.vehicles.all), None)
+        is_of_all = target in (EVERYBODY, self.vehicles.our_address.system_id)
+        vehicle = (
+            next(iter(self.vehicles.all), None) if is_of_all else self.vehicles.look_at(target)
+        )
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def stop_taken(self, vehicle: int, *, now: float) -> None:

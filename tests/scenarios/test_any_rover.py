@@ -189,6 +189,17 @@ def test_the_status_of_a_task_can_be_requested_without_its_rover(make_world: Mak
     assert unknown.times_sent == 1
 
 
+def test_a_stop_to_the_server_stops_every_rover(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    for number in (1, 2):
+        world.client.move(5.0, nonce=number, target=(number, 191))
+    world.run(3.0)
+    sent = world.client.stop(target=ANY)
+    world.until(lambda: world.stands(1) and world.stands(2), within=3)
+    assert sent.result == ACCEPTED
+    assert [world.state(task)[0] for task in (1, 2)] == [S.KILLED, S.KILLED]
+
+
 # choosing again
 
 

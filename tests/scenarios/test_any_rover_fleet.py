@@ -134,6 +134,16 @@ def test_a_repeat_while_the_database_is_away_is_refused_by_both(fleet: Fleet) ->
     assert not fleet.known("b")
 
 
+def test_a_stop_to_the_server_stops_the_whole_fleet(fleet: Fleet) -> None:
+    sent = [fleet.submit(fleet.here, 5.0, nonce=1), fleet.submit(fleet.there, 5.0, nonce=2)]
+    fleet.world.run(3.0)
+    fleet.world.watched.to_clients.clear()  # the observer expects a STOP that was read in force
+    fleet.here.stop(target=ANY)
+    fleet.world.run(0.3)
+    tasks = fleet.tasks()
+    assert [tasks[each.task_id].state for each in sent] == [S.KILLED, S.KILLED]
+
+
 def test_a_task_moves_at_the_gateway_that_has_it_now(fleet: Fleet) -> None:
     """Also after a takeover: the store has kept that any rover may drive it."""
     for metres, nonce in ((8.0, 1), (8.0, 2), (3.0, 3)):

@@ -57,11 +57,7 @@ class Elsewhere:
     def stops_of(self, vehicle: int, *, now: float) -> list[Received]:
         """Return the STOPs for a vehicle that came just now, when nobody may have had it."""
         self._stops = [(at, each) for at, each in self._stops if now - at <= IN_TRANSIT]
-        return [
-            each
-            for _, each in self._stops
-            if getattr(each.message, "target_system", None) in (EVERYBODY, vehicle)
-        ]
+        return [each for _, each in self._stops if self._target_of(each) in (EVERYBODY, vehicle)]
 
     def takes(self, received: Received, *, now: float) -> bool:
         """Pass a packet on if it is for others; return whether it is for another one alone."""
@@ -72,7 +68,7 @@ class Elsewhere:
             self._stops = [*self._stops[-MOST_STOPS:], (now, received)]
         if received.client.key[0] == FLEET_LINK:
             return False
-        target = getattr(message, "target_system", None)
+        target = self._target_of(received)
         if target == EVERYBODY or isinstance(message, m.Heartbeat):
             for gateway in sorted(set(self._holders.values())):
                 self._pass_on(gateway, received)
@@ -83,6 +79,12 @@ class Elsewhere:
         if gateway:
             self._pass_on(gateway, received)
         return bool(gateway)
+
+    def _target_of(self, received: Received) -> int | None:
+        """Return whom a packet is for; a STOP to the server's own system is for all."""
+        target: int | None = getattr(received.message, "target_system", None)
+        is_ours = target == self._vehicles.our_address.system_id
+        return EVERYBODY if is_ours and is_stop(received.message) else target
 
     def bring_back(self, item: Packets) -> Packets:
         """Send our clients what other gateways have for them; return the rest: their clients'."""

@@ -286,10 +286,12 @@ class Commands:
     def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """Stop one vehicle or all, whatever the target component; execute and answer every copy.
 
-        DEVIATION: for target_system 0 there is one ack, not one from each system: the worst
-        result, from the task server of the lowest system id.
+        DEVIATION: for target_system 0, or the server's own, there is one ack, not one from each
+        system: the worst result, from the task server of the lowest system id.
         """
         target = command.target
+        if target.system_id == self._vehicles.our_address.system_id:  # the server's: all
+            target = Address(EVERYBODY, target.component_id)
         targets = self._vehicles.addressed_by(target.system_id)
         actor = str(client.submitter(packet.source))
         is_to_clear = command.params[0] == 1.0
