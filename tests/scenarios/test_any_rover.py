@@ -4,8 +4,9 @@ from typing import Any
 
 import pytest
 
+from mav_tasks.engine.commands import assignments
 from mav_tasks.engine.commands.assignments import GRACE
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.settings import Driving, Queueing, Settings
 from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -317,6 +318,26 @@ def test_without_another_rover_the_task_stays(make_world: MakeWorld) -> None:
     world.client.proceed(target=(1, 191))
     world.run(10.0)
     assert rover_of(world, task) == 1
+
+
+@pytest.mark.patches_core
+def test_a_task_that_nobody_else_can_drive_holds_no_other_up(
+    make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(assignments, "MOST_AT_ONCE", 1)
+    settings = Settings(driving=Driving(max_distance=98.5))
+    world = make_world(rovers=2, settings=settings)
+    for number, metres in ((1, 10.0), (2, 3.0)):
+        world.client.move(metres, nonce=number, target=(number, 191))
+    world.run(2.0)
+    far = go_to(world, 0.0, 100.0).opaque_id  # too far for rover 1
+    assert rover_of(world, far) == 2
+    world.client.stop(target=(1, 191))
+    near = submit(world, 0.5, nonce=9).task_id
+    world.client.proceed(target=(1, 191))
+    world.rovers[1].autopilot.set_faults(Faults(silent=True))
+    world.until(lambda: rover_of(world, near) == 1, within=15)
+    assert rover_of(world, far) == 2
 
 
 def test_a_task_of_a_named_rover_never_moves(make_world: MakeWorld) -> None:

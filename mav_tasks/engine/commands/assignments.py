@@ -113,6 +113,7 @@ class Assignments:
         over = {each for each, since in self._failing.items() if now - since >= GRACE}
         movable = [task for task in tasks if task.vehicle in over and self._is_movable(task)]
         for task in movable[:MOST_AT_ONCE]:
+            self._may_move[task.id] = self._may_move.pop(task.id)  # next time others come first
             self._assign_again(task, whys[task.vehicle], now=now)
 
     def _is_movable(self, task: Task) -> bool:
