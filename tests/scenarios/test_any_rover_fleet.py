@@ -38,9 +38,11 @@ class Fleet:
         self.world.run(0.3)
         return sent
 
-    def upload(self, client: FakeClient, *, nonce: int = 7, east: float = 1.0) -> Upload:
+    def upload(
+        self, client: FakeClient, *, nonce: int = 7, east: float = 1.0, after: int = 0
+    ) -> Upload:
         x, y = DEFAULT_ORIGIN.to_global(0.0, east)
-        options = Item(OPTIONS, nonce, 0, 5.0, 0.0, 0.0, 0.0, frame=2)
+        options = Item(OPTIONS, nonce, 0, 5.0, 0.0, 0.0, after, frame=2)
         items = [Item(WAYPOINT, x, y, param1=0.01, param4=0.0), options]
         upload = Upload(client, items, target=ANY)
         self.world.until(lambda: upload.result is not None, within=5)
@@ -174,3 +176,30 @@ def test_a_task_moves_at_the_gateway_that_has_it_now(fleet: Fleet) -> None:
     )
     assert (moved.task_id, moved.before, moved.vehicle) == (task.id, 2, 1)
     assert fleet.tasks()[task.id].vehicle == 1
+
+
+@pytest.mark.parametrize("what", ["task", "plan"])
+def test_one_for_any_rover_runs_after_a_task_of_another_gateways_rover(
+    fleet: Fleet, what: str
+) -> None:
+    def send(after: int) -> tuple[int | None, int]:
+        if what == "plan":
+            plan = fleet.upload(fleet.there, after=after)
+            return plan.result, plan.opaque_id
+        sent = fleet.there.command(MOVE, 0.5, 0, 0, 0, after, 0, 5, target=ANY)
+        fleet.world.run(0.5)
+        return sent.result, sent.task_id if sent.result == ACCEPTED else 0
+
+    first = fleet.submit(fleet.here, 2.0, nonce=1)
+    result, second = send(first.task_id)
+    assert result == ACCEPTED
+    assert fleet.tasks()[second].state is S.BLOCKED
+    fleet.world.until(lambda: fleet.tasks()[second].state is S.COMPLETED, within=40)
+    ended, begun = fleet.tasks()[first.task_id], fleet.tasks()[second]
+    assert ended.state is S.COMPLETED
+    assert ended.changed_at is not None
+    assert begun.changed_at is not None
+    assert begun.changed_at > ended.changed_at + 1.0
+    result, _ = send(777)
+    assert result != ACCEPTED
+    assert "run after 777: no such task" in " ".join(fleet.there.texts())

@@ -7,6 +7,7 @@ the texts and the status of the task come from that rover's task server.
 """
 
 from dataclasses import replace
+from functools import partial
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.message_requests import MessageRequests
@@ -153,6 +154,10 @@ class AnyRover:
         if known is not None:
             self._answer_repeat(client, packet, pending, known, now=now)
             return
+        again = partial(self._submit_late, client, packet, pending)
+        refuse = partial(self._refuse, client, packet, pending)
+        if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
+            return
         self._submissions.check_open()
         choice = self._assignments.choose(wish.goal, now=now)
         vehicle = self._vehicles.get(choice.vehicle)
@@ -164,6 +169,15 @@ class AnyRover:
         draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)
         task = self._submissions.take_in(asked.rights, vehicle, draft, now=now)
         self._submissions.await_commit(asked, task, now=now)
+
+    def _submit_late(
+        self, client: GcsClient, packet: Packet, pending: Pending, *, now: float
+    ) -> None:
+        """Submit what was held back, to the rover that is the best one now."""
+        try:
+            self._submit(client, packet, pending, now=now)
+        except Rejection as refusal:
+            self._refuse(client, packet, pending, refusal, now=now)
 
     def _answer_repeat(
         self, client: GcsClient, packet: Packet, pending: Pending, known: Known, *, now: float

@@ -6,6 +6,7 @@ plan is whole, of each rover. One upload is under way at a time, as at every add
 """
 
 from dataclasses import replace
+from functools import partial
 from hashlib import blake2b
 from math import inf
 from typing import NamedTuple
@@ -186,6 +187,9 @@ class AnyUploads:
         if known is not None:
             self._finish(known, now=now)
             return
+        again = partial(self._take_in_late, upload)
+        if self._submissions.questions.hold(draft.terms.after, again, self._refuse, now=now):
+            return
         choice = self._assignments.choose(wanted.plan, now=now)
         vehicle = self._vehicles.get(choice.vehicle)
         assert vehicle is not None, "it was chosen among them"
@@ -196,6 +200,13 @@ class AnyUploads:
         draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)
         task = self._submissions.submit_plan(client.rights, vehicle, draft, now=now)
         self._submissions.gate.hold(_Plan(sender, vehicle, task), now=now)
+
+    def _take_in_late(self, upload: Upload, *, now: float) -> None:
+        """Submit what was held back, to the rover that is the best one now."""
+        try:
+            self._take_in(upload, now=now)
+        except Rejection as why:
+            self._refuse(why, now=now)
 
     def _accept(self, plan: _Plan, *, now: float) -> None:
         _, vehicle, task = plan
