@@ -184,7 +184,7 @@ def test_one_for_any_rover_runs_after_a_task_of_another_gateways_rover(
 ) -> None:
     def send(after: int) -> tuple[int | None, int]:
         if what == "plan":
-            plan = fleet.upload(fleet.there, nonce=after, after=after)
+            plan = fleet.upload(fleet.there, nonce=100 + after, after=after)
             return plan.result, plan.opaque_id
         sent = fleet.there.command(MOVE, 0.5, 0, 0, 0, after, 0, 5, target=ANY)
         fleet.world.run(0.5)
