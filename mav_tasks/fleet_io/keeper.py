@@ -84,7 +84,10 @@ class Keeper:
             self._peers = Peers(self._selector, host, port)
         except (OSError, ValueError, OverflowError) as error:
             self._selector.close()
-            raise StoreError(f"gateway {name}: UDP port {port} of {host}: {error}") from error
+            raise StoreError(
+                f"gateway {name}: UDP port {port} of {host}: {error}:"
+                " fleet.address must be an IP address of this machine"
+            ) from error
         try:
             database = LeaseDatabase(address, name, host=host, port=self._peers.port)
         except BaseException:

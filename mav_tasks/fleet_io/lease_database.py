@@ -23,6 +23,7 @@ from mav_tasks.fleet_io.endpoint import Endpoint
 from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, failure
+from mav_tasks.store.postgres.rights import check_rights
 from mav_tasks.store.postgres.session import Found, Limits, Session
 from mav_tasks.store.postgres.session_lock import LOCK_NOT_AVAILABLE, SessionLock
 from mav_tasks.store.postgres.writable import check_writable
@@ -104,6 +105,7 @@ class LeaseDatabase:
         session = Session(self._address, purpose=f"gateway {self.name}")
         try:
             check_writable(session)
+            check_rights(session)
             schema.migrate(session)
             ((secret,),) = session.execute("SELECT secret FROM gateway_secret").fetchall()
             return str(secret).encode()

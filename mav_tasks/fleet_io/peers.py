@@ -74,7 +74,11 @@ class Peers:
         self._secret = b""
         self._peers: dict[str, _Peer] = {}
         self._socket = _udp_socket(host)
-        self._socket.bind((host, port))
+        try:
+            self._socket.bind((host, port))
+        except BaseException:
+            self._socket.close()
+            raise
         self.port: int = self._socket.getsockname()[1]
         selector.register(self._socket, selectors.EVENT_READ)
 

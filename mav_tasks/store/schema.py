@@ -73,7 +73,10 @@ def check(connection: sqlite3.Connection) -> None:
     ):
         raise StoreError("it is a database of another program")
     if version > known:
-        raise StoreError(f"written by a newer version (schema {version}, this one knows {known})")
+        raise StoreError(
+            f"written by a newer version (schema {version}, this one knows {known}):"
+            " install that version, or restore an older copy"
+        )
 
 
 def is_empty(connection: sqlite3.Connection) -> bool:

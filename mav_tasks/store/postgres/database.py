@@ -20,6 +20,7 @@ from mav_tasks.store.postgres.dependencies import IS_EXPECTED, write_dependencie
 from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
 from mav_tasks.store.postgres.ownership import Ownership
 from mav_tasks.store.postgres.reader import PostgresReader
+from mav_tasks.store.postgres.rights import check_rights
 from mav_tasks.store.postgres.session import Limits, Session
 from mav_tasks.store.postgres.writable import check_writable
 from mav_tasks.store.retention import Trimmer
@@ -87,6 +88,7 @@ class PostgresDatabase:
             self._session = Session(address, purpose=purpose, limits=limits)
             try:
                 check_writable(self._session)
+                check_rights(self._session)
                 self._ownership.lock(self._session)
                 schema.migrate(self._session)
                 #: names the fleet, over copies and moves of its database

@@ -35,6 +35,7 @@ _ADVICE = (
     (r"Connection refused|No such file or directory", "is the server running there?"),
     (r"resolve host|translate host name", "check the host's name in the URL"),
     (r"timeout expired", "check host and port in the URL, and the network"),
+    (r"invalid response to SSL negotiation", "is PostgreSQL's port in the URL?"),
     (r"session is read-only|server is in hot standby", "name the primary server in the URL"),
 )
 #: classes and codes that only a mistake of ours can cause: invalid data, features, statements
@@ -66,6 +67,11 @@ def failure(error: Exception) -> str | None:
     words = _WORDS.get(code) or _WORDS.get(code[:2])
     if code == "42501" and "for database" in str(error):
         words = "the role may not create the schema mav_tasks: GRANT CREATE ON DATABASE … TO it"
+    elif code == "42501" and "must be owner" in str(error):
+        words = (
+            "this older store must be converted by the role that owns its tables: start a server"
+            " of this version once as that role"
+        )
     if code == "54000" and "NOTIFY" in str(error):
         words = (
             "the server's queue of notifications is full: end the session that listens and does"

@@ -145,7 +145,8 @@ def version_of(session: Session) -> int:
     known = len(MIGRATIONS)
     if version > known:
         raise PostgresError(
-            f"written by a newer version (schema {version}, this one knows {known})"
+            f"written by a newer version (schema {version}, this one knows {known}):"
+            " install that version here, too"
         )
     return int(version)
 

@@ -131,5 +131,7 @@ def test_a_name_that_is_in_use_or_is_none_is_refused(postgres: PostgresServer) -
             Keeper(parse(url), "a", host="127.0.0.1")
     with pytest.raises(StoreError, match="a name has up to 40 letters"):
         Keeper(parse(url), "a b", host="127.0.0.1")
-    with pytest.raises(StoreError, match="gateway a: UDP port 0 of nowhere"):
-        Keeper(parse(url), "a", host="nowhere")
+    for host in ("nowhere", "192.0.2.1"):
+        words = f"gateway a: UDP port 0 of {host}: .*: fleet.address must be an IP address of this"
+        with pytest.raises(StoreError, match=words):
+            Keeper(parse(url), "a", host=host)

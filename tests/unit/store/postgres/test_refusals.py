@@ -1,14 +1,18 @@
 """Databases that a server cannot use: each is told in one line, which says what to do."""
 
+import socket
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from mav_tasks.errors import StoreError
+from mav_tasks.fleet_io.lease_database import LeaseDatabase
 from mav_tasks.store.base import Which
 from mav_tasks.store.opening import kind_of
+from mav_tasks.store.postgres.address import parse
 from tests.kit.postgres import PostgresServer
 from tests.kit.processes import free_tcp_ports
 from tests.unit.store.samples import opened, submitted, wait_for
@@ -19,7 +23,7 @@ def refusal(url: str) -> str:
         opened(url).__enter__()
     text = str(told.value)
     assert "\n" not in text
-    assert "secret" not in text
+    assert "secret" not in text.replace("gateway_secret", "")  # a table
     return text
 
 
@@ -112,7 +116,116 @@ def test_another_roles_schema(postgres: PostgresServer) -> None:
         store.append([submitted(1)])
     with role(postgres, "plain") as name:
         text = refusal(url.replace("postgres@", f"{name}@"))
-        assert "use the role that owns the schema mav_tasks" in text
+        assert text.endswith(
+            "the role plain lacks USAGE on the schema: GRANT USAGE ON SCHEMA mav_tasks TO plain,"
+            " or use the role that owns the schema mav_tasks"
+        )
+
+
+def of_gateway(url: str) -> str:
+    """Return the refusal of a gateway's lease."""
+    with pytest.raises(StoreError) as told:
+        LeaseDatabase(parse(url), "a", host="127.0.0.1", port=1)
+    return str(told.value)
+
+
+def test_each_right_that_a_role_lacks_is_named(postgres: PostgresServer) -> None:
+    url = postgres.new_database()
+    with role(postgres, "plain") as name:
+        theirs = url.replace("postgres@", f"{name}@")
+
+        def sql(statement: str) -> None:
+            postgres.execute(f"{statement} {name}", database=name_of(url))
+
+        postgres.execute("CREATE SCHEMA mav_tasks", database=name_of(url))
+        sql("GRANT USAGE ON SCHEMA mav_tasks TO")
+        assert "lacks CREATE on the schema: GRANT CREATE ON SCHEMA" in refusal(theirs)
+        with opened(url):
+            pass
+        grant = "GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA mav_tasks TO"
+        assert "SELECT on formats, gateway_secret, gateway_writes and 11 more;" in refusal(theirs)
+        sql(grant)
+        sql("REVOKE UPDATE, INSERT ON mav_tasks.journal FROM")
+        sql("REVOKE UPDATE ON mav_tasks.holdings FROM")
+        sql("REVOKE INSERT ON mav_tasks.versions FROM")  # is not needed
+        for text in (refusal(theirs), of_gateway(theirs)):
+            told = (
+                f"INSERT on journal; UPDATE on holdings, journal; USAGE on gateway_epochs: {grant}"
+            )
+            assert f": the role plain lacks {told} plain, or use the role that owns" in text
+        sql(grant)
+        lacks = "lacks USAGE on gateway_epochs: GRANT USAGE ON ALL SEQUENCES IN SCHEMA mav_tasks TO"
+        assert lacks in of_gateway(theirs)
+        sql("GRANT USAGE ON ALL SEQUENCES IN SCHEMA mav_tasks TO")
+        LeaseDatabase(parse(theirs), "a", host="127.0.0.1", port=1).close()
+        with opened(theirs) as store:
+            store.append([submitted(1)])
+            wait_for(store, 1)
+
+
+def test_tables_that_only_their_owner_can_convert(postgres: PostgresServer) -> None:
+    url = postgres.new_database()
+    with opened(url):
+        pass
+    with role(postgres, "plain") as name:
+        for each in (
+            "GRANT ALL ON SCHEMA mav_tasks TO plain",
+            "GRANT ALL ON ALL TABLES IN SCHEMA mav_tasks TO plain",
+            "GRANT ALL ON ALL SEQUENCES IN SCHEMA mav_tasks TO plain",
+            "DELETE FROM mav_tasks.versions WHERE version >= 4",
+            "ALTER TABLE mav_tasks.gateways DROP COLUMN hears",
+        ):
+            postgres.execute(each, database=name_of(url))
+        text = of_gateway(url.replace("postgres@", f"{name}@"))
+    assert "must be converted by the role that owns its tables: start a server of this" in text
+
+
+def test_a_database_of_a_newer_version(postgres: PostgresServer) -> None:
+    url = postgres.new_database()
+    with opened(url):
+        pass
+    add = "INSERT INTO mav_tasks.versions (version) VALUES (99)"
+    postgres.execute(add, database=name_of(url))
+    for text in (refusal(url), of_gateway(url)):
+        assert "written by a newer version (schema 99, this one knows" in text
+        assert text.endswith(": install that version here, too")
+
+
+@pytest.mark.parametrize(
+    ("where", "advice"),
+    [
+        ("DATABASE {0}", "ALTER DATABASE … RESET default_transaction_read_only"),
+        ("ROLE plain", "ALTER ROLE … RESET default_transaction_read_only"),
+        ("ROLE plain IN DATABASE {0}", "ALTER ROLE … IN DATABASE … RESET default_transaction"),
+    ],
+)
+def test_a_read_only_database_is_told_with_what_makes_it_so(
+    postgres: PostgresServer, where: str, advice: str
+) -> None:
+    url = postgres.new_database()
+    with role(postgres, "plain") as name:
+        postgres.execute(f"GRANT CREATE ON DATABASE {name_of(url)} TO {name}")
+        set_it = f"ALTER {where.format(name_of(url))} SET default_transaction_read_only = on"
+        postgres.execute(set_it)
+        try:
+            assert f"it is read-only: {advice}" in of_gateway(url.replace("postgres@", f"{name}@"))
+        finally:  # or the role could not be removed
+            postgres.execute(set_it.partition(" SET ")[0] + " RESET ALL")
+
+
+def test_what_is_no_postgresql_server() -> None:
+    """Some web server, for example, at that port."""
+    with socket.create_server(("127.0.0.1", 0)) as server, ThreadPoolExecutor() as thread:
+
+        def answer() -> None:
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(100)
+                connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+        thread.submit(answer)
+        text = refusal(f"postgresql://127.0.0.1:{server.getsockname()[1]}/fleet")
+    assert text.endswith("is PostgreSQL's port in the URL?")
 
 
 def test_a_role_that_may_only_read_reads_the_journal_and_serves_nothing(
@@ -128,9 +241,11 @@ def test_a_role_that_may_only_read_reads_the_journal_and_serves_nothing(
         journal = kind_of(theirs).open_journal(theirs, Which())
         assert [number for number, _ in journal.take(offset=0.0)] == [1]
         journal.close()
-        assert "permission denied" in refusal(theirs)
+        assert "lacks DELETE on formats, gateway_writes, gateways and 9 more; INSERT" in refusal(
+            theirs
+        )
         postgres.execute(f"ALTER ROLE {name} SET default_transaction_read_only = on")
-        assert "read-only for this role" in refusal(theirs)
+        assert "it is read-only: ALTER ROLE … RESET default" in refusal(theirs)
 
 
 def test_a_replica_is_refused_and_read(postgres: PostgresServer) -> None:
