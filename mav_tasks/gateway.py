@@ -144,21 +144,22 @@ class Gateway:
             self.is_over = True
 
     def _await_lease(self) -> None:
+        """Wait for the lease, and say what it takes so long; raise StoreError."""
         end = time.monotonic() + JOIN_LIMIT
+        why = "another process has the name"
         while not self._keeper.epoch:
             fd = self._keeper.fileno()
             left = end - time.monotonic()
             if fd is None or left <= 0:
-                raise StoreError(
-                    f"gateway {self.name}: no lease within {JOIN_LIMIT:.0f} s; the database does"
-                    " not answer, or another process has the name"
-                )
+                raise StoreError(f"gateway {self.name}: no lease within {JOIN_LIMIT:.0f} s: {why}")
             select.select([fd], [], [], left)
-            early = self._keeper.take()
-            self._early += early
-            for news in early:
+            for news in self._keeper.take():
                 if isinstance(news, Trouble) and news.words is not None:
-                    raise StoreError(f"gateway {self.name}: the fleet's database: {news.words}")
+                    why = f"the fleet's database: {news.words}"
+                    waits = "gateway %s waits for its lease, %.0f s at most: %s"
+                    log.warning(waits, self.name, max(0.0, end - time.monotonic()), why)
+                else:
+                    self._early.append(news)
 
 
 def _changed(permit: Permit) -> LeaseChanged:

@@ -100,8 +100,10 @@ class Keeper:
         self._asker = Asker(database, self._results)
         self._asked: tuple[Request, float] | None = None  # and when
         self._is_busy = False  # the asker
-        self._is_connected = True
-        self._is_troubled = False
+        self._is_connected = not database.late
+        self._is_troubled = bool(database.late)
+        if database.late:
+            self._news.put(Trouble(database.late))
         self._connect_at = self._ping_at = 0.0
         self._is_ending = False
         self._thread = Thread(target=self._run, name="lease keeper", daemon=True)

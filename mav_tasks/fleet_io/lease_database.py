@@ -22,7 +22,7 @@ from mav_tasks.fleet.rivals import Rival
 from mav_tasks.fleet_io.endpoint import Endpoint
 from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
-from mav_tasks.store.postgres.failures import PostgresError, failure
+from mav_tasks.store.postgres.failures import PostgresError, failure, is_temporary
 from mav_tasks.store.postgres.rights import check_rights
 from mav_tasks.store.postgres.session import Found, Limits, Session
 from mav_tasks.store.postgres.session_lock import LOCK_NOT_AVAILABLE, SessionLock
@@ -52,7 +52,8 @@ class LeaseDatabase:
         """Make the tables if they are missing, and take the name.
 
         ``host`` and ``port`` are where this process answers pings. Raise StoreError, with a line
-        that names the process which has the name.
+        that names the process which has the name. If the database is only too slow for a lease,
+        there is no session yet, and ``late`` says why.
         """
         self._address = address
         self.name = name
@@ -60,9 +61,15 @@ class LeaseDatabase:
         self._session: Session | None = None
         self._lock: SessionLock | None = None
         self._number = 0
+        self.late = ""
         try:
             self.secret = self._prepare()
-            self.connect()
+            try:
+                self.connect()
+            except PostgresError as error:
+                if not is_temporary(error):
+                    raise
+                self.late = failure(error) or str(error)
         except PostgresError as error:
             words = failure(error) or str(error)
             raise StoreError(f"store {address.shown}: {words}") from error

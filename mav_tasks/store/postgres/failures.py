@@ -41,6 +41,8 @@ _ADVICE = (
 #: classes and codes that only a mistake of ours can cause: invalid data, features, statements
 _BUGS = ("22", "0A", "42601", "42804", "42P18", "42883", "08P01")
 LOST = "08006"
+#: of a server that is slow, busy or starts: the next attempt may succeed
+_TEMPORARY = (LOST, "53", "55P03", "57014", "57P01", "57P02", "57P03", "25P04")
 
 
 class PostgresError(Exception):
@@ -78,6 +80,11 @@ def failure(error: Exception) -> str | None:
             " not end its transaction (pg_stat_activity)"
         )
     return f"{words} ({error})" if words else str(error)
+
+
+def is_temporary(error: PostgresError) -> bool:
+    """Return whether the next attempt may succeed, without anybody having mended anything."""
+    return error.sqlstate.startswith(_TEMPORARY)
 
 
 def connecting(text: str) -> str:
