@@ -7,6 +7,7 @@ import logging
 import select
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import closing
 from math import inf
 
 from mav_tasks.clock import boot_time
@@ -23,7 +24,10 @@ from mav_tasks.fleet_link import FleetLink
 from mav_tasks.settings import Gateway as GatewaySettings
 from mav_tasks.settings import Retention
 from mav_tasks.store.postgres.address import Address, parse
+from mav_tasks.store.postgres.failures import PostgresError, failure
 from mav_tasks.store.postgres.fleet_store import FleetStore
+from mav_tasks.store.postgres.session import Session
+from mav_tasks.store.postgres.writable import check_writable
 
 log = logging.getLogger("mav_tasks")
 
@@ -160,6 +164,16 @@ class Gateway:
                     log.warning(waits, self.name, max(0.0, end - time.monotonic()), why)
                 else:
                     self._early.append(news)
+
+
+def check_database(place: str, name: str) -> None:
+    """Raise StoreError if a gateway cannot use the fleet's database now."""
+    where = parse(place)
+    try:
+        with closing(Session(where, purpose=f"gateway {name} begins")) as session:
+            check_writable(session)
+    except PostgresError as error:
+        raise StoreError(f"store {where.shown}: {failure(error) or error}") from error
 
 
 def _changed(permit: Permit) -> LeaseChanged:

@@ -53,11 +53,30 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
 
     With ``reload``, SIGHUP reads the configuration again.
     """
-    while (code := _serve(settings, reload)) == EVICTED:
-        log.warning("gateway %s begins again, without rovers", settings.gateway.name)
-        while not _is_reachable(settings):
-            time.sleep(AGAIN)
+    code = _serve(settings, reload)
+    while code == EVICTED:
+        with log_to_stderr(settings.log):
+            log.warning("gateway %s begins again, without rovers", settings.gateway.name)
+        code = _serve_again(settings, reload)
     return code
+
+
+def _serve_again(settings: ServerSettings, reload: Reload | None) -> int:
+    """Serve once the fleet's database can be used: no fault of it ends a gateway that served."""
+    from mav_tasks.gateway import check_database  # noqa: PLC0415  # needs an extra
+
+    _take_signals()
+    told = ""
+    while True:
+        try:
+            check_database(settings.store, settings.gateway.name)
+            return _serve(settings, reload)
+        except StoreError as error:
+            if str(error) != told:
+                told = str(error)
+                with log_to_stderr(settings.log):
+                    log.error("%s; trying again until it works", told)
+        time.sleep(AGAIN)
 
 
 def _serve(settings: ServerSettings, reload: Reload | None) -> int:
@@ -67,8 +86,7 @@ def _serve(settings: ServerSettings, reload: Reload | None) -> int:
         raise fault
     asked, pushing = links_of(links), pushing_url(links)
     pushed = tuple(parse_endpoint(text, what=f"--push {text}") for text in links.push)
-    for number in (signal.SIGINT, signal.SIGTERM):  # until the loop takes them over
-        signal.signal(number, _leave_before_serving)
+    _take_signals()
     if reload is not None:
         signal.signal(signal.SIGHUP, reload.note)
     say = partial(_say, as_json=settings.log.format == "json")
@@ -149,14 +167,10 @@ def _join(settings: ServerSettings) -> "Gateway | None":
     return Gateway(settings.store, settings.gateway, settings.engine.retention)
 
 
-def _is_reachable(settings: ServerSettings) -> bool:
-    """Return whether the fleet's database answers; log why not."""
-    try:
-        kind_of(settings.store).read_parameters(settings.store)
-    except StoreError as error:
-        log.error("%s", error)  # one line, no traceback
-        return False
-    return True
+def _take_signals() -> None:
+    """Let SIGINT and SIGTERM end this process at once, until the loop takes them over."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _leave_before_serving)
 
 
 def _leave_before_serving(_number: int, _frame: object) -> None:
