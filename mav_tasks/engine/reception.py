@@ -129,10 +129,11 @@ class Reception:
         return Kind.WISH if vehicle is None else kind_of_message(message, vehicle.persona)
 
     def stop_taken(self, vehicle: int, *, now: float) -> None:
-        """Obey the STOPs that came just before this gateway got a vehicle."""
+        """Obey the STOPs that came before this gateway got a vehicle, and that nobody obeyed."""
         for received in self.elsewhere.stops_of(vehicle, now=now):
             self.gcs.hear_out(received, now=now)
             self._see_to(received, now=now)
+        self.elsewhere.obeyed(vehicle)
 
     def forget(self, vehicle: int) -> None:
         """Forget a vehicle, which another gateway may have from here on."""

@@ -16,7 +16,8 @@ datagram's age is overestimated by the fastest trip in the other direction, and 
 underestimated: it includes what the sender, the database or the receiver stood still.
 
 Packets that are first are kept until the other one says that it has taken them (``taken``). If a
-session ends before that, they are sent again: they may arrive twice.
+session ends before that, they are sent again: they may arrive twice. Those that waited for a
+connection leave when there is one, however long that took.
 """
 
 from collections import deque
@@ -86,6 +87,9 @@ class Source(Protocol):
 
     def meet(self, names: frozenset[str], *, now: float) -> None:
         """Take which gateways can be reached now."""
+
+    def renew(self, *, now: float) -> None:
+        """A connection begins: what is first waited only because there was none."""
 
     def put_back(self, to: str, items: Iterable[Waiting]) -> None:
         """Put datagrams that are first back."""
@@ -163,6 +167,7 @@ class Exchange:
         self._peers.clear()
         self._greeting.clear()
         self._taken.clear()
+        self._outbox.renew(now=now)
         self._outbox.meet(self.peers, now=now)
 
     def receive(self, text: str, *, now: float) -> list[Arrived]:

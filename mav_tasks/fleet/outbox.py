@@ -2,12 +2,13 @@
 
 A MAVLink packet that comes late does more harm than one that is lost. So each datagram has a time
 until which it may leave, and if too many wait for one gateway, the oldest are dropped. Those that
-stop a vehicle (``first``) overtake all others, and are dropped last.
+stop a vehicle (``first``) overtake all others, and are dropped last; as long as
+nothing can leave, they do not become too old.
 """
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 from typing import TypeVar
 
@@ -15,6 +16,9 @@ T = TypeVar("T")
 
 LIMIT = 1_000  # ordinary datagrams for one gateway, and as many that are first
 KEPT = 1.0  # s for which a datagram that is first is never dropped
+#: s from the beginning of a connection, in which those that are first leave at any age: until then
+#: the others are connected again, too
+AFTER_LOSS = 3.0
 ALL = ""  # instead of a name: all other gateways
 
 
@@ -78,6 +82,13 @@ class Outbox:
                     self._put(name, item)
         self._names = names
 
+    def renew(self, *, now: float) -> None:
+        """A connection begins: what is first waited only because there was none."""
+        until = now + AFTER_LOSS
+        for queue in self._queues.values():
+            queue.first = deque(_until(each, until) for each in queue.first)
+        self._for_all = deque((_until(each, until), got_by) for each, got_by in self._for_all)
+
     def put_back(self, to: str, items: Iterable[Waiting]) -> None:
         """Put datagrams that are first back: it is not known whether they have arrived."""
         queue = self._queues.setdefault(to, _Queue())
@@ -134,6 +145,10 @@ class Outbox:
                     self.expired += 1
             if not queue.first and not queue.ordinary:
                 del self._queues[name]
+
+
+def _until(item: Waiting, until: float) -> Waiting:
+    return replace(item, until=max(item.until, until))
 
 
 def _make_room(items: deque[T], at: Callable[[T], float], now: float) -> int:

@@ -45,7 +45,8 @@ _NOTIFY = (
 class Carrier:
     """A gateway's mail. Nothing here waits for the database; ``take`` has what has come.
 
-    While the database cannot be used, datagrams wait until they are too old.
+    While the database cannot be used, datagrams wait until they are too old; those that are first
+    until it can be used.
     """
 
     def __init__(self, address: Address, name: str) -> None:
@@ -94,7 +95,8 @@ class Carrier:
 
         It leaves in the order of ``send``, but before all others if it is ``first``, and until
         ``until`` (boot_time) or not at all: by default 0.5 s, and 1 s if it is first. Those that
-        are first are sent again after a lost connection, and may arrive twice. Once they have left
+        are first are sent again after a lost connection, and may arrive twice; without a connection
+        they wait until there is one, whatever ``until`` says. Once they have left
         they are delivered, however late; ``waited`` tells. Others must also arrive until ``until``.
         """
         if len(payload) > LONGEST:

@@ -55,6 +55,11 @@ class SharedOutbox:
             self._has_rung = False
             self._outbox.meet(names, now=now)
 
+    def renew(self, *, now: float) -> None:
+        """A connection begins: what is first waited only because there was none."""
+        with self._lock:
+            self._outbox.renew(now=now)
+
     def put_back(self, to: str, items: Iterable[Waiting]) -> None:
         """Put datagrams that are first back."""
         with self._lock:

@@ -214,6 +214,76 @@ def test_no_task_starts_on_a_taken_rover_before_the_gateway_has_listened(
         assert 1.0 <= armed_at[0] - took < 4.0
 
 
+def texts(client: FakeClient) -> str:
+    return "".join(client.texts())
+
+
+def reach(fleet: Fleet, *gateways: Gateway, is_reached: bool) -> None:
+    """Let gateways reach the database, or not."""
+    for it in gateways:
+        it.is_reached = it.store.is_reached = is_reached
+
+
+@pytest.mark.parametrize("after", [0.3, 2.0])
+def test_a_stop_at_another_gateway_while_the_database_hangs_is_in_force_before_a_task_goes_on(
+    fleet: Fleet, after: float
+) -> None:
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    fleet.world.watched.to_clients.clear()  # the observer expects a STOP that was read in force
+    both = fleet.first, fleet.other
+    reach(fleet, *both, is_reached=False)
+    fleet.world.run(after)
+    far = fleet.clients[fleet.other.name]
+    sent = far.stop()
+    fleet.world.run(0.1)
+    assert ("STOP waits for the fleet's database" in texts(far)) is (after > 1.0)
+    fleet.world.run(10.0)
+    assert sent.ack is None
+    assert fleet.world.stands()
+    where = fleet.world.truth.north
+    reach(fleet, *both, is_reached=True)
+    fleet.world.run(10.0)
+    assert sent.result == ACCEPTED
+    assert fleet.task(task).state is S.KILLED
+    assert fleet.world.shared.part(frozenset({1})).paused == {1: R.STOPPED}
+    assert abs(fleet.world.truth.north - where) < 0.05
+
+
+@pytest.mark.parametrize("is_answered", [False, True])
+def test_a_stop_that_no_gateway_could_obey_is_in_force_when_its_gateway_is_back(
+    tmp_path: Path, *, is_answered: bool
+) -> None:
+    """Nobody else hears the rover: the same gateway gets it again, in another life."""
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
+    fleet.world.watched.to_clients.clear()
+    fleet.world.cut(fleet.other.name)
+    fleet.world.run(6.0)
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    far = fleet.clients[fleet.other.name]
+    if is_answered:  # and resumed since: it is not owed any more
+        sent = far.stop()
+        fleet.world.run(1.0)
+        assert sent.result == ACCEPTED
+        fleet.client.proceed()
+        fleet.world.run(5.0)
+        task = fleet.submit(5.0)
+        fleet.drives(task)
+    reach(fleet, fleet.first, is_reached=False)
+    fleet.world.run(2.0)
+    if not is_answered:
+        far.stop()
+    fleet.world.run(8.0)
+    assert fleet.world.database.holder(1) is None
+    reach(fleet, fleet.first, is_reached=True)
+    assert fleet.world.holder() is fleet.first
+    fleet.world.run(10.0)
+    assert (fleet.task(task).state is S.KILLED) is not is_answered
+    stopped = {} if is_answered else {1: R.STOPPED}
+    assert fleet.world.shared.part(frozenset({1})).paused == stopped
+
+
 def test_what_was_pre_empted_goes_on_after_a_takeover(tmp_path: Path) -> None:
     queueing = Queueing(preemption_gap=3, preemption_rest=0.3)
     fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume", queueing=queueing))

@@ -4,28 +4,58 @@ A client may be connected to any gateway. Its packets for a vehicle that another
 there as they came, with their signatures, on the link FLEET_LINK; there the client is one more
 client, and what that gateway sends it comes back the same way. So every gateway lists the whole
 fleet, and a task gets its id from the gateway that drives it.
+
+A STOP may come while nobody has the vehicle, or while its gateway is out of reach. It is passed on
+to each gateway that gets the vehicle soon after, or as long as the vehicle has not answered it.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TypeGuard
 
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets, Peer
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Decoder
+from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.services.command_receiver import is_stop
 
 EVERYBODY = 0  # target_system
 MOST = 4096  # clients whose number is remembered
 #: s; the longest time without a holder after a gateway has failed, and what the database then takes
 IN_TRANSIT = 3.0
+#: s for which a STOP without an answer is kept for a vehicle that another gateway had: as long as
+#: a gateway may take to be there again, and not for ever: its answer may have been lost
+UNANSWERED = 60.0
 MOST_STOPS = 100
+NOT_PASSED_ON = "STOP waits for the fleet's database. Use the rover's own gateway or switch"
 
 #: begin the peers of FLEET_LINK that are no clients, before a gateway's name and the number of a
 #: client of ours: there goes what it sends, from there comes what it is sent. The peer of another
 #: gateway's client is that gateway's name and number only
 TOWARDS, BACK = "to", "from"
 LENGTH = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Stop:
+    """A STOP that came at ``at``, and the vehicles that have not answered it."""
+
+    at: float
+    received: Received
+    target: int | None  # system id
+    owed: set[int]
+
+    def is_for(self, vehicle: int, *, now: float) -> bool:
+        """Return whether a gateway that gets a vehicle now must obey it."""
+        is_recent = now - self.at <= IN_TRANSIT and self.target in (EVERYBODY, vehicle)
+        return is_recent or vehicle in self.owed
+
+    def is_over(self, *, now: float) -> bool:
+        return now - self.at > (UNANSWERED if self.owed else IN_TRANSIT)
 
 
 class Elsewhere:
@@ -37,7 +67,9 @@ class Elsewhere:
         self._vehicles = vehicles
         self.is_shared = vehicles.lease.is_shared
         self._holders: Mapping[int, str] = {}
-        self._stops: list[tuple[float, Received]] = []  # the latest, and when
+        self._had: set[int] = set()  # vehicles that other gateways have, or had
+        self._stops: list[_Stop] = []  # the latest
+        self._decoder = Decoder()
         self._clients: dict[int, tuple[str, Peer]] = {}  # by number
         self._numbers: dict[tuple[str, Peer], int] = {}
         self._last = 0  # number
@@ -48,6 +80,7 @@ class Elsewhere:
     def change(self, change: FleetChanged, *, now: float) -> None:
         """Take which gateway has which vehicle now; pass on a STOP that came just before."""
         before, self._holders = self._holders, dict(change.holders)
+        self._had |= self._holders.keys()
         for vehicle, gateway in change.holders:
             if before.get(vehicle) != gateway:
                 for received in self.stops_of(vehicle, now=now):
@@ -55,9 +88,14 @@ class Elsewhere:
                         self._pass_on(gateway, received)
 
     def stops_of(self, vehicle: int, *, now: float) -> list[Received]:
-        """Return the STOPs for a vehicle that came just now, when nobody may have had it."""
-        self._stops = [(at, each) for at, each in self._stops if now - at <= IN_TRANSIT]
-        return [each for _, each in self._stops if self._target_of(each) in (EVERYBODY, vehicle)]
+        """Return the STOPs for a vehicle that nobody may have heard who has had it."""
+        self._stops = [each for each in self._stops if not each.is_over(now=now)]
+        return [each.received for each in self._stops if each.is_for(vehicle, now=now)]
+
+    def obeyed(self, vehicle: int) -> None:
+        """Forget the STOPs that a vehicle had not answered: it is ours, and stops."""
+        for each in self._stops:
+            each.owed.discard(vehicle)
 
     def takes(self, received: Received, *, now: float) -> bool:
         """Pass a packet on if it is for others; return whether it is for another one alone."""
@@ -65,7 +103,7 @@ class Elsewhere:
         if not self.is_shared or message is None:
             return False
         if is_stop(message):
-            self._stops = [*self._stops[-MOST_STOPS:], (now, received)]
+            self._note_stop(received, now=now)
         if received.client.key[0] == FLEET_LINK:
             return False
         target = self._target_of(received)
@@ -93,12 +131,38 @@ class Elsewhere:
             if _is_back(peer):
                 client = self._clients.get(peer[-1])
                 if client is not None and self._gcs.has(*client):
+                    self._note_answer(client, data, by=peer[1])
                     self._queue.append(Outgoing(*client, data))
         return Packets(
             item.link,
             [item.datagrams[place] for place in places],
             [item.waited[place] for place in places] if item.waited else (),
         )
+
+    def _note_stop(self, received: Received, *, now: float) -> None:
+        target = self._target_of(received)
+        owed = {
+            each
+            for each in self._had
+            if target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
+        }
+        self._stops = [*self._stops[-MOST_STOPS:], _Stop(now, received, target, owed)]
+        client, component = received.client, getattr(received.message, "target_component", 0)
+        if owed and not self._vehicles.lease.is_trusted and client.key[0] != FLEET_LINK:
+            client.answer_in_words(NOT_PASSED_ON, Address(min(owed), component), now=now)
+
+    def _note_answer(self, client: tuple[str, Peer], data: bytes, *, by: str) -> None:
+        """Forget a client's STOPs that another gateway has answered: one answer stands for all."""
+        for packet in split_datagram(data) if self._stops else ():
+            if packet.message_id != m.CommandAck.id:
+                continue
+            ack = self._decoder.decode(packet)
+            if isinstance(ack, m.CommandAck) and ack.command == MavCmd.TASK_STOP:
+                theirs = {each for each, gateway in self._holders.items() if gateway == by}
+                for each in self._stops:
+                    if each.received.client.key == client:
+                        is_for_all = each.target == EVERYBODY
+                        each.owed.difference_update(theirs if is_for_all else {packet.system_id})
 
     def _pass_on(self, gateway: str, received: Received) -> None:
         key = received.client.key

@@ -254,6 +254,11 @@ class GcsClient:
         self._refusals_told[source, text] = now
         self.tell(text, MavSeverity.WARNING, source, now=now)
 
+    def answer_in_words(self, text: str, source: Address, *, now: float) -> None:
+        """Send a STATUSTEXT of an address that the client has just named, within the rate limit."""
+        if self._texts.take(now=now):
+            self._say(text, MavSeverity.ERROR, source)
+
     def tell_what_was_left_out(self, *, now: float) -> None:
         """Send one text for each source: the number of its dropped texts."""
         while self.left_out and self._texts.take(now=now):

@@ -44,12 +44,18 @@ from tests.kit.gateways.database import Database
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 
+STOP = 54003
 BLOCK = 1_000  # task ids
 CARRIED = 0.01  # s, for which a packet is under way between gateways
 GIVEN_UP = 0.4  # s, for which an answer is awaited
 PING = 0.1  # s
 LOOK = 2.0  # s between two looks at other gateways' tasks, task_watch.PERIOD
 SESSION_ENDS = 0.02  # s after the death of its process
+
+
+def is_stop(data: bytes) -> bool:
+    """Return whether a MAVLink 2 packet is a COMMAND_LONG that stops a rover."""
+    return data[7:10] == b"\x4c\0\0" and data[38:40] == STOP.to_bytes(2, "little")
 
 
 def part_of(restored: Restored, vehicles: frozenset[int]) -> Restored:
@@ -81,9 +87,14 @@ class FleetLink(MemoryLink):
         self._world, self._gateway = world, gateway
         self.under_way: deque[tuple[float, Peer, bytes]] = deque()
         self.sent = 0
+        self._kept: list[tuple[Peer, bytes]] = []  # until the database is reached
 
     def send(self, peer: Peer, data: bytes) -> None:
         assert isinstance(peer, tuple)
+        if not self._is_reached():  # as the real one: a STOP waits, and the rest is lost
+            if is_stop(data):
+                self._kept.append((peer, data))
+            return
         self.sent += 1
         if peer[0] == TOWARDS:
             _, there, number = peer
@@ -96,12 +107,25 @@ class FleetLink(MemoryLink):
             other.mail.under_way.append((self._world.now + CARRIED, origin, data))
 
     def next_arrival(self) -> float | None:
-        return self.under_way[0][0] if self.under_way else None
+        if not self._is_reached():
+            return None
+        return self._world.now if self._kept else self.under_way[0][0] if self.under_way else None
 
     def deliver(self, now: float) -> None:
+        if not self._is_reached():
+            stops = [each for each in self.under_way if is_stop(each[2])]
+            self.under_way = deque(stops)
+            return
+        kept, self._kept = self._kept, []
+        for peer, data in kept:
+            self.send(peer, data)
         while self.under_way and self.under_way[0][0] <= now:
             _, peer, data = self.under_way.popleft()
             self.arrived.append((peer, data))
+
+    def _is_reached(self) -> bool:
+        own = self._world.gateways.get(self._gateway)
+        return own is None or own.is_reached
 
 
 class SharedStore:

@@ -40,9 +40,14 @@ def moves(data: bytes) -> bool:
     return False
 
 
+def is_zero(data: bytes) -> bool:
+    """Return whether a MAVLink 2 packet is a set-point that stops a rover."""
+    return int.from_bytes(data[7:10], "little") in SETPOINTS and not moves(data)
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A packet of a gateway that moves the rover, at a time of CLOCK_MONOTONIC."""
+    """A packet of a gateway that moves or stops the rover, at a time of CLOCK_MONOTONIC."""
 
     at: float
     name: str
@@ -51,8 +56,10 @@ class Motion:
 class Tap:
     """Forwards datagrams between one gateway and the rover, and notes those that move it."""
 
-    def __init__(self, name: str, rover_port: int, motions: list[Motion]) -> None:
-        self._name, self._motions = name, motions
+    def __init__(
+        self, name: str, rover_port: int, motions: list[Motion], zeros: list[Motion]
+    ) -> None:
+        self._name, self._motions, self._zeros = name, motions, zeros
         self._front, self._back = (_socket() for _ in range(2))
         self._back.connect(("127.0.0.1", rover_port))
         self.port = int(self._front.getsockname()[1])
@@ -82,6 +89,8 @@ class Tap:
             data, self._gateway = self._front.recvfrom(65_536)
             if moves(data):
                 self._motions.append(Motion(time.monotonic(), self._name))
+            elif is_zero(data):
+                self._zeros.append(Motion(time.monotonic(), self._name))
             if not self.is_cut:
                 self._back.send(data)
         else:
@@ -132,6 +141,7 @@ class Serving:
     ends: ExitStack
     rover_port: int
     motions: list[Motion] = field(default_factory=list)
+    zeros: list[Motion] = field(default_factory=list)  # set-points that stop it
     processes: dict[str, Process] = field(default_factory=dict)
     clients: dict[str, int] = field(default_factory=dict)  # ports
     taps: dict[str, Tap] = field(default_factory=dict)
@@ -195,7 +205,7 @@ def serving(server: PostgresServer, folder: Path, names: str) -> Iterator[Servin
         it = Serving(server, folder, server.new_database(), ends, rover_port)
         for name, port in zip(names, clients, strict=True):
             it.clients[name] = port
-            it.taps[name] = ends.enter_context(closing(Tap(name, rover_port, it.motions)))
+            it.taps[name] = ends.enter_context(closing(Tap(name, rover_port, it.motions, it.zeros)))
             it.proxies[name] = ends.enter_context(closing(TcpProxy(server.port)))
             it.start(name)
         yield it

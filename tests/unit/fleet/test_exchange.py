@@ -109,6 +109,22 @@ def test_a_stranger_a_recording_and_another_fleet_are_refused() -> None:
             assert b.receive(text, now=now) == []
 
 
+def test_what_is_first_outlasts_a_time_without_a_connection_and_the_rest_does_not() -> None:
+    net = Net()
+    net.put("a", b"stop", first=True, until=1.0)
+    net.put("a", b"telemetry", until=1.0)
+    net.now += 60.0  # nothing is sent or received: the database hangs
+    net.begin("a", 4)
+    net.begin("b", 5)
+    found = [each for _ in range(4) for each in net.exchange()]
+    assert [each.payload for each in found] == [b"stop"]
+    assert found[0].waited >= 60.0
+    net.put("a", b"stop", first=True, until=1.0)
+    net.gateways["a"].notifications(net.local("a") + SILENCE)  # only the other one is away
+    net.now += SILENCE + 1.0
+    assert [each for _ in range(4) for each in net.exchange()] == []
+
+
 def test_what_is_first_is_sent_again_after_a_lost_connection_and_the_rest_is_not() -> None:
     net = Net()
     net.put("a", b"stop", first=True, until=5.0)
