@@ -7,6 +7,7 @@ all gateways are in the order of the commits, and a reader that has seen one has
 
 from collections.abc import Sequence
 
+from mav_tasks.clock import boot_time
 from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_rows
@@ -21,6 +22,9 @@ from mav_tasks.store.retention import Trimmer
 AT_WORK = 30.0  # s after the start; vehicles are loaded within some seconds
 TRIM_LOCK = 0x4D565453_00000003  # of the gateway that deletes expired rows
 
+#: the database's clock: one for all gateways, whose own may be set at any time
+UTC = "extract(epoch FROM clock_timestamp())::float8"
+
 #: to the number of a row in its gateway's count, for the number in the journal
 _BASE = "current_setting('mav_tasks.base')::bigint + "
 
@@ -32,7 +36,7 @@ class FleetDatabase(PostgresDatabase):
 
     def __init__(self, address: Address, gateway: str, epoch: int) -> None:
         self._lease = GatewayOwnership(gateway, epoch)
-        self._first_look = 0.0  # UTC, s
+        self._began = boot_time()
         purpose = f"gateway {gateway} store"
         super().__init__(address, ownership=self._lease, purpose=purpose, limits=LIMITS)
 
@@ -53,7 +57,7 @@ class FleetDatabase(PostgresDatabase):
         with self._fenced():
             self._lease.wrote(session, self.last_number, batch.last)
             session.execute(
-                "UPDATE meta SET last_number = last_number + ?, last_write = ?", (count, utc)
+                f"UPDATE meta SET last_number = last_number + ?, last_write = {UTC}", (count,)
             )
             session.execute(
                 "SELECT set_config('mav_tasks.base', (last_number - ?::bigint)::text, true)"
@@ -78,10 +82,10 @@ class FleetDatabase(PostgresDatabase):
         row of ``meta``, for which every write waits, so it is a transaction of its own.
         """
         has_more = self._trim(trimmer, utc=utc)
-        self._first_look = self._first_look or utc
-        if not has_more and utc - self._first_look >= AT_WORK:  # not at the start, after hours
+        is_at_work = boot_time() - self._began >= AT_WORK  # not at the start, after hours
+        if not has_more and is_at_work:
             with self._fenced():
-                self._session.execute("UPDATE meta SET last_write = ?", (utc,))
+                self._session.execute(f"UPDATE meta SET last_write = {UTC}")
         return has_more
 
     def _trim(self, trimmer: Trimmer, *, utc: float) -> bool:

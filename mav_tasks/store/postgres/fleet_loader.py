@@ -16,6 +16,7 @@ from mav_tasks.mailbox import Mailbox
 from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome, VehiclesLoaded
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
+from mav_tasks.store.postgres.fleet_database import UTC
 from mav_tasks.store.postgres.gateway_ownership import LIMITS, GatewayOwnership
 from mav_tasks.store.postgres.reader import PostgresReader
 from mav_tasks.store.postgres.session import Found, Session
@@ -34,9 +35,14 @@ _RESERVE = (
     " ELSE next_id + ?::bigint END"
 )
 _LEAD = (
-    "UPDATE holdings SET lead = least(?, greatest(0, lead - ?::float8 * (? - lead_utc)) + ?),"
+    # a clock that was set back must not make it longer: at the most it is no fence any more
+    "UPDATE holdings SET lead = least(?,"
+    " greatest(0, lead - ?::float8 * greatest(0, ? - lead_utc)) + ?),"
     " lead_utc = ? WHERE vehicle = ANY(?::bigint[]) RETURNING lead"
 )
+
+#: by the clock of the database, as it was written: those of gateways may have been set since
+_IDLE = f"SELECT greatest(0, coalesce({UTC} - last_write, 0)) FROM meta"
 
 Job = frozenset[int] | None  # vehicles to load; None: task ids
 
@@ -131,8 +137,7 @@ class FleetLoader:
     def _loaded(self, vehicles: frozenset[int]) -> VehiclesLoaded:
         offset, purpose = self._wall_offset(), f"gateway {self._gateway} load"
         with closing(PostgresReader(self._address, purpose=purpose)) as reader:
-            ((last_write,),) = reader.connection.execute("SELECT last_write FROM meta").fetchall()
-            idle = 0.0 if last_write is None else max(0.0, boot_time() + offset - last_write)
+            ((idle,),) = reader.connection.execute(_IDLE).fetchall()
             restored = read_restored(
                 reader, offset=offset, ended_well=True, idle=idle, vehicles=vehicles
             )

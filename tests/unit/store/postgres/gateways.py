@@ -66,13 +66,13 @@ class Gateway:
         assert self.epoch
         self.open()
 
-    def open(self, url: str | None = None) -> None:
+    def open(self, url: str | None = None, *, wall_offset: float = OFFSET) -> None:
         self.through = 0
         self.store = FleetStore(
             address.parse(url or self.url),
             self.name,
             self.epoch,
-            wall_offset=lambda: OFFSET,
+            wall_offset=lambda: wall_offset,
             retention=FOR_EVER,
         )
 

@@ -12,7 +12,7 @@ from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Renew, Take
 from mav_tasks.store import Evicted, IdsGranted, NotKept, VehiclesLoaded, Which
 from mav_tasks.store.opening import kind_of
-from mav_tasks.store.postgres import address
+from mav_tasks.store.postgres import address, fleet_database
 from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.fleet_database import FleetDatabase
 from mav_tasks.store.retention import Trimmer
@@ -238,18 +238,22 @@ def test_a_commit_whose_answer_was_lost_is_not_made_twice(
         assert ids_in(url) == [1, 2, 3]
 
 
-def test_a_fleet_that_has_nothing_to_store_is_seen_to_be_at_work(url: str) -> None:
+def test_a_fleet_that_has_nothing_to_store_is_seen_to_be_at_work(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Else the next gateway would pause the queues, as after hours without anybody."""
-    hours_ago = boot_time() + OFFSET - 7_200.0
+    hours_ago = time.time() - 7_200.0  # by the clock of the database
     with gateways(url, "a") as (a,), connected(url) as connection:
         connection.execute("UPDATE meta SET last_write = %s", (hours_ago,))
         a.store.load_vehicles(frozenset({1}))
         assert a.next(VehiclesLoaded).restored.idle > 7_000
         database = FleetDatabase(address.parse(url), "a", a.epoch)
         database.begin()
-        utc = boot_time() + OFFSET
+        began = boot_time()
         for seconds, is_noted in ((0.0, False), (10.0, False), (60.0, True)):
-            database.trim(Trimmer(FOR_EVER), utc=utc + seconds)
+            later = began + seconds
+            monkeypatch.setattr(fleet_database, "boot_time", lambda later=later: later)
+            database.trim(Trimmer(FOR_EVER), utc=boot_time() + OFFSET)
             (last,) = connection.execute("SELECT last_write FROM meta").fetchone()
             assert (last > hours_ago) is is_noted
         database.close(utc=None)

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Renew, Take
 from mav_tasks.settings import Retention
@@ -19,7 +20,7 @@ from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.connection import Connection
 from mav_tasks.store.opening import kind_of
-from mav_tasks.store.postgres import address, fleet_loader, session
+from mav_tasks.store.postgres import address, fleet_database, fleet_loader, session
 from mav_tasks.store.postgres.failures import PostgresError, Replaced
 from mav_tasks.store.postgres.fleet_database import FleetDatabase
 from mav_tasks.store.reading import read_restored
@@ -248,15 +249,45 @@ class Looking(Trimmer):
         return super().step(connection, utc=utc, kept=kept)
 
 
-def test_a_gateway_that_deletes_expired_rows_keeps_no_other_from_writing(url: str) -> None:
+def test_a_gateway_that_deletes_expired_rows_keeps_no_other_from_writing(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor does a clock that is set tell that the fleet is at work, but only the time."""
     trimmer = Looking(url)
-    with gateways(url, "a") as (a,):
+    with gateways(url, "a") as (a,), connected(url) as other:
+
+        def is_at_work() -> bool:
+            found = other.execute("SELECT last_write FROM meta").fetchone()[0]
+            return found is not None
+
         database = FleetDatabase(address.parse(url), "a", a.epoch)
         database.begin()
-        for utc in (1_000.0, 2_000.0):  # at the second the fleet is noted to be at work
+        for utc in (1_000.0, 5_000.0):
             database.trim(trimmer, utc=utc)
+            assert not is_at_work()
+        later = boot_time() + fleet_database.AT_WORK
+        monkeypatch.setattr(fleet_database, "boot_time", lambda: later)
+        database.trim(trimmer, utc=1_000.0)
+        assert is_at_work()
         database.close(utc=None)
-    assert trimmer.steps == 2
+    assert trimmer.steps == 3
+
+
+@pytest.mark.parametrize("wrong", [-3600.0, 3600.0])
+def test_a_clock_that_is_set_changes_neither_idle_times_nor_leads(url: str, wrong: float) -> None:
+    """Queues of a fleet that was at work just now go on; the fence at the vehicle stays one."""
+    with gateways(url, "a") as (a,):
+        a.leases.execute(Take(Renew("a", a.epoch), frozenset({1})))
+        a.store.append([of_vehicle(1, 1)])
+        a.kept(1)
+        a.store.load_vehicles(frozenset({1}))
+        assert a.next(VehiclesLoaded).restored.signing_lead == STEP
+        a.store.close()
+        a.open(wall_offset=OFFSET + wrong)
+        a.store.load_vehicles(frozenset({1}))
+        restored = a.next(VehiclesLoaded).restored
+        assert restored.idle < 60.0
+        assert restored.signing_lead == (2 * STEP if wrong < 0 else STEP)
 
 
 def test_one_gateway_at_a_time_deletes_expired_rows(url: str) -> None:
