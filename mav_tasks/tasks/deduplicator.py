@@ -83,9 +83,10 @@ class SubmissionDeduplicator:
             nonce = task.marks.nonce
             if nonce:
                 self._nonces[_key(task.submitter, nonce)] = task.id
-            of_late = now - task.submitted_at <= LONGEST
-            if of_late and not (nonce and not isinstance(task.goal, GoTo)):
-                self.remember(task, at=task.submitted_at, now=now)
+            # later than now: the clock was set back since, or was another gateway's
+            at = min(task.submitted_at, now)
+            if now - at <= LONGEST and not (nonce and not isinstance(task.goal, GoTo)):
+                self.remember(task, at=at, now=now)
 
     def known(
         self, draft: Draft, *, confirmation: int, origin: GlobalPlace | None, now: float

@@ -13,8 +13,9 @@ from mav_tasks.tasks.events import Event
 class PromptSqliteStore(SqliteStore):
     """The real store on a real file; virtual time stands still while it writes."""
 
-    def __init__(self, path: Path, *, wall_offset: float) -> None:
-        super().__init__(path, wall_offset=lambda: wall_offset)
+    def __init__(self, path: Path, *, wall_offset: float | Callable[[], float]) -> None:
+        offset = wall_offset if callable(wall_offset) else lambda: wall_offset
+        super().__init__(path, wall_offset=offset)
         self.events: list[Event] = []
         self._kept = 0
 

@@ -84,7 +84,7 @@ class Life:
         last = chance.uniform(0.05, 3.0)
         if not well(it):
             return
-        match chance.randrange(6):
+        match chance.randrange(7):
             case 0:
                 world.kill(it.name)
                 self._later(last, lambda: world.start(it.name))
@@ -100,6 +100,8 @@ class Life:
             case 4:  # the rover drives out of its reach
                 world.cut(it.name)
                 self._later(3 * last, lambda: world.mend(it.name))
+            case 5:
+                it.set_clock(chance.choice((3_600.0, -3_600.0, 5.0, -5.0, 0.0)))
             case _:
                 world.database.restart()
                 world.database.is_up = False

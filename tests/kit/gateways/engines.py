@@ -16,6 +16,7 @@ from mav_tasks.engine.inputs import (
     Peer,
     TasksElsewhere,
     VehiclesGone,
+    WallClock,
 )
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Change, Member, Request
@@ -132,7 +133,9 @@ class SharedStore:
     """What all gateways have stored, in the order of their commits."""
 
     def __init__(self, path: Path) -> None:
-        self.store = PromptSqliteStore(path, wall_offset=0.0)
+        #: UTC less virtual time, by the clock of the gateway that writes or reads
+        self.offset = 0.0
+        self.store = PromptSqliteStore(path, wall_offset=lambda: self.offset)
         self._next_id = 1
         #: called when something was stored that other gateways are notified of
         self.notify: Callable[[], None] = lambda: None
@@ -151,8 +154,9 @@ class SharedStore:
             self.leads[vehicle] = min(MOST_LEAD, self.leads.get(vehicle, 0.0) + STEP)
         return max(self.leads[vehicle] for vehicle in vehicles)
 
-    def keep(self, events: Sequence[Event]) -> list[NonceTaken]:
+    def keep(self, events: Sequence[Event], *, offset: float = 0.0) -> list[NonceTaken]:
         """Make events durable; refuse tasks for any rover whose nonce others have."""
+        self.offset = offset
         taken = [
             found
             for event in events
@@ -178,12 +182,14 @@ class SharedStore:
             return None
         return NonceTaken(task.id, first.id, first.marks.payload)
 
-    def part(self, vehicles: frozenset[int]) -> Restored:
+    def part(self, vehicles: frozenset[int], *, offset: float = 0.0) -> Restored:
         """Return what is stored about some vehicles."""
+        self.offset = offset
         return part_of(self.store.load(), vehicles)
 
     def tasks(self) -> tuple[Task, ...]:
         """Return all stored tasks."""
+        self.offset = 0.0
         return self.store.load().tasks
 
 
@@ -208,11 +214,16 @@ class GatewayStore:
     name = place = "shared"
 
     def __init__(
-        self, shared: SharedStore, is_current: Callable[[], bool | None], gateway: str
+        self,
+        shared: SharedStore,
+        is_current: Callable[[], bool | None],
+        gateway: str,
+        offset: Callable[[], float],
     ) -> None:
         self._shared = shared
         self._is_current = is_current
         self._gateway = gateway
+        self._offset = offset
         self._count = 0
         self._outcomes: list[Outcome] = []
         self.events: list[Event] = []
@@ -233,7 +244,7 @@ class GatewayStore:
         is_current = self._is_current()
         if self.is_reached and self._waiting and is_current is not None:
             if is_current:
-                self._outcomes += self._shared.keep(self._waiting)
+                self._outcomes += self._shared.keep(self._waiting, offset=self._offset())
                 self.events += self._waiting
                 self._count += len(self._waiting)
                 self._outcomes.append(Kept(self._count))
@@ -246,7 +257,8 @@ class GatewayStore:
     def load_vehicles(self, vehicles: frozenset[int]) -> None:
         """Answer in ``take_outcomes``."""
         lead = self._shared.next_lead(vehicles)
-        restored = replace(self._shared.part(vehicles), signing_lead=lead)
+        part = self._shared.part(vehicles, offset=self._offset())
+        restored = replace(part, signing_lead=lead)
         self._outcomes.append(VehiclesLoaded(tuple(sorted(vehicles)), restored))
 
     def grant_ids(self) -> None:
@@ -281,7 +293,7 @@ class Gateway:
 
     def _begin(self) -> None:
         """Begin with an engine that has no vehicle."""
-        self.store = GatewayStore(self.world.shared, self._is_current, self.name)
+        self.store = GatewayStore(self.world.shared, self._is_current, self.name, self._offset)
         self.mail = FleetLink(self.world, self.name)
         self._told: tuple[tuple[int, str], ...] = ()
         self._expected: frozenset[int] = frozenset()
@@ -295,7 +307,7 @@ class Gateway:
             restored=self.store.load(),
             name=self.name,
             others=(self.mail,),
-            wall_offset=self.world.wall_offset,
+            wall_offset=None if self.world.wall_offset is None else self._offset(),
             policies=self.world.policies_of(self.name),
             keys=self.world.keys,
             now=self.world.now,
@@ -304,6 +316,14 @@ class Gateway:
 
     def __repr__(self) -> str:
         return f"Gateway({self.name}, {self.member.lease})"
+
+    def set_clock(self, error: float) -> None:
+        """Set the wall clock of its machine, so many seconds ahead of the true time."""
+        self.world.clock_errors[self.name] = error
+        self.server.take_in(WallClock(self._offset()), now=self.world.now)
+
+    def _offset(self) -> float:
+        return (self.world.wall_offset or 0.0) + self.world.clock_errors.get(self.name, 0.0)
 
     @property
     def engine(self) -> Any:
@@ -451,6 +471,7 @@ class FleetWorld(World):
         self.lost_notices = 0.0
         self.random = Random(seed)
         self.gateways: dict[str, Gateway] = {}
+        self.clock_errors: dict[str, float] = {}  # of machines, s
         self.settings: Settings | None = kw.get("settings")
         self.keys: tuple[Key, ...] | None = kw.get("keys")
         self.wall_offset: float | None = kw.get("wall_offset")

@@ -215,6 +215,18 @@ def test_after_a_restart_everything_is_known_as_before() -> None:
     assert rig.known(rig.draft("b", nonce=7), now=1e6) == Known(marked.id, Rule.NONCE)
 
 
+def test_a_submission_of_later_than_now_makes_copies_of_what_follows_no_longer_than_others() -> (
+    None
+):
+    """The clock was set back since, or another gateway's was ahead."""
+    rig = Rig()
+    plain = rig.submit(rig.draft("a"), now=3_600.0)
+    rig.memory = SubmissionDeduplicator(rig.registry)
+    rig.memory.restore(rig.registry.all(), now=100.0)
+    assert rig.known(rig.draft("a"), now=101.0) == Known(plain.id, Rule.SAME_PAYLOAD)
+    assert rig.known(rig.draft("a"), now=110.0) is None
+
+
 def test_clients_that_come_and_go_do_not_add_up() -> None:
     rig = Rig()
     for number in range(3 * MANY_CLIENTS):
