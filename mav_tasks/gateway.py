@@ -11,14 +11,14 @@ from contextlib import closing
 from math import inf
 
 from mav_tasks.clock import boot_time
-from mav_tasks.engine.inputs import FleetChanged, LeaseChanged, VehiclesGone
+from mav_tasks.engine.inputs import FleetChanged, LeaseChanged, ParametersChanged, VehiclesGone
 from mav_tasks.engine.snapshot import Reach
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.lease import Permit
 from mav_tasks.fleet.member import Change
 from mav_tasks.fleet.standing import MAY_STOP, Effect, Standing
 from mav_tasks.fleet_io.carrier import Carrier
-from mav_tasks.fleet_io.keeper import Holders, Keeper, News, Trouble
+from mav_tasks.fleet_io.keeper import Holders, Keeper, News, Parameters, Trouble
 from mav_tasks.fleet_io.own_address import own_address
 from mav_tasks.fleet_link import FleetLink
 from mav_tasks.settings import Gateway as GatewaySettings
@@ -98,7 +98,7 @@ class Gateway:
             self._expected = tasks
             self.store.watch_tasks(tasks)
 
-    def take(self) -> Iterator[LeaseChanged | FleetChanged | VehiclesGone]:
+    def take(self) -> Iterator[LeaseChanged | FleetChanged | ParametersChanged | VehiclesGone]:
         """Yield what has changed, and ask for the data of vehicles that this gateway has got."""
         early, self._early = self._early, []
         for news in (*early, *self._keeper.take()):
@@ -107,6 +107,8 @@ class Gateway:
                     yield _changed(news)
                 case Holders(pairs=pairs):
                     yield FleetChanged(pairs)
+                case Parameters(pairs=pairs):
+                    yield ParametersChanged(pairs)
                 case Change(effects=effects, got=got, lets_go=lets_go):
                     if got:
                         self._gone -= got

@@ -223,6 +223,9 @@ class Engine:
             case inputs.TasksElsewhere(states=states):
                 with self._fleet.room.told(dict(states), now=now):
                     self._questions.answered(now=now)
+            case inputs.ParametersChanged(values=values):
+                self._parameters.share(dict(values))
+                self.not_in_force = self._parameters.not_in_force
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.NonceTaken():

@@ -165,6 +165,13 @@ class TasksElsewhere:
 
 
 @dataclass(frozen=True, slots=True)
+class ParametersChanged:
+    """All parameters that clients have set, at any gateway of the fleet: pairs of name, value."""
+
+    values: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class IdsGranted:
     """The next ``count`` task ids from ``first`` on are this gateway's, besides earlier ones."""
 
@@ -220,6 +227,7 @@ Input = (
     | VehiclesGone
     | FleetChanged
     | TasksElsewhere
+    | ParametersChanged
     | IdsGranted
     | NonceTaken
     | SettingsChanged

@@ -46,7 +46,14 @@ class Holders:
     pairs: tuple[tuple[int, str], ...] = ()
 
 
-News = Change | Trouble | Permit | Holders
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """The parameters that clients have set, at any gateway: pairs of name and value."""
+
+    pairs: tuple[tuple[str, float], ...] = ()
+
+
+News = Change | Trouble | Permit | Holders | Parameters
 
 
 def _both_permits(earlier: News, later: News) -> bool:
@@ -77,6 +84,7 @@ class Keeper:
         self._member = Member(name, terms or Terms())
         self._permit = Permit()
         self._holders = Holders()
+        self._parameters: Parameters | None = None  # not read yet
         self._heard: tuple[frozenset[int], frozenset[int]] = frozenset(), frozenset()
         self._forgotten: SimpleQueue[frozenset[int]] = SimpleQueue()
         self._selector = selectors.DefaultSelector()
@@ -226,7 +234,7 @@ class Keeper:
                 if not self._is_troubled:
                     self._is_troubled = True
                     self._news.put(Trouble(words))
-            case Answer(row, endpoints):
+            case Answer(row, endpoints, parameters):
                 assert self._asked is not None
                 (request, sent), self._asked = self._asked, None
                 self._tell(self._member.answered(request, row, sent=sent, now=now))
@@ -234,10 +242,17 @@ class Keeper:
                 if holders != self._holders:
                     self._holders = holders
                     self._news.put(holders)
+                if parameters is not None:
+                    self._take_parameters(Parameters(tuple(parameters.items())))
                 self._peers.update(endpoints)
                 if self._is_troubled:
                     self._is_troubled = False
                     self._news.put(Trouble(None))
+
+    def _take_parameters(self, parameters: Parameters) -> None:
+        if parameters != self._parameters:
+            self._parameters = parameters
+            self._news.put(parameters)
 
     def _tell(self, change: Change) -> None:
         """Publish what the lease permits now, and what has changed."""

@@ -36,10 +36,15 @@ LIMITS = Limits(answer=0.3, statement=0.25, lock=0.2, in_transaction=0.5, sendin
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer to a request, and where the gateways in it answer pings, by name."""
+    """The answer to a request, and what else was read with it.
+
+    ``endpoints``: where the gateways in it answer pings, by name. ``parameters``: those that
+    clients have set at any gateway; None: no gateway is in the fleet, and they were not read.
+    """
 
     row: Row
     endpoints: Mapping[str, Endpoint]
+    parameters: Mapping[str, float] | None = None
 
 
 class LeaseDatabase:
@@ -197,15 +202,16 @@ class LeaseDatabase:
         holds: frozenset[int] = frozenset()
         rivals: list[Rival] = []
         endpoints: dict[str, Endpoint] = {}
+        parameters: Mapping[str, float] | None = None
         for row in rows:
-            name, epoch, renewals, in_session, vehicles, hears, host, port = row
+            name, epoch, renewals, in_session, vehicles, hears, host, port, parameters = row
             if epoch == granted:
                 holds = frozenset(vehicles)
             else:
                 held, heard = frozenset(vehicles), frozenset(hears)
                 rivals.append(Rival(name, epoch, renewals, in_session, held, heard))
                 endpoints[name] = Endpoint(epoch, host, port)
-        return Answer(Row(granted, holds, tuple(rivals)), endpoints)
+        return Answer(Row(granted, holds, tuple(rivals)), endpoints, parameters)
 
 
 def _array(vehicles: Iterable[int]) -> str:
@@ -258,7 +264,9 @@ WHERE vehicle = ? AND gateway = gateways.number AND gateways.number = ? AND epoc
 """
 _READ = """
 SELECT name, epoch, renewals, pid_of_lock IS NOT NULL,
-  ARRAY(SELECT vehicle FROM holdings WHERE gateway = gateways.number), hears, host, port
+  ARRAY(SELECT vehicle FROM holdings WHERE gateway = gateways.number), hears, host, port,
+  (SELECT coalesce(json_object_agg(name, value ORDER BY name), '{}') FROM parameters
+   WHERE value IS NOT NULL)
 FROM gateways LEFT JOIN (
   SELECT objid, pid AS pid_of_lock FROM pg_locks
   WHERE locktype = 'advisory' AND granted AND objsubid = 1 AND classid = ?

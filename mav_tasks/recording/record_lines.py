@@ -138,6 +138,9 @@ def input_of(line: Sequence[Any]) -> Input | None:
             (states,) = values
             known = ((task, None if state is None else TaskState(state)) for task, state in states)
             return inputs.TasksElsewhere(tuple(known))
+        case "parameters":
+            (pairs,) = values
+            return inputs.ParametersChanged(tuple((name, value) for name, value in pairs))
         case _ if kind in _SIMPLE:
             return _SIMPLE[kind](*values)
         case _:
@@ -200,6 +203,8 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["fleet", now, holders]
         case inputs.TasksElsewhere(states=states):
             return ["tasks elsewhere", now, states]
+        case inputs.ParametersChanged(values=values):
+            return ["parameters", now, values]
         case inputs.IdsGranted(first=first, count=count):
             return ["ids", now, first, count]
         case inputs.NonceTaken(task_id=task_id, known=known, payload=payload):

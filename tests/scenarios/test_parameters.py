@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import ParametersChanged
 from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -288,3 +289,29 @@ def test_where_the_rover_has_a_191_itself_they_are_at_the_next(world: World) -> 
     world.client.send(ask_all(192))
     world.run(0.3)
     assert len(told(world.client, (1, 192))) == len(PARAMETERS)
+
+
+def test_a_parameter_that_was_set_at_another_gateway_is_in_force_and_told(
+    make_world: MakeWorld,
+) -> None:
+    store = LateStore(delay=0.3)
+    world = make_world(store=store)
+    world.run(2.0)
+    world.client.received.clear()
+    shared = (("TSK_SPEED", 0.3),)
+    world.server.take_in(ParametersChanged(shared), now=world.now)
+    world.run(0.5)
+    assert told(world.client) == [("TSK_SPEED", 0.3)]
+    assert world.server.engine.parameters == dict(shared)
+    assert world.events(ParameterSet) == []
+    world.client.send(put("TSK_SPEED", 0.4))
+    world.run(0.1)
+    # what was read meanwhile is older than what is being stored here
+    world.server.take_in(ParametersChanged((("TSK_SPEED", 0.2),)), now=world.now)
+    assert world.server.engine.parameters == dict(shared)
+    world.run(1.0)
+    assert world.server.engine.parameters == {"TSK_SPEED": pytest.approx(0.4)}
+    world.server.take_in(ParametersChanged(()), now=world.now)
+    world.run(0.5)
+    assert world.server.engine.parameters == {}
+    assert told(world.client)[-1] == ("TSK_SPEED", 0.5)

@@ -61,6 +61,7 @@ def test_what_can_come_into_the_engine() -> None:
         "VehiclesGone",
         "FleetChanged",
         "TasksElsewhere",
+        "ParametersChanged",
         "IdsGranted",
         "NonceTaken",
         "SettingsChanged",

@@ -88,6 +88,20 @@ class ParameterServer:
                 self._tell(name)
         return self._settings
 
+    def share(self, values: Mapping[str, float]) -> None:
+        """Take the parameters that clients have set at all gateways; they are durable.
+
+        One that is set here, and not durable yet, keeps its value until then.
+        """
+        ours = {name: self._kept[name] for name in self._pending if name in self._kept}
+        theirs = {name: value for name, value in values.items() if name not in self._pending}
+        kept = theirs | ours
+        if kept == self._kept:
+            return
+        self._kept = kept
+        self.configured(self._configured)
+        self.is_changed = True
+
     def take_change(self) -> Settings:
         """Return the settings in force, and clear ``is_changed``."""
         self.is_changed = False

@@ -11,9 +11,9 @@ from mav_tasks.errors import StoreError
 from mav_tasks.fleet.lease import Permit
 from mav_tasks.fleet.member import Change
 from mav_tasks.fleet.standing import Effect, Standing
-from mav_tasks.fleet_io.keeper import Keeper, News, Trouble
+from mav_tasks.fleet_io.keeper import Keeper, News, Parameters, Trouble
 from mav_tasks.store.postgres.address import parse
-from tests.kit.postgres import PostgresServer
+from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import wait_until
 
 BOTH = frozenset({1, 2})
@@ -47,7 +47,8 @@ def news_until(it: Keeper, is_enough: Callable[[list[News]], bool]) -> list[News
 def test_it_takes_what_it_hears_and_tells_so(postgres: PostgresServer) -> None:
     with kept(postgres.new_database(), "a") as it:
         news = told(it, Change(got=BOTH))
-        assert [each for each in news if not isinstance(each, Permit)] == [Change(got=BOTH)]
+        others = [each for each in news if not isinstance(each, Permit)]
+        assert others == [Parameters(), Change(got=BOTH)]
         assert [vehicle for vehicle in range(4) if it.may_move(vehicle)] == [1, 2]
         assert it.may_stop(1)
         assert it.epoch == 1
@@ -65,6 +66,18 @@ def permits(news: list[News]) -> list[Permit]:
     """Return those of a holder."""
     found = [each for each in news if isinstance(each, Permit)]
     return [each for each in found if each.standing is Standing.HOLDER]
+
+
+def test_parameters_that_are_set_anywhere_are_told_once(postgres: PostgresServer) -> None:
+    url = postgres.new_database()
+    with kept(url, "a") as it, connected(url) as connection:
+        told(it, Parameters())
+        connection.execute("INSERT INTO parameters VALUES ('TSK_B', 0.1), ('TSK_A', NULL)")
+        told(it, Parameters((("TSK_B", 0.1),)))
+        connection.execute("UPDATE parameters SET value = 2 WHERE name = 'TSK_A'")
+        news = told(it, Parameters((("TSK_A", 2.0), ("TSK_B", 0.1))))
+        news += news_until(it, lambda found: len(permits(found)) > 2)
+        assert sum(isinstance(each, Parameters) for each in news) == 1
 
 
 def test_another_one_has_the_vehicles_after_an_end_in_order(postgres: PostgresServer) -> None:
