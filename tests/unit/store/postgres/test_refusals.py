@@ -143,7 +143,7 @@ def test_each_right_that_a_role_lacks_is_named(postgres: PostgresServer) -> None
         with opened(url):
             pass
         grant = "GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA mav_tasks TO"
-        assert "SELECT on formats, gateway_secret, gateway_writes and 11 more;" in refusal(theirs)
+        assert "SELECT on formats, gateway_secret, gateway_writes and 12 more;" in refusal(theirs)
         sql(grant)
         sql("REVOKE UPDATE, INSERT ON mav_tasks.journal FROM")
         sql("REVOKE UPDATE ON mav_tasks.holdings FROM")
@@ -241,7 +241,7 @@ def test_a_role_that_may_only_read_reads_the_journal_and_serves_nothing(
         journal = kind_of(theirs).open_journal(theirs, Which())
         assert [number for number, _ in journal.take(offset=0.0)] == [1]
         journal.close()
-        assert "lacks DELETE on formats, gateway_writes, gateways and 9 more; INSERT" in refusal(
+        assert "lacks DELETE on formats, gateway_writes, gateways and 10 more; INSERT" in refusal(
             theirs
         )
         postgres.execute(f"ALTER ROLE {name} SET default_transaction_read_only = on")
