@@ -50,7 +50,8 @@ class Executor:
         self._resumes_by_itself = False
         self._lost_at: Pose | None = None  # the last pose before the loss
         self._was_silent = False  # heartbeats were lost, too
-        self._is_unbegun = False  # another gateway had not begun to move the vehicle
+        self._is_taken_over = False  # from another gateway, and it has not resumed since
+        self._is_unbegun = False  # that gateway had not begun to move the vehicle
         self._untaken_in: ModeKind | None = None  # mode at the loss, if we had sent nothing
         self._meter: TimingMeter | None = None  # while EXECUTING
         #: intervals between setpoints of all tasks of this run, s
@@ -93,14 +94,14 @@ class Executor:
         """Make a task the active one, in the state that it has."""
         self.task_id = task.id
         self._executed_before = task.progress.execution_time
-        self._resumes_by_itself = self._is_unbegun = False
+        self._resumes_by_itself = self._is_taken_over = self._is_unbegun = False
 
     def take_over(self, task: Task, *, now: float) -> None:
         """Make a task the active one that another gateway drove; it resumes by itself."""
         self.adopt(task)
         self._since = self._lost_until = now
         self._lost_at, self._was_silent, self._untaken_in = None, False, None
-        self._resumes_by_itself = True
+        self._resumes_by_itself = self._is_taken_over = True
         self._is_unbegun = not has_moved(task)
 
     def give_up(self) -> None:
@@ -334,7 +335,7 @@ class Executor:
             lost = R.POSITION_LOST
         if lost:
             self._lost_at, self._was_silent = None if motion is None else motion.pose, False
-            self._is_unbegun = False
+            self._is_taken_over = self._is_unbegun = False
             self._untaken_in = seen.mode if seen.is_untouched and not seen.armed else None
             self.pause(lost, actor=SERVER, now=now)
         return bool(lost)
@@ -346,6 +347,10 @@ class Executor:
         watch = self._settings.watch
         if not seen.is_ours:  # the time-out is for vehicles that stay silent
             self._since = self._lost_until = now
+            return
+        if now - self._since > watch.lost_timeout and self._is_taken_over:
+            # silent, or not as it was left: the gateway before may have ended the task
+            self._change(S.HELD, R.OUTCOME_UNKNOWN, actor=SERVER, now=now)
             return
         if now - self._since > watch.lost_timeout:
             self._finish(S.FAILED, R.LINK_TIMEOUT, actor=SERVER, now=now)

@@ -455,6 +455,20 @@ def test_a_task_that_had_not_armed_its_rover_goes_on_after_a_takeover(
     fleet.world.check()
 
 
+def test_a_rover_that_was_disarmed_between_two_gateways_waits_for_a_person(tmp_path: Path) -> None:
+    """Perhaps a person did it, or the gateway before at the end of the task, which it lost."""
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    fleet.world.kill(fleet.first.name)
+    fleet.world.operator_arm(False)
+    assert fleet.world.holder() is fleet.other
+    fleet.world.until(lambda: fleet.task(task).state is S.HELD, within=45)
+    assert fleet.task(task).reason is R.OUTCOME_UNKNOWN
+    assert not fleet.world.rover.autopilot.armed
+    fleet.world.check()
+
+
 @pytest.mark.parametrize("on_takeover", ["hold", "resume"])
 def test_a_gateway_that_ends_hands_its_rover_and_tasks_over(
     tmp_path: Path, on_takeover: str
