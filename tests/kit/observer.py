@@ -412,6 +412,8 @@ class Observer:
                 self._violation(now, "moving setpoint after a takeover")
             elif now == self._disarmed_at or is_held:
                 pass
+            elif self.mode < 0:
+                pass  # a new gateway brakes it, and knows its last heartbeat only
             elif is_pause or self._zeros_left == 0:
                 self._hold_due = now
             self._zeros_left = max(0, self._zeros_left - 1)
