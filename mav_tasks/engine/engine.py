@@ -124,7 +124,10 @@ class Engine:
         )
         assignments.watch(earlier.tasks, now=now)
         room = self._fleet.room
-        self._any = AnyRover(vehicles, registry, room, submissions, assignments, displays, settings)
+        elsewhere = self._elsewhere = Elsewhere(self._packets, gcs, vehicles)
+        self._any = AnyRover(
+            vehicles, registry, room, submissions, assignments, displays, elsewhere, settings
+        )
         self._any_plans = AnyUploads(
             gcs, vehicles, registry, submissions, assignments, timers, settings
         )
@@ -133,7 +136,6 @@ class Engine:
         )
         self._passing = Forwarder(vehicles, refusals)
         self._door = Door(vehicles, refusals)
-        self._elsewhere = Elsewhere(self._packets, gcs, vehicles)
         self._operator = OperatorWatch(timers, self._note_unheard, settings)
         self._reception = Reception(
             gcs=gcs,

@@ -203,3 +203,28 @@ def test_one_for_any_rover_runs_after_a_task_of_another_gateways_rover(
     result, _ = send(777)
     assert result != ACCEPTED
     assert "run after 777: no such task" in " ".join(fleet.there.texts())
+
+
+@pytest.mark.parametrize("nonce", [0, 9])
+def test_one_that_no_rover_here_can_drive_goes_to_another_gateway(fleet: Fleet, nonce: int) -> None:
+    stopped = fleet.here.stop(target=(1, 191))
+    fleet.world.run(0.3)
+    assert stopped.result == ACCEPTED
+    first = fleet.submit(fleet.here, 0.5, nonce=nonce)
+    assert first.result == ACCEPTED
+    assert fleet.tasks()[first.task_id].vehicle == 2
+    fleet.here.proceed(target=(1, 191))  # from now on rover 1 could drive a copy
+    fleet.world.run(2.0)
+    copy = fleet.here.command(MOVE, 0.5, 0, 0, nonce, 0, 0, 5, target=ANY, confirmation=1)
+    fleet.world.run(0.3)
+    assert (copy.result, copy.task_id) == (ACCEPTED, first.task_id)
+    assert list(fleet.tasks()) == [first.task_id]
+
+
+def test_one_that_no_rover_of_the_fleet_can_drive_is_refused(fleet: Fleet) -> None:
+    fleet.world.watched.to_clients.clear()  # the STOP takes its time to the other gateway
+    fleet.here.stop(target=(0, 191))
+    fleet.world.run(0.5)
+    sent = fleet.submit(fleet.here)
+    assert sent.result not in (None, ACCEPTED)
+    assert not fleet.tasks()

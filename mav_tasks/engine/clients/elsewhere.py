@@ -9,10 +9,12 @@ A STOP may come while nobody has the vehicle, or while its gateway is out of rea
 to each gateway that gets the vehicle soon after, or as long as the vehicle has not answered it.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeGuard
 
+from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets, Peer
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -20,7 +22,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavCmd
-from mav_tasks.mavlink.packet import split_datagram
+from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.services.command_receiver import is_stop
 
 EVERYBODY = 0  # target_system
@@ -118,6 +120,20 @@ class Elsewhere:
             self._pass_on(gateway, received)
         return bool(gateway)
 
+    def gateway_for_any(self, client: GcsClient) -> str:
+        """Return the gateway with the most rovers, for a task that none of ours can drive.
+
+        "": there is none; or the client is another gateway's, which has passed it on already.
+        """
+        if client.key[0] == FLEET_LINK:
+            return ""
+        counts = Counter(self._holders.values())
+        return max(sorted(counts), key=lambda name: counts[name], default="")
+
+    def pass_to(self, gateway: str, client: GcsClient, packet: Packet) -> None:
+        """Pass a client's packet on to a gateway, which answers it."""
+        self._send_on(gateway, client.key, packet.raw, is_first=False)
+
     def _target_of(self, received: Received) -> int | None:
         """Return whom a packet is for; a STOP to the server's own system is for all."""
         target: int | None = getattr(received.message, "target_system", None)
@@ -165,7 +181,10 @@ class Elsewhere:
                         each.owed.difference_update(theirs if is_for_all else {packet.system_id})
 
     def _pass_on(self, gateway: str, received: Received) -> None:
-        key = received.client.key
+        is_first = is_stop(received.message)
+        self._send_on(gateway, received.client.key, received.packet.raw, is_first=is_first)
+
+    def _send_on(self, gateway: str, key: tuple[str, Peer], raw: bytes, *, is_first: bool) -> None:
         number = self._numbers.get(key)
         if number is None:
             if len(self._clients) >= MOST:
@@ -173,9 +192,8 @@ class Elsewhere:
                 del self._numbers[self._clients.pop(oldest)]
             number = self._last = self._last + 1
             self._numbers[key], self._clients[number] = number, key
-        is_first = is_stop(received.message)
         there = TOWARDS, gateway, number
-        self._queue.append(Outgoing(FLEET_LINK, there, received.packet.raw, is_first))
+        self._queue.append(Outgoing(FLEET_LINK, there, raw, is_first))
 
 
 def _is_back(peer: Peer) -> TypeGuard[tuple[str, str, int]]:

@@ -4,11 +4,16 @@ A task command to (250, 191), the address of the server, is a submission for any
 is parsed and recognised as a repeat before a rover is chosen, so that a copy of a command is never
 a task of another rover. The answers come from that address; an accepting one names the rover, and
 the texts and the status of the task come from that rover's task server.
+
+In a fleet a gateway chooses among the rovers that it has. If none of them can drive the task, it
+passes the command on to another gateway, with all copies of it.
 """
 
+from collections.abc import Hashable
 from dataclasses import replace
 from functools import partial
 
+from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.commands.assignments import Assignments, check_any, driven_by
@@ -38,6 +43,7 @@ from mav_tasks.tasks.task import ANY, Draft, TaskId
 
 R = TaskReason
 
+REMEMBERS = 10.0  # s for a command that was passed on; clients repeat one within 4 s
 #: commands that mean something only for a rover that the sender knows
 _OF_ONE_ROVER = (MavCmd.DO_REPOSITION, MavCmd.NAV_SET_YAW_SPEED, MavCmd.NAV_RETURN_TO_LAUNCH)
 SUBMITTED = frozenset(GOALS) - frozenset(_OF_ONE_ROVER)
@@ -81,8 +87,11 @@ class AnyRover:
         submissions: Submissions,
         assignments: Assignments,
         displays: MessageRequests,
+        elsewhere: Elsewhere,
         settings: Settings,
     ) -> None:
+        self._elsewhere = elsewhere
+        self._passed_on: dict[Hashable, tuple[float, str]] = {}  # when, and to which gateway
         self._vehicles = vehicles
         self._registry = registry
         self._room = room
@@ -154,12 +163,24 @@ class AnyRover:
         if known is not None:
             self._answer_repeat(client, packet, pending, known, now=now)
             return
+        copied = client.key, packet.source, draft.marks.nonce, draft.marks.payload
+        if gateway := self._passed_on_to(copied, now=now):
+            self._elsewhere.pass_to(gateway, client, packet)
+            return
         again = partial(self._submit_late, client, packet, pending)
         refuse = partial(self._refuse, client, packet, pending)
         if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
             return
         self._submissions.check_open()
-        choice = self._assignments.choose(wish.goal, now=now)
+        try:
+            choice = self._assignments.choose(wish.goal, now=now)
+        except Rejection:
+            gateway = self._elsewhere.gateway_for_any(client)
+            if not gateway:
+                raise
+            self._passed_on[copied] = now, gateway
+            self._elsewhere.pass_to(gateway, client, packet)
+            return
         vehicle = self._vehicles.get(choice.vehicle)
         assert vehicle is not None, "it was chosen among them"
         asked = AnyRequest(client, vehicle, packet, pending, self._vehicles.our_address)
@@ -169,6 +190,13 @@ class AnyRover:
         draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)
         task = self._submissions.take_in(asked.rights, vehicle, draft, now=now)
         self._submissions.await_commit(asked, task, now=now)
+
+    def _passed_on_to(self, copied: Hashable, *, now: float) -> str:
+        """Return the gateway that has got an equal command just before; "": none."""
+        for key in [key for key, (at, _) in self._passed_on.items() if now - at > REMEMBERS]:
+            del self._passed_on[key]
+        _, gateway = self._passed_on.get(copied, (now, ""))
+        return gateway
 
     def _submit_late(
         self, client: GcsClient, packet: Packet, pending: Pending, *, now: float
