@@ -2,7 +2,9 @@
 
 import os
 import signal
+import sys
 import threading
+from collections.abc import Iterator
 
 import pytest
 
@@ -25,6 +27,15 @@ if (
     and signal.getsignal(signal.SIGINT) is signal.SIG_IGN
 ):
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def closed_stores() -> Iterator[None]:
+    """Close the stores of virtual worlds after each test."""
+    yield
+    module = sys.modules.get("tests.kit.store")
+    while module is not None and module.PromptSqliteStore.opened:
+        module.PromptSqliteStore.opened.pop().close()
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -95,12 +95,15 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Web, Path
 
 
 def is_whole(page: Web, records: Path, copies: Path) -> bool:
-    """Copy what the server has written so far; return whether the task's end is in it."""
+    """Copy what the server has written so far; return whether the task and its HOLD are in it."""
     for path in records.iterdir():
         shutil.copy(path, copies)
     (run,) = page.get("/records")["records"]
     answer = page.client.get(f"/api/v1/records/{run['name']}")
-    return answer.is_success and "completed" in answer.text
+    if not answer.is_success or "completed" not in answer.text:
+        return False
+    (rover,) = answer.json()["vehicles"]
+    return bool(rover["modes"]) and rover["modes"][-1][1] == "HOLD"
 
 
 def test_tiles_of_a_file_are_below_the_rover(

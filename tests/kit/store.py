@@ -3,7 +3,8 @@
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from select import select
+from select import POLLIN, poll
+from typing import ClassVar
 
 from mav_tasks.store import Kept, MemoryStore, NotKept, Outcome
 from mav_tasks.store.sqlite import SqliteStore
@@ -13,11 +14,15 @@ from mav_tasks.tasks.events import Event
 class PromptSqliteStore(SqliteStore):
     """The real store on a real file; virtual time stands still while it writes."""
 
+    #: closed after each test: many worlds would use up the process's files
+    opened: ClassVar[list["PromptSqliteStore"]] = []
+
     def __init__(self, path: Path, *, wall_offset: float | Callable[[], float]) -> None:
         offset = wall_offset if callable(wall_offset) else lambda: wall_offset
         super().__init__(path, wall_offset=offset)
         self.events: list[Event] = []
         self._kept = 0
+        self.opened.append(self)
 
     def append(self, events: Sequence[Event]) -> None:
         super().append(events)
@@ -32,7 +37,9 @@ class PromptSqliteStore(SqliteStore):
             if self._kept < len(self.events):
                 mail = self.fileno()
                 assert mail is not None, "closed"
-                assert select([mail], [], [], 10)[0], "the disk does not answer"
+                ready = poll()
+                ready.register(mail, POLLIN)
+                assert ready.poll(10_000), "the disk does not answer"
                 outcomes += super().take_outcomes()
         return outcomes
 

@@ -180,3 +180,4 @@ def test_faults_of_gateways_in_virtual_time(first: int) -> None:
             least = -0.1 - METRES * len(life.skipped)
             assert least < more < 0.1 + ROLLED * life.released, f"seed {seed}: {more}"
             life.world.check()
+            life.world.shared.store.close()
