@@ -152,7 +152,7 @@ class Gateway:
     def _await_lease(self) -> None:
         """Wait for the lease, and say what it takes so long; raise StoreError."""
         end = time.monotonic() + JOIN_LIMIT
-        why = "another process has the name"
+        why = "perhaps another process has the name: end it, or choose another --gateway NAME"
         while not self._keeper.epoch:
             fd = self._keeper.fileno()
             left = end - time.monotonic()

@@ -145,7 +145,7 @@ async def wait(
 
 @app.command()
 @command
-async def home(terms: TaskOptions, common: AnyCommon, speed: Speed = None) -> None:
+async def home(terms: TaskOptions, common: Common, speed: Speed = None) -> None:
     """Return to the rover's home."""
     await _submit([GoTo(None, speed=speed)], terms, common)
 

@@ -130,7 +130,7 @@ class Reception:
 
     def stop_taken(self, vehicle: int, *, now: float) -> None:
         """Obey the STOPs that came before this gateway got a vehicle, and that nobody obeyed."""
-        for received in self.elsewhere.stops_of(vehicle, now=now):
+        for received in self.elsewhere.stops_for(vehicle, now=now):
             self.gcs.hear_out(received, now=now)
             self._see_to(received, now=now)
         self.elsewhere.obeyed(vehicle)

@@ -92,8 +92,9 @@ class Dependencies:
     def check_here(self, after: int) -> None:
         """Raise Rejection if a waiting task cannot be changed to run after this one."""
         if self.is_shared and self._registry.get(after) is None:
-            words = f"run after {after}: no rover of this gateway has that task"
-            raise Rejection(R.UNKNOWN_DEPENDENCY, f"{words}; only a new task can name it")
+            words = f"run after {after}: no rover of this gateway has that task:"
+            words += " cancel this one, and submit it again to run after that"
+            raise Rejection(R.UNKNOWN_DEPENDENCY, words)
         self.check(after)
 
     def check_cycle(self, task: Task, after: int) -> None:

@@ -51,7 +51,6 @@ class Executor:
         self._lost_at: Pose | None = None  # the last pose before the loss
         self._was_silent = False  # heartbeats were lost, too
         self._is_taken_over = False  # from another gateway, and it has not resumed since
-        self._is_unbegun = False  # that gateway had not begun to move the vehicle
         self._untaken_in: ModeKind | None = None  # mode at the loss, if we had sent nothing
         self._meter: TimingMeter | None = None  # while EXECUTING
         #: intervals between setpoints of all tasks of this run, s
@@ -94,7 +93,7 @@ class Executor:
         """Make a task the active one, in the state that it has."""
         self.task_id = task.id
         self._executed_before = task.progress.execution_time
-        self._resumes_by_itself = self._is_taken_over = self._is_unbegun = False
+        self._resumes_by_itself = self._is_taken_over = False
 
     def take_over(self, task: Task, *, now: float) -> None:
         """Make a task the active one that another gateway drove; it resumes by itself."""
@@ -102,7 +101,6 @@ class Executor:
         self._since = self._lost_until = now
         self._lost_at, self._was_silent, self._untaken_in = None, False, None
         self._resumes_by_itself = self._is_taken_over = True
-        self._is_unbegun = not has_moved(task)
 
     def give_up(self) -> None:
         """Drop the active task in the state that it has, to make room for another."""
@@ -115,6 +113,7 @@ class Executor:
         If the vehicle was moved off the task's line, hold the task rather than drive back blindly.
         """
         task = self._active(S.PAUSED)
+        self._is_taken_over = False
         if seen.motion is not None and is_off_line(task, seen.motion.pose):
             self._change(S.HELD, R.OFF_TRACK, actor=actor, now=now)
         else:
@@ -335,7 +334,7 @@ class Executor:
             lost = R.POSITION_LOST
         if lost:
             self._lost_at, self._was_silent = None if motion is None else motion.pose, False
-            self._is_taken_over = self._is_unbegun = False
+            self._is_taken_over = False
             self._untaken_in = seen.mode if seen.is_untouched and not seen.armed else None
             self.pause(lost, actor=SERVER, now=now)
         return bool(lost)
@@ -359,7 +358,7 @@ class Executor:
         if seen.armed:
             ours = seen.mode in (ModeKind.OURS, ModeKind.HOLD)
         else:  # in the mode that it had when it was lost, before we took it
-            ours = self._is_unbegun or seen.mode is self._untaken_in
+            ours = seen.mode is self._untaken_in
         task = self._active(S.PAUSED)
         if not ours or start_blocker(seen, watch=watch, now=now, goal=goal_of(task)):
             self._lost_until = now

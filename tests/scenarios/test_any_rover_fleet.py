@@ -87,6 +87,43 @@ def test_a_nonce_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:
     assert fleet.tasks()[new.task_id].vehicle == 2
 
 
+def test_one_that_is_cleared_before_its_nonce_is_refused_is_answered(fleet: Fleet) -> None:
+    """The store takes a while; a STOP with *clear* comes meanwhile."""
+    first = fleet.submit(fleet.here)
+    fleet.world.watched.to_clients.clear()
+    it = fleet.world.gateways["b"]
+    it.store.is_reached = False
+    again = fleet.there.move(0.5, nonce=7, target=ANY)
+    fleet.world.run(0.1)
+    fleet.there.stop(clear=True, target=(0, 191))
+    fleet.world.run(0.1)
+    it.store.is_reached = True
+    fleet.world.run(1.0)
+    assert (again.result, again.task_id) == (ACCEPTED, first.task_id)
+
+
+def test_a_stop_for_all_stops_a_rover_that_is_taken_later_and_no_other_again(
+    tmp_path: Path,
+) -> None:
+    world = FleetWorld(tmp_path, rovers=2)
+    world.cut("server", 2)
+    world.cut("b", 1)
+    assert [world.holder(rover).name for rover in (1, 2)] == ["server", "b"]
+    world.run(4.0)
+    world.mend("server", 2)
+    world.watched.to_clients.clear()
+    world.run(1.5)
+    stopped = world.client.stop(target=(0, 191))
+    world.run(0.1)
+    going = world.client.proceed(target=(1, 191))
+    world.run(0.1)
+    assert (stopped.result, going.result) == (ACCEPTED, ACCEPTED)
+    world.kill("b")
+    assert world.holder(2).name == "server"
+    world.run(1.0)
+    assert world.shared.part(frozenset({1, 2})).paused == {2: R.STOPPED}
+
+
 def test_two_copies_at_once_make_one_task(fleet: Fleet) -> None:
     sent = [client.move(0.5, nonce=7, target=ANY) for client in (fleet.here, fleet.there)]
     fleet.world.run(0.5)

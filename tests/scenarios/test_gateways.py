@@ -426,9 +426,10 @@ def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
 
 
 @pytest.mark.parametrize("disarmed_by", ["nobody", "a person"])
-def test_a_task_that_had_not_armed_its_rover_goes_on_after_a_takeover(
+def test_a_task_that_had_not_armed_its_rover_waits_for_a_person_after_a_takeover(
     tmp_path: Path, disarmed_by: str
 ) -> None:
+    """Nobody can tell it from one that a person disarmed between the two gateways."""
     fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
     if disarmed_by == "a person":
         first = fleet.submit(1.0)
@@ -447,11 +448,10 @@ def test_a_task_that_had_not_armed_its_rover_goes_on_after_a_takeover(
     fleet.world.watched.loses = lambda *_: False
     assert fleet.world.holder() is fleet.other
     if disarmed_by == "nobody":
-        fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=20)
-        assert abs(fleet.world.truth.north - 1.0) < 0.1
+        fleet.world.until(lambda: fleet.task(task).state is S.HELD, within=45)
     else:
         fleet.world.run(10.0)
-        assert not fleet.world.rover.autopilot.armed
+    assert not fleet.world.rover.autopilot.armed
     fleet.world.check()
 
 

@@ -11,6 +11,7 @@ to each gateway that gets the vehicle soon after, or as long as the vehicle has 
 
 from collections import Counter
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from typing import TypeGuard
 
@@ -94,6 +95,15 @@ class Elsewhere:
         self._stops = [each for each in self._stops if not each.is_over(now=now)]
         return [each.received for each in self._stops if each.is_for(vehicle, now=now)]
 
+    def stops_for(self, vehicle: int, *, now: float) -> list[Received]:
+        """Return the same STOPs as for this vehicle alone: others may have been continued since."""
+        found = []
+        for received in self.stops_of(vehicle, now=now):
+            alone = copy(received.message)
+            alone.target_system = vehicle  # type: ignore[union-attr]
+            found.append(received._replace(message=alone))
+        return found
+
     def obeyed(self, vehicle: int) -> None:
         """Forget the STOPs that a vehicle had not answered: it is ours, and stops."""
         for each in self._stops:
@@ -156,15 +166,18 @@ class Elsewhere:
         )
 
     def _note_stop(self, received: Received, *, now: float) -> None:
-        target = self._target_of(received)
-        owed = {
-            each
-            for each in self._had
-            if target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
-        }
-        self._stops = [*self._stops[-MOST_STOPS:], _Stop(now, received, target, owed)]
-        client, component = received.client, getattr(received.message, "target_component", 0)
-        if owed and not self._vehicles.lease.is_trusted and client.key[0] != FLEET_LINK:
+        client, target = received.client, self._target_of(received)
+        owed: set[int] = set()
+        if client.key[0] != FLEET_LINK:  # its own gateway passes it on
+            theirs = (each for each in self._had if self._vehicles.look_at(each) is None)
+            owed = {each for each in theirs if target in (EVERYBODY, each)}
+        said = client.key, target
+        kept = [each for each in self._stops if (each.received.client.key, each.target) != said]
+        if len(kept) >= MOST_STOPS:  # those that nobody has to hear any more go first
+            kept = sorted(kept, key=lambda each: bool(each.owed))[-MOST_STOPS + 1 :]
+        self._stops = [*kept, _Stop(now, received, target, owed)]
+        component = getattr(received.message, "target_component", 0)
+        if owed and not self._vehicles.lease.is_trusted:
             client.answer_in_words(NOT_PASSED_ON, Address(min(owed), component), now=now)
 
     def _note_answer(self, client: tuple[str, Peer], data: bytes, *, by: str) -> None:

@@ -36,7 +36,7 @@ from mav_tasks.services.command_receiver import Answer, Command, Pending
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, reused
 from mav_tasks.tasks.events import SubmissionRefused
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.lifecycle import WAITING, TaskReason
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import ANY, Draft, TaskId
@@ -138,7 +138,8 @@ class AnyRover:
         task = self._registry.get(taken.task_id)
         if task is None:  # not stored in time, and withdrawn already
             return
-        self._room.withdraw(task, now=now)
+        if task.state in WAITING:  # else it was cancelled before that
+            self._room.withdraw(task, now=now)
         for asked in self._submissions.retract(task):
             if taken.payload == task.marks.payload:
                 acknowledge(asked, TaskId(taken.known))
@@ -165,6 +166,7 @@ class AnyRover:
             return
         copied = client.key, packet.source, draft.marks.nonce, draft.marks.payload
         if gateway := self._passed_on_to(copied, now=now):
+            self._passed_on[copied] = now, gateway
             self._elsewhere.pass_to(gateway, client, packet)
             return
         again = partial(self._submit_late, client, packet, pending)

@@ -143,8 +143,9 @@ class Assignments:
             return ""
         if tasks.paused and (tasks.paused not in DISABLED or tasks.halts.is_by_word):
             return ""
-        if vehicle is None:  # not heard in this run
-            return "silent" if self._vehicles.has_listened(now=now) else ""
+        if vehicle is None:  # not heard in this run; another gateway may have begun its task
+            is_lost = self._vehicles.has_listened(now=now) and not self._vehicles.lease.is_shared
+            return "silent" if is_lost else ""
         if not vehicle.is_heard(now=now):
             return "silent"
         if tasks.paused:

@@ -88,8 +88,9 @@ class DependencyQuestions:
     def _give_up_late(self, *, now: float) -> None:
         while self._held and self._held[0].until <= now:
             after, _, _, refuse = self._held.popleft()
-            words = f"run after {after}: the fleet's database does not say in time whether"
-            refuse(Rejection(R.STORE_UNAVAILABLE, f"{words} that task exists"), now=now)
+            words = f"run after {after}: the fleet's database did not say within {WITHIN:g} s"
+            words += " whether that task exists: submit it again"
+            refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now)
         self._plan()
 
     def _plan(self) -> None:
