@@ -53,10 +53,10 @@ def test_it_passes_the_simulated_rover_with_everything_on(persona: str, tmp_path
     truth = tmp_path / "truth.csv"
     options = ("--persona", persona, "--speed", SPEED, "--truth", str(truth))
     everything = ("--arm", "--drive", "--write", "--persona", persona, "--speed", SPEED)
-    for _ in range(2):
+    for _ in range(2):  # at this speed a busy machine makes gaps in its stream, seen or not
         with rover(tmp_path, *options) as url:
             result = check(url, *everything)
-        if STARVED not in result.stdout:
+        if result.returncode == 0 and STARVED not in result.stdout:
             break
     assert result.returncode == 0, result.stdout
     *lines, summary = result.stdout.splitlines()
