@@ -131,9 +131,9 @@ class Elsewhere:
         return bool(gateway)
 
     def gateway_for_any(self, client: GcsClient) -> str:
-        """Return the gateway with the most rovers, for a task that none of ours can drive.
+        """Return the gateway with the most rovers, for a task that our rovers cannot drive.
 
-        "": there is none; or the client is another gateway's, which has passed it on already.
+        Return "" if no other gateway has rovers, or if the client's gateway passed the task on.
         """
         if client.key[0] == FLEET_LINK:
             return ""
