@@ -60,8 +60,7 @@ def it(both: tuple[Stand, Web]) -> Iterator[Web]:
         return not queue["running"] and not queue["waiting_count"]
 
     wait_until(is_empty, within=15, what="an empty queue")
-    epoch = running.get("/vehicles/1/queue")["halt_epoch"]
-    running.post("/vehicles/1/resume", {"epoch": epoch})
+    running.resume()
 
 
 @pytest.fixture

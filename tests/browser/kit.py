@@ -93,10 +93,27 @@ def _wait_for_words(page: Any, selector: str, words: str) -> None:
     )
 
 
-def resume(it: Web, rover: int = 1) -> None:
-    """Let a rover's tasks run."""
-    epoch = it.get(f"/vehicles/{rover}/queue")["halt_epoch"]
-    it.post(f"/vehicles/{rover}/resume", {"epoch": epoch})
+def press_resume(page: Any, where: str, words: str = "") -> None:
+    """Resume a rover by the page, with these words in the dialogue.
+
+    Again if the page says that something halted the rover since: on a busy machine the server may
+    take the web process's copy of a pause after the page has shown the pause.
+    """
+    for _ in range(3):
+        page.click(f"{where} >> text=Resume…")
+        says(page, ".box", words)
+        page.click(".box >> text='Resume'")
+        page.wait_for_function(_ANSWERED)
+        if not page.query_selector(".box"):
+            return
+        says(page, ".box .failure", "Something halted the rover after this page was drawn.")
+        page.click(".box >> text='Back'")
+    raise AssertionError("three times: something halted the rover")
+
+
+_ANSWERED = (
+    "() => !document.querySelector('.box') || document.querySelector('.box .failure:not([hidden])')"
+)
 
 
 def add(it: Web, goal: dict[str, Any], **terms: Any) -> Any:

@@ -14,7 +14,7 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
-from tests.browser.kit import HOSTILE, judge, move, opened, resume, says, text_of
+from tests.browser.kit import HOSTILE, judge, move, opened, press_resume, says, text_of
 from tests.kit.processes import Process, Stand, free_udp_ports, process, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
@@ -70,7 +70,7 @@ def test_it_goes_on_after_the_server_and_the_web_process_were_killed(
             says(page, "#stop-outcome", "STOP: acknowledged")
             page.wait_for_selector("#banner", state="hidden", timeout=AWAY)
             says(page, ".card", "STOP is in force")
-            resume(first)
+            first.resume()
             first.process.end(signal.SIGKILL)
             says(page, "#banner", "The connection to the web process is lost; trying again.")
             says(page, "#banner", "STOP is still sent when you press it.")
@@ -87,7 +87,7 @@ def test_it_goes_on_after_the_server_and_the_web_process_were_killed(
                 page.wait_for_selector(".card:not(.old)")
                 page.wait_for_selector(".rover-mark:not(.old)", state="attached")
                 says(page, ".card", "STOP is in force")
-                resume(second)
+                second.resume()
                 task = move(second, 0.3)
                 page.click("#tab-past")
                 says(page, "#panel-past .task", f"Task {task['id']}: move 0.3 m")
@@ -138,9 +138,7 @@ def test_tasks_that_the_servers_end_interrupted_are_released(
                 if how == "skip":  # it halts the rover once more: the page must know
                     page.wait_for_selector(".task.now", state="detached")
                 if shown.get(f"/vehicles/{rover}/queue")["paused"]:
-                    page.click(".notice >> text=Resume…")
-                    page.click(".box >> text='Resume'")
-                    page.wait_for_selector(".box", state="detached")
+                    press_resume(page, ".notice")
             assert shown.wait_for(tasks["skip"], "cancelled")
             shown.wait_for(after["id"], "completed")
             says(page, "#panel-queue .what", "Rover 3: no task runs, 0 wait")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mav_tasks import Move, SyncClient
-from tests.browser.kit import PHONE, judge, opened, resume, says
+from tests.browser.kit import PHONE, judge, opened, says
 from tests.kit.processes import stand, wait_until
 from tests.kit.web import Web, web
 
@@ -121,7 +121,7 @@ def test_tracks_and_goals_of_all_are_shown_if_they_are_wanted(
         many.post(f"/vehicles/{rover}/clear", {})
         task = many.post(f"/vehicles/{rover}/tasks", body)
         if rover < 5:
-            resume(many, rover)
+            many.resume(rover)
             driven.append(task["id"])
     for each in driven:  # where 20 rovers and a browser share two processors, a server is late
         while many.wait_for(each, "completed", "held")["state"] == "held":

@@ -53,17 +53,12 @@ def page(both: tuple[Stand, Web]) -> Iterator[Web]:
     yield it
     it.post("/stop", {"clear": True})
     wait_until(lambda: not _active(it), within=15, what="an empty queue")
-    resume(it)
+    it.resume()
 
 
 def _active(it: Web) -> Any:
     queue = it.get("/vehicles/1/queue")
     return queue["running"] or queue["waiting_count"]
-
-
-def resume(it: Web) -> None:
-    epoch = it.get("/vehicles/1/queue")["halt_epoch"]
-    it.post("/vehicles/1/resume", {"epoch": epoch})
 
 
 def move(it: Web, metres: float, **more: Any) -> Any:
@@ -185,7 +180,7 @@ def test_why_a_task_waits_and_what_helps(page: Web) -> None:
     assert queue["waiting"][0]["remedy"] == {"action": "resume", "words": "Resume lets it run."}
     rover = page.get("/vehicles/1")
     assert rover["control"] == "paused"
-    resume(page)
+    page.resume()
     page.wait_for(task["id"], "completed")
 
 
@@ -376,7 +371,7 @@ def test_a_task_carries_the_halt_epoch_that_releases_it(page: Web) -> None:
         page.post("/vehicles/1/pause", {})
         epoch = page.get("/vehicles/1/queue")["halt_epoch"]
         assert page.task(task)["halt_epoch"] == epoch > 0
-        resume(page)
+        page.resume()
 
 
 def test_events_are_as_the_document_says(page: Web) -> None:
@@ -507,7 +502,7 @@ def test_idle_streams_and_slow_readers_keep_nobody_from_a_stop(
                 held.append(each)
             stops = [it.post("/stop", {}) for _ in range(5)]
             assert {stop["phase"] for stop in stops} == {"acknowledged"}
-            resume(it)
+            it.resume()
             unended = held[-1]
             unended.settimeout(25)
             assert unended.recv(100) == b""  # closed after 10 s without a request
@@ -652,4 +647,4 @@ async def test_a_client_made_of_the_document_drives_a_task(both: tuple[Stand, We
     assert (await made.get_vehicles()).vehicles[0].vehicle == 1
     stop = await made.post_stop(data={"vehicle": 1})
     assert stop.phase == "acknowledged"
-    both[1].post("/vehicles/1/resume", {"epoch": both[1].get("/vehicles/1/queue")["halt_epoch"]})
+    both[1].resume()

@@ -119,8 +119,7 @@ def test_who_floods_stop_keeps_nobody_from_an_answer_nor_a_rover_stopped(page: W
     with flood(page, stop, clients=12):
         answers = [page.post("/stop", {}) for _ in range(3)]
     assert {each["phase"] for each in answers} == {"acknowledged"}
-    epoch = page.get("/vehicles/1/queue")["halt_epoch"]
-    page.post("/vehicles/1/resume", {"epoch": epoch})
+    page.resume()
     task = page.post("/vehicles/1/tasks", {"goals": [{"kind": "move", "distance": 0.3}]})
     page.wait_for(task["id"], "completed")
 
@@ -160,7 +159,7 @@ def test_nothing_but_a_resume_that_has_seen_it_ends_a_stop(both: tuple[Stand, We
     it, page = both
     page.post("/stop", {"clear": True})
     seen = page.get("/vehicles/1/queue")["halt_epoch"]
-    page.post("/vehicles/1/resume", {"epoch": seen})
+    page.resume()
     move = {"goals": [{"kind": "move", "distance": 5}]}
     task = page.post("/vehicles/1/tasks", move)["id"]
     later = page.post("/vehicles/1/tasks", move | {"delay": 1000})["id"]

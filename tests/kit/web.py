@@ -37,6 +37,19 @@ class Web:
         assert answer.is_success, answer.text
         return answer.json() if answer.content else None
 
+    def resume(self, rover: int = 1) -> None:
+        """Let a rover's tasks run.
+
+        Each copy of a halt counts as a halt. On a busy machine the server may take the web client's
+        copy of a pause or STOP just after this has read the epoch: then read it again.
+        """
+        for _ in range(3):
+            epoch = self.get(f"/vehicles/{rover}/queue")["halt_epoch"]
+            answer = self.send("POST", f"/vehicles/{rover}/resume", {"epoch": epoch})
+            if answer.is_success or answer.json()["reason"] != "stale":
+                break
+        assert answer.is_success, answer.text
+
     def task(self, task_id: int) -> Any:
         """Return a task."""
         return self.get(f"/tasks/{task_id}")
