@@ -37,8 +37,13 @@ JOIN_LIMIT = 10.0  # s; a lease of an earlier process with this name ends within
 class Gateway:
     """A lease and the store under it; ``take`` returns what the engine must know of the lease."""
 
-    def __init__(self, place: str, settings: GatewaySettings, retention: Retention) -> None:
-        """Join the fleet whose database ``place`` names; raise StoreError if that fails."""
+    def __init__(
+        self, place: str, settings: GatewaySettings, retention: Retention, *, system_id: int
+    ) -> None:
+        """Join the fleet whose database ``place`` names; raise StoreError if that fails.
+
+        ``system_id``: with which this gateway sends.
+        """
         where = parse(place)
         host = settings.address or own_address(where)
         self.name = settings.name
@@ -48,7 +53,7 @@ class Gateway:
         self._ours: frozenset[int] = frozenset()  # vehicles that the engine had
         self._going: dict[int, str] = {}  # that it was asked to forget, and who hears them
         self._gone: frozenset[int] = frozenset()  # that it has forgotten
-        self._keeper = Keeper(where, settings.name, host=host)
+        self._keeper = Keeper(where, settings.name, host=host, system_id=system_id)
         try:
             self._await_lease()
             self.store = FleetStore(

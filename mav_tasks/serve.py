@@ -164,7 +164,12 @@ def _join(settings: ServerSettings) -> "Gateway | None":
     kind_of(settings.store)  # explains a missing package
     from mav_tasks.gateway import Gateway  # noqa: PLC0415  # needs an extra
 
-    return Gateway(settings.store, settings.gateway, settings.engine.retention)
+    return Gateway(
+        settings.store,
+        settings.gateway,
+        settings.engine.retention,
+        system_id=settings.engine.identity.system_id,
+    )
 
 
 def _take_signals() -> None:

@@ -73,11 +73,13 @@ class Keeper:
         *,
         host: str,
         port: int = 0,
+        system_id: int = 0,
         terms: Terms | None = None,
     ) -> None:
         """Take the name, and begin. ``host``: the IP address at which others reach this machine.
 
-        Raise StoreError if the database cannot be used, or another process has the name.
+        ``system_id``: with which this gateway sends, 0: unknown. Raise StoreError if the database
+        cannot be used, another process has the name, or a gateway runs with another system id.
         """
         if not _NAME.fullmatch(name):
             raise StoreError(f"gateway {name!r}: a name has up to 40 letters, digits, dots, - or _")
@@ -97,7 +99,9 @@ class Keeper:
                 " fleet.address must be an IP address of this machine"
             ) from error
         try:
-            database = LeaseDatabase(address, name, host=host, port=self._peers.port)
+            database = LeaseDatabase(
+                address, name, host=host, port=self._peers.port, system_id=system_id
+            )
         except BaseException:
             self._peers.close()
             self._selector.close()

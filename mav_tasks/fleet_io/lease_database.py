@@ -53,16 +53,20 @@ class LeaseDatabase:
     After any error the session is over, and ``connect`` begins a new one.
     """
 
-    def __init__(self, address: Address, name: str, *, host: str, port: int) -> None:
+    def __init__(
+        self, address: Address, name: str, *, host: str, port: int, system_id: int = 0
+    ) -> None:
         """Make the tables if they are missing, and take the name.
 
-        ``host`` and ``port`` are where this process answers pings. Raise StoreError, with a line
-        that names the process which has the name. If the database is only too slow for a lease,
-        there is no session yet, and ``late`` says why.
+        ``host`` and ``port`` are where this process answers pings. ``system_id`` is the one with
+        which it sends, 0: unknown. Raise StoreError, with a line that names the process which has
+        the name, or a gateway that runs with another system id. If the database is only too slow
+        for a lease, there is no session yet, and ``late`` says why.
         """
         self._address = address
         self.name = name
         self._host, self._port = host, port
+        self._system_id = system_id
         self._session: Session | None = None
         self._lock: SessionLock | None = None
         self._number = 0
@@ -119,10 +123,25 @@ class LeaseDatabase:
             check_writable(session)
             check_rights(session)
             schema.migrate(session)
+            self._check_system_id(session)
             ((secret,),) = session.execute("SELECT secret FROM gateway_secret").fetchall()
             return str(secret).encode()
         finally:
             session.close()
+
+    def _check_system_id(self, session: Session) -> None:
+        """Raise PostgresError if a gateway that runs has another system id.
+
+        A rover knows its ground station by that id: it may take a second one for a stranger, and
+        its signatures fence gateways by it.
+        """
+        found = session.execute(_OTHER_ID, (NAME_LOCK, self.name, self._system_id)).fetchone()
+        if found is not None and self._system_id:
+            other, theirs = found
+            raise PostgresError(
+                f"identity.system_id is {self._system_id} here and {theirs} at gateway {other}:"
+                " all gateways of a fleet need the same one"
+            )
 
     def _take_name(self, session: Session) -> None:
         session.execute(
@@ -130,8 +149,8 @@ class LeaseDatabase:
             " WHERE NOT EXISTS (SELECT 1 FROM gateways WHERE name = ?) ON CONFLICT DO NOTHING",
             (self.name, self.name),
         )
-        query = "SELECT number, machine, pid, since FROM gateways WHERE name = ?"
-        ((number, machine, pid, since),) = session.execute(query, (self.name,)).fetchall()
+        query = "SELECT number, machine, pid, since, system_id FROM gateways WHERE name = ?"
+        ((number, machine, pid, since, said),) = session.execute(query, (self.name,)).fetchall()
         if self._lock is None or number != self._number:
             self._number, self._lock = number, SessionLock(NAME_LOCK << 32 | number)
         try:
@@ -147,6 +166,10 @@ class LeaseDatabase:
                 f"the gateway name {self.name} is in use by a process {words}:"
                 " end that one, or choose another name"
             ) from error
+        if said != self._system_id:
+            session.execute(
+                "UPDATE gateways SET system_id = ? WHERE number = ?", (self._system_id, number)
+            )
 
     def _queue(self, session: Session, request: Request) -> None:
         """Queue the statements of a request.
@@ -261,6 +284,14 @@ WHERE holdings.gateway IS NULL
 _FREE = """
 UPDATE holdings SET gateway = NULL FROM gateways
 WHERE vehicle = ? AND gateway = gateways.number AND gateways.number = ? AND epoch = ?
+"""
+#: of gateways that run: a session has the lock of each one's name
+_OTHER_ID = """
+SELECT name, system_id FROM gateways JOIN pg_locks ON objid = gateways.number::oid
+WHERE locktype = 'advisory' AND granted AND objsubid = 1 AND classid = ?
+  AND database = (SELECT oid FROM pg_database WHERE datname = current_database())
+  AND name <> ? AND system_id NOT IN (0, ?)
+ORDER BY number LIMIT 1
 """
 _READ = """
 SELECT name, epoch, renewals, pid_of_lock IS NOT NULL,

@@ -91,6 +91,12 @@ def fleet(postgres: PostgresServer, tmp_path: Path) -> Iterator[Fleet]:
         yield Fleet(opened, tmp_path, postgres.new_database())
 
 
+def test_a_gateway_whose_system_id_is_another_does_not_start(fleet: Fleet) -> None:
+    fleet.start("a")
+    with pytest.raises(AssertionError, match="system_id is 249 here and 250 at gateway a: all"):
+        fleet.start("b", "--set", "identity.system_id=249")
+
+
 def test_a_gateway_takes_over_from_one_that_was_killed(fleet: Fleet) -> None:
     fleet.start("a")
     assert fleet.holder() == "a"

@@ -122,6 +122,9 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         ),
         "CREATE INDEX of_nonce ON nonces (task_id)",
     ),
+    (  # 0: not known, of an older server
+        "ALTER TABLE gateways ADD COLUMN system_id INTEGER NOT NULL DEFAULT 0",
+    ),
 )
 
 

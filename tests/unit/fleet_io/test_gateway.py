@@ -20,7 +20,7 @@ SLOW = "gateway a waits for its lease, 10 s at most: the fleet's database: anoth
 
 
 def opened(url: str) -> Gateway:
-    return Gateway(url, GatewaySettings(name="a"), Retention())
+    return Gateway(url, GatewaySettings(name="a"), Retention(), system_id=250)
 
 
 def ended(it: Gateway) -> None:

@@ -27,8 +27,8 @@ NAMES = ("a", "b", "c")
 STEPS = 400
 
 
-def opened(url: str, name: str) -> LeaseDatabase:
-    return LeaseDatabase(parse(url), name, host="127.0.0.1", port=1)
+def opened(url: str, name: str, *, system_id: int = 0) -> LeaseDatabase:
+    return LeaseDatabase(parse(url), name, host="127.0.0.1", port=1, system_id=system_id)
 
 
 @contextmanager
@@ -184,6 +184,21 @@ def test_a_second_process_of_a_name_is_refused_and_the_first_one_named(
         (ghost,) = [each for each in row.rivals if each.name == "a"]
         assert not ghost.in_session
         assert second.execute(Join("a", Eviction("a", ghost.epoch, ghost.renewals))).row.epoch
+
+
+def test_a_gateway_with_another_system_id_than_one_that_runs_is_refused(
+    postgres: PostgresServer,
+) -> None:
+    url = postgres.new_database()
+    with closing(opened(url, "a", system_id=250)):
+        opened(url, "b", system_id=250).close()
+        with pytest.raises(StoreError, match="system_id is 249 here and 250 at gateway a: all"):
+            opened(url, "b", system_id=249)
+    with (  # a does not run: all of the fleet can get another one
+        closing(opened(url, "b", system_id=249)),
+        pytest.raises(StoreError, match="system_id is 250 here and 249 at gateway b"),
+    ):
+        opened(url, "a", system_id=250)
 
 
 def test_a_new_session_ends_the_lost_one_of_the_same_process(postgres: PostgresServer) -> None:
