@@ -92,6 +92,8 @@ class LeaseDatabase:
         session = Session(self._address, purpose=f"gateway {self.name}", limits=LIMITS)
         try:
             check_writable(session)
+            if not self._number:  # the first time
+                self._check_system_id(session)
             self._take_name(session)
         except BaseException:
             session.close()
@@ -123,7 +125,6 @@ class LeaseDatabase:
             check_writable(session)
             check_rights(session)
             schema.migrate(session)
-            self._check_system_id(session)
             ((secret,),) = session.execute("SELECT secret FROM gateway_secret").fetchall()
             return str(secret).encode()
         finally:

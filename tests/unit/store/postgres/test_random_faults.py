@@ -6,10 +6,12 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from subprocess import Popen
+from typing import Any
 
 import pytest
 
 from tests.kit.postgres import PostgresServer, connected
+from tests.kit.processes import wait_until
 from tests.kit.tcp_proxy import TcpProxy
 from tests.unit.store.test_failures import child, line
 
@@ -125,6 +127,15 @@ FAULTS: list[Callable[[PostgresServer, TcpProxy, str, Life], None]] = [
 ]
 
 
+def await_end(tables: Any) -> None:
+    """Wait until the database has ended a killed server's sessions: the next one waits 1 s only."""
+    query = (
+        "SELECT count(*) FROM pg_stat_activity"
+        " WHERE datname = current_database() AND application_name = 'mav-tasks serve'"
+    )
+    wait_until(lambda: tables.execute(query).fetchone() == (0,), within=20, what="no session")
+
+
 @contextmanager
 def proxied(server: PostgresServer, url: str) -> Iterator[tuple[TcpProxy, str]]:
     with closing(TcpProxy(server.port)) as proxy:
@@ -154,6 +165,7 @@ def test_nothing_that_was_kept_is_lost_and_nothing_is_there_twice(
                 life.until_kept(life.kept + AT_LEAST)
                 life.die()
             with connected(url) as tables:
+                await_end(tables)
                 found = tables.execute("SELECT id, number FROM tasks ORDER BY id").fetchall()
             assert [each[0] for each in found] == list(range(1, len(found) + 1))
             assert len({each[1] for each in found}) == len(found)
