@@ -4,14 +4,17 @@ import { newKey, post } from "./api.js";
 import { consequenceOf } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { h } from "./dom.js";
-import { state } from "./store.js";
+import { choose, state } from "./store.js";
 
 const NAMES = {
   move: "Move straight", rotate: "Turn by an angle", drive: "Drive at a velocity", goto: "Go to (metres)",
   goto_global: "Go to (latitude, longitude)", face: "Face a heading", wait: "Wait", home: "Return home",
 };
 
-/** Open the form for a rover, with the parts of a goal filled in. */
+const ANY = "any"; // as the API calls it
+const ANY_WORDS = "The server chooses the rover that would begin it first, and chooses again if another one would. The page then shows that rover's queue.";
+
+/** Open the form for a rover, with the parts of a goal filled in; where there are several, any of them can be chosen. */
 export function openTaskForm(vehicle, goal = {}) {
   const kinds = state.session.goals;
   const select = h("select", { name: "kind" }, ...kinds.map((kind) => h("option", { value: kind.kind, selected: kind.kind === goal.kind }, NAMES[kind.kind] ?? kind.kind)));
@@ -31,13 +34,22 @@ export function openTaskForm(vehicle, goal = {}) {
     labelled("Start in (s)", h("input", { name: "delay", type: "number", min: 0, step: "any" }), "empty: when it is its turn"),
     labelled("Repeat every (s)", h("input", { name: "every", type: "number", min: 10, step: 1 }), "empty: once"),
     labelled("After task", h("input", { name: "after", type: "number", min: 1, step: 1 }), "empty: none"));
-  const key = newKey();
+  const consequence = h("p", { class: "empty", "aria-live": "polite" }, consequenceOf(vehicle));
+  const who = h("select", { name: "rover" }, h("option", { value: vehicle }, `Rover ${vehicle}`), h("option", { value: ANY }, "Any rover"));
+  const isAny = () => who.value === ANY;
+  who.addEventListener("change", () => (consequence.textContent = isAny() ? ANY_WORDS : consequenceOf(vehicle)));
+  const isOne = state.vehicles.size < 2;
+  const keys = { [vehicle]: newKey(), [ANY]: newKey() }; // each for one place, however often it is tried
   ask({
-    title: `Add a task for rover ${vehicle}`,
-    words: [h("label", { class: "fields" }, "What ", select), meaning],
-    fields: h("div", {}, numbers, terms, h("p", { class: "empty" }, consequenceOf(vehicle))),
+    title: isOne ? `Add a task for rover ${vehicle}` : "Add a task",
+    words: [...(isOne ? [] : [h("label", { class: "fields" }, "Who ", who)]), h("label", { class: "fields" }, "What ", select), meaning],
+    fields: h("div", {}, numbers, terms, consequence),
     word: "Add the task",
-    act: (form) => post(`/vehicles/${vehicle}/tasks`, bodyOf(form, kinds.find((each) => each.kind === select.value)), { key: `${key}` }),
+    act: async (form) => {
+      const body = bodyOf(form, kinds.find((each) => each.kind === select.value));
+      const task = await post(`/vehicles/${who.value}/tasks`, body, { key: keys[who.value] });
+      if (isAny()) choose(task.vehicle);
+    },
   });
 }
 
