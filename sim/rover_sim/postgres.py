@@ -42,9 +42,12 @@ class PostgresServer:
         self._process: subprocess.Popen[bytes] | None = None
         self.owner = NOBODY if os.geteuid() == 0 else os.geteuid()
         os.chown(self.folder, self.owner, -1)
+        self._make_files(self.folder / "data")
+
+    def _make_files(self, data: Path) -> None:
         how = ["--auth=trust", "--encoding=UTF8", "--locale=C", "--username=postgres"]
         # what initdb writes is synced by the first checkpoint; a crash before that loses a test
-        self.run("initdb", "--no-sync", *how, "-D", str(self.folder / "data"))
+        self.run("initdb", "--no-sync", *how, "-D", str(data))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}(port {self.port})"

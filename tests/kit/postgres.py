@@ -93,6 +93,28 @@ class PostgresServer(PlainServer):
         super().close()
 
 
+class Standby(PostgresServer):
+    """A replica of a primary server, without which the primary commits nothing."""
+
+    def __init__(self, primary: PostgresServer) -> None:
+        """Copy the primary server, which runs, and start."""
+        self._primary = primary
+        super().__init__(installed())
+        self.start()
+        primary.execute("ALTER SYSTEM SET synchronous_standby_names = '*'")
+        primary.execute("SELECT pg_reload_conf()")
+        query = "SELECT count(*) FROM pg_stat_replication WHERE sync_state = 'sync'"
+        wait_until(lambda: primary.execute(query) == [(1,)], within=START_LIMIT)
+
+    def _make_files(self, data: Path) -> None:
+        where = ("-h", "127.0.0.1", "-p", str(self._primary.port), "-U", "postgres")
+        self.run("pg_basebackup", *where, "-D", str(data), "-R", "-X", "stream", "-c", "fast")
+
+    def promote(self) -> None:
+        """Make it the primary server."""
+        assert self.execute("SELECT pg_promote()") == [(True,)]
+
+
 def connected(url: str) -> Any:
     """Return psycopg's connection, in the schema of the store; each statement commits itself."""
     import psycopg
