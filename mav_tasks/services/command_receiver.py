@@ -6,7 +6,7 @@ submissions are the same task is the task domain's to say (``tasks/deduplicator.
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
@@ -48,7 +48,7 @@ def command_of(message: CommandLong | CommandInt) -> Command:
     return Command(target, message.command, first + last, message.confirmation, None, message)
 
 
-def is_stop(message: Message | None) -> bool:
+def is_stop(message: Message | None) -> TypeGuard[CommandLong | CommandInt]:
     """Whether a message stops a vehicle; that others have a field for a command means nothing."""
     return isinstance(message, CommandLong | CommandInt) and message.command == MavCmd.TASK_STOP
 

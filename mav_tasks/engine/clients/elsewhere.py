@@ -100,7 +100,8 @@ class Elsewhere:
         found = []
         for received in self.stops_of(vehicle, now=now):
             alone = copy(received.message)
-            alone.target_system = vehicle  # type: ignore[union-attr]
+            assert is_stop(alone)
+            alone.target_system = vehicle
             found.append(received._replace(message=alone))
         return found
 

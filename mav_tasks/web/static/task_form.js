@@ -12,7 +12,7 @@ const NAMES = {
 };
 
 const ANY = "any"; // as the API calls it
-const ANY_WORDS = "The server chooses the rover that would begin it first, and chooses again if another one would. The page then shows that rover's queue.";
+const ANY_WORDS = "The server chooses the rover that would begin it first, and chooses again if that one is lost before the task begins. The page then shows that rover's queue.";
 
 /** Open the form for a rover, with the parts of a goal filled in; where there are several, any of them can be chosen. */
 export function openTaskForm(vehicle, goal = {}) {
