@@ -9,10 +9,10 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from mav_tasks.client.mission_downloader import MissionDownloader
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
-from mav_tasks.services.mission_downloader import MissionDownloader
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import MissionUploader, Patience
 

@@ -1,9 +1,9 @@
 """Fetching plans, to exact times."""
 
+from mav_tasks.client.mission_downloader import ASK_AGAIN, GIVE_UP, MissionDownloader
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult as Result
-from mav_tasks.services.mission_downloader import ASK_AGAIN, GIVE_UP, MissionDownloader
 from mav_tasks.services.mission_item import Item, message_of
 
 MISSION, FENCE = 0, 1
