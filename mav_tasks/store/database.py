@@ -5,11 +5,13 @@ sqlite3's errors.
 """
 
 import os
+import secrets
+import socket
 import sqlite3
-from collections.abc import Sequence
-from contextlib import suppress
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from errno import ENOENT
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +21,22 @@ from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_batch
 from mav_tasks.store.failures import failure
+from mav_tasks.store.held_file import GONE, HeldFile, Identity, identity_of
+from mav_tasks.store.holder import Holder, Replaced, words_for
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.store.schema import transaction
 from mav_tasks.store.sqlite_reader import SqliteReader
 
 BUSY_TIMEOUT = 0.25  # s, SQLite's wait for another program's lock
-GONE = "the file was removed or replaced while it was in use"
-ANOTHER = "it is not the file that was opened: restore that file, or end the server and check"
+LOOK_PERIOD = 1.0  # s between two looks whether the file is still in its place
+CHECKPOINT = 1_000  # pages in the WAL, about, as SQLite's own default
+#: above it finished tasks are deleted, however few: each may have a plan of a few hundred KB
+MOST_BYTES = 1 << 30
+OF_A_BATCH, OF_A_TRIM = 8, 250  # pages, about
+OVERWRITTEN = (
+    "another file was copied over it while it was in use: this server can store nothing any more;"
+    " end it, and remove the files -wal and -shm beside the store, which do not belong to the copy"
+)
 MOST_ROWS = 128  # in one INSERT: with seven columns below SQLite's oldest limit, 999 values
 
 _PRAGMAS = (
@@ -34,21 +45,36 @@ _PRAGMAS = (
     "PRAGMA fullfsync = ON",  # macOS: fsync alone does not reach the disk
     "PRAGMA temp_store = MEMORY",
     f"PRAGMA journal_size_limit = {16 << 20}",  # bytes that the WAL keeps after a checkpoint
+    "PRAGMA wal_autocheckpoint = 0",  # then every change of the file itself is of ``_checkpoint``
 )
 
 
 class Database:
-    """An open store file; implements ``EventDatabase``.
+    """An open store file; implements ``EventDatabase``, once ``begin`` has made it this server's.
 
-    The constructor raises StoreError if the file cannot be used.
+    The lock of the file keeps other servers out. Whether it is still the only one, and its file the
+    one that people find at its path, is checked before and after each transaction: by the names of
+    file and WAL, by the row of ``writer``, whose epoch is a fencing token, and by that row's page
+    in the file itself, for a file that was copied over another one has the same name and inode.
+
+    Constructor and ``begin`` raise StoreError if the file cannot be used.
     """
 
-    look_period = inf  # a file is not lost by itself
+    look_period = LOOK_PERIOD
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, file: HeldFile) -> None:
         self._path = path
-        try:
-            _create(path)
+        self._file = file
+        self._epoch, self._page = 0, b""
+        self._replaced: Replaced | None = None
+        self._unwritten = 0  # pages in the WAL, about
+        with self._at_start():
+            if file.names > 1:
+                raise StoreError(
+                    "it has another name (a hard link), beside which SQLite's log may be:"
+                    " remove that name, or copy the store"
+                )
+            _sync_folder(path)
             self._connection = _connect(path)
             try:
                 schema.check(self._connection)
@@ -57,49 +83,74 @@ class Database:
                 schema.migrate(self._connection)
                 with transaction(self._connection):
                     self.format_id = find_format(self._connection)
-                row = self._meta("next_id, last_number, last_write, ended_well")
-                with transaction(self._connection):  # durable before any rover is moved
-                    self._connection.execute("UPDATE meta SET ended_well = 0")
-                self._files = _identities(path)
+                row = self._meta("next_id, last_number, last_write, ended_well, fleet")
+                (root,) = self._row("SELECT rootpage FROM sqlite_master WHERE name = 'writer'")
+                (self._page_size,) = self._row("PRAGMA page_size")
             except BaseException:
                 self._connection.close()
                 raise
-        except StoreError as error:
-            raise StoreError(f"store {path}: {error}") from None
-        except (OSError, sqlite3.Error) as error:
-            raise StoreError(f"store {path}: {failure(error) or error}") from error
+        self._place = (root - 1) * self._page_size  # of the row of writer
+        self._log = self._identity_of_log()
         self.next_id: int = row[0]
         self.last_number: int = row[1]
         self.last_write: float | None = row[2]  # UTC seconds, of an earlier process
         self.ended_well = bool(row[3])
+        #: names the store, over its copies; "": it has no name yet
+        self.fleet: str = row[4]
 
     def __repr__(self) -> str:
         return f"Database({self._path.name}, event {self.last_number})"
 
+    def begin(self, fleet: str) -> None:
+        """Become the writer, of the store with this name; durable before any rover is moved."""
+        self._epoch = secrets.randbits(62)
+        with self._at_start():
+            with transaction(self._connection):
+                self._connection.execute("UPDATE meta SET ended_well = 0, fleet = ?", (fleet,))
+                self._connection.execute(
+                    "UPDATE writer SET epoch = ?, host = ?, pid = ?, since = ?",
+                    (self._epoch, socket.gethostname(), os.getpid(), time.time()),
+                )
+            self._checkpoint("FULL")
+            self._log = self._identity_of_log()
+
     def is_open(self) -> bool:
-        """Return True: whether the file is still there is seen when it is written to."""
+        """Return whether the file is still the one that was opened, and in its place."""
+        try:
+            self._check_file()
+        except (OSError, Replaced):
+            return False
         return True
 
     def reopen(self) -> None:
         """Open the file again after a failure, and read the number of its last event.
 
-        Raise OSError if the file was replaced: another file lacks events reported as durable.
+        Raise OSError if the file is not in its place: another file lacks events reported as
+        durable. Raise Replaced, at each later call, too, if its content is another store's.
         """
+        try:
+            self._check_file()
+        except OSError:
+            with suppress(sqlite3.Error):  # the file may have another name now, without its log
+                self._checkpoint("PASSIVE")
+            raise
         with suppress(sqlite3.Error):
             self._connection.close()
-        if _identity(self._path) != self._files[0]:
-            raise OSError(ENOENT, ANOTHER)
+        self._page = self._page_on_disk()  # closing may have written the log back
         self._connection = _connect(self._path)
         _set_up(self._connection)
-        (self.last_number,) = self._meta("last_number")
-        self._files = _identities(self._path)
+        with transaction(self._connection):
+            found = self._fence()
+        if found < self.last_number:
+            raise self._lost(OVERWRITTEN)
+        self.last_number = found
+        self._log = self._identity_of_log()
 
     def write(self, batch: Batch, *, utc: float) -> None:
         """Make a batch durable, as a whole or not at all."""
-        with transaction(self._connection):
+        self._unwritten += OF_A_BATCH + (batch.last - batch.first) // 2
+        with self._fenced():
             write_batch(self._connection, batch, insert=self._insert, utc=utc)
-        if _identities(self._path) != self._files:
-            raise OSError(ENOENT, GONE)  # the batch went to a file that is no longer there
         self.last_number = batch.last
 
     def refused(self, batch: Batch) -> list[NonceTaken]:  # noqa: ARG002
@@ -112,23 +163,30 @@ class Database:
         A COMMIT that failed may still be found in the WAL. After a failed fsync its pages may not
         be on the disk: the commit counts only once a checkpoint has written them to the file.
         """
-        _, pages, done = self._connection.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
-        return bool(pages == done)
+        return self._checkpoint("FULL")
 
     def trim(self, trimmer: Trimmer, *, utc: float) -> bool:
         """Delete some expired rows; return whether there may be more."""
-        with transaction(self._connection):
-            return trimmer.step(self._connection, utc=utc)
+        self._unwritten += OF_A_TRIM
+        with self._fenced():
+            (pages,), (free,) = map(self._row, ("PRAGMA page_count", "PRAGMA freelist_count"))
+            is_too_large = (pages - free) * self._page_size > MOST_BYTES
+            return trimmer.step(self._connection, utc=utc, is_too_large=is_too_large)
 
     def close(self, *, utc: float | None) -> None:
-        """Close the file; record a clean end at ``utc``, or none if None."""
+        """Close the file; record a clean end at ``utc``, or none if None.
+
+        A file that was copied over this one stays as it is, and so does a log that is not ours.
+        """
         try:
             if utc is not None:
-                with transaction(self._connection):
+                with self._fenced():
                     self._connection.execute(
                         "UPDATE meta SET ended_well = 1, last_write = ?", (utc,)
                     )
         finally:
+            if self._replaced is not None or self._identity_of_log() not in (self._log, None):
+                self._file.leave_as_it_is()
             self._connection.close()
 
     def reader(self) -> SqliteReader:
@@ -138,6 +196,77 @@ class Database:
     def failure(self, error: Exception) -> str | None:
         """Return the words for a disk failure; None: it is a bug of ours."""
         return failure(error)
+
+    @contextmanager
+    def _fenced(self) -> Iterator[None]:
+        """Execute the block durably, unless the store is no longer this server's."""
+        self._check()
+        with transaction(self._connection):
+            if self._fence() != self.last_number:
+                raise self._lost(OVERWRITTEN)
+            is_full = self._unwritten >= CHECKPOINT
+            if is_full:
+                self._connection.execute("UPDATE writer SET beats = beats + 1")
+            yield
+        self._check()  # else it went to a file that is no longer there
+        if is_full:
+            with suppress(sqlite3.Error):  # a full disk: the WAL has all of it
+                self._checkpoint("PASSIVE")
+
+    def _fence(self) -> int:
+        """Return the number of the last event; raise Replaced if another server has begun."""
+        query = "SELECT epoch, host, pid, since, last_number FROM writer, meta"
+        *found, last_number = self._row(query)
+        holder = Holder(*found)
+        if holder.epoch != self._epoch:
+            taken = "has taken the store over: this server can store nothing any more; end it"
+            raise self._lost(f"{words_for(holder)} {taken}")
+        return int(last_number)
+
+    def _check(self) -> None:
+        """Raise OSError or Replaced if what is written now is not what people find."""
+        self._check_file()
+        if self._identity_of_log() != self._log:
+            raise OSError(ENOENT, GONE)
+
+    def _check_file(self) -> None:
+        if self._replaced is not None:
+            raise self._replaced
+        self._file.check()
+        if self._page_on_disk() != self._page:
+            raise self._lost(OVERWRITTEN)
+
+    def _lost(self, words: str) -> Replaced:
+        self._replaced = Replaced(words)
+        return self._replaced
+
+    def _checkpoint(self, mode: str) -> bool:
+        """Write the WAL back to the file; return whether that was all of it.
+
+        Note how the page of ``writer`` is in the file since: nobody else changes it.
+        """
+        try:
+            query = f"PRAGMA wal_checkpoint({mode})"
+            _, pages, done = self._connection.execute(query).fetchone()
+        finally:
+            self._page = self._page_on_disk()
+        self._unwritten = 0
+        return bool(pages == done)
+
+    def _page_on_disk(self) -> bytes:
+        return os.pread(self._file.fd, self._page_size, self._place)
+
+    def _identity_of_log(self) -> Identity | None:
+        return identity_of(self._path.with_name(f"{self._path.name}-wal"))
+
+    @contextmanager
+    def _at_start(self) -> Iterator[None]:
+        try:
+            yield
+        except StoreError as error:
+            raise StoreError(f"store {self._path}: {error}") from None
+        except (OSError, sqlite3.Error) as error:
+            raise StoreError(f"store {self._path}: {failure(error) or error}") from error
 
     def _insert(self, table: str, columns: Sequence[str], rows: Sequence[tuple[Any, ...]]) -> None:
         """Insert many rows with few statements.
@@ -159,36 +288,35 @@ class Database:
             done += size
 
     def _meta(self, columns: str) -> tuple[Any, ...]:
-        row: tuple[Any, ...] | None = self._connection.execute(
-            f"SELECT {columns} FROM meta"
-        ).fetchone()
+        return self._row(f"SELECT {columns} FROM meta")
+
+    def _row(self, query: str) -> tuple[Any, ...]:
+        row: tuple[Any, ...] | None = self._connection.execute(query).fetchone()
         if row is None:
-            raise sqlite3.DatabaseError("the table meta is empty")
+            raise sqlite3.DatabaseError("a table has lost its row")
         return row
 
 
-def _create(path: Path) -> None:
-    """Create the file with mode 0600 unless it exists; make its folder entry durable."""
-    fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-    os.close(fd)
+def holder_of(path: Path) -> Holder | None:
+    """Return the server that another process has a file for, as far as the file says it.
+
+    It is read without the WAL, which may be beside another name, and without locks.
+    """
+    try:
+        with closing(sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)) as connection:
+            row = connection.execute("SELECT epoch, host, pid, since FROM writer").fetchone()
+    except sqlite3.Error:
+        return None
+    return None if row is None else Holder(*row)
+
+
+def _sync_folder(path: Path) -> None:
+    """Make the file's entry in its folder durable."""
     folder = os.open(path.parent, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(folder)
     finally:
         os.close(folder)
-
-
-def _identities(path: Path) -> tuple[tuple[int, int], ...]:
-    """Return device and inode of the store and its WAL; raise OSError if one is missing."""
-    return _identity(path), _identity(path.with_name(f"{path.name}-wal"))
-
-
-def _identity(path: Path) -> tuple[int, int]:
-    try:
-        found = path.stat()
-    except OSError as error:
-        raise OSError(ENOENT, GONE) from error
-    return found.st_dev, found.st_ino
 
 
 def _connect(path: Path) -> sqlite3.Connection:

@@ -2,6 +2,8 @@
 
 import sqlite3
 
+from mav_tasks.store.holder import Replaced
+
 #: SQLite's primary result codes (sqlite.org/rescode.html)
 _WORDS = {
     sqlite3.SQLITE_FULL: "the disk is full",
@@ -18,6 +20,8 @@ _WORDS = {
 
 def failure(error: Exception) -> str | None:
     """Return the words for a disk failure, which may be temporary; None: it is a bug of ours."""
+    if isinstance(error, Replaced):
+        return str(error)
     if isinstance(error, OSError):
         return words_for(error)
     if type(error) not in (

@@ -9,6 +9,9 @@ Each register has two cells, in different pages. A word overwrites the older cel
 write leaves the previous word. Cells of registers that a later version adds go to the end of the
 file; opening extends a shorter file. Vehicle 0, which does not exist, has the next task id, so that
 no id is used twice after an older database was restored.
+
+One process has the file for itself. Its header names the store that it belongs to, as that store
+and all of its copies do: another store's halts are not taken for this one's.
 """
 
 import os
@@ -17,11 +20,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
-from errno import ENOENT
+from errno import EIO
 from pathlib import Path
 from zlib import crc32
 
 from mav_tasks.errors import StoreError
+from mav_tasks.store.held_file import HeldFile, InUse
 from mav_tasks.tasks.events import (
     Event,
     QueueContinued,
@@ -32,6 +36,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.lifecycle import TaskReason
 
 HEADER = b"mav-tasks record of halts, version 1\n".ljust(64, b"\0")
+FLEET = 48  # where in the header the store's name is, 16 bytes; zeros: none yet
 VEHICLES = 256  # system ids, MAVLink
 SLOTS = 2
 CELL = 64  # bytes; divides a disk sector
@@ -120,24 +125,54 @@ class HaltRecord:
         ``name`` is what people call the store.
         """
         self._path = store.with_name(f"{store.name}.halts")
+        self._name = name
         try:
             if not os.path.lexists(self._path):
                 _make(self._path)
-            self._fd = os.open(self._path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+            self._file = HeldFile(self._path)
         except OSError as error:
-            raise StoreError(f"store {name}: {self._path.name}: {error.strerror}") from error
+            raise self._error(error.strerror or str(error)) from error
+        except InUse as error:
+            raise self._error(str(error)) from None
         try:
-            content = os.pread(self._fd, SIZE + 1, 0)
+            content = os.pread(self._file.fd, SIZE + 1, 0)
             if len(content) == FIRST_SIZE:
                 content = content.ljust(SIZE, b"\0")
             self._newest = dict(_words_in(content))
-            if os.pwrite(self._fd, content, 0) < SIZE:  # a copied file may be sparse
-                raise OSError(0, "the disk is full")
-            os.fsync(self._fd)
+            self._rewrite(content)
         except (OSError, ValueError) as error:
-            os.close(self._fd)
-            words = getattr(error, "strerror", None) or str(error)
-            raise StoreError(f"store {name}: {self._path.name}: {words}") from error
+            self._file.close()
+            raise self._error(getattr(error, "strerror", None) or str(error)) from error
+
+    def _rewrite(self, content: bytes) -> None:
+        if os.pwrite(self._file.fd, content, 0) < SIZE:  # a copied file may be sparse
+            raise OSError(0, "the disk is full")
+        os.fsync(self._file.fd)
+        self._header = content[: len(HEADER)]
+
+    @property
+    def fleet(self) -> str:
+        """The name of the store that the record belongs to; "": of none yet."""
+        name = self._header[FLEET:]
+        return name.hex() if any(name) else ""
+
+    def belong_to(self, fleet: str) -> None:
+        """Belong to a store from now on; raise StoreError if the record is another store's."""
+        fleet = fleet.replace("-", "")
+        if self.fleet and self.fleet != fleet:
+            raise self._error(
+                "it is the record of another store's halts: put this store's own record there, or"
+                " check that the rovers stand still, and move it away"
+            )
+        self._header = self._header[:FLEET] + bytes.fromhex(fleet)
+        try:
+            os.pwrite(self._file.fd, self._header, 0)
+            os.fsync(self._file.fd)
+        except OSError as error:
+            raise self._error(error.strerror or str(error)) from error
+
+    def _error(self, words: str) -> StoreError:
+        return StoreError(f"store {self._name}: {self._path.name}: {words}")
 
     def __repr__(self) -> str:
         return f"HaltRecord({self._path.name}, {len(self._newest)} words)"
@@ -160,10 +195,10 @@ class HaltRecord:
     def write(self, word: Word) -> None:
         """Make a word durable; raise OSError if that fails, or if the file was replaced."""
         self._put(word)
-        getattr(os, "fdatasync", os.fsync)(self._fd)  # macOS has no fdatasync
-        found, ours = self._path.stat(), os.fstat(self._fd)
-        if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
-            raise OSError(ENOENT, "it was removed or replaced while it was in use")
+        os.fdatasync(self._file.fd)
+        self._file.check()
+        if os.pread(self._file.fd, len(HEADER), 0) != self._header:
+            raise OSError(EIO, "another file was copied over it while it was in use")
 
     def note_next_id(self, next_id: int, *, number: int) -> None:
         """Write the next task id as of event ``number``, without a sync.
@@ -173,13 +208,13 @@ class HaltRecord:
         self._put(Word(IDS, number, value=next_id))
 
     def close(self) -> None:
-        os.close(self._fd)
+        self._file.close()
 
     def _put(self, word: Word) -> None:
         slot = 1 - self._newest[word.key][0] if word.key in self._newest else 0
         body = _BODY.pack(word.number, word.utc, word.value, word.reason, word.actor.encode()[:39])
         cell = _CRC.pack(crc32(body)) + body
-        if os.pwrite(self._fd, cell, _place(slot, word.key)) < len(cell):
+        if os.pwrite(self._file.fd, cell, _place(slot, word.key)) < len(cell):
             raise OSError(0, "it was written only in part")
         self._newest[word.key] = slot, word
 
@@ -192,7 +227,7 @@ def _place(slot: int, key: int) -> int:
 
 def _words_in(content: bytes) -> Iterator[tuple[int, tuple[int, Word]]]:
     """Yield each register's newest word with its slot; raise ValueError if the file is damaged."""
-    if len(content) != SIZE or not content.startswith(HEADER):
+    if len(content) != SIZE or not content.startswith(HEADER[:FLEET]):
         raise ValueError("it is damaged: check that the rovers stand still, then remove it")
     for key in range(REGISTERS):
         places = [_place(slot, key) for slot in range(SLOTS)]

@@ -62,6 +62,16 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE vehicles ADD COLUMN halted_utc REAL",
     ),
     ("ALTER TABLE tasks ADD COLUMN assigned TEXT",),  # the last vehicle, if it was chosen again
+    (  # the server that opened the file last; beats: its checkpoints; '': no name yet
+        (
+            "CREATE TABLE writer (one INTEGER PRIMARY KEY CHECK (one = 1), epoch INTEGER NOT NULL,"
+            " host TEXT NOT NULL, pid INTEGER NOT NULL, since REAL NOT NULL,"
+            " beats INTEGER NOT NULL)"
+        ),
+        "INSERT INTO writer VALUES (1, 0, '', 0, 0, 0)",
+        "ALTER TABLE meta ADD COLUMN fleet TEXT NOT NULL DEFAULT ''",
+    ),
+    ("CREATE INDEX of_kind ON journal (kind, task_id)",),  # they are counted
 )
 
 

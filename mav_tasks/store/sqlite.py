@@ -5,6 +5,7 @@ import stat
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
+from secrets import token_hex
 
 from platformdirs import user_data_path
 
@@ -13,11 +14,13 @@ from mav_tasks.folders import make_private
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import Which
-from mav_tasks.store.database import Database
+from mav_tasks.store.database import Database, holder_of
 from mav_tasks.store.durable import DurableStore
 from mav_tasks.store.halt_record import HaltRecord
+from mav_tasks.store.held_file import HeldFile, InUse
+from mav_tasks.store.holder import words_for
 from mav_tasks.store.journal import Journal
-from mav_tasks.store.lock import Lock
+from mav_tasks.store.network_folder import MOUNTS, network_type
 from mav_tasks.store.sqlite_reader import SqliteReader
 
 DEFAULT_STORE = "mav-tasks.sqlite3"
@@ -37,13 +40,22 @@ class SqliteStore(DurableStore):
         wall_offset: Callable[[], float],
         retention: Retention | None = None,
     ) -> None:
-        path = _real_path(Path(path))
+        asked = Path(path)
+        path = _real_path(asked)
         name = str(path)
         with ExitStack() as opened:
-            opened.callback(Lock(path, name=name).release)
+            file = _held(path, asked.expanduser().absolute())
+            opened.callback(file.close)
+            database = Database(path, file)
+            closing_database = opened.enter_context(ExitStack())
+            closing_database.callback(database.close, utc=None)
             record = HaltRecord(path, name=name)
             opened.callback(record.close)
-            database = Database(path)
+            # a new store, or a copy of an old one, goes on where the record's has ended
+            fleet = database.fleet or record.fleet or token_hex(16)
+            record.belong_to(fleet)
+            database.begin(fleet)
+            closing_database.pop_all()
             release = opened.pop_all().close
         super().__init__(
             database,
@@ -89,6 +101,25 @@ def read_parameters(place: str) -> dict[str, float]:
 
 def _path_of(place: str) -> Path:
     return Path(place or user_data_path("mav-tasks", appauthor=False) / DEFAULT_STORE)
+
+
+def _held(path: Path, asked: Path) -> HeldFile:
+    """Lock a file; raise StoreError if that fails, or would not keep other machines out."""
+    try:
+        mounts = MOUNTS.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        mounts = ""
+    if kind := network_type(path, mounts):
+        raise StoreError(
+            f"store {path}: its folder is on a network ({kind}), where another machine could write"
+            " it, too: choose a local folder with --store, or PostgreSQL"
+        )
+    try:
+        return HeldFile(path, asked=asked)
+    except InUse:
+        raise StoreError(f"store {path}: in use by {words_for(holder_of(path))}") from None
+    except OSError as error:
+        raise StoreError(f"store {path}: {error.strerror}") from error
 
 
 def _real_path(path: Path) -> Path:

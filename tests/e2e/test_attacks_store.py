@@ -10,6 +10,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,17 +27,24 @@ from tests.kit.processes import (
     wait_until,
 )
 
-MOVE, STOP, CONTINUE, ARM = 54000, 54003, 193, 400
+MOVE, STOP, CONTINUE, ARM, CHANGE_SPEED = 54000, 54003, 193, 400, 178
 AUTOPILOT = (1, 1)
 DELAY = 6.0  # s, until the task that waits would drive
 GOES_ON = ("--set", "rules.on_restart=continue")
 NO_FILE_AT_ALL = 1  # byte
+SOME = 40  # changes, whose entries in SQLite's log are longer than the record of halts
 
 
 def limit_files(running: Stand, largest: int) -> None:
     """Let no write of the server go beyond this many bytes of a file."""
     _, hard = resource.prlimit(running.server.popen.pid, resource.RLIMIT_FSIZE)
     resource.prlimit(running.server.popen.pid, resource.RLIMIT_FSIZE, (largest, hard))
+
+
+def use_log(link: Any) -> None:
+    """Let SQLite write further back in its log than the record of halts is long."""
+    for number in range(SOME):
+        assert command_long(link, CHANGE_SPEED, 1, 0.5 + number / 100).result == 0
 
 
 def is_latched(path: Path) -> bool:
@@ -68,6 +76,7 @@ def test_a_stop_outlives_a_full_disk_and_the_end_of_the_server(
     path = tmp_path / "tasks.sqlite3"
     with stand(tmp_path, *GOES_ON, serve_store=str(path)) as running:
         link = running.connect()
+        use_log(link)
         submit(link, MOVE, 5.0, 0, 0, 11, 0, DELAY)
         limit_files(running, SIZE)
         assert command_long(link, STOP).result == 0
@@ -91,6 +100,7 @@ def test_a_continue_outlives_a_full_disk_too(tmp_path: Path) -> None:
     path = tmp_path / "tasks.sqlite3"
     with stand(tmp_path, *GOES_ON, serve_store=str(path)) as running:
         link = running.connect()
+        use_log(link)
         assert command_long(link, STOP).result == 0
         wait_until(lambda: is_latched(path), within=5, what="the latch on the disk")
         limit_files(running, SIZE)

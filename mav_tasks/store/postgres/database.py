@@ -14,10 +14,11 @@ from mav_tasks.store.base import NonceTaken
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.batch_writing import find_format, write_batch
 from mav_tasks.store.codec import dumps
+from mav_tasks.store.holder import Replaced
 from mav_tasks.store.postgres import schema
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.dependencies import IS_EXPECTED, write_dependencies
-from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
+from mav_tasks.store.postgres.failures import PostgresError, failure
 from mav_tasks.store.postgres.ownership import Ownership
 from mav_tasks.store.postgres.reader import PostgresReader
 from mav_tasks.store.postgres.rights import check_rights

@@ -2,6 +2,8 @@
 
 import re
 
+from mav_tasks.store.holder import Replaced
+
 #: SQLSTATE, or its class -> words (postgresql.org/docs/current/errcodes-appendix.html)
 _WORDS = {
     "53100": "the disk of the database is full",
@@ -53,10 +55,6 @@ class PostgresError(Exception):
         self.sqlstate = sqlstate
         self.table = table
         self.column = column
-
-
-class Replaced(Exception):
-    """Another server has taken the database over. The text is one line, and stays true."""
 
 
 def failure(error: Exception) -> str | None:

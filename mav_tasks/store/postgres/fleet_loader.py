@@ -14,8 +14,9 @@ from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.mailbox import Mailbox
 from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome, VehiclesLoaded
+from mav_tasks.store.holder import Replaced
 from mav_tasks.store.postgres.address import Address
-from mav_tasks.store.postgres.failures import PostgresError, Replaced, failure
+from mav_tasks.store.postgres.failures import PostgresError, failure
 from mav_tasks.store.postgres.fleet_database import UTC
 from mav_tasks.store.postgres.gateway_ownership import LIMITS, GatewayOwnership
 from mav_tasks.store.postgres.reader import PostgresReader

@@ -9,7 +9,6 @@ from mav_tasks.store import reading
 from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome
 from mav_tasks.store.durable import CLOSE_LIMIT, DurableStore
 from mav_tasks.store.halt_record import HaltRecord, Word
-from mav_tasks.store.lock import Lock
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.fleet_database import FleetDatabase
 from mav_tasks.store.postgres.fleet_loader import BLOCK, FleetLoader
@@ -42,9 +41,9 @@ class FleetStore(DurableStore):
             database = FleetDatabase(where, gateway, epoch)
             begun.callback(database.close, utc=None)
             path = local_path(f"{database.name}-{gateway}", database.fleet, name=name)
-            begun.callback(Lock(path, name=name).release)
             record = HaltRecord(path, name=name)
             begun.callback(record.close)
+            record.belong_to(database.fleet)
             database.begin()
             release = begun.pop_all().close
         self._fleet, self._gateway = database, gateway

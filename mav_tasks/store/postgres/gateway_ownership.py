@@ -10,8 +10,9 @@ A session that this gateway has lost may still commit its last batch, after anot
 asked what is stored. So a batch says after which event it comes, and fails at any other place.
 """
 
-from mav_tasks.store.postgres.failures import PostgresError, Replaced
-from mav_tasks.store.postgres.ownership import Ownership, holder_if_any, words_for
+from mav_tasks.store.holder import Replaced, words_for
+from mav_tasks.store.postgres.failures import PostgresError
+from mav_tasks.store.postgres.ownership import Ownership, holder_if_any
 from mav_tasks.store.postgres.session import Limits, Session
 
 #: a gateway that stops in a transaction keeps others from writing, and its lease from ending: the

@@ -12,29 +12,15 @@ transaction of an older one has either been committed before or never will be.
 import os
 import socket
 import time
-from dataclasses import dataclass
 
-from mav_tasks.store.postgres.failures import PostgresError, Replaced
+from mav_tasks.store.holder import Holder, Replaced, words_for
+from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.session import Session
 from mav_tasks.store.postgres.session_lock import LOCK_NOT_AVAILABLE, SessionLock
 
 LOCK = 0x4D565453_00000001  # "MVTS", and the first purpose; gateways of a fleet share it
 
 _NOT_NULL_VIOLATION, _UNDEFINED_TABLE = "23502", "42P01"
-
-
-@dataclass(frozen=True, slots=True)
-class Holder:
-    """The row of ``writer``: the server that opened the database last; ``since`` is UTC seconds."""
-
-    epoch: int
-    host: str
-    pid: int
-    since: float
-
-    def __str__(self) -> str:
-        since = time.strftime("%Y-%m-%d %H:%M:%SZ", time.gmtime(self.since))
-        return f"the server on {self.host}, pid {self.pid}, since {since}"
 
 
 class Ownership:
@@ -122,11 +108,6 @@ class Ownership:
 def _holder(session: Session) -> Holder | None:
     found = session.execute("SELECT epoch, host, pid, since FROM writer").fetchone()
     return None if found is None else Holder(*found)
-
-
-def words_for(holder: Holder | None) -> str:
-    """Return the words for the server that has the lock for itself."""
-    return str(holder) if holder is not None and holder.epoch else "another server"
 
 
 def holder_if_any(session: Session) -> Holder | None:

@@ -125,6 +125,10 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (  # 0: not known, of an older server
         "ALTER TABLE gateways ADD COLUMN system_id INTEGER NOT NULL DEFAULT 0",
     ),
+    (  # they are counted
+        "CREATE INDEX of_kind ON journal (kind, task_id)",
+        "DROP INDEX of_no_task",
+    ),
 )
 
 

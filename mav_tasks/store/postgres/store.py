@@ -9,7 +9,6 @@ from mav_tasks.store.base import Which
 from mav_tasks.store.durable import DurableStore
 from mav_tasks.store.halt_record import HaltRecord
 from mav_tasks.store.journal import Journal
-from mav_tasks.store.lock import Lock
 from mav_tasks.store.postgres import address
 from mav_tasks.store.postgres.address import Address
 from mav_tasks.store.postgres.database import PostgresDatabase
@@ -35,9 +34,9 @@ class PostgresStore(DurableStore):
             database = PostgresDatabase(where)
             begun.callback(database.close, utc=None)
             path = local_path(database.name, database.fleet, name=name)
-            begun.callback(Lock(path, name=name).release)
             record = HaltRecord(path, name=name)
             begun.callback(record.close)
+            record.belong_to(database.fleet)
             database.begin()
             release = begun.pop_all().close
         super().__init__(

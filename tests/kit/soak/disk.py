@@ -13,6 +13,7 @@ from mav_tasks.store import Kept, NotKept, Outcome
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.database import Database
+from mav_tasks.store.held_file import HeldFile
 from mav_tasks.store.reading import read_restored
 from mav_tasks.store.retention import Trimmer
 from mav_tasks.tasks.events import Event, QueueContinued, QueuePaused, VehicleHalted
@@ -28,7 +29,9 @@ class Disk:
     def __init__(self, path: Path, *, wall_offset: float) -> None:
         self.path = path
         self.wall_offset = wall_offset
-        self._database = Database(path)
+        self._file = HeldFile(path)
+        self._database = Database(path, self._file)
+        self._database.begin(self._database.fleet or "00" * 16)
         self._encoder = Encoder()
 
     def write(self, events: Sequence[Event], *, now: float) -> None:
@@ -57,6 +60,7 @@ class Disk:
     def close(self) -> None:
         """Close the file."""
         self._database.close(utc=None)
+        self._file.close()
 
 
 class UncertainStore(LateStore):

@@ -41,7 +41,7 @@ def stop_on_full_disk(path: Path) -> None:
     """Stop a rover when nothing can be written, and die when the record has had time for it."""
     store = SqliteStore(path, wall_offset=lambda: 0.0)
     fill(path.parent / "filler")
-    store.append([submitted(1)])
+    store.append([submitted(number) for number in range(1, 1000)])  # more than the log has room for
     failure: NotKept = wait_for_failure(store)
     print("not kept" if "full" in failure.text else failure.text, flush=True)
     store.append([QueuePaused(1, TaskReason.STOPPED, "client", 100.0)])

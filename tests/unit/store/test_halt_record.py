@@ -176,7 +176,7 @@ def test_a_halt_that_neither_keeps_is_reported_and_one_that_the_database_keeps_i
         outcomes += store.take_outcomes()
     told = [outcome for outcome in outcomes if isinstance(outcome, HaltNotKept)]
     assert [each.vehicle for each in told] == [2, 2]
-    assert "No such file" in told[0].text
+    assert "removed or replaced" in told[0].text
     assert "lost: rover 2: STOP by client" in told[1].text
     monkeypatch.undo()
     with opened(place) as store:

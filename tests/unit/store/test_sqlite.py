@@ -32,7 +32,7 @@ def test_files_are_their_users_alone(path: Path) -> None:
         wait_for(store, 1)
         modes = {entry.name: stat.S_IMODE(entry.stat().st_mode) for entry in path.parent.iterdir()}
     assert set(modes.values()) == {0o600}
-    assert set(modes) >= {"tasks.sqlite3", "tasks.sqlite3.lock", "tasks.sqlite3-wal"}
+    assert set(modes) >= {"tasks.sqlite3", "tasks.sqlite3.halts", "tasks.sqlite3-wal"}
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
 
 

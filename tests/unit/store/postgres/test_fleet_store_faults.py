@@ -19,9 +19,10 @@ from mav_tasks.store import IdsGranted, VehiclesLoaded, Which
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.connection import Connection
+from mav_tasks.store.holder import Replaced
 from mav_tasks.store.opening import kind_of
 from mav_tasks.store.postgres import address, fleet_database, fleet_loader, session
-from mav_tasks.store.postgres.failures import PostgresError, Replaced
+from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.store.postgres.fleet_database import FleetDatabase
 from mav_tasks.store.reading import read_restored
 from mav_tasks.store.retention import Trimmer
@@ -242,11 +243,11 @@ class Looking(Trimmer):
         self._url = url
         self.steps = 0
 
-    def step(self, connection: Connection, *, utc: float, kept: str = "") -> bool:
+    def step(self, connection: Connection, *, utc: float, **options: Any) -> bool:
         with connected(self._url) as other:
             other.execute("SELECT 1 FROM meta FOR UPDATE NOWAIT")
         self.steps += 1
-        return super().step(connection, utc=utc, kept=kept)
+        return super().step(connection, utc=utc, **options)
 
 
 def test_a_gateway_that_deletes_expired_rows_keeps_no_other_from_writing(
@@ -292,9 +293,9 @@ def test_a_clock_that_is_set_changes_neither_idle_times_nor_leads(url: str, wron
 
 def test_one_gateway_at_a_time_deletes_expired_rows(url: str) -> None:
     class Trimming(Trimmer):
-        def step(self, connection: Connection, *, utc: float, kept: str = "") -> bool:
+        def step(self, connection: Connection, *, utc: float, **options: Any) -> bool:
             assert not other.trim(Looking(url), utc=utc)  # it does not even look
-            return super().step(connection, utc=utc, kept=kept)
+            return super().step(connection, utc=utc, **options)
 
     with gateways(url, "a", "b") as (a, b):
         first, other = (FleetDatabase(address.parse(url), g.name, g.epoch) for g in (a, b))

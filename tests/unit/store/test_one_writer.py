@@ -1,0 +1,236 @@
+"""A store has one writer, whatever happens to its files: real processes on real files.
+
+Each case does something to the files of a running server and starts a second server. The second is
+refused, or the first says that it can store nothing any more, and acknowledges nothing after that.
+"""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path, PurePath
+
+import pytest
+
+from mav_tasks.errors import StoreError
+from mav_tasks.store import Kept
+from mav_tasks.store.network_folder import network_type
+from tests.unit.store.samples import PATIENCE, opened, submitted, wait_for, wait_for_failure
+from tests.unit.store.test_failures import ROOT, child, kept, line
+
+SOME = 30  # tasks
+MANY = 1500  # tasks, for which the log is written back to the file
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    return folder / "tasks.sqlite3"
+
+
+def lock_deleted(path: Path) -> Path:
+    for each in path.parent.glob("*.lock"):
+        each.unlink()
+    return path
+
+
+def hard_linked(path: Path) -> Path:
+    other = path.with_name("other.sqlite3")
+    os.link(path, other)
+    return other
+
+
+def linked(path: Path) -> Path:
+    other = path.with_name("other.sqlite3")
+    other.symlink_to(path)
+    return other
+
+
+def renamed(path: Path) -> Path:
+    return path.rename(path.with_name("other.sqlite3"))
+
+
+def folder_moved(path: Path) -> Path:
+    path.parent.rename(path.parent.with_name("elsewhere"))
+    return path.parent.with_name("elsewhere") / path.name
+
+
+def replaced(path: Path) -> Path:
+    copy = path.with_name("copy")
+    shutil.copyfile(path, copy)
+    copy.rename(path)
+    return path
+
+
+def another_copied_over(path: Path) -> Path:
+    with opened(path.with_name("another.sqlite3")) as another:
+        another.append([submitted(number) for number in range(1, 100)])
+    shutil.copyfile(path.with_name("another.sqlite3"), path)
+    return path
+
+
+def second(place: Path) -> str:
+    """Start a second server; return what it says if it is refused, "" if it begins."""
+    done = subprocess.Popen(
+        [sys.executable, "-m", "tests.unit.store.child", str(place)],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        if line(done) == "open":
+            return ""
+        said = done.communicate(timeout=PATIENCE)[1]
+        return said.splitlines()[-1]
+    finally:
+        done.kill()
+        done.communicate(timeout=PATIENCE)
+
+
+def found(place: Path) -> list[int]:
+    with opened(place) as store:
+        return [task.id for task in store.load().tasks]
+
+
+def end(process: "subprocess.Popen[str]") -> list[str]:
+    """Kill a server; return the rest of its lines."""
+    process.send_signal(signal.SIGKILL)
+    process.wait(PATIENCE)
+    assert process.stdout is not None
+    return [each.strip() for each in process.stdout]
+
+
+@pytest.mark.parametrize("deed", [lock_deleted, hard_linked, linked])
+def test_a_second_server_is_refused_and_the_first_goes_on(
+    path: Path, deed: Callable[[Path], Path]
+) -> None:
+    with child(path) as process:
+        kept(process, at_least=SOME)
+        place = deed(path)
+        said = second(place)
+        rest = end(process)
+    assert f"in use by the server on {socket.gethostname()}, pid {process.pid}, since" in said
+    if deed is hard_linked:  # SQLite's log is beside the other name
+        assert "another name (a hard link)" in second(place)
+        place.unlink()
+    assert rest, "it went on"
+    assert {each.split()[0] for each in rest} == {"kept"}
+    assert len(found(path)) >= int(rest[-1].split()[1])
+
+
+@pytest.mark.parametrize("deed", [renamed, folder_moved, replaced, another_copied_over])
+def test_a_server_whose_file_is_no_longer_the_one_that_people_find_says_so_and_keeps_nothing(
+    path: Path, deed: Callable[[Path], Path]
+) -> None:
+    with child(path) as process:
+        through = kept(process, at_least=SOME)
+        place = deed(path)
+        said = line(process)
+        while said.startswith("kept"):
+            through = int(said.split()[1])
+            said = line(process)
+        refused = second(place)
+        time.sleep(0.6)  # it tries again, in vain
+        rest = end(process)
+    assert f"store {path}: another file was copied over it" in said or "replaced" in said
+    assert not [each for each in rest if each.startswith("kept")]
+    assert "in use by" in refused
+    if deed in (renamed, folder_moved):
+        assert len(found(place)) >= through
+
+
+def test_an_older_copy_of_the_same_life_put_back_in_place_is_noticed(path: Path) -> None:
+    with child(path) as process:
+        through = kept(process, at_least=SOME)
+        shutil.copyfile(path, path.with_name("copy"))
+        through = kept(process, at_least=through + MANY)
+        shutil.copyfile(path.with_name("copy"), path)
+        while line(process).startswith("kept"):
+            pass
+        assert second(path)
+        assert not [each for each in end(process) if each.startswith("kept")]
+
+
+def test_a_server_that_has_nothing_to_write_notices_it_too(path: Path) -> None:
+    with opened(path) as store:
+        away = path.rename(path.with_name("away"))
+        assert str(path) in wait_for_failure(store).text
+        away.rename(path)
+        store.append([submitted(1)])
+        wait_for(store, 1)
+
+
+def test_what_was_copied_over_it_is_left_as_it_is(path: Path) -> None:
+    with opened(path) as store:
+        store.append([submitted(1)])
+        wait_for(store, 1)
+        another_copied_over(path)
+        store.append([submitted(2)])
+        assert "another file was copied over it" in wait_for_failure(store).text
+        content = path.read_bytes()
+    assert path.read_bytes() == content
+    for name in ("-wal", "-shm"):  # as it has said
+        path.with_name(f"{path.name}{name}").unlink()
+    with pytest.raises(StoreError, match=r"halts: it is the record of another store's halts"):
+        found(path)
+    path.with_name(f"{path.name}.halts").unlink()
+    assert len(found(path)) == 99
+
+
+@pytest.mark.parametrize("is_running", [True, False])
+def test_a_copy_is_a_store_of_its_own_that_starts(path: Path, is_running: bool) -> None:
+    copy = path.with_name("copy.sqlite3")
+    with child(path) as process:
+        kept(process, at_least=SOME)
+        if not is_running:
+            end(process)
+        for name in ("", "-wal", ".halts"):
+            shutil.copyfile(f"{path}{name}", f"{copy}{name}")
+        with opened(copy) as store:
+            store.append([submitted(99_999)])
+            assert wait_for(store, 1)[-1] == Kept(1)
+
+
+def test_a_record_of_halts_is_not_taken_for_another_stores(path: Path) -> None:
+    other = path.with_name("other.sqlite3")
+    for each in (path, other):
+        with opened(each) as store:
+            store.append([submitted(1)])
+    shutil.copyfile(f"{other}.halts", f"{path}.halts")
+    with pytest.raises(StoreError, match=r"tasks\.sqlite3\.halts: it is the record of another"):
+        opened(path).__enter__()
+    path.with_name(f"{path.name}.halts").unlink()
+    assert found(path) == [1]
+
+
+MOUNTS = """\
+22 1 254:0 / / rw,relatime - ext4 /dev/vda rw
+30 22 0:30 / /home rw - nfs4 server:/export/home rw
+31 30 0:31 / /home/rover/local rw - xfs /dev/vdb rw
+32 22 0:32 / /mnt/my\\040share rw shared:1 - cifs //server/share rw
+33 22 0:33 / /mnt/far rw - fuse.sshfs rover@far: rw
+34 22 0:34 / /mnt/crypt rw - fuse.gocryptfs /data rw
+"""
+
+
+@pytest.mark.parametrize(
+    ("folder", "kind"),
+    [
+        ("/var/lib/mav-tasks", ""),
+        ("/home/rover/.local/share", "nfs4"),
+        ("/home/rover/local/share", ""),
+        ("/mnt/my share/rover", "cifs"),
+        ("/mnt/my", ""),
+        ("/mnt/far", "sshfs"),
+        ("/mnt/crypt", ""),
+    ],
+)
+def test_a_folder_of_another_machine_is_known_by_its_mount(folder: str, kind: str) -> None:
+    assert network_type(PurePath(folder), MOUNTS) == kind
