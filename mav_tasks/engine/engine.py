@@ -211,7 +211,8 @@ class Engine:
             case inputs.Congestion():
                 self._gcs.note_congestion(item, now=now)
             case inputs.StoreFailed():
-                self._submissions.store_failed()
+                if self._submissions.store_failed():
+                    self._publisher.warn_of_store(now=now)
             case inputs.HaltNotStored(vehicle=vehicle):
                 self._publisher.warn_of_loss(vehicle, now=now)
             case inputs.LeaseChanged():

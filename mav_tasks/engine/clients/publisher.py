@@ -111,6 +111,12 @@ class Publisher:
             text = f"{what} in force but not stored: a server restart loses it. See its log"
             self._gcs.tell(text, MavSeverity.ERROR, vehicle.server_address, now=now)
 
+    def warn_of_store(self, *, now: float) -> None:
+        """Tell all clients that the store has failed."""
+        text = "Store failed: new tasks are refused. See the server's log"
+        for vehicle in self._vehicles.all:
+            self._gcs.tell(text, MavSeverity.ERROR, vehicle.server_address, now=now)
+
     def _tell_ends(self, ended: _Ended, *, now: float) -> None:
         self._ended -= ended.tasks
         for task_id in sorted(ended.tasks):

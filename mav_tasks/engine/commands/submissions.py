@@ -89,9 +89,10 @@ class Submissions:
         self._store_is_away = False
         self.gate.committed(through, now=now)
 
-    def store_failed(self) -> None:
-        """Refuse new submissions until something has been committed again."""
-        self._store_is_away = True
+    def store_failed(self) -> bool:
+        """Refuse new submissions until something was committed; return whether that is new."""
+        was_away, self._store_is_away = self._store_is_away, True
+        return not was_away
 
     def submit(self, asked: CommandRequest, *, now: float) -> None:
         """Submit the task of a command. Raise Rejection if it is refused."""
