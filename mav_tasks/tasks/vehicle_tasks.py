@@ -162,6 +162,8 @@ class VehicleTasks(Lineup):
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change a task's terms. Raise Rejection if its dependency cannot complete."""
+        if terms == task.terms:
+            return
         if task.state in WAITING:
             self.room.modify(task, terms, actor=actor, now=now)
         else:

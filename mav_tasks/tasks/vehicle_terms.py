@@ -111,7 +111,8 @@ class VehicleTerms:
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> None:
         """Set the speed of the active task, and of later goals that name none."""
+        if speed != self._speed:
+            self._registry.record(VehicleSpeedSet(self._vehicle, speed, actor, now))
         self._speed = speed
         self._apply_driving()
         self._executor.set_speed(speed)
-        self._registry.record(VehicleSpeedSet(self._vehicle, speed, actor, now))

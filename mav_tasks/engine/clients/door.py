@@ -7,12 +7,16 @@ station shows why nothing happens. STOP is accepted from any address, and is nev
 Packets of a transfer under way, heartbeats and manual control are not counted: their rate is
 limited before parsing. From a client below operator, every message that an observer may send is
 counted, because the link to the rover may be slow.
+
+What is stored, or lets a rover go, has a smaller limit besides, for it may fill the disk.
 """
 
+from mav_tasks.engine.clients.gcs_client import CHANGES
 from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR
 from mav_tasks.engine.commands.translate import result_of
+from mav_tasks.engine.commands.words import row_said
 from mav_tasks.engine.policy import Kind, row_of
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -20,8 +24,10 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavSeverity
-from mav_tasks.services.command_receiver import Answer, is_stop
+from mav_tasks.services.command_receiver import Answer, command_of, is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
+
+ITEMS = 20  # of a plan, that count as one more change
 
 
 class Door:
@@ -46,14 +52,21 @@ class Door:
             # noise may look so, and nobody waits for an answer to a heartbeat
             return False
         is_counted = row.is_counted or (row.role == OBSERVER and not client.rights.reach(OPERATOR))
-        if not is_counted or client.requests.take(now=now):
+        if not is_counted:
+            return True
+        rights, what, rate = client.rights, "requests", client.rights.limits.rate
+        is_taken = client.requests.take(now=now)
+        if isinstance(message, m.CommandLong | m.CommandInt):
+            row = row_said(command_of(message))
+        if is_taken and row.is_claimed and row.kind in (Kind.WISH, Kind.GO):
+            items = message.count if isinstance(message, m.MissionCount) else 0
+            is_taken = client.changes.take(tokens=min(1 + items // ITEMS, rate), now=now)
+            what, rate = "changes", rate * CHANGES
+        if is_taken:
             return True
         self.left_out += 1
         if isinstance(message, m.CommandLong | m.CommandInt):
-            rights = client.rights
-            words = (
-                f"too many requests: role {rights.role} may send {rights.limits.rate:g} per second"
-            )
+            words = f"too many {what}: role {rights.role} may send {rate:g} per second"
             self._refuse(received, message, Rejection(TaskReason.RATE_LIMITED, words), now=now)
         return False
 

@@ -21,7 +21,8 @@ from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
 
 AT_ONCE = 5.0  # s, whose requests may come in one burst: a script queues a day's work
-REFUSALS = 20.0  # a second
+CHANGES = 1 / 20  # of the rate of requests: what is stored, or lets a rover go
+REFUSALS, REFUSALS_AT_ONCE = 2.0, 20.0  # told and recorded: a second, and in one burst
 #: s for which a refusal is not repeated: QGroundControl asks three times for a mode, 1.3 s apart,
 #: and sends one "go to" in two messages
 REFUSAL_EACH = 5.0
@@ -93,10 +94,10 @@ class GcsClient:
         self._submitters: dict[
             tuple[Address, str], Submitter
         ] = {}  # cached: each command needs one
-        #: limit of its requests; ``_refusals`` limits the refusals that are told
-        self.requests = TokenBucket(rate=0.0, burst=0.0, now=now)
-        self._requests_of: dict[str, TokenBucket] = {}  # by role: the key may change
-        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS, now=now)
+        #: limits of its requests, and of changes; ``_refusals`` limits the refusals that are told
+        self.requests = self.changes = TokenBucket(rate=0.0, burst=0.0, now=now)
+        self._limits_of: dict[str, list[TokenBucket]] = {}  # by role: the key may change
+        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE, now=now)
         self._senders: dict[Address, Sender] = {}
 
     def __repr__(self) -> str:
@@ -126,11 +127,13 @@ class GcsClient:
     def take_rights(self, rights: Rights, *, now: float) -> None:
         """Set the client's rights, and the rate limit of its role."""
         self.rights, rate = rights, rights.limits.rate
-        bucket = self._requests_of.get(rights.role)
-        if bucket is None or bucket.rate != rate:
-            bucket = TokenBucket(rate=rate, burst=rate * AT_ONCE, now=now)
-            self._requests_of[rights.role] = bucket
-        self.requests = bucket
+        limits = self._limits_of.get(rights.role)
+        if limits is None or limits[0].rate != rate:
+            limits = self._limits_of[rights.role] = [
+                TokenBucket(rate=each, burst=rate * AT_ONCE, now=now)
+                for each in (rate, rate * CHANGES)
+            ]
+        self.requests, self.changes = limits
 
     def may_be_refused(self, *, now: float) -> bool:
         """Whether one more refusal may be told and recorded now; a flood of them is not."""

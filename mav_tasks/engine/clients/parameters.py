@@ -182,7 +182,8 @@ class ParameterServer:
         except Rejection as refusal:
             self._refuse(wish, refusal.text, MavParamError.PERMISSION_DENIED, now=now)
             return
-        self._registry.record(ParameterSet(name, value, str(wish.who), now))
+        if name in self._pending or value != self._kept.get(name):
+            self._registry.record(ParameterSet(name, value, str(wish.who), now))
         self._pending[name] = wish
         self._submissions.gate.hold(wish, now=now)
 

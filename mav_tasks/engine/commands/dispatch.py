@@ -258,9 +258,12 @@ class Commands:
                 raise asked.rights.refusal(why_not, R.RATE_LIMITED)
 
     def _refuse_unknown(self, asked: CommandRequest, *, now: float) -> None:
+        result, reason = MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE
+        if not asked.client.may_be_refused(now=now):
+            asked.answer(result, reason)
+            return
         words = f"command {asked.command.command}: not supported in this version"
-        unknown = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
-        self._registry.record(asked.refuse(unknown, result=MavResult.UNSUPPORTED, now=now))
+        self._registry.record(asked.refuse(Rejection(reason, words), result=result, now=now))
 
     def _reposition(self, asked: CommandRequest, *, now: float) -> None:
         """DO_REPOSITION: submit a "go to"; without a place, pause."""

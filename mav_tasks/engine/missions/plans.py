@@ -104,6 +104,8 @@ class Plans:
 
     def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
         """Store a plan in place of the one before; NOTHING removes it."""
+        if stored == self.stored(vehicle.system_id, kind):
+            return
         if kind == MISSION and stored.items != self.stored(vehicle.system_id, MISSION).items:
             vehicle.parts.forget_start()
         self._stored[vehicle.system_id, kind] = stored
