@@ -224,6 +224,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         {
             "mav_tasks.histogram",
             "mav_tasks.metrics",
+            "mav_tasks.engine",
+            "mav_tasks.key_ring",
             "mav_tasks.recording",
             "mav_tasks.client",
             "mav_tasks.logs",
@@ -233,8 +235,6 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.tasks",
             "mav_tasks.mavlink",
             "mav_tasks.settings",
-            "mav_tasks.folders",
-            "mav_tasks.whole_file",
             "mav_tasks.errors",
         }
     ),

@@ -81,7 +81,8 @@ def add(
     if derivation == how.GENERATED:
         output.say(secret.hex())
         sys.stderr.write(
-            "mav-tasks: this is the secret; enter it at the other end. It is not shown again\n"
+            "mav-tasks: this is the secret; enter it at the other end, or as the token of the web "
+            "page. It is not shown again\n"
         )
     sys.stderr.write(f"mav-tasks: added key {name} ({key.fingerprint}), role {role}, to {path}\n")
 

@@ -1,4 +1,4 @@
-"""``mav-tasks web``: serve the web page and the HTTP API; and the tokens of their users."""
+"""``mav-tasks web``: serve the web page and the HTTP API."""
 
 import os
 from pathlib import Path
@@ -7,25 +7,19 @@ from typing import Annotated, Any
 import typer
 
 from mav_tasks.cli import output
-from mav_tasks.cli.lazy import completing, group
-from mav_tasks.cli.options import DEFAULT_SERVER, Json, RingFile, Server, SignWith
+from mav_tasks.cli.options import DEFAULT_SERVER, RingFile, Server, SignWith
+from mav_tasks.cli.ring import key_to_sign_with, ring_path
 from mav_tasks.errors import UsageError
-from mav_tasks.settings import ROLES
+from mav_tasks.key_ring.ring_file import load
+from mav_tasks.key_ring.watch import RingWatch
 
 DEFAULT_LISTEN = "127.0.0.1:8560"
 
 app = typer.Typer(rich_markup_mode=None)  # without a command it serves
-tokens = group("Add, list and revoke the tokens of the web page and the HTTP API.")
-app.add_typer(tokens, name="tokens")
+KEYS = "mav-tasks keys add NAME --role operator prints a token; keys list and revoke manage them"
+OLD_TOKENS = "web-tokens.json"
 
-TokenFile = Annotated[
-    str,
-    typer.Option(
-        "--tokens",
-        metavar="FILE",
-        help="File of tokens; default: web-tokens.json in your configuration folder.",
-    ),
-]
+Gone = Annotated[str | None, typer.Option(hidden=True)]
 
 
 @app.callback(invoke_without_command=True)
@@ -34,24 +28,16 @@ def web(
     server: Server = DEFAULT_SERVER,
     listen: Annotated[
         str,
-        typer.Option(metavar="HOST:PORT", help="Address; beyond loopback, tokens are needed."),
+        typer.Option(metavar="HOST:PORT", help="Address; beyond loopback, users need tokens."),
     ] = DEFAULT_LISTEN,
     name: Annotated[
         list[str] | None,
         typer.Option(
             metavar="HOST[:PORT]",
-            help="A name or address by which browsers reach it, or its proxy; repeatable.",
+            help="A name or address by which browsers reach it, or its proxy; users need tokens "
+            "then; repeatable.",
         ),
     ] = None,
-    role: Annotated[
-        str,
-        typer.Option(
-            metavar="ROLE",
-            autocompletion=completing("mav_tasks.settings:ROLES"),
-            help="Role without a token, on loopback: observer, submitter, operator or safety; "
-            '"": a token is required.',
-        ),
-    ] = "safety",
     tiles: Annotated[
         str,
         typer.Option(
@@ -74,41 +60,45 @@ def web(
             help="Show the recordings in this folder (serve --tlog and --record) on the map.",
         ),
     ] = "",
-    token_file: TokenFile = "",
     sign: SignWith = "",
     keys: RingFile = "",
+    role: Gone = None,
+    tokens: Gone = None,
 ) -> None:
     """Show and steer the rovers in a browser.
 
     Serves the web page and the HTTP API until Ctrl-C.
 
-    On loopback no token is needed. The page is a client of the task server, like any other one.
+    Each user logs in with a key of the key ring, and the task server decides what it may do. On
+    loopback nobody needs to, as long as the ring has no key of a client.
     """
     if ctx.invoked_subcommand is not None:
         return
     serving = _loaded()
     host, port = _address(listen)
-    if role and role not in ROLES:
-        raise UsageError(f"--role {role}: expected one of {', '.join(ROLES)}")
+    if role is not None:
+        words = "the server decides what a page without a token may do: serve --set roles.unsigned="
+        raise UsageError(f"--role: {words}{role or 'observer'}; for a token: {KEYS}")
+    if tokens is not None:
+        raise UsageError(f"--tokens: the page's tokens are keys of the key ring now: {KEYS}")
     from mav_tasks.web.records import Records  # noqa: PLC0415
     from mav_tasks.web.tiles import tiles_of  # noqa: PLC0415  # with the extra only
-    from mav_tasks.web.tokens import Tokens, load, path_of_tokens  # noqa: PLC0415
 
-    path = path_of_tokens(token_file)
-    known = load(path)
-    if not serving.is_loopback(host):
-        role = ""
-        if not known:
-            words = "add a token first: mav-tasks web tokens add NAME --role operator"
-            raise UsageError(f"--listen {listen}: other machines reach it; {words}")
+    ring = _ring(keys)
+    is_far = bool(name) or not serving.is_loopback(host)
+    if is_far and not any(key.secret and key.role for key in ring.keys or ()):
+        where = f"--name {name[0]}" if name else f"--listen {listen}"
+        raise UsageError(f"{where}: who sits elsewhere needs a token. {KEYS} (ring: {ring.path})")
+    old = ring.path.with_name(OLD_TOKENS)
+    if old.exists():
+        output.warn(f"{old} is not used any more: {KEYS}")
     options = serving.WebOptions(
         server=server,
         host=host,
         port=port,
         names=tuple(name or ()),
-        role=role,
-        tokens=Tokens(path),
-        key=_key(sign, keys),
+        ring=ring,
+        key=key_to_sign_with(sign, keys) if sign else None,
         journal=_journal(store),
         tiles=tiles_of(tiles) if tiles else None,
         records=Records(Path(records).expanduser()) if records else None,
@@ -117,47 +107,11 @@ def web(
     serving.run(options, bound, started=lambda address: output.say(f"web page: {address}"))
 
 
-@tokens.command()
-def add(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the person or program.")],
-    role: Annotated[
-        str,
-        typer.Option(
-            metavar="ROLE",
-            autocompletion=completing("mav_tasks.settings:ROLES"),
-            help="observer, submitter, operator or safety.",
-        ),
-    ],
-    token_file: TokenFile = "",
-) -> None:
-    """Add a token and print it once; a running page accepts it at once."""
-    from mav_tasks.web import tokens as kept  # noqa: PLC0415
-
-    output.say(kept.add(kept.path_of_tokens(token_file), name, role))
-
-
-@tokens.command(name="list")
-def list_(token_file: TokenFile = "", as_json: Json = False) -> None:
-    """List the tokens: names and roles."""
-    from mav_tasks.web import tokens as kept  # noqa: PLC0415
-
-    for token in kept.load(kept.path_of_tokens(token_file)):
-        if as_json:
-            output.say_json({"name": token.name, "role": token.role, "added": token.added})
-        else:
-            output.say(f"{token.name}  {token.role}  added {token.added}")
-
-
-@tokens.command()
-def revoke(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the token.")],
-    token_file: TokenFile = "",
-) -> None:
-    """Revoke a token; a running page refuses it at once."""
-    from mav_tasks.web import tokens as kept  # noqa: PLC0415
-
-    kept.revoke(kept.path_of_tokens(token_file), name)
-    output.say(f"token {name} revoked")
+@app.command(hidden=True, context_settings={"ignore_unknown_options": True})
+def tokens(words: Annotated[list[str] | None, typer.Argument()] = None) -> None:
+    """Say what took the place of tokens of the page's own."""
+    del words
+    raise UsageError(f"web tokens: the page's tokens are keys of the key ring now: {KEYS}")
 
 
 def _loaded() -> Any:
@@ -176,14 +130,11 @@ def _address(text: str) -> tuple[str, int]:
     return host.removeprefix("[").removesuffix("]"), int(port)
 
 
-def _key(sign: str, keys: str) -> Any:
-    if not sign:
-        if keys:
-            raise UsageError("--keys needs --sign NAME")
-        return None
-    from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415
-
-    return key_to_sign_with(sign, keys)
+def _ring(asked: str) -> RingWatch:
+    """Return a watch on the key ring; only one that is not named may be missing."""
+    path = ring_path(asked)
+    is_there = asked or os.path.lexists(path)
+    return RingWatch(path, load(path) if is_there else None)
 
 
 def _journal(store: str | None) -> Any:

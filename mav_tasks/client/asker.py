@@ -225,7 +225,7 @@ class Asker:
                 raise NoAnswer(f"{target}: the upload was not answered", nonce=nonce)
             if result != MavMissionResult.ACCEPTED:
                 words = await _words(heard, target.system_id, otherwise=result.name)
-                raise Refused(words, result=result, reason=0)
+                raise Refused(words, result=result, reason=opaque_id)
             return opaque_id
 
     async def download(self, target: Address, kind: MavMissionType) -> tuple[Item, ...]:

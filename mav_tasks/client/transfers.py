@@ -15,10 +15,13 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import MissionUploader, Patience
+from mav_tasks.tasks.lifecycle import TaskReason
 
 #: the server gives up after 2.3 s without an item
 PATIENCE = Patience(count_again=0.5, give_up=2.6, at_most=60.0, last_again=0.5)
 TRIES = 4
+#: reasons of a refusal because another client uploads; 0: of an older server
+BUSY = (TaskReason.NONE, TaskReason.WRONG_STATE)
 BUSY_AGAIN = 0.25  # s until the next try while another client uploads
 BUSY_WITHIN = 10.0  # s for which such tries continue
 REST = 0.6  # s after a refusal for which its copies may still arrive
@@ -33,7 +36,7 @@ MESSAGES = (
     m.MissionRequestInt,
 )
 
-#: MAV_MISSION_RESULT, None after a time-out; the plan's id
+#: MAV_MISSION_RESULT, None after a time-out; the plan's id, or the reason of a refusal
 Uploaded = Callable[[MavMissionResult | None, int], None]
 Downloaded = Callable[[tuple[Item, ...] | None, MavMissionResult | None], None]
 
@@ -150,7 +153,8 @@ class Transfers:
     def _tried(self, result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:
         upload = self._waiting[0]
         assert isinstance(upload, _Upload)
-        is_others_turn = result == MavMissionResult.DENIED and upload.items and not upload.is_asked
+        is_busy = result == MavMissionResult.DENIED and opaque_id in BUSY
+        is_others_turn = is_busy and upload.items and not upload.is_asked
         if is_others_turn and upload.tries < TRIES and now < upload.give_way_until:
             upload.tries -= 1
             self._rests_until = now + BUSY_AGAIN

@@ -1,7 +1,11 @@
 """Operations on rovers: their state, STOP, pause, resume, queue, fence and rally points."""
 
+from collections.abc import Awaitable, Callable
+from typing import TypeVar
+
+from mav_tasks.client.aio import Client
 from mav_tasks.client.fence_form import circle_of, polygon_of, shapes_of
-from mav_tasks.errors import NoSuchVehicle
+from mav_tasks.errors import MavTasksError, NoSuchVehicle, Refused
 from mav_tasks.plan_files import PlanFile
 from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
@@ -11,6 +15,10 @@ from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.plan_text import NAME, plan_of, text_field
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
+from mav_tasks.web.stops import Stop
+from mav_tasks.web.users import Line
+
+T = TypeVar("T")
 
 LIMIT = Field("limit", "integer", "at most this many tasks", False, 0, 10_000)
 PLACE = {
@@ -32,7 +40,7 @@ RALLY = [NAME, text_field("contents of a .plan file with rally points")]
 
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
-    client, live = services.client, services.live
+    client, live, asks = services.client, services.live, services.asks
     pauses = Flights()
 
     def known(call: Call) -> int:
@@ -51,19 +59,38 @@ def operations(services: Services) -> list[Operation]:
     async def stop(call: Call) -> object:
         rover = call.body["vehicle"]
         clear = bool(call.body["clear"])
-        found = await live.stops.stop(rover, clear=clear, by=call.identity.name)
-        return found.form()
+
+        async def send(line: Line) -> Stop:
+            return await live.stops.stop(rover, clear=clear, by=call.identity.name, line=line)
+
+        return (await halted(call, send)).form()
 
     async def pause(call: Call) -> None:
         rover = known(call)
-        await pauses.join(rover, lambda: client.pause(vehicle=rover))
-        await live.refresh(call.vehicle)
 
-    async def resume(call: Call) -> None:
+        async def send(line: Line) -> None:
+            await pauses.join((rover, line.name), lambda: line.client.pause(vehicle=rover))
+
+        await halted(call, send)
+        await live.refresh(rover)
+
+    async def halted(call: Call, send: Callable[[Line], Awaitable[T]]) -> T:
+        """Halt by the user's connection if it is up; without an answer, by that of the process."""
+        *others, last = services.users.ways_to_halt(call.identity)
+        for line in others:
+            try:
+                return await send(line)
+            except Refused:
+                raise
+            except MavTasksError:  # the next one goes at once
+                continue
+        return await send(last)
+
+    async def resume(call: Call, client: Client) -> None:
         await client.resume(epoch=seen_epoch(call.body), vehicle=known(call))
         await live.refresh(call.vehicle)
 
-    async def clear(call: Call) -> None:
+    async def clear(call: Call, client: Client) -> None:
         running_too = bool(call.body["running_too"])
         await client.clear(running_too=running_too, vehicle=known(call))
         await live.refresh(call.vehicle)
@@ -88,11 +115,11 @@ def operations(services: Services) -> list[Operation]:
     async def fence(call: Call) -> object:
         return {"shapes": shapes_of(await client.fence_file(vehicle=known(call)))}
 
-    async def set_fence(call: Call) -> object:
+    async def set_fence(call: Call, client: Client) -> object:
         plan = await _fence_of(call)
         return {"items": await client.set_fence(plan, vehicle=known(call))}
 
-    async def clear_fence(call: Call) -> None:
+    async def clear_fence(call: Call, client: Client) -> None:
         await client.set_fence(PlanFile((), None, (), ()), vehicle=known(call))
 
     async def rally(call: Call) -> object:
@@ -100,7 +127,7 @@ def operations(services: Services) -> list[Operation]:
         places = [{"latitude": item.x / 1e7, "longitude": item.y / 1e7} for item in items]
         return {"places": places}
 
-    async def set_rally(call: Call) -> object:
+    async def set_rally(call: Call, client: Client) -> object:
         plan = await plan_of(call.body)
         return {"items": await client.set_rally_points(plan, vehicle=known(call))}
 
@@ -113,28 +140,25 @@ def operations(services: Services) -> list[Operation]:
             "/stop",
             "Stop one rover or all at once; no task runs until you resume",
             stop,
-            may="stop",
             body=[
                 Field("vehicle", "integer", "the rover; all if not given", False, 1, 255),
                 Field("clear", "boolean", "also cancel the waiting tasks"),
             ],
             answer="Stop",
         ),
-        Operation("POST", f"{one}/pause", "Pause a rover and its queue", pause, "pause", body=[]),
+        Operation("POST", f"{one}/pause", "Pause a rover and its queue", pause, body=[]),
         Operation(
             "POST",
             f"{one}/resume",
             "Resume after a pause, a STOP or a takeover",
-            resume,
-            may="resume",
+            asks(resume),
             body=[EPOCH],
         ),
         Operation(
             "POST",
             f"{one}/clear",
             "Cancel the waiting tasks",
-            clear,
-            may="clear",
+            asks(clear),
             body=[Field("running_too", "boolean", "also cancel the running task")],
         ),
         Operation("GET", f"{one}/queue", "The queue", queue, query=[LIMIT], answer="Queue"),
@@ -152,16 +176,15 @@ def operations(services: Services) -> list[Operation]:
         Operation("GET", f"{one}/mission", "The staged mission", mission, answer="Path"),
         Operation("GET", f"{one}/fence", "The fence", fence, answer="Fence"),
         Operation(
-            "PUT", f"{one}/fence", "Set the fence", set_fence, "fence", body=FENCE, answer="Count"
+            "PUT", f"{one}/fence", "Set the fence", asks(set_fence), body=FENCE, answer="Count"
         ),
-        Operation("DELETE", f"{one}/fence", "Remove the fence", clear_fence, "fence"),
+        Operation("DELETE", f"{one}/fence", "Remove the fence", asks(clear_fence)),
         Operation("GET", f"{one}/rally", "The rally points", rally, answer="Places"),
         Operation(
             "PUT",
             f"{one}/rally",
             "Set the rally points",
-            set_rally,
-            may="fence",
+            asks(set_rally),
             body=RALLY,
             answer="Count",
         ),

@@ -2,38 +2,39 @@
 
 import time
 from collections.abc import AsyncGenerator, AsyncIterator
-from contextlib import aclosing
+from contextlib import aclosing, suppress
 from importlib.metadata import version
 
 from starlette.responses import Response, StreamingResponse
 
 from mav_tasks.client.goal_form import KINDS
+from mav_tasks.errors import ClientError
 from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
 from mav_tasks.web.events import description
 from mav_tasks.web.fields import Field
-from mav_tasks.web.identity import OPEN_NAME
+from mav_tasks.web.guard import UNKNOWN
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.problems import Problem
 from mav_tasks.web.services import Services
 from mav_tasks.web.sessions import COOKIE, LASTS
 
 MOST_STREAMS = 200
-MOST_OF_A_TOKEN = 100  # streams, so that nobody takes those of all others
-CHECKED = 1.0  # s between looks at the token of an open stream
-TOKEN = Field(
-    "token", "string", "the token, as 'mav-tasks web tokens add' printed it", True, 1, 200
-)
+MOST_OF_A_KEY = 100  # streams, so that nobody takes those of all others
+CHECKED = 1.0  # s between looks at the key of an open stream
+TOKEN = Field("token", "string", "the token: what 'mav-tasks keys add' printed", True, 1, 200)
 
 
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
 
     async def session(call: Call) -> object:
+        with suppress(ClientError):  # who acts is told why
+            await services.users.open(call.identity)  # before it is needed
         return {
             "name": call.identity.name,
             "role": call.identity.role,
-            "may": sorted(call.identity.may),
+            "may": call.identity.may,
             "version": version("mav-tasks"),
             "server": services.server,
             "instance": services.instance,
@@ -63,13 +64,13 @@ def operations(services: Services) -> list[Operation]:
         }
 
     async def log_in(call: Call) -> Response:
-        token = services.tokens.of_text(call.body["token"])
-        if token is None:
-            raise Problem(401, "Unknown token", "there is no such token, or it was revoked")
+        key = services.users.of_token(call.body["token"])
+        if key is None:
+            raise Problem(401, "Unknown token", UNKNOWN)
         if call.session is not None:
             services.sessions.end(call.session)
         response = Response(status_code=204)
-        number = services.sessions.begin(token)
+        number = services.sessions.begin(key)
         is_tls = call.headers.get("origin", "").startswith("https://")  # of a proxy
         response.set_cookie(
             COOKIE,
@@ -119,7 +120,7 @@ def operations(services: Services) -> list[Operation]:
 async def _while_it_may(
     call: Call, frames: AsyncGenerator[bytes], services: Services
 ) -> AsyncIterator[bytes]:
-    """Yield the frames of a stream until its token is revoked, or its session ends."""
+    """Yield the frames of a stream until its key is revoked, or its session ends."""
     if not _is_place(call, services):  # others have begun since the request came
         return
     checked_at = time.monotonic()
@@ -129,7 +130,7 @@ async def _while_it_may(
             async for frame in frames:
                 if time.monotonic() - checked_at > CHECKED:
                     checked_at = time.monotonic()
-                    if not services.is_still_known(call.session, call.headers):
+                    if not services.is_still_known(call):
                         return
                 yield frame
     finally:
@@ -139,5 +140,5 @@ async def _while_it_may(
 def _is_place(call: Call, services: Services) -> bool:
     """Return whether another stream may open."""
     streams = services.streams
-    of_it = 0 if call.identity.name == OPEN_NAME else streams[call.identity.name]
-    return streams.total() < MOST_STREAMS and of_it < MOST_OF_A_TOKEN
+    of_it = 0 if call.identity.key is None else streams[call.identity.name]
+    return streams.total() < MOST_STREAMS and of_it < MOST_OF_A_KEY

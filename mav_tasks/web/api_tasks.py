@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mav_tasks.client.aio import AnyRover
+from mav_tasks.client.aio import AnyRover, Client
 from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.values import TaskStatus
@@ -56,11 +56,6 @@ RELEASE = (
 )
 
 
-def own_of(status: TaskStatus) -> int:
-    """Return the id by which the submitter of a task is known: the first one of its series."""
-    return status.series or status.id
-
-
 def _named_by(call: Call) -> int | AnyRover:
     """Return the rover that the path names, or "any"."""
     return call.vehicle if "vehicle" in call.path else "any"
@@ -68,30 +63,30 @@ def _named_by(call: Call) -> int | AnyRover:
 
 def operations(services: Services) -> list[Operation]:
     """Return the operations."""
-    client, live = services.client, services.live
+    client, live, asks = services.client, services.live, services.asks
 
-    async def add(call: Call, plan: Plan, places: list[Place]) -> Any:
+    async def add(call: Call, by: Client, plan: Plan, places: list[Place]) -> Any:
         task = await submit(
-            client,
+            by,
             plan,
             vehicle=_named_by(call),
             terms=call.body,
             headers=call.headers,
             by=call.identity.name,
         )
-        services.own(task.id, call.identity)
         if places:
             live.remember_places(task.id, places)
         live.hurry(task.vehicle)
-        return live.task_form(await task.refresh())
+        # asked on our own connection, which gets each change of the task from now on
+        return live.task_form(await client.status(task.id, vehicle=task.vehicle))
 
-    async def submit_task(call: Call) -> Any:
+    async def submit_task(call: Call, by: Client) -> Any:
         goals = goals_of(call.body["goals"])
-        return await add(call, goals, places_of_goals(goals))
+        return await add(call, by, goals, places_of_goals(goals))
 
-    async def submit_mission(call: Call) -> Any:
+    async def submit_mission(call: Call, by: Client) -> Any:
         plan = await plan_of(call.body)
-        return await add(call, plan, places_of_items(plan.items))
+        return await add(call, by, plan, places_of_items(plan.items))
 
     async def preview(call: Call) -> Any:
         return await preview_response(call.body)
@@ -113,29 +108,26 @@ def operations(services: Services) -> list[Operation]:
     async def track(call: Call) -> Any:
         return {"points": live.tracks.of_task(call.task)}
 
-    async def modify(call: Call) -> Any:
+    async def modify(call: Call, by: Client) -> Any:
         status = await status_of(call)
-        services.check_may("modify", own_of(status), call.identity)
         changes = dict(call.body) | {"at": moment_of(call.body["at"])}
-        await client.modify(status.id, vehicle=status.vehicle, **changes)
+        await by.modify(status.id, vehicle=status.vehicle, **changes)
         live.hurry(status.vehicle)
         return live.task_form(await client.status(status.id, vehicle=status.vehicle))
 
-    async def cancel(call: Call) -> None:
+    async def cancel(call: Call, by: Client) -> None:
         status = await status_of(call)
-        services.check_may("cancel", own_of(status), call.identity)
         if call.body["kill"]:
-            await client.kill(status.id, vehicle=status.vehicle)
+            await by.kill(status.id, vehicle=status.vehicle)
         else:
             series = bool(call.body["series"])
-            await client.cancel(status.id, series=series, vehicle=status.vehicle)
+            await by.cancel(status.id, series=series, vehicle=status.vehicle)
         live.hurry(status.vehicle)
 
-    async def release(call: Call) -> None:
+    async def release(call: Call, by: Client) -> None:
         epoch, how = seen_epoch(call.body), call.body["how"]
         status = await status_of(call)
-        services.check_may("release", own_of(status), call.identity)
-        await client.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
+        await by.release(status.id, how, epoch=epoch, vehicle=status.vehicle)
         live.hurry(status.vehicle)
 
     async def journal(call: Call) -> Any:
@@ -150,8 +142,7 @@ def operations(services: Services) -> list[Operation]:
             f"{any_rover}/tasks",
             "Submit goals as one task of the rover that would begin it first; it may get another"
             " rover before it begins",
-            submit_task,
-            may="submit",
+            asks(submit_task),
             body=[GOALS, *TERMS],
             answer="Task",
             status=201,
@@ -161,8 +152,7 @@ def operations(services: Services) -> list[Operation]:
             "POST",
             f"{any_rover}/missions",
             "Submit a mission file as one task of the rover that would begin it first",
-            submit_mission,
-            may="mission",
+            asks(submit_mission),
             body=[*FILE, *TERMS],
             answer="Task",
             status=201,
@@ -172,8 +162,7 @@ def operations(services: Services) -> list[Operation]:
             "POST",
             f"{rover}/tasks",
             "Submit goals as one task; answered once the task is durable",
-            submit_task,
-            may="submit",
+            asks(submit_task),
             body=[GOALS, *TERMS],
             answer="Task",
             status=201,
@@ -183,8 +172,7 @@ def operations(services: Services) -> list[Operation]:
             "POST",
             f"{rover}/missions",
             "Submit a mission file as one task",
-            submit_mission,
-            may="mission",
+            asks(submit_mission),
             body=[*FILE, *TERMS],
             answer="Task",
             status=201,
@@ -214,17 +202,16 @@ def operations(services: Services) -> list[Operation]:
             answer="Track",
         ),
         Operation("GET", f"{one}/journal", "What happened to a task", journal, answer="Entries"),
-        Operation("PATCH", one, "Change a task", modify, "own", body=CHANGES, answer="Task"),
+        Operation("PATCH", one, "Change a task", asks(modify), body=CHANGES, answer="Task"),
         Operation(
             "POST",
             f"{one}/cancel",
             "Cancel a task",
-            cancel,
-            may="own",
+            asks(cancel),
             body=[
                 Field("kill", "boolean", "put the rover into HOLD at once"),
                 Field("series", "boolean", "end its series, too: it does not repeat any more"),
             ],
         ),
-        Operation("POST", f"{one}/release", "Release a held task", release, "own", body=RELEASE),
+        Operation("POST", f"{one}/release", "Release a held task", asks(release), body=RELEASE),
     ]

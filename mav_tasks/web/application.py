@@ -14,7 +14,6 @@ from mav_tasks.metrics.exposition import CONTENT_TYPE
 from mav_tasks.web import api_past, api_rovers, api_session, api_tasks, pages
 from mav_tasks.web.figures import Figures
 from mav_tasks.web.guard import Guard
-from mav_tasks.web.identity import Identity
 from mav_tasks.web.openapi import document_of
 from mav_tasks.web.operation import ROOT, Operation
 from mav_tasks.web.problems import Problem
@@ -32,7 +31,7 @@ def application(
     *,
     hosts: Iterable[str],
     behind_tls: Iterable[str],
-    open_identity: Identity | None,
+    is_open: bool,
 ) -> ASGIApp:
     """Return the application. The other arguments are as in Guard."""
     operations = operations_of(services)
@@ -69,9 +68,9 @@ def application(
         app,
         hosts=hosts,
         behind_tls=behind_tls,
-        tokens=services.tokens,
+        users=services.users,
         sessions=services.sessions,
-        open_identity=open_identity,
+        is_open=is_open,
         tile_origins=() if services.tiles is None else services.tiles.origins,
         note_answer=figures.note_answer,
     )

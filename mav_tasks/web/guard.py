@@ -13,11 +13,11 @@ from typing import Any
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from mav_tasks.web.identity import Identity
+from mav_tasks.web.identity import LOCAL, Identity
 from mav_tasks.web.problems import Problem
 from mav_tasks.web.rates import Rates
 from mav_tasks.web.sessions import COOKIE, Sessions
-from mav_tasks.web.tokens import Tokens
+from mav_tasks.web.users import Users
 
 SAFE = frozenset({"GET", "HEAD"})
 METHODS = SAFE | {"POST", "PUT", "PATCH", "DELETE"}
@@ -33,6 +33,13 @@ WITH_PLANS = ("/plans", "/missions", "/fence", "/rally")
 SLOWED = 0.5  # s until a refusal is sent to who gets too many of them
 BODY_WITHIN = 15.0  # s for the whole body
 
+NO_TOKEN = (
+    "a token is required: log in, or send 'Authorization: Bearer TOKEN'; "
+    "'mav-tasks keys add NAME --role operator' makes one"
+)
+UNKNOWN = "there is no such token, or it was revoked"
+#: headers of proxies, besides X-Forwarded-...
+PROXIES = frozenset({"forwarded", "via", "x-real-ip"})
 #: headers that decide; programs differ in which of two counts
 ONCE = frozenset(
     {"host", "origin", "sec-fetch-site", "authorization", "content-type", "content-length"}
@@ -56,9 +63,9 @@ class Guard:
     """The layer around an application.
 
     ``hosts`` are the values of Host that are accepted, in lower case; ``behind_tls`` are those of
-    them that a proxy serves with TLS, so that its pages have an https origin. ``open_identity`` is
-    that of requests without a token; None: a token is required. ``tile_origins`` are the sites of
-    tiles.
+    them that a proxy serves with TLS, so that its pages have an https origin. ``is_open``: whether
+    only this machine can ask, so that a token is needed only once a client has a key, or by a
+    proxy. ``tile_origins`` are the sites of tiles.
     ``note_answer`` gets the status of each answer.
     """
 
@@ -67,9 +74,9 @@ class Guard:
         app: ASGIApp,
         *,
         hosts: Iterable[str],
-        tokens: Tokens,
+        users: Users,
         sessions: Sessions,
-        open_identity: Identity | None,
+        is_open: bool,
         behind_tls: Iterable[str] = (),
         tile_origins: tuple[str, ...] = (),
         note_answer: Callable[[int], None] = lambda _status: None,
@@ -77,9 +84,9 @@ class Guard:
         self._app = app
         self._hosts = frozenset(hosts)
         self._behind_tls = frozenset(behind_tls)
-        self._tokens = tokens
+        self._users = users
         self._sessions = sessions
-        self._open_identity = open_identity
+        self._is_open = is_open
         self._tile_origins = tile_origins
         self._note_answer = note_answer
         self._rates = Rates()
@@ -149,15 +156,14 @@ class Guard:
             schemes = ("http", "https") if host in self._behind_tls else ("http",)
             _check_origin(headers, {f"{scheme}://{host}" for scheme in schemes})
         length = _length_of(headers, most=_most_bytes(scope["path"]))
-        identity, session = self._identity(headers)
+        identity, session = self._identity(scope, headers)
         scope.setdefault("state", {})
         scope["state"]["identity"], scope["state"]["session"] = identity, session
         if not scope["path"].startswith((API, METRICS)):
             return length
         is_login = scope["path"] == SESSION and scope["method"] == "POST"
         if identity is None and not is_login:
-            words = "a token is required: log in, or send 'Authorization: Bearer TOKEN'"
-            raise Problem(401, "Not logged in", words, headers={"www-authenticate": "Bearer"})
+            raise Problem(401, "Not logged in", NO_TOKEN, headers={"www-authenticate": "Bearer"})
         is_stop = scope["path"] == STOP and scope["method"] == "POST"
         if not is_stop:  # STOP is never rate-limited
             who = scope["client"][0] if identity is None else identity.name
@@ -167,21 +173,28 @@ class Guard:
                 raise Problem(429, "Too many requests", words, headers={"retry-after": str(wait)})
         return length
 
-    def _identity(self, headers: dict[str, str]) -> tuple[Identity | None, str | None]:
+    def _identity(
+        self, scope: Scope, headers: dict[str, str]
+    ) -> tuple[Identity | None, str | None]:
         """Return the identity of a request, and its session."""
         kind, _, text = headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer" and text:
-            token = self._tokens.of_text(text.strip())
-            if token is None:
-                words = "there is no such token, or it was revoked"
-                raise Problem(401, "Unknown token", words, headers={"www-authenticate": "Bearer"})
-            return Identity(token.name, token.role), None
+            key = self._users.of_token(text)
+            if key is None:
+                raise Problem(401, "Unknown token", UNKNOWN, headers={"www-authenticate": "Bearer"})
+            return Identity(key.name, key), None
         session = _cookie_of(headers.get("cookie", ""))
-        if session is not None:
-            token = self._sessions.token_of(session)
-            if token is not None:
-                return Identity(token.name, token.role), session
-        return self._open_identity, None
+        key = None if session is None else self._sessions.key_of(session)
+        if key is not None:
+            return Identity(key.name, key), session
+        is_local = self._is_open and not self._users.are_any and not _is_of_proxy(scope, headers)
+        return (LOCAL if is_local else None), None
+
+
+def _is_of_proxy(scope: Scope, headers: dict[str, str]) -> bool:
+    """Return whether a proxy may have passed a request on: for a person who sits elsewhere."""
+    is_told = any(name in PROXIES or name.startswith("x-forwarded-") for name in headers)
+    return is_told or scope.get("http_version") == "1.0"  # nginx's default to who is behind it
 
 
 def _headers_of(scope: Scope) -> dict[str, str]:

@@ -1,31 +1,50 @@
-"""The sender of a request, and what its role permits. Roles are those of signing keys. Pure."""
+"""The sender of a request: the holder of a key, or a person at this machine. Pure.
+
+What a user may do is the task server's decision. ``may`` is for the page, which offers nothing that
+the server would refuse: it is read from the server's own table.
+"""
 
 from dataclasses import dataclass
 
-from mav_tasks.settings import ROLES
+from mav_tasks.engine.clients.rights import RANKS
+from mav_tasks.engine.policy import PAUSE, row_of_command, row_of_message
+from mav_tasks.engine.policy.messages import BOUNDING_PLAN
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.signing import Key
 
-#: what each role may do; every role may stop and pause
-MAY = {
-    "observer": frozenset({"stop", "pause"}),
-    "submitter": frozenset({"stop", "pause", "submit", "mission"}),
-    "operator": frozenset(
-        {"stop", "pause", "submit", "mission", "resume", "cancel", "modify", "release", "clear"}
-    ),
+#: what the page offers, and the row of the server's policy that decides about it
+OFFERED = {
+    "stop": row_of_command(MavCmd.TASK_STOP),
+    "pause": PAUSE,
+    "submit": row_of_command(MavCmd.TASK_MOVE),
+    "mission": row_of_message(m.MissionCount.id),
+    "resume": row_of_command(MavCmd.DO_PAUSE_CONTINUE),
+    "cancel": row_of_command(MavCmd.TASK_CANCEL),
+    "modify": row_of_command(MavCmd.TASK_MODIFY),
+    "release": row_of_command(MavCmd.TASK_RELEASE),
+    "clear": row_of_command(MavCmd.TASK_CLEAR),
+    "fence": BOUNDING_PLAN,
 }
-MAY["safety"] = MAY["operator"] | {"fence"}
-assert tuple(MAY) == ROLES, "each role of the server has its line"
-
-OPEN_NAME = "local"  # the name of users without a token
 
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A person or program: the name of its token, OPEN_NAME without one, and its role."""
+    """A person or program. ``key`` None: at this machine, with the rights of the web process."""
 
     name: str
-    role: str
+    key: Key | None = None
 
     @property
-    def may(self) -> frozenset[str]:
-        """The actions that its role permits."""
-        return MAY[self.role]
+    def role(self) -> str | None:
+        """The role of its key; None: the server knows what the web process may do."""
+        return None if self.key is None else self.key.role
+
+    @property
+    def may(self) -> list[str]:
+        """What the server may accept from it; some of that for its own tasks only."""
+        rank = max(RANKS.values()) if self.key is None else RANKS[self.key.role]
+        return sorted(what for what, row in OFFERED.items() if RANKS[row.role] <= rank)
+
+
+LOCAL = Identity("local")

@@ -15,7 +15,7 @@ from mav_tasks.errors import MavTasksError
 from mav_tasks.tasks.task import MAX_TASK_ID
 from mav_tasks.web.fields import Field, read_body
 from mav_tasks.web.guard import SMALL_BODY
-from mav_tasks.web.identity import Identity
+from mav_tasks.web.identity import LOCAL, Identity
 from mav_tasks.web.problems import Problem, invalid, not_found, problem_of
 
 ROOT = "/api/v1"
@@ -71,15 +71,14 @@ Handler = Callable[[Call], Awaitable[Any]]
 class Operation:
     """``path`` is below ROOT; "{vehicle}" and "{task}" in it are numbers.
 
-    ``may``: what the role must permit; "": anybody; "own": the handler checks. ``body``: None: the
-    request has none. ``answer``: the name of the answer's schema; "": no contents.
+    ``body``: None: the request has none. ``answer``: the name of the answer's schema; "": no
+    contents. Whether a user may do it, the task server decides.
     """
 
     method: str
     path: str
     summary: str
     handler: Handler
-    may: str = ""
     query: Sequence[Field] = ()
     body: Sequence[Field] | None = None
     answer: str = ""
@@ -100,12 +99,6 @@ class Operation:
         return JSONResponse(result, status_code=self.status, headers={"cache-control": "no-store"})
 
     async def _call(self, request: Request) -> Call:
-        identity = request.state.identity
-        if identity is None:  # only to log in
-            identity = Identity("nobody", "observer")
-        if self.may and self.may != "own" and self.may not in identity.may:
-            words = f"{identity.name} has the role {identity.role}, which may not {self.may}"
-            raise Problem(403, "Not allowed", words, reason="not_allowed")
         for name, most in (("vehicle", MAX_VEHICLE), ("task", MAX_TASK_ID)):
             number = request.path_params.get(name)
             if number is not None and not 1 <= number <= most:
@@ -114,7 +107,7 @@ class Operation:
         if self.body is not None:
             body = read_body(self.body, await _json_of(request))
         return Call(
-            identity,
+            request.state.identity or LOCAL,  # None: only to log in
             request.state.session,
             request.path_params,
             {field.name: _queried(field, request.query_params) for field in self.query},

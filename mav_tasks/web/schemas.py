@@ -369,8 +369,8 @@ SCHEMAS: dict[str, Schema] = {
     "Session": whole(
         {
             "name": TEXT,
-            "role": TEXT,
-            "may": listed(TEXT),
+            "role": or_null(TEXT),
+            "may": said(listed(TEXT), "what the server may accept, perhaps of your own tasks only"),
             "version": TEXT,
             "server": TEXT,
             "instance": said(TEXT, "new with each start of the web process"),

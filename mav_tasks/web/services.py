@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,34 +11,29 @@ from mav_tasks.client.aio import Client
 from mav_tasks.errors import StoreError
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.web.goal_places import places_of_goals
-from mav_tasks.web.identity import Identity
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live
+from mav_tasks.web.operation import Call, Handler
 from mav_tasks.web.problems import Problem
 from mav_tasks.web.records import Records
 from mav_tasks.web.sessions import Sessions
 from mav_tasks.web.tiles import Tiles
-from mav_tasks.web.tokens import Tokens
-
-#: what a submitter may do to its own tasks
-WITH_OWN = frozenset({"cancel", "modify", "release"})
-MOST_OWNERS = 20_000
+from mav_tasks.web.users import Users
 
 
 @dataclass(slots=True)
 class Services:
-    """``owners``: the name of the token that submitted a task here. ``journal``: None: no store."""
+    """``client``: of the web process, for all reading. ``journal``: None: no store."""
 
     client: Client
     live: Live
-    tokens: Tokens
+    users: Users
     sessions: Sessions
     instance: str
     server: str
     journal: Journal | None = None
     tiles: Tiles | None = None
     records: Records | None = None
-    owners: dict[int, str] = field(default_factory=dict)
     #: open event streams by the names of their users
     streams: Counter[str] = field(default_factory=Counter)
     #: one reader of the journal at a time: several would take the interpreter from the event loop
@@ -66,11 +61,17 @@ class Services:
                 self.live.remember_places(task, places)
                 self.live.show_again(task)
 
-    def own(self, task: int, identity: Identity) -> None:
-        """Record the user who submitted a task."""
-        self.owners[task] = identity.name
-        while len(self.owners) > MOST_OWNERS:
-            del self.owners[next(iter(self.owners))]
+    def asks(self, handler: Callable[[Call, Client], Awaitable[Any]]) -> Handler:
+        """Return a handler that gets the client of the user who calls, once it has the server."""
+
+        async def run(call: Call) -> Any:
+            line = await self.users.open(call.identity)
+            with line.used():
+                if line.client is not self.client:
+                    await line.client.found()
+                return await handler(call, line.client)
+
+        return run
 
     async def entries(
         self, *, task: int | None, vehicle: int | None = None, after: int = 0, limit: int
@@ -85,21 +86,9 @@ class Services:
         except StoreError as error:
             raise Problem(503, "The journal cannot be read", str(error)) from error
 
-    def is_still_known(self, session: str | None, headers: Mapping[str, str]) -> bool:
-        """Return whether the session, or the token in the headers, of a request is still valid."""
-        if session is not None:
-            return self.sessions.token_of(session) is not None
-        kind, _, text = headers.get("authorization", "").partition(" ")
-        if kind.lower() != "bearer" or not text:
-            return True
-        return self.tokens.of_text(text.strip()) is not None
-
-    def check_may(self, what: str, task: int, identity: Identity) -> None:
-        """Raise Problem unless the user may do this to a task."""
-        is_own = self.owners.get(task) == identity.name
-        if what in identity.may:
-            return
-        if is_own and identity.role == "submitter" and what in WITH_OWN:
-            return
-        words = f"{identity.name} has the role {identity.role}, which may not {what} task {task}"
-        raise Problem(403, "Not allowed", words, reason="not_allowed")
+    def is_still_known(self, call: Call) -> bool:
+        """Return whether the session of a request, or its key, is still valid."""
+        if call.session is not None:
+            return self.sessions.key_of(call.session) is not None
+        key = call.identity.key
+        return not self.users.are_any if key is None else self.users.has(key)

@@ -16,24 +16,24 @@ import uvicorn
 
 from mav_tasks.client.aio import Client
 from mav_tasks.errors import UsageError
+from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Log
 from mav_tasks.web.application import application
 from mav_tasks.web.connections import PatientProtocol
-from mav_tasks.web.identity import OPEN_NAME, Identity
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live
 from mav_tasks.web.records import Records
 from mav_tasks.web.services import Services
 from mav_tasks.web.sessions import Sessions
 from mav_tasks.web.tiles import Tiles
-from mav_tasks.web.tokens import Tokens
+from mav_tasks.web.users import Users
 
 #: not the address of a script, nor of a ground station
 PAGE = Address(243, 190)
-TELEMETRY = 10  # Hz
+TELEMETRY, SELDOM = 10, 1  # Hz, of our own connection and of a user's
 BACKLOG = 1024  # connections that are not accepted yet
 GRACE = 1  # s for open requests at the end
 FILES = 4096  # descriptors
@@ -45,14 +45,13 @@ GARBAGE = 1000
 
 @dataclass(frozen=True, slots=True)
 class WebOptions:
-    """How to run. ``role`` is that of requests without a token, "" if they need one."""
+    """How to run."""
 
     server: str
     host: str
     port: int
     names: tuple[str, ...]
-    role: str
-    tokens: Tokens
+    ring: RingWatch
     key: Key | None
     journal: Journal | None
     tiles: Tiles | None
@@ -95,34 +94,35 @@ async def _run(options: WebOptions, bound: socket.socket, started: Callable[[str
     _allow_files()
     port = bound.getsockname()[1]
     instance = secrets.token_hex(4)
-    client = Client(
-        options.server,
-        system_id=PAGE.system_id,
-        component_id=PAGE.component_id,
-        key=options.key,
-        telemetry_rate=TELEMETRY,
-    )
+
+    def connect(key: Key | None, rate: int = SELDOM) -> Client:
+        return Client(options.server, **PAGE._asdict(), key=key, telemetry_rate=rate)
+
+    client = connect(options.key, TELEMETRY)
     client.open()
     try:
         live = Live(client, instance, server=options.server)
+        users = Users(
+            *(options.ring, client), server=options.server, own_key=options.key, connect=connect
+        )
         services = Services(
             client,
             live,
-            options.tokens,
-            Sessions(options.tokens),
+            users,
+            Sessions(users),
             instance,
             options.server,
             options.journal,
             options.tiles,
             options.records,
         )
-        identity = Identity(OPEN_NAME, options.role) if options.role else None
         hosts, behind_tls = _hosts(options, port)
-        app = application(services, hosts=hosts, behind_tls=behind_tls, open_identity=identity)
+        is_open = is_loopback(options.host) and not options.names
+        app = application(services, hosts=hosts, behind_tls=behind_tls, is_open=is_open)
         server = _Server(app, live)
         async with asyncio.TaskGroup() as group:
-            viewing = group.create_task(live.run())
-            group.create_task(server.until_ended([bound], viewing))
+            kept = [group.create_task(each) for each in (live.run(), users.run())]
+            group.create_task(server.until_ended([bound], kept))
             started(f"http://{_shown(options.host)}:{port}/")
     finally:
         await client.close()
@@ -156,12 +156,15 @@ class _Server(uvicorn.Server):
             loop.add_signal_handler(number, self.handle_exit, number, None)
         yield
 
-    async def until_ended(self, sockets: list[socket.socket], viewing: asyncio.Task[None]) -> None:
-        """Serve; then end the view."""
+    async def until_ended(
+        self, sockets: list[socket.socket], kept: list[asyncio.Task[None]]
+    ) -> None:
+        """Serve; then end the view, and the connections of users."""
         try:
             await self.serve(sockets=sockets)
         finally:
-            viewing.cancel()
+            for each in kept:
+                each.cancel()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End the event streams, which would never end by themselves, and then the rest."""

@@ -12,6 +12,7 @@ from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import MavTasksError, NoAnswer, Refused
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.web.flights import Flights
+from mav_tasks.web.users import Line
 
 KEPT = 50
 STANDS = 0.1  # m/s; below this a rover counts as standing: measured speeds are noisy
@@ -22,8 +23,8 @@ COPIES = 0.02  # s between copies of STOPs that share an answer
 FRESH = 1.5  # s; an older position says nothing about now
 
 
-#: which rover, None: all; and whether the waiting tasks are cancelled
-Kind = tuple[int | None, bool]
+#: which rover, None: all; whether the waiting tasks are cancelled; and the connection's name
+Kind = tuple[int | None, bool, str]
 
 
 class Stop:
@@ -76,22 +77,22 @@ class Stops:
         """Return the latest STOPs, the oldest first."""
         return [stop.form() for stop in self._kept]
 
-    async def stop(self, vehicle: int | None, *, clear: bool, by: str) -> Stop:
+    async def stop(self, vehicle: int | None, *, clear: bool, by: str, line: Line) -> Stop:
         """Send a STOP. Return it once it is acknowledged; raise NoAnswer or Refused.
 
         If the user repeats it while it is queued, both share one Stop.
         """
-        kind = vehicle, clear
+        kind = vehicle, clear, line.name
         shared = self._flights.waiting(kind)
         if shared is not None:
-            self._copy(kind)
+            self._copy(kind, line.client)
         whose, stop = self._sharing.get((kind, by), (None, None))
         if stop is None or shared is None or whose is not shared:
             stop = self._begun(vehicle, by)
 
         async def send() -> None:
             self._sharing[kind, by] = self._flights.waiting(kind), stop
-            await self._client.stop(clear=clear, vehicle=vehicle)
+            await line.client.stop(clear=clear, vehicle=vehicle)
 
         if shared is not None:
             self._sharing[kind, by] = shared, stop
@@ -115,7 +116,7 @@ class Stops:
         asyncio.get_running_loop().call_soon(self._publish, stop)
         return stop
 
-    def _copy(self, kind: Kind) -> None:
+    def _copy(self, kind: Kind, client: Client) -> None:
         """Send a copy of a STOP that shares an answer at once, or within COPIES seconds."""
         if kind in self._copies:
             return
@@ -123,15 +124,15 @@ class Stops:
         wait = self._copied_at.get(kind, 0.0) + COPIES - loop.time()
         if wait > 0:
             self._copies.add(kind)
-            loop.call_later(wait, self._send_copy, kind)
+            loop.call_later(wait, self._send_copy, kind, client)
         else:
-            self._send_copy(kind)
+            self._send_copy(kind, client)
 
-    def _send_copy(self, kind: Kind) -> None:
+    def _send_copy(self, kind: Kind, client: Client) -> None:
         self._copies.discard(kind)
         self._copied_at[kind] = asyncio.get_running_loop().time()
         with suppress(MavTasksError):  # the client was closed
-            self._client.stop_again(clear=kind[1], vehicle=kind[0])
+            client.stop_again(clear=kind[1], vehicle=kind[0])
 
     def _failed(self, stop: Stop, error: NoAnswer | Refused) -> None:
         if stop.phase == "sent":

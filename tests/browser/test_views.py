@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from tests.browser.kit import HOSTILE, PHONE, judge, move, opened, says, text_of
-from tests.kit.processes import Stand, frozen, process
-from tests.kit.web import Web, web
+from tests.kit.commands import called
+from tests.kit.processes import Stand, frozen
+from tests.kit.web import Web, add_key, ring_of, web
 
 pytestmark = pytest.mark.slow
 
@@ -218,15 +219,16 @@ def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
     with web(tmp_path, both[0], name="first") as first:
         port = first.url.rpartition(":")[2]
         with opened(chromium, first, path=f"/tasks/{task}", may_fail=True) as page:
-            says(page, "#link", "you: safety")
+            says(page, "#link", "you: local")
             page.wait_for_selector("#panel-past >> text=Cancel…")
             first.process.end(signal.SIGKILL)
             says(page, "#banner", "The connection to the web process is lost")
             with pytest.MonkeyPatch.context() as patch:
                 patch.setenv("PYTHONPATH", other_version)
-                options = ("--role", "observer", "--listen", f"127.0.0.1:{port}")
-                with web(tmp_path, both[0], *options, name="second"):
-                    says(page, "#link", "you: observer")
+                token = add_key(tmp_path, "anna", "observer")
+                with web(tmp_path, both[0], "--listen", f"127.0.0.1:{port}", name="second"):
+                    log_in(page, token)
+                    says(page, "#link", "you: anna, observer")
                     page.wait_for_selector("#panel-past >> text=Cancel…", state="hidden")
                     page.click("#tab-queue")
                     page.wait_for_selector(f"#panel-queue [data-task='{task}']")
@@ -241,8 +243,14 @@ def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
                     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
                     page.screenshot(path=str(shots / "another version 360.png"))
                     page.click("#news >> text=Load again")
-                    says(page, "#link", "you: observer")
+                    says(page, "#link", "you: anna, observer")
                     page.wait_for_selector("#news", state="hidden")
+
+
+def log_in(page: Any, token: str) -> None:
+    """Enter a token where the page asks for one."""
+    page.fill(".box [name=token]", token)
+    page.click(".box [type=submit]")
 
 
 @pytest.fixture
@@ -257,28 +265,22 @@ def other_version(tmp_path: Path) -> str:
 def test_a_token_opens_the_page_and_its_revocation_closes_it(
     chromium: Any, both: tuple[Stand, Web], tmp_path: Path, shots: Path
 ) -> None:
-    command = ("-m", "mav_tasks.cli", "web", "tokens")
-    file = ("--tokens", str(tmp_path / "web-tokens.json"))
-    with web(tmp_path, both[0], "--role", "", name="closed") as it:
-        add_one = (*command, "add", "anna", "--role", "observer", *file)
-        with process(*add_one, folder=tmp_path, name="add") as adding:
-            assert adding.popen.wait(20) == 0
-            token = adding.text.strip()
-        with opened(chromium, it, waits=False, may_fail=True) as page:
-            page.fill(".box [name=token]", "wrong")
-            page.click(".box [type=submit]")
-            says(page, ".box .failure", "There is no such token")
-            judge(page, "log in")
-            page.screenshot(path=str(shots / "log in.png"))
-            page.fill(".box [name=token]", token)
-            page.click(".box [type=submit]")
-            page.wait_for_selector(".card")
-            says(page, "#link", "you: anna, observer")
-            assert page.is_visible("#stop-all")
-            assert not page.is_visible("text=Add a task…")  # an observer's page
-            revoke_one = (*command, "revoke", "anna", *file)
-            with process(*revoke_one, folder=tmp_path, name="revoke") as revoking:
-                assert revoking.popen.wait(20) == 0
-            says(page, ".box", "This page needs a token.")  # the stream of events has ended
-            page.click("#stop-all")
-            says(page, "#stop-outcome", "STOP not acknowledged: a token is required")
+    token = add_key(tmp_path, "anna", "observer")
+    with (
+        web(tmp_path, both[0], name="closed") as it,
+        opened(chromium, it, waits=False, may_fail=True) as page,
+    ):
+        page.fill(".box [name=token]", "wrong")
+        page.click(".box [type=submit]")
+        says(page, ".box .failure", "There is no such token")
+        judge(page, "log in")
+        page.screenshot(path=str(shots / "log in.png"))
+        log_in(page, token)
+        page.wait_for_selector(".card")
+        says(page, "#link", "you: anna, observer")
+        assert page.is_visible("#stop-all")
+        assert not page.is_visible("text=Add a task…")  # an observer's page
+        assert called("keys", "revoke", "anna", "--keys", str(ring_of(tmp_path))).status == 0
+        says(page, ".box", "This page needs a token.")  # the stream of events has ended
+        page.click("#stop-all")
+        says(page, "#stop-outcome", "STOP not acknowledged: a token is required")

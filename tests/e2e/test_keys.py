@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -328,3 +328,30 @@ def test_who_signs_may_come_from_other_machines_without_a_further_word(
         server.wait_for(re.escape(f"clients on udpin:0.0.0.0:{port}, signed only\n"))
         server.end()
     assert server.popen.returncode == 0
+
+
+def test_keys_that_are_added_and_revoked_at_once_are_all_kept(tmp_path: Path) -> None:
+    """Twelve administrators at a time, each with a process of its own; then a revocation, too."""
+    ring = tmp_path / "keys.toml"
+
+    def at_once(*commands: tuple[str, ...]) -> None:
+        with ExitStack() as running:
+            all_of_them = [
+                running.enter_context(
+                    process(
+                        *("-m", "mav_tasks.cli", "keys", *command, "--keys", str(ring)),
+                        folder=tmp_path,
+                        name="-".join(command[:2]),
+                    )
+                )
+                for command in commands
+            ]
+            assert [each.popen.wait(30) for each in all_of_them] == [0] * len(commands)
+
+    names = [f"user{number}" for number in range(12)]
+    at_once(*(("add", name, "--role", "submitter") for name in names))
+    assert sorted(key.name for key in load(ring).ring.usable) == sorted(names)
+    more = [("add", f"later{number}", "--role", "observer") for number in range(3)]
+    at_once(*more[:2], ("revoke", "user0"), more[2])
+    usable = {key.name for key in load(ring).ring.usable}
+    assert usable == {*names[1:], "later0", "later1", "later2"}

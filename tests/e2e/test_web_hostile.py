@@ -19,10 +19,9 @@ import httpx
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from mav_tasks.web import tokens
 from mav_tasks.web.sessions import COOKIE
 from tests.kit.processes import Stand, environment_with, process, stand, wait_until
-from tests.kit.web import Web, has_rover, web
+from tests.kit.web import Web, add_key, has_rover, web
 
 pytestmark = pytest.mark.slow
 
@@ -210,9 +209,9 @@ def _circle(rover: dict[str, float]) -> dict[str, float]:
 def test_who_logs_in_again_and_again_ends_nobody_elses_session(
     tmp_path: Path, both: tuple[Stand, Web]
 ) -> None:
-    kept = tmp_path / "web-tokens.json"
-    anna, eve = (tokens.add(kept, *each) for each in (("anna", "operator"), ("eve", "observer")))
-    with web(tmp_path, both[0], "--role", "", name="closed") as page:
+    people = (("anna", "operator"), ("eve", "observer"))
+    anna, eve = (add_key(tmp_path, *each) for each in people)
+    with web(tmp_path, both[0], name="closed") as page:
         page.client.cookies.clear()
         assert page.send("POST", "/session", {"token": anna}).status_code == 204
         anna_s = page.client.cookies[COOKIE]
@@ -372,8 +371,12 @@ def test_behind_a_proxy_with_tls_only_its_own_pages_may_change_something(
     tmp_path: Path, both: tuple[Stand, Web]
 ) -> None:
     names = ("--name", "rover.example", "--name", "rover.example:8443")
-    token = tokens.add(tmp_path / "web-tokens.json", "anna", "observer")
+    token = add_key(tmp_path, "anna", "observer")
     with web(tmp_path, both[0], *names, name="proxied") as page:
+        for host in ("rover.example", page.url.removeprefix("http://")):
+            # whoever asks by whatever name: a proxy may have put its own there
+            assert page.send("POST", "/stop", {}, host=host).status_code == 401
+        page.client.headers["authorization"] = f"Bearer {token}"
         port = page.url.rpartition(":")[2]
 
         def stop(host: str, origin: str) -> int:
@@ -399,9 +402,9 @@ def test_behind_a_proxy_with_tls_only_its_own_pages_may_change_something(
 
 
 def test_who_has_no_token_learns_nothing_of_the_server(tmp_path: Path) -> None:
-    tokens.add(tmp_path / "web-tokens.json", "anna", "observer")
-    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", "", "--role", ""]
-    command += ["--server", "udpout:127.0.0.1:9", "--tokens", str(tmp_path / "web-tokens.json")]
+    add_key(tmp_path, "anna", "observer")
+    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", ""]
+    command += ["--server", "udpout:127.0.0.1:9"]
     with process(*command, folder=tmp_path, name="alone") as alone:
         url = alone.wait_for(r"web page: (http://\S+)/\n")[1]
         ready = httpx.get(f"{url}/readyz")
@@ -413,9 +416,9 @@ def test_who_has_no_token_learns_nothing_of_the_server(tmp_path: Path) -> None:
 def test_many_streams_of_one_token_leave_some_to_others(
     tmp_path: Path, both: tuple[Stand, Web]
 ) -> None:
-    kept = tmp_path / "web-tokens.json"
-    anna, eve = (tokens.add(kept, *each) for each in (("anna", "operator"), ("eve", "observer")))
-    with web(tmp_path, both[0], "--role", "", name="streams") as page:
+    people = (("anna", "operator"), ("eve", "observer"))
+    anna, eve = (add_key(tmp_path, *each) for each in people)
+    with web(tmp_path, both[0], name="streams") as page:
         port = int(page.url.rpartition(":")[2])
         head = f"GET /api/v1/events HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
         held = [socket.create_connection(("127.0.0.1", port), 10) for _ in range(250)]

@@ -9,6 +9,7 @@ from typing import Any
 
 import httpx
 
+from tests.kit.commands import called
 from tests.kit.processes import Process, Stand, process, wait_until
 
 
@@ -84,14 +85,31 @@ class Web:
 def web(
     folder: Path, it: Stand, *options: str, server: str = "", name: str = "web"
 ) -> Iterator[Web]:
-    """Run a web process for a ``with`` block, on a free port of the loopback."""
+    """Run a web process for a ``with`` block, on a free port of the loopback.
+
+    Its key ring is that of a server in the same folder.
+    """
     command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", ""]
     command += ["--server", server or f"udpout:127.0.0.1:{it.client_port}"]
-    command += ["--tokens", str(folder / "web-tokens.json"), *options]
+    command += options
     with process(*command, folder=folder, name=name) as running:
         url = running.wait_for(r"web page: (http://\S+)/\n")[1]
         with httpx.Client(base_url=url, timeout=15) as client:
             yield Web(running, url, client)
+
+
+def add_key(folder: Path, name: str, role: str) -> str:
+    """Add a key to the ring of the processes in a folder; return its token."""
+    ring = ring_of(folder)
+    ring.parent.mkdir(mode=0o700, exist_ok=True)
+    done = called("keys", "add", name, "--role", role, "--keys", str(ring))
+    assert done.status == 0, done.error
+    return done.output.strip()
+
+
+def ring_of(folder: Path) -> Path:
+    """Return the key ring of the processes in a folder."""
+    return folder / "mav-tasks" / "keys.toml"
 
 
 def has_rover(it: Web) -> Any:

@@ -259,7 +259,9 @@ def _web(port: int) -> Iterator[str]:
         log = Path(folder) / "web.log"
         command = [sys.executable, "-m", "mav_tasks.cli", "web", "--store", ""]
         command += ["--server", f"udpout:{HOST}:{loopback(port)[1]}", "--listen", f"{HOST}:0"]
-        command += ["--tokens", str(Path(folder) / "tokens.json")]
+        keys = Path(folder) / "keys.toml"  # none: nobody needs a token
+        keys.touch(mode=0o600)
+        command += ["--keys", str(keys)]
         with log.open("wb") as output:
             running = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
         try:

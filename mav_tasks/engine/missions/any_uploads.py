@@ -145,7 +145,7 @@ class AnyUploads:
                 words = f"upload: mission type {kind} belongs to one rover: name it"
                 raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
         except Rejection as refusal:
-            self._answers.ack(sender, kind, result_of(refusal))
+            self._answers.ack(sender, kind, result_of(refusal), refusal.reason)
             self._tell_refused(sender, refusal, now=now)
             return
         self._receiver.count(message, sender, rank=client.rights.rank, now=now)
@@ -159,11 +159,14 @@ class AnyUploads:
         """Send messages, and decide about whole uploads; ``refusal``: of the one just decided."""
         outgoing, uploads = self._receiver.take()
         for told in outgoing:
-            self._answers.send(told)
             if isinstance(told.message, m.MissionAck) and told.message.type:
                 ended = refusal_of(told.message.type, told.why)
                 why = ended if told.why else refusal or self._check.take_refusal() or ended
+                told.message.opaque_id = why.reason
+                self._answers.send(told)
                 self._tell_refused(told.sender, why, now=now)
+            else:
+                self._answers.send(told)
         for upload in uploads:
             try:
                 self._take_in(upload, now=now)

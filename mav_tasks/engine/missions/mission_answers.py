@@ -32,9 +32,9 @@ class MissionAnswers:
         if client is not None:
             client.outlet.send(told.message, told.sender.addressed)
 
-    def ack(self, sender: Sender, kind: int, result: MavMissionResult) -> None:
-        """Send a MISSION_ACK that names no plan."""
-        self.send(ToClient(sender, m.MissionAck(*sender.address, result, kind)))
+    def ack(self, sender: Sender, kind: int, result: MavMissionResult, reason: int = 0) -> None:
+        """Send a MISSION_ACK that names no plan, but the reason of a refusal."""
+        self.send(ToClient(sender, m.MissionAck(*sender.address, result, kind, reason)))
 
     def tell(self, sender: Sender, vehicle: Vehicle, words: str, *, now: float) -> None:
         """Send a warning text to the sender's client."""

@@ -101,7 +101,7 @@ class MissionClearing:
             self._forget(vehicle, sender, asked, rest, so_far, now=now)
 
         def refuse(refusal: Rejection, *, now: float) -> None:
-            self._answers.ack(sender, asked, result_of(refusal))
+            self._answers.ack(sender, asked, result_of(refusal), refusal.reason)
             self._refused(sender, vehicle, refusal, now=now)
 
         if first == MISSION:

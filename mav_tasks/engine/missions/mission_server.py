@@ -176,7 +176,7 @@ class MissionServers:
             client.rights.require(row.role, f"change {row.about}")
         except Rejection as refusal:
             if isinstance(message, m.MissionCount | m.MissionClearAll):
-                self._answers.ack(sender, kind, MavMissionResult.DENIED)
+                self._answers.ack(sender, kind, MavMissionResult.DENIED, refusal.reason)
                 is_upload = isinstance(message, m.MissionCount)
                 message_id = 0 if is_upload else type(message).id
                 self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)

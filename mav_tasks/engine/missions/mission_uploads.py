@@ -42,7 +42,7 @@ R = TaskReason
 
 #: reason of an upload that the receiver itself ended, by its MAV_MISSION_RESULT
 ENDED = {
-    MavMissionResult.DENIED: R.NOT_ALLOWED,
+    MavMissionResult.DENIED: R.WRONG_STATE,  # another client uploads
     MavMissionResult.NO_SPACE: R.QUEUE_FULL,
     MavMissionResult.OPERATION_CANCELLED: R.WRONG_STATE,
 }
@@ -113,11 +113,14 @@ class MissionUploads:
         """
         outgoing, uploads = desk.receiver.take()
         for told in outgoing:
-            self._answers.send(told)
             if isinstance(told.message, m.MissionAck) and told.message.type:
                 ended = refusal_of(told.message.type, told.why)
                 why = ended if told.why else refusal or desk.check.take_refusal() or ended
+                told.message.opaque_id = why.reason
+                self._answers.send(told)
                 self.refused(told.sender, vehicle, why, now=now)
+            else:
+                self._answers.send(told)
         for upload in uploads:
             self._vehicles.mark_dirty(vehicle)
             self._decide(desk, vehicle, upload, now=now)

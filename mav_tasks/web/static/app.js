@@ -87,7 +87,7 @@ function drawLink() {
   say(bannerAge, age);
   show(banner, Boolean(trouble));
   if (!state.session) return;
-  const who = state.session.name === "local" ? state.session.role : `${state.session.name}, ${state.session.role}`;
+  const who = [state.session.name, state.session.role].filter(Boolean).join(", ");
   say(link, trouble ? "no connection" : state.stream.isOpen ? `connected · you: ${who}` : "connecting…");
   link.className = trouble ? "link bad" : "link";
 }

@@ -8,7 +8,7 @@ import { h } from "./dom.js";
 export function logIn(then) {
   ask({
     title: "Log in", word: "Log in",
-    words: ["This page needs a token. An administrator adds one with: mav-tasks web tokens add NAME --role operator"],
+    words: ["This page needs a token. An administrator makes one with: mav-tasks keys add NAME --role operator"],
     fields: h("div", {}, h("input", { class: "quiet", type: "text", name: "username", autocomplete: "username", tabIndex: -1, "aria-hidden": "true" }), h("label", { class: "fields" }, "Token", h("input", { name: "token", type: "password", autocomplete: "current-password", required: true }))),
     act: async (form) => {
       await post("/session", { token: String(new FormData(form).get("token")).trim() });

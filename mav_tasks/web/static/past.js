@@ -168,7 +168,7 @@ function drawFacts(found) {
   facts.replaceChildren(...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]), ...kept);
   show(release, task.state === "held" && acts.may("release"));
   say(cancel, task.state === "cancelling" ? "Kill…" : "Cancel…");
-  show(cancel, !OVER.has(task.state) && (acts.may("cancel") || acts.may("submit")));
+  show(cancel, !OVER.has(task.state) && acts.may("cancel"));
 }
 
 function addFact(name, value) {

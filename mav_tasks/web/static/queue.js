@@ -99,7 +99,7 @@ function make(task, isCurrent) {
     const isCancelling = shown.state === "cancelling";
     say(cancel, isCancelling ? "Kill…" : "Cancel…");
     cancel.setAttribute("aria-label", `${isCancelling ? "Kill" : "Cancel"} task ${id}`);
-    show(cancel, acts.may("cancel") || acts.may("submit"));
+    show(cancel, acts.may("cancel"));
     const isMovable = !isCurrent && acts.may("modify");
     show(grip, isMovable);
     element.classList.toggle("movable", isMovable);

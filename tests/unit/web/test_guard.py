@@ -10,26 +10,33 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from mav_tasks.web import rates, tokens
+from mav_tasks.client.aio import Client
+from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
+from mav_tasks.key_ring.ring_file import Loaded
+from mav_tasks.key_ring.watch import RingWatch
+from mav_tasks.web import rates
 from mav_tasks.web.guard import PLAN_BODY, SMALL_BODY, Guard
-from mav_tasks.web.identity import Identity
 from mav_tasks.web.problems import Problem
 from mav_tasks.web.sessions import COOKIE, Sessions
-from mav_tasks.web.tokens import Tokens
+from mav_tasks.web.users import Users
 from tests.kit.awaited import awaited
 
 HOST = "127.0.0.1:8560"
 JSON = {"content-type": "application/json"}
-LOCAL = Identity("local", "operator")
+SECRET = b"a" * 32
+TOKEN = SECRET.hex()
 
 
 class Rig:
     """A guard around an application that says who asked and how long the body was."""
 
-    def __init__(self, folder: Path, *, open_identity: Identity | None = LOCAL) -> None:
-        self.path = folder / "tokens.json"
-        self.tokens = Tokens(self.path)
-        self.sessions = Sessions(self.tokens)
+    def __init__(self, folder: Path, *, has_key: bool = False) -> None:
+        self.key = key_of("anna", "submitter", SECRET)
+        ring = KeyRing((Entry("anna", "submitter", self.key),) if has_key else ())
+        watch = RingWatch(folder / "keys.toml", Loaded(ring, (0, 0, 0, 0, 0)))
+        client = Client()
+        users = Users(watch, client, server="", own_key=None, connect=lambda _key: client)
+        self.sessions = Sessions(users)
         app = Starlette(
             routes=[
                 Route("/api/v1/{rest:path}", _said, methods=["GET", "POST", "PUT", "PATCH"]),
@@ -40,9 +47,9 @@ class Rig:
         guard = Guard(
             app,
             hosts={HOST},
-            tokens=self.tokens,
+            users=users,
             sessions=self.sessions,
-            open_identity=open_identity,
+            is_open=True,
         )
         transport = httpx.ASGITransport(app=guard, client=("127.0.0.1", 5))
         self.client = httpx.AsyncClient(transport=transport, base_url=f"http://{HOST}")
@@ -106,7 +113,7 @@ async def test_our_own_page_and_programs_pass(tmp_path: Path) -> None:
     ours = {"origin": f"http://{HOST}", "sec-fetch-site": "same-origin"}
     for headers in (JSON, JSON | ours, {"content-type": "application/json; charset=utf-8"}):
         answer = await rig.client.post("/api/v1/stop", headers=headers, content="{}")
-        assert answer.json() == {"who": "local operator", "bytes": 2}
+        assert answer.json() == {"who": "local None", "bytes": 2}
 
 
 @awaited
@@ -128,7 +135,7 @@ async def test_every_answer_forbids_what_the_page_does_not_need(tmp_path: Path) 
 
 @awaited
 async def test_without_a_token_nothing_but_the_page_and_the_login(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, open_identity=None)
+    rig = Rig(tmp_path, has_key=True)
     assert (await rig.client.get("/api/v1/vehicles")).status_code == 401
     stop = await rig.client.post("/api/v1/stop", headers=JSON, content="{}")
     assert stop.status_code == 401
@@ -140,25 +147,21 @@ async def test_without_a_token_nothing_but_the_page_and_the_login(tmp_path: Path
 
 
 @awaited
-async def test_a_token_names_its_holder_until_it_is_revoked(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, open_identity=None)
-    text = tokens.add(rig.path, "anna", "submitter")
-    bearer = {"authorization": f"Bearer {text}"}
-    answer = await rig.client.get("/api/v1/vehicles", headers=bearer)
-    assert answer.json()["who"] == "anna submitter"
-    for wrong in (f"Bearer {text}x", "Bearer x", f"Bearer {text[:-1]}"):
+async def test_a_token_names_its_holder(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, has_key=True)
+    for text in (TOKEN, TOKEN.upper()):
+        bearer = {"authorization": f"Bearer {text}"}
+        answer = await rig.client.get("/api/v1/vehicles", headers=bearer)
+        assert answer.json()["who"] == "anna submitter"
+    for wrong in (f"Bearer {TOKEN}x", "Bearer x", f"Bearer {TOKEN[:-1]}"):
         refused = await rig.client.get("/api/v1/vehicles", headers={"authorization": wrong})
         assert refused.status_code == 401
-    tokens.revoke(rig.path, "anna")
-    assert (await rig.client.get("/api/v1/vehicles", headers=bearer)).status_code == 401
 
 
 @awaited
-async def test_a_session_ends_with_its_token_and_when_it_is_ended(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, open_identity=None)
-    found = rig.tokens.of_text(tokens.add(rig.path, "anna", "operator"))
-    assert found is not None
-    numbers = [rig.sessions.begin(found) for _ in range(2)]
+async def test_a_session_ends_when_it_is_ended(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, has_key=True)
+    numbers = [rig.sessions.begin(rig.key) for _ in range(2)]
 
     async def who(number: str) -> int:
         headers = {"cookie": f"{COOKIE}={number}"}
@@ -168,16 +171,12 @@ async def test_a_session_ends_with_its_token_and_when_it_is_ended(tmp_path: Path
     rig.sessions.end(numbers[0])
     assert [await who(number) for number in numbers] == [401, 200]
     assert await who(numbers[1][:-1]) == 401
-    tokens.revoke(rig.path, "anna")
-    assert await who(numbers[1]) == 401
 
 
 @awaited
 async def test_a_stolen_cookie_does_not_help_a_page_of_another_site(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, open_identity=None)
-    found = rig.tokens.of_text(tokens.add(rig.path, "anna", "operator"))
-    assert found is not None
-    cookie = {"cookie": f"{COOKIE}={rig.sessions.begin(found)}"}
+    rig = Rig(tmp_path, has_key=True)
+    cookie = {"cookie": f"{COOKIE}={rig.sessions.begin(rig.key)}"}
     evil = JSON | cookie | {"origin": "https://evil.example"}
     answer = await rig.client.post("/api/v1/stop", headers=evil, content="{}")
     assert answer.status_code == 403

@@ -1,0 +1,407 @@
+"""Who uses the page is a client of the server: a request gets the same answer as by MAVLink."""
+
+import json
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from mav_tasks import Key, Move, Refused, SyncClient, Wait
+from mav_tasks.tasks.lifecycle import TaskReason
+from tests.kit.commands import called
+from tests.kit.processes import Stand, process, stand, wait_until
+from tests.kit.web import Web, add_key, has_rover, ring_of, web
+
+pytestmark = pytest.mark.slow
+
+ROLES = {"ola": "observer", "sam": "submitter", "otto": "operator", "sue": "safety"}
+LIMITS = {"max_priority": 7, "max_speed": 1.0, "quota": 3}
+LATER = 1000  # s: no task of these tests begins
+SERVO = """QGC WPL 110
+0\t1\t3\t16\t0\t0\t0\t0\t-35.363262\t149.165237\t0\t1
+1\t0\t3\t183\t5\t1900\t0\t0\t0\t0\t0\t1
+"""
+CIRCLE = {
+    "circle": {"center": [-35.363262, 149.165237], "radius": 90},
+    "inclusion": True,
+    "version": 1,
+}
+FENCE = json.dumps(
+    {
+        "fileType": "Plan",
+        "groundStation": "QGroundControl",
+        "version": 1,
+        "mission": {"items": [], "version": 2},
+        "geoFence": {"version": 2, "circles": [CIRCLE], "polygons": []},
+        "rallyPoints": {"points": [], "version": 2},
+    }
+)
+FILES = {"servo.waypoints": SERVO, "yard.plan": FENCE}
+WITH_REASON = {403: {"not_allowed"}, 409: {"quota", "wrong_state"}}
+
+
+@dataclass
+class Rig:
+    """A server with a key for each role, a rover, and a web process; tokens and clients by name."""
+
+    folder: Path
+    stand: Stand
+    page: Web
+    tokens: dict[str, str]
+    clients: dict[str, SyncClient]
+
+    def http(self, name: str, method: str, path: str, body: Any = None) -> httpx.Response:
+        """Send a request with a user's token."""
+        return self.page.send(method, path, body, authorization=f"Bearer {self.tokens[name]}")
+
+    def submit(self, name: str, **more: Any) -> httpx.Response:
+        """Submit a task that waits."""
+        body = {"goals": [{"kind": "wait", "duration": 5}], "delay": LATER} | more
+        return self.http(name, "POST", "/vehicles/1/tasks", body)
+
+    def key(self, name: str) -> Key:
+        """Return a user's key."""
+        return Key(name, bytes.fromhex(self.tokens[name]))
+
+    def of(self, name: str) -> int:
+        """Return a new waiting task of a user."""
+        return self.clients[name].submit(Wait(5), delay=LATER).id
+
+    def epoch(self) -> int:
+        """Return the rover's halt epoch."""
+        return self.clients["otto"].queue().halt_epoch
+
+    def paused(self) -> int:
+        """Pause the rover; return its halt epoch."""
+        self.clients["otto"].pause()
+        return self.epoch()
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    """One of each for all of them."""
+    folder = tmp_path_factory.mktemp("rights")
+    tokens = {name: add_key(folder, name, role) for name, role in ROLES.items()}
+    for name, text in FILES.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    limits = [f"roles.submitter.{name}={value}" for name, value in LIMITS.items()]
+    options = [word for each in limits for word in ("--set", each)]
+    store = str(folder / "tasks.sqlite3")
+    with (
+        stand(folder, *options, serve_store=store) as it,
+        web(folder, it, "--store", store) as page,
+        ExitStack() as opened,
+    ):
+        page.client.headers["authorization"] = f"Bearer {tokens['sue']}"
+        has_rover(page)
+        url = f"udpout:127.0.0.1:{it.client_port}"
+        clients = {
+            name: opened.enter_context(SyncClient(url, key=Key(name, bytes.fromhex(token))))
+            for name, token in tokens.items()
+        }
+        yield Rig(folder, it, page, tokens, clients)
+
+
+@dataclass
+class Case:
+    """A request by HTTP, and by MAVLink. Both are about the number that ``prepare`` returns."""
+
+    by_http: Callable[[Rig, str, int], httpx.Response]
+    by_mavlink: Callable[[Rig, SyncClient, int], Any]
+    prepare: Callable[[Rig, str], int] = lambda _rig, _name: 0
+
+
+def _file(name: str) -> dict[str, Any]:
+    return {"name": name, "text": FILES[name]}
+
+
+CASES = {
+    "submit": Case(
+        lambda rig, who, _: rig.submit(who),
+        lambda _rig, client, _: client.submit_mission([Wait(5)], delay=LATER),
+    ),
+    "plan with a servo": Case(
+        lambda rig, who, _: rig.http(
+            who, "POST", "/vehicles/1/missions", _file("servo.waypoints") | {"delay": LATER}
+        ),
+        lambda rig, client, _: client.submit_mission(rig.folder / "servo.waypoints", delay=LATER),
+    ),
+    "priority": Case(
+        lambda rig, who, _: rig.submit(who, priority=8),
+        lambda _rig, client, _: client.submit_mission([Wait(5)], delay=LATER, priority=8),
+    ),
+    "speed": Case(
+        lambda rig, who, _: rig.submit(who, goals=[{"kind": "move", "distance": 1, "speed": 2}]),
+        lambda _rig, client, _: client.submit_mission([Move(1, speed=2)], delay=LATER),
+    ),
+    "pre-emptive": Case(
+        lambda rig, who, task: rig.http(who, "PATCH", f"/tasks/{task}", {"preemptive": True}),
+        lambda _rig, client, task: client.modify(task, preemptive=True),
+        lambda rig, who: rig.of("otto" if who == "ola" else who),
+    ),
+    "cancel": Case(
+        lambda rig, who, task: rig.http(who, "POST", f"/tasks/{task}/cancel", {}),
+        lambda _rig, client, task: client.cancel(task),
+        lambda rig, _: rig.of("otto"),
+    ),
+    "change": Case(
+        lambda rig, who, task: rig.http(who, "PATCH", f"/tasks/{task}", {"priority": 2}),
+        lambda _rig, client, task: client.modify(task, priority=2),
+        lambda rig, _: rig.of("otto"),
+    ),
+    "release": Case(
+        lambda rig, who, task: rig.http(
+            *(who, "POST", f"/tasks/{task}/release"), {"how": "skip", "epoch": rig.epoch()}
+        ),
+        lambda rig, client, task: client.release(task, "skip", epoch=rig.epoch()),
+        lambda rig, _: rig.of("otto"),
+    ),
+    "resume": Case(
+        lambda rig, who, epoch: rig.http(who, "POST", "/vehicles/1/resume", {"epoch": epoch}),
+        lambda _rig, client, epoch: client.resume(epoch=epoch),
+        lambda rig, _: rig.paused(),
+    ),
+    "clear": Case(
+        lambda rig, who, _: rig.http(who, "POST", "/vehicles/1/clear", {}),
+        lambda _rig, client, _: client.clear(),
+    ),
+    "fence": Case(
+        lambda rig, who, _: rig.http(who, "PUT", "/vehicles/1/fence", _file("yard.plan")),
+        lambda rig, client, _: client.set_fence(rig.folder / "yard.plan"),
+    ),
+    "STOP": Case(
+        lambda rig, who, _: rig.http(who, "POST", "/stop", {}),
+        lambda _rig, client, _: client.stop(),
+    ),
+    "pause": Case(
+        lambda rig, who, _: rig.http(who, "POST", "/vehicles/1/pause", {}),
+        lambda _rig, client, _: client.pause(),
+    ),
+}
+#: the lowest role that may, and what a role below it is told
+ALLOWED = {
+    "submit": ("submitter", "submit"),
+    "plan with a servo": ("operator", "may not send a plan that contains rover commands"),
+    "priority": ("operator", "role submitter may use priority 7 at most, not 8"),
+    "speed": ("operator", "role submitter may drive 1 m/s at most, not 2"),
+    "pre-emptive": ("operator", "may not make a task pre-emptive; operator may"),
+    "cancel": ("operator", "belongs to 244/190@"),
+    "change": ("operator", "belongs to 244/190@"),
+    "release": ("operator", "belongs to 244/190@"),
+    "resume": ("operator", "operator may"),
+    "clear": ("operator", "operator may"),
+    "fence": ("safety", "safety may"),
+    "STOP": ("observer", ""),
+    "pause": ("observer", ""),
+}
+
+
+@pytest.mark.parametrize("what", CASES)
+def test_each_role_gets_the_answer_that_it_gets_by_mavlink(what: str, rig: Rig) -> None:
+    case, (lowest, words) = CASES[what], ALLOWED[what]
+    ranks = list(ROLES.values())
+    for who, role in ROLES.items():
+        answer = case.by_http(rig, who, case.prepare(rig, who))
+        told = None
+        if not answer.is_success:
+            told = answer.json()
+            assert told["reason"] in WITH_REASON[answer.status_code], told
+        heard: tuple[str, str] | None = None
+        try:
+            case.by_mavlink(rig, rig.clients[who], case.prepare(rig, who))
+        except Refused as refused:
+            heard = TaskReason(refused.reason).name.lower(), str(refused)
+        if told is None:
+            assert heard is None or heard[0] == "wrong_state", (who, heard)
+        else:
+            assert heard is not None, (who, told)
+            assert _alike(told["detail"]) == _alike(heard[1])
+            assert told["reason"] == heard[0]
+        may = ranks.index(role) >= ranks.index(lowest)
+        if not may:
+            assert told is not None, who
+            assert told["reason"] == "not_allowed"
+            if role != "observer":
+                assert words in told["detail"]
+        elif told is not None:
+            assert told["reason"] == "wrong_state"  # it was not held
+    rig.http("sue", "POST", "/stop", {"clear": True})
+
+
+def _alike(words: str) -> str:
+    """Return words without the ids of tasks, which differ between two requests."""
+    return " ".join("N" if word.strip(":,").isdigit() else word for word in words.split())
+
+
+def test_the_quota_of_a_role_holds_for_the_page_and_mavlink_together(rig: Rig) -> None:
+    assert [rig.submit("sam").status_code for _ in range(2)] == [201, 201]
+    with SyncClient(f"udpout:127.0.0.1:{rig.stand.client_port}", key=rig.key("sam")) as script:
+        script.submit(Wait(5), delay=LATER)
+        refused = rig.submit("sam")
+        words = "role submitter may have at most 3 waiting tasks"
+        assert (refused.status_code, refused.json()["reason"]) == (409, "quota")
+        assert refused.json()["detail"] == words
+        with pytest.raises(Refused, match=words):
+            script.submit(Wait(5), delay=LATER)
+    rig.http("sue", "POST", "/stop", {"clear": True})
+
+
+def test_the_server_knows_who_submitted_and_who_stopped(rig: Rig) -> None:
+    task = rig.submit("sam").json()["id"]
+    assert rig.http("sam", "PATCH", f"/tasks/{task}", {"priority": 2}).json()["priority"] == 2
+    assert rig.http("sam", "POST", f"/tasks/{task}/cancel", {}).status_code == 204
+    entries = rig.http("ola", "GET", f"/tasks/{task}/journal").json()["entries"]
+    assert sum("signed sam" in json.dumps(entry) for entry in entries) >= 2
+    rig.http("ola", "GET", "/session")  # what the page does first: it opens her connection
+
+    def is_known() -> bool:
+        stop = rig.http("ola", "POST", "/stop", {})
+        assert (stop.status_code, stop.json()["by"]) == (200, "ola")
+        return "signed ola" in rig.stand.server.text
+
+    wait_until(is_known, within=5, what=lambda: rig.stand.server.text[-1000:])
+
+
+def test_a_token_of_another_ring_does_nothing_but_stop(rig: Rig, tmp_path: Path) -> None:
+    """The server would take unsigned packets: what it does not know is not sent to it unsigned."""
+    token = add_key(tmp_path, "eve", "safety")
+    with web(tmp_path, rig.stand, name="other") as page:
+        page.client.headers["authorization"] = f"Bearer {token}"
+        has_rover(page)
+        refused = page.send("POST", "/vehicles/1/tasks", {"goals": [{"kind": "home"}]})
+        assert refused.status_code == 504
+        assert "does the server have key eve (" in refused.json()["detail"]
+        assert page.post("/stop", {})["phase"] == "acknowledged"
+
+
+def test_a_revoked_key_ends_its_session_and_does_nothing_more(rig: Rig) -> None:
+    token = add_key(rig.folder, "ben", "operator")
+    with httpx.Client(base_url=rig.page.url, timeout=10) as client:
+
+        def has_logged_in() -> bool:
+            return client.post("/api/v1/session", json={"token": token.upper()}).is_success
+
+        wait_until(has_logged_in, within=5, what="the new key")
+        cookie = client.get("/api/v1/session")
+        assert (cookie.json()["name"], cookie.json()["role"]) == ("ben", "operator")
+        assert client.post("/api/v1/vehicles/1/pause", json={}).status_code == 204
+        done = called("keys", "revoke", "ben", "--keys", str(ring_of(rig.folder)))
+        assert done.status == 0, done.error
+
+        def is_out() -> bool:
+            return client.get("/api/v1/session").status_code == 401
+
+        wait_until(is_out, within=5, what="the end of its session")
+        bearer = {"authorization": f"Bearer {token}"}
+        assert client.get("/api/v1/vehicles", headers=bearer).status_code == 401
+
+
+def test_a_person_sees_what_the_role_may_do(rig: Rig) -> None:
+    may = {name: set(rig.http(name, "GET", "/session").json()["may"]) for name in ROLES}
+    assert may["ola"] == {"stop", "pause"}
+    assert may["sam"] - may["ola"] == {"submit", "mission", "cancel", "modify", "release"}
+    assert may["otto"] - may["sam"] == {"resume", "clear"}
+    assert may["sue"] - may["otto"] == {"fence"}
+
+
+@pytest.fixture(scope="module")
+def open_page(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Web]:
+    """A web process on loopback without a key."""
+    with web(tmp_path_factory.mktemp("open"), rig.stand, name="open") as page:
+        yield page
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["x-forwarded-for", "x-forwarded-host", "x-real-ip", "forwarded", "via"],
+)
+def test_a_proxy_on_this_machine_lets_nobody_in(name: str, open_page: Web) -> None:
+    assert open_page.get("/session")["name"] == "local"
+    headers = {name: "203.0.113.9"}
+    refused = open_page.client.post("/api/v1/stop", json={}, headers=headers)
+    assert refused.status_code == 401
+    assert "mav-tasks keys add NAME --role operator" in refused.json()["detail"]
+    assert open_page.client.get("/", headers=headers).status_code == 200  # where to log in
+
+
+def test_an_old_form_of_http_that_proxies_speak_lets_nobody_in(open_page: Web) -> None:
+    port = int(open_page.url.rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port), 10) as proxy:
+        proxy.sendall(f"GET /api/v1/session HTTP/1.0\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        assert b" 401 " in proxy.recv(100)
+
+
+def test_the_first_key_closes_an_open_page(rig: Rig, tmp_path: Path) -> None:
+    with web(tmp_path, rig.stand, name="closing") as page:
+        with page.client.stream("GET", "/api/v1/events") as stream:
+            token = add_key(tmp_path, "anna", "observer")
+            wait_until(
+                lambda: page.client.get("/api/v1/session").status_code == 401,
+                within=5,
+                what="a page that needs a token",
+            )
+            assert list(stream.iter_lines())  # it ends
+        bearer = {"authorization": f"Bearer {token}"}
+        assert page.client.get("/api/v1/session", headers=bearer).json()["name"] == "anna"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--listen", "0.0.0.0:0"), "--listen 0.0.0.0:0: who sits elsewhere needs a token"),
+        (("--name", "rover.example"), "--name rover.example: who sits elsewhere needs a token"),
+        (("--role", "observer"), "--role: the server decides"),
+        (("--tokens", "x.json"), "keys of the key ring now: mav-tasks keys add NAME"),
+        (("tokens", "add", "anna", "--role", "operator"), "keys of the key ring now"),
+        (("--keys", "none.toml"), "key ring none.toml does not exist"),
+    ],
+)
+def test_a_page_that_needs_a_key_says_how_to_make_one(
+    options: tuple[str, ...], words: str, tmp_path: Path
+) -> None:
+    command = ("-m", "mav_tasks.cli", "web", *options)
+    with process(*command, folder=tmp_path, name="refused") as it:
+        assert it.popen.wait(20) == 2
+    assert words in it.text
+    assert len(it.text.splitlines()) == 1
+
+
+def test_tokens_of_an_older_version_are_named(tmp_path: Path) -> None:
+    old = ring_of(tmp_path).with_name("web-tokens.json")
+    old.parent.mkdir()
+    old.write_text("{}", encoding="utf-8")
+    command = ("-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", "")
+    with process(*command, folder=tmp_path, name="old") as it:
+        it.wait_for("web page: ")
+        assert f"{old} is not used any more: mav-tasks keys add NAME" in it.text
+
+
+def test_an_owner_is_known_by_the_server_and_its_store(tmp_path: Path) -> None:
+    """A server with another store has another task of the same id: it is not the submitter's."""
+    tokens = {name: add_key(tmp_path, name, ROLES[name]) for name in ("sam", "otto")}
+    with stand(tmp_path) as it, web(tmp_path, it) as page:
+        page.client.headers["authorization"] = f"Bearer {tokens['sam']}"
+        has_rover(page)
+        goals = {"goals": [{"kind": "wait", "duration": 5}], "delay": LATER}
+        own = page.post("/vehicles/1/tasks", goals)["id"]
+        it.server.end(signal.SIGKILL)
+        serve = ("-m", "mav_tasks.cli", "serve", "--no-push", "--store", str(tmp_path / "new"))
+        links = ("--client", f"udpin:127.0.0.1:{it.client_port}")
+        rover = ("--vehicle", f"udpout:127.0.0.1:{it.rover_port}")
+        with process(*serve, *links, *rover, folder=tmp_path, name="again") as again:
+            again.wait_for("rover 1: found")
+            key = Key("otto", bytes.fromhex(tokens["otto"]))
+            with SyncClient(f"udpout:127.0.0.1:{it.client_port}", key=key) as otto:
+                assert otto.submit(Wait(5), delay=LATER).id == own
+            refused = page.send("POST", f"/tasks/{own}/cancel", {})
+            assert refused.status_code == 403
+            assert "belongs to 244/190" in refused.json()["detail"]
+            assert page.task(own)["state"] == "scheduled"
+            other = page.post("/vehicles/1/tasks", goals)["id"]  # its connection goes on
+            assert page.send("POST", f"/tasks/{other}/cancel", {}).status_code == 204
