@@ -44,7 +44,6 @@ WITH_CURL = (
 COMMANDS = {
     "./tools/demo": "tests/e2e/test_demo.py",
     "mav-tasks web": "tests/e2e/test_web.py",
-    "mav-tasks web tokens add anna --role operator": "tests/e2e/test_web.py",
     WITH_CURL: "tests/e2e/test_web.py",
     "createuser rover": "tests/e2e/test_postgres.py",
     "createdb --owner=rover fleet": "tests/e2e/test_postgres.py",

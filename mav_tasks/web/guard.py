@@ -64,8 +64,8 @@ class Guard:
 
     ``hosts`` are the values of Host that are accepted, in lower case; ``behind_tls`` are those of
     them that a proxy serves with TLS, so that its pages have an https origin. ``is_open``: whether
-    only this machine can ask, so that a token is needed only once a client has a key, or by a
-    proxy. ``tile_origins`` are the sites of tiles.
+    only this machine can ask, so that a token is needed only by a proxy, or once a client has a
+    key. ``tile_origins`` are the sites of tiles.
     ``note_answer`` gets the status of each answer.
     """
 

@@ -99,8 +99,8 @@ class Users:
 
     @property
     def are_any(self) -> bool:
-        """Whether a client has a usable key, so that nobody is let in without one."""
-        return bool(self._keys)
+        """Whether a client has a key, also a revoked one, so that nobody is let in without one."""
+        return any(key.role for key in self._ring.keys or ())
 
     def of_token(self, text: str) -> Key | None:
         """Return the key of a token; None: there is none, or it was revoked."""

@@ -349,6 +349,11 @@ def test_the_first_key_closes_an_open_page(rig: Rig, tmp_path: Path) -> None:
             assert list(stream.iter_lines())  # it ends
         bearer = {"authorization": f"Bearer {token}"}
         assert page.client.get("/api/v1/session", headers=bearer).json()["name"] == "anna"
+        done = called("keys", "revoke", "anna", "--keys", str(ring_of(tmp_path)))
+        assert done.status == 0, done.error
+        wait_until(lambda: "anna was revoked" in page.process.text, within=5, what="the log")
+        for named in (bearer, {}):  # nor does the end of the last one open it again
+            assert page.client.get("/api/v1/session", headers=named).status_code == 401
 
 
 @pytest.mark.parametrize(
