@@ -15,7 +15,7 @@ import pytest
 from mav_tasks import Key, Move, Refused, SyncClient, Wait
 from mav_tasks.tasks.lifecycle import TaskReason
 from tests.kit.commands import called
-from tests.kit.processes import Stand, process, stand, wait_until
+from tests.kit.processes import Stand, free_udp_ports, process, stand, wait_until
 from tests.kit.web import Web, add_key, has_rover, ring_of, web
 
 pytestmark = pytest.mark.slow
@@ -375,6 +375,20 @@ def test_a_page_that_needs_a_key_says_how_to_make_one(
         assert it.popen.wait(20) == 2
     assert words in it.text
     assert len(it.text.splitlines()) == 1
+
+
+def test_a_link_for_one_client_carries_no_other_user(tmp_path: Path) -> None:
+    token = add_key(tmp_path, "sam", "submitter")
+    (port,) = free_udp_ports(1)
+    command = ("-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", "")
+    link = f"udpin:127.0.0.1:{port}"
+    with process(*command, "--server", link, folder=tmp_path, name="single") as it:
+        url = it.wait_for(r"web page: (http://\S+)/\n")[1]
+        bearer = {"authorization": f"Bearer {token}"}
+        path = f"{url}/api/v1/vehicles/1/resume"
+        refused = httpx.post(path, json={"epoch": 1}, headers=bearer)
+        assert refused.status_code == 409
+        assert f"only one client can use {link}, and it signs with key none" in refused.text
 
 
 def test_tokens_of_an_older_version_are_named(tmp_path: Path) -> None:

@@ -320,7 +320,9 @@ def test_a_plan_is_bound_by_the_same_limits(with_roles: MakeRoles) -> None:
     fast = Item(CHANGE_SPEED, param1=1, param2=0.9, param4=0.0, frame=2)
     assert upload(world, submitter, fast, one, target=(1, 191)) != 0
     relay = Item(RELAY, param1=0, param2=1, param4=0.0, frame=2)
-    assert upload(world, submitter, relay, one, target=(1, 191)) != 0
+    refused = Upload(submitter, (relay, one), target=(1, 191))
+    world.run(2.0)
+    assert (refused.result, refused.opaque_id) == (MISSION_DENIED, R.NOT_ALLOWED)
     assert any("contains rover commands" in text for text in submitter.texts())
     assert len(world.tasks()) == 1
 
