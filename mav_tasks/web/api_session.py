@@ -8,7 +8,7 @@ from importlib.metadata import version
 from starlette.responses import Response, StreamingResponse
 
 from mav_tasks.client.goal_form import KINDS
-from mav_tasks.errors import ClientError
+from mav_tasks.errors import UsageError
 from mav_tasks.mavlink.label import MAX_LABEL
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY
 from mav_tasks.web.events import description
@@ -29,7 +29,7 @@ def operations(services: Services) -> list[Operation]:
     """Return the operations."""
 
     async def session(call: Call) -> object:
-        with suppress(ClientError):  # who acts is told why
+        with suppress(UsageError):  # who acts is told why
             await services.users.open(call.identity)  # before it is needed
         return {
             "name": call.identity.name,

@@ -13,7 +13,6 @@ from mav_tasks.web.fields import Field
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.plan_text import NAME, plan_of, preview_response, text_field
-from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 from mav_tasks.web.submissions import (
     AFTER,
@@ -44,6 +43,11 @@ CHANGES = (
     Field("preemptible", "boolean", "other tasks may interrupt it"),
     Field("preemptive", "boolean", "it may interrupt other tasks"),
 )
+#: what the path names as the rover, and what it means for a new task
+RUNS_ON = {
+    "any": " of the rover that would begin it first; it may get another rover before it begins",
+    "{vehicle}": "; answered once the task is durable",
+}
 RELEASE = (
     Field(
         "how",
@@ -131,53 +135,28 @@ def operations(services: Services) -> list[Operation]:
         live.hurry(status.vehicle)
 
     async def journal(call: Call) -> Any:
-        if services.journal is None:
-            raise not_found("the web process has no store: start it with --store")
         return {"entries": await services.entries(task=call.task, limit=1000)}
 
-    one, rover, any_rover = "/tasks/{task}", "/vehicles/{vehicle}", "/vehicles/any"
+    one = "/tasks/{task}"
+    submissions = [
+        Operation(
+            "POST",
+            f"/vehicles/{rover}/{name}",
+            f"Submit {what} as one task{whose}",
+            asks(handler),
+            body=[*body, *TERMS],
+            answer="Task",
+            status=201,
+            headers=KEYED,
+        )
+        for rover, whose in RUNS_ON.items()
+        for name, what, handler, body in (
+            ("tasks", "goals", submit_task, (GOALS,)),
+            ("missions", "a mission file", submit_mission, FILE),
+        )
+    ]
     return [
-        Operation(
-            "POST",
-            f"{any_rover}/tasks",
-            "Submit goals as one task of the rover that would begin it first; it may get another"
-            " rover before it begins",
-            asks(submit_task),
-            body=[GOALS, *TERMS],
-            answer="Task",
-            status=201,
-            headers=KEYED,
-        ),
-        Operation(
-            "POST",
-            f"{any_rover}/missions",
-            "Submit a mission file as one task of the rover that would begin it first",
-            asks(submit_mission),
-            body=[*FILE, *TERMS],
-            answer="Task",
-            status=201,
-            headers=KEYED,
-        ),
-        Operation(
-            "POST",
-            f"{rover}/tasks",
-            "Submit goals as one task; answered once the task is durable",
-            asks(submit_task),
-            body=[GOALS, *TERMS],
-            answer="Task",
-            status=201,
-            headers=KEYED,
-        ),
-        Operation(
-            "POST",
-            f"{rover}/missions",
-            "Submit a mission file as one task",
-            asks(submit_mission),
-            body=[*FILE, *TERMS],
-            answer="Task",
-            status=201,
-            headers=KEYED,
-        ),
+        *submissions,
         Operation(
             "POST",
             "/plans",

@@ -7,18 +7,14 @@ the server would refuse: it is read from the server's own table.
 from dataclasses import dataclass
 
 from mav_tasks.engine.clients.rights import RANKS
-from mav_tasks.engine.policy import PAUSE, row_of_command, row_of_message
+from mav_tasks.engine.policy import row_of_command
 from mav_tasks.engine.policy.messages import BOUNDING_PLAN
-from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.signing import Key
 
-#: what the page offers, and the row of the server's policy that decides about it
+#: what the page offers besides STOP and pause: the row of the server's policy that decides
 OFFERED = {
-    "stop": row_of_command(MavCmd.TASK_STOP),
-    "pause": PAUSE,
     "submit": row_of_command(MavCmd.TASK_MOVE),
-    "mission": row_of_message(m.MissionCount.id),
     "resume": row_of_command(MavCmd.DO_PAUSE_CONTINUE),
     "cancel": row_of_command(MavCmd.TASK_CANCEL),
     "modify": row_of_command(MavCmd.TASK_MODIFY),

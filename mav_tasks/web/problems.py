@@ -11,6 +11,7 @@ from mav_tasks.errors import (
     NoSuchVehicle,
     PlanFileError,
     Refused,
+    UsageError,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -85,7 +86,7 @@ def problem_of(error: Exception) -> Problem:
             return Problem(status, "The task server refused", str(error), reason=name)
         case PlanFileError() | ValueError():
             return invalid(str(error))
-        case ClientError():
+        case ClientError() | UsageError():  # a connection to the server that cannot be opened
             return Problem(409, "Not done", str(error))
         case _:
             raise error

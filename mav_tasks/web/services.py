@@ -14,7 +14,7 @@ from mav_tasks.web.goal_places import places_of_goals
 from mav_tasks.web.journal import Journal
 from mav_tasks.web.live import Live
 from mav_tasks.web.operation import Call, Handler
-from mav_tasks.web.problems import Problem
+from mav_tasks.web.problems import Problem, not_found
 from mav_tasks.web.records import Records
 from mav_tasks.web.sessions import Sessions
 from mav_tasks.web.tiles import Tiles
@@ -66,18 +66,18 @@ class Services:
 
         async def run(call: Call) -> Any:
             line = await self.users.open(call.identity)
-            with line.used():
-                if line.client is not self.client:
-                    await line.client.found()
-                return await handler(call, line.client)
+            if line.client is not self.client:
+                await line.client.found()
+            return await handler(call, line.client)
 
         return run
 
     async def entries(
         self, *, task: int | None, vehicle: int | None = None, after: int = 0, limit: int
     ) -> list[dict[str, Any]]:
-        """Return events of the journal; raise Problem if it cannot be read."""
-        assert self.journal is not None, "the operation has looked"
+        """Return events of the journal; raise Problem if there is none, or it cannot be read."""
+        if self.journal is None:
+            raise not_found("the web process has no store: start it with --store")
         try:
             async with self._reading:
                 return await asyncio.to_thread(

@@ -7,44 +7,31 @@ share the connection of the web process.
 """
 
 import asyncio
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from dataclasses import dataclass
 from hashlib import sha256
 from hmac import compare_digest
 
 from mav_tasks.client.aio import Client
-from mav_tasks.errors import ClientError, UsageError
+from mav_tasks.errors import UsageError
 from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.web.identity import Identity
 
 LOOK = 1.0  # s between looks for unused connections
 IDLE = 600.0  # s without a request, after which a user's connection is closed
-MOST = 16  # connections that are kept: each gets all telemetry, and the server has room for 64
+MOST = 32  # connections that are kept: the server has room for 64 clients
 #: kinds of links that a client can open more than once
 EACH_OWN = ("udpout", "tcp")
 
 
+@dataclass(eq=False)
 class Line:
-    """A connection to the server, and the requests that use it now. ``name``: "" for our own."""
+    """A connection to the server. ``name``: of its key, "" for that of the web process."""
 
-    def __init__(self, name: str, client: Client) -> None:
-        self.name, self.client = name, client
-        self.requests = 0
-        self.used_at = 0.0
-
-    def __repr__(self) -> str:
-        return f"Line({self.name or 'own'}, {self.requests} requests)"
-
-    @contextmanager
-    def used(self) -> Iterator[None]:
-        """Keep the connection open for a ``with`` block."""
-        self.requests += 1
-        try:
-            yield
-        finally:
-            self.requests -= 1
-            self.used_at = asyncio.get_running_loop().time()
+    name: str
+    client: Client
+    used_at: float = 0.0
 
     @property
     def is_up(self) -> bool:
@@ -87,8 +74,7 @@ class Users:
                 await asyncio.sleep(LOOK)
                 now = asyncio.get_running_loop().time()
                 for key, line in list(self._lines.items()):
-                    is_idle = not line.requests and now - line.used_at > IDLE
-                    if is_idle or key not in self._keys:
+                    if now - line.used_at > IDLE or key not in self._keys:
                         await self._close(key)
         finally:
             self._ring.close()
@@ -126,7 +112,7 @@ class Users:
         return [self._own] if line is None or not line.is_up else [line, self._own]
 
     async def open(self, identity: Identity) -> Line:
-        """Return a user's connection; it need not have the server yet. Raise ClientError."""
+        """Return a user's connection; it need not have the server yet. Raise UsageError."""
         key = identity.key
         if key is None or key == self._own_key:
             return self._own
@@ -134,24 +120,19 @@ class Users:
         if line is None:
             line = self._lines[key] = Line(key.name, self._opened(key))
         line.used_at = asyncio.get_running_loop().time()
-        unused = [each for each in self._lines.items() if not each[1].requests]
-        unused.sort(key=lambda each: each[1].used_at)
-        for other, _ in unused[: max(0, len(self._lines) - MOST)]:
-            await self._close(other)
+        if len(self._lines) > MOST:
+            await self._close(min(self._lines, key=lambda each: self._lines[each].used_at))
         return line
 
     def _opened(self, key: Key) -> Client:
         if self._server.partition(":")[0] not in EACH_OWN:
             its = "none" if self._own_key is None else self._own_key.name
-            raise ClientError(
+            raise UsageError(
                 f"only one client can use {self._server}, and it signs with key {its}: "
                 "let the web process reach the server by udpout: or tcp:"
             )
         client = self._connect(key)
-        try:
-            client.open()
-        except UsageError as error:
-            raise ClientError(str(error)) from error
+        client.open()
         return client
 
     async def _close(self, key: Key) -> None:
