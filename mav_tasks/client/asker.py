@@ -211,6 +211,8 @@ class Asker:
             with self._future(tuple[MavMissionResult | None, int]) as future:
 
                 def done(result: MavMissionResult | None, opaque_id: int) -> None:
+                    while not heard.empty():  # the reason of a refusal follows it
+                        heard.get_nowait()
                     if not future.done():
                         future.set_result((result, opaque_id))
 
