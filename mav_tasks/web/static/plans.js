@@ -83,7 +83,7 @@ async function open(file) {
   });
   showMap();
   preview(plan, form);
-  if (!may(plan.items ? "mission" : "fence")) form.querySelector(".main-word").disabled = true;
+  if (!may(plan.items ? "submit" : "fence")) form.querySelector(".main-word").disabled = true;
 }
 
 // on a phone the map is a view of its own
