@@ -308,9 +308,11 @@ class Engine:
         )
 
     def has_heard(self, link: str, peer: Peer) -> bool:
-        """Return whether a client or rover is at an endpoint: a valid packet has come from there."""
+        """Return whether a client or a rover at an endpoint has sent a valid packet."""
         client = self._gcs.client((link, peer))
-        return self._vehicles.links.has_vehicle_at(link, peer) if client is None else client.is_heard
+        if client is not None:
+            return client.is_heard
+        return self._vehicles.links.has_vehicle_at(link, peer)
 
     def reach(self, *, now: float) -> Reach:
         """Return which vehicles are heard, also those that another gateway has, and are ours."""

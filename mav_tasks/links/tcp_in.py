@@ -9,10 +9,11 @@ otherwise lines name the address only, so that the log writes them once, with th
 
 import selectors
 import socket
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable
 
 from mav_tasks.clock import boot_time
+from mav_tasks.crowd import first_of_crowd
 from mav_tasks.errors import LinkOpenError
 from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
@@ -120,8 +121,7 @@ class TcpInLink(TcpLink):
         unheard = [guest for guest in guests if not self._is_heard(guest.peer)]
         guests = unheard or (guests if count >= most + SPARE else [])
         if guests:
-            of_each = Counter(guest.peer[0] for guest in guests)
-            oldest = max(guests, key=lambda guest: of_each[guest.peer[0]])  # the first of several
+            oldest = first_of_crowd(guests, lambda guest: guest.peer[0])
             self._turn_away(oldest, "the link is full")
 
     def _guests(self) -> list[Connection]:

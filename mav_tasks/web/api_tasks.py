@@ -104,7 +104,7 @@ def operations(services: Services) -> list[Operation]:
         return await client.status(call.task, vehicle=rovers[0].id)
 
     async def task(call: Call) -> Any:
-        return live.task_form(await status_of(call))
+        return live.task_form(await status_of(call), is_whole=True)
 
     async def timing(call: Call) -> Any:
         status = await status_of(call)
