@@ -119,8 +119,9 @@ class PatientProtocol(H11Protocol):
 
     def _drop(self) -> None:
         self._others.pop(self, None)
-        held: socket.socket = self.transport.get_extra_info("socket")
-        held.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, LINGER)
+        if self._full_since is not None:
+            held: socket.socket = self.transport.get_extra_info("socket")
+            held.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, LINGER)
         self.transport.abort()
 
     def _look(self) -> None:

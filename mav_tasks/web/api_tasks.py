@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from starlette.responses import Response
+
 from mav_tasks.client.aio import AnyRover
 from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.plan_sources import Plan
@@ -12,7 +14,7 @@ from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_text import NAME, plan_of, preview_response, text_field
+from mav_tasks.web.plan_text import NAME, text_field, with_plan, with_preview
 from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 from mav_tasks.web.submissions import (
@@ -90,11 +92,11 @@ def operations(services: Services) -> list[Operation]:
         return await add(call, goals, places_of_goals(goals))
 
     async def submit_mission(call: Call) -> Any:
-        plan = await plan_of(call.body)
+        plan = call.body["plan"]
         return await add(call, plan, places_of_items(plan.items))
 
     async def preview(call: Call) -> Any:
-        return await preview_response(call.body)
+        return Response(call.body["answer"], media_type="application/json")
 
     async def status_of(call: Call) -> TaskStatus:
         """Return a task's status. The server of any rover knows the tasks of all rovers."""
@@ -164,6 +166,7 @@ def operations(services: Services) -> list[Operation]:
             submit_mission,
             may="mission",
             body=[*FILE, *TERMS],
+            reading=with_plan,
             answer="Task",
             status=201,
             headers=KEYED,
@@ -186,6 +189,7 @@ def operations(services: Services) -> list[Operation]:
             submit_mission,
             may="mission",
             body=[*FILE, *TERMS],
+            reading=with_plan,
             answer="Task",
             status=201,
             headers=KEYED,
@@ -197,6 +201,7 @@ def operations(services: Services) -> list[Operation]:
             preview,
             body=FILE,
             answer="Plan",
+            reading=with_preview,
         ),
         Operation("GET", one, "One task", task, answer="Task"),
         Operation(

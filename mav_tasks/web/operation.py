@@ -4,7 +4,7 @@ import asyncio
 import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
@@ -13,6 +13,7 @@ from starlette.responses import JSONResponse, Response
 from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
 from mav_tasks.tasks.task import MAX_TASK_ID
+from mav_tasks.web.apart import apart
 from mav_tasks.web.fields import Field, read_body
 from mav_tasks.web.guard import SMALL_BODY
 from mav_tasks.web.identity import Identity
@@ -63,6 +64,8 @@ class Call:
         return int(self.path["task"])
 
 
+Parts = dict[str, Any]
+Reading = Callable[[Parts], Parts]
 #: returns a JSON value, a Response, or None for an answer without contents
 Handler = Callable[[Call], Awaitable[Any]]
 
@@ -72,7 +75,8 @@ class Operation:
     """``path`` is below ROOT; "{vehicle}" and "{task}" in it are numbers.
 
     ``may``: what the role must permit; "": anybody; "own": the handler checks. ``body``: None: the
-    request has none. ``answer``: the name of the answer's schema; "": no contents.
+    request has none. ``reading``: a function of a module that reads more of it. ``answer``: the
+    name of the answer's schema; "": no contents.
     """
 
     method: str
@@ -86,6 +90,7 @@ class Operation:
     status: int = 200
     headers: Sequence[Field] = ()
     description: str = ""
+    reading: Reading | None = None
 
     async def run(self, request: Request) -> Response:
         """Answer a request."""
@@ -112,7 +117,7 @@ class Operation:
                 raise not_found(f"there is no {WORDS[name]} {number}: ids are 1 to {most}")
         body: Mapping[str, Any] = {}
         if self.body is not None:
-            body = read_body(self.body, await _json_of(request))
+            body = await _body_of(request, self.body, self.reading)
         return Call(
             identity,
             request.state.session,
@@ -123,28 +128,32 @@ class Operation:
         )
 
 
-async def _json_of(request: Request) -> object:
+async def _body_of(request: Request, fields: Sequence[Field], more: Reading | None) -> Parts:
+    """Return the declared parts of a body; a large one, or a file, is read elsewhere."""
     data = await request.body()
-    if not data:
-        return {}
+    if len(data) > SMALL_BODY:
+        return cast(Parts, await apart(read_parts, data, fields, more))
+    if more is None:
+        return read_parts(data, fields, None)
+    async with _reading:  # one at a time: a STOP waits for one of them at most
+        return await asyncio.to_thread(read_parts, data, fields, more)
+
+
+_reading = asyncio.Lock()
+
+
+def read_parts(data: bytes, fields: Sequence[Field], more: Reading | None) -> Parts:
+    """Return the declared parts of a body. Raise Problem, or what ``more`` raises."""
+    if data.count(b"[") + data.count(b"{") > MOST_PARTS:  # nothing here has so many
+        raise Problem(413, "Too large", f"the body has more than {MOST_PARTS} parts")
     try:
-        if len(data) <= SMALL_BODY:
-            return _parsed(data)
-        if data.count(b"[") + data.count(b"{") > MOST_PARTS:  # nothing here has so many
-            raise Problem(413, "Too large", f"the body has more than {MOST_PARTS} parts")
-        async with _parsing:  # one at a time: a STOP waits for one of them at most
-            return await asyncio.to_thread(_parsed, data)
+        value = json.loads(data, object_pairs_hook=_object_of) if data else {}
     except Problem:
         raise
     except (ValueError, RecursionError) as error:
         raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
-
-
-_parsing = asyncio.Lock()
-
-
-def _parsed(data: bytes) -> object:
-    return json.loads(data, object_pairs_hook=_object_of)
+    body = read_body(fields, value)
+    return body if more is None else more(body)
 
 
 def _object_of(parts: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -1,6 +1,5 @@
-"""Parses the mission files of requests in a thread, so that a STOP does not wait for them."""
+"""Parses the mission files of requests."""
 
-import asyncio
 from typing import Any
 
 from starlette.responses import JSONResponse
@@ -16,27 +15,25 @@ MOST_LINES = 200_000  # QGroundControl writes some 30 for an item
 NAME = Field("name", "string", "name of the file, for messages", False, 0, 255)
 
 
-_one_at_a_time = asyncio.Lock()
-
-
 def text_field(meaning: str, *, is_required: bool = True) -> Field:
     """Return the part of a request that has a file's text."""
     return Field("text", "string", meaning, is_required, 1, LONGEST)
 
 
-async def plan_of(body: Any) -> PlanFile:
-    """Return the parsed file of a request. Raise PlanFileError, with its name, if it is invalid."""
-    async with _one_at_a_time:
-        return await asyncio.to_thread(_parsed, body)
+def with_plan(body: dict[str, Any]) -> dict[str, Any]:
+    """Return the parts of a request, with "plan" in place of the text, if there is one.
+
+    Raise PlanFileError, with the file's name, if it is invalid.
+    """
+    return body | ({} if body["text"] is None else {"text": "", "plan": _parsed(body)})
 
 
-async def preview_response(body: Any) -> JSONResponse:
-    """Return the answer that shows the file of a request. Raise PlanFileError if it is invalid."""
-    async with _one_at_a_time:
-        return await asyncio.to_thread(lambda: JSONResponse(preview_of(_parsed(body))))
+def with_preview(body: dict[str, Any]) -> dict[str, Any]:
+    """Return the "answer" that shows the file of a request. Raise PlanFileError as above."""
+    return {"answer": JSONResponse(preview_of(_parsed(body))).body}
 
 
-def _parsed(body: Any) -> PlanFile:
+def _parsed(body: dict[str, Any]) -> PlanFile:
     text, name = body["text"], body["name"] or "text"
     try:
         if text.count("\n") > MOST_LINES:
