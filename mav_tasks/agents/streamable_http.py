@@ -5,6 +5,7 @@ that name this address as their host, from pages of this address if a browser se
 from elsewhere cannot use a rover through a browser on this machine.
 """
 
+import logging
 from collections.abc import Callable
 from ipaddress import ip_address
 from typing import Any, NamedTuple
@@ -87,5 +88,6 @@ async def serve_http(server: Server[Any], place: Place, tell: Callable[[str], No
         max_request_body_size=LONGEST_BODY,
     )
     tell(f"http://{place.authority}{PATH}")
+    logging.getLogger("mcp").setLevel(logging.WARNING)  # it has a line for each session
     with under_load():
         await HttpServer(HttpSessions(app), limits).serve(sockets=[bound])

@@ -26,6 +26,7 @@ from tests.kit.web import Web, has_rover, web
 pytestmark = pytest.mark.slow
 
 HOST = "127.0.0.1"
+APART = 0.8  # s; one client's STOPs that are closer wait, so that they are no copies
 JSON = {"content-type": "application/json"}
 
 
@@ -107,7 +108,7 @@ def stops(it: Web, count: int) -> list[float]:
         began = time.monotonic()
         assert it.post("/stop", {})["phase"] == "acknowledged"
         took.append(time.monotonic() - began)
-        time.sleep(0.05)
+        time.sleep(APART)
     return took
 
 
@@ -164,28 +165,26 @@ def test_changes_of_a_long_mission_leave_nothing_in_memory(page: Web) -> None:
     page.post(f"/tasks/{task}/cancel", {})
 
 
-def _bodies() -> list[bytes]:
-    return [
-        json.dumps(
-            {"text": '{"fileType": "Plan", "mission": [' + "[]," * 250_000 + "1]}"}
-        ).encode(),
-        json.dumps({"text": "QGC WPL 110\n" + "1\n" * 2_900_000}).encode(),
-        b'{"text": "x", "more": [' + b'{"a":1},' * 280_000 + b"1]}",
-        b'{"text": "' + b"\\u0041" * 1_900_000 + b'"}',
-    ]
+LISTS = '{"fileType": "Plan", "mission": [' + "[]," * 250_000 + "1]}"
+#: bodies that take long to read, with the status of the answer and the begin of its detail
+BODIES = [
+    (json.dumps({"name": "a.plan", "text": LISTS}).encode(), 422, "a.plan: "),
+    (json.dumps({"text": "QGC WPL 110\n" + "1\n" * 2_900_000}).encode(), 422, "text: more than"),
+    (b'{"text": "x", "more": [' + b'{"a":1},' * 280_000 + b"1]}", 422, "'more': no such part"),
+    (json.dumps({"text": "[]," * 1_900_000}).encode(), 413, "the body has more than"),
+    (b'{"text": "' + b"\\u0041" * 1_900_000 + b'"}', 422, "text: "),
+]
 
 
 def test_large_bodies_keep_no_stop_back(page: Web) -> None:
-    said = [page.client.post("/api/v1/plans", content=each, headers=JSON) for each in _bodies()]
-    assert [each.status_code for each in said] == [422] * 4
-    assert [each.json()["detail"].partition(":")[0] for each in said] == [
-        *("text", "text", "'more'", "text")
-    ]
-    with flood(page, _bodies()):
+    for body, status, words in BODIES:
+        said = page.client.post("/api/v1/plans", content=body, headers=JSON)
+        assert said.status_code == status
+        assert said.json()["detail"].startswith(words)
+    with flood(page, [body for body, _, _ in BODIES]):
         time.sleep(0.5)
-        took = stops(page, 20)
-    assert max(took) < 1.0, took
-    assert median(took) < 0.3, took
+        took = stops(page, 5)
+    assert max(took) < 0.5, took  # it was up to 1.5 s
 
 
 @contextmanager
@@ -193,10 +192,16 @@ def flood(it: Web, bodies: list[bytes]) -> Iterator[None]:
     """Let clients send these bodies again and again for a ``with`` block."""
     is_over = threading.Event()
 
+    port = port_of(it.url)
+
     def send(body: bytes) -> None:
-        with httpx.Client(base_url=it.url, timeout=60) as client:
+        head = f"POST /api/v1/plans HTTP/1.1\r\nHost: {HOST}:{port}\r\nContent-Length: {len(body)}"
+        request = f"{head}\r\nContent-Type: application/json\r\n\r\n".encode() + body
+        with socket.create_connection((HOST, port), 60) as connection:
             while not is_over.is_set():
-                client.post("/api/v1/plans", content=body, headers=JSON)
+                connection.sendall(request)
+                while not connection.recv(65536).endswith(b"}"):
+                    pass
 
     threads = [threading.Thread(target=send, args=(body,)) for body in bodies]
     for each in threads:
@@ -245,15 +250,15 @@ def test_an_agent_stops_a_rover_whoever_opens_connections_and_sessions(
         port = port_of(url)
         agent = OldAgent(url)
         agent.post({"method": "notifications/initialized"})
-        assert "acknowledged" in agent.stop().text
+        assert "STOP is in force" in agent.stop().text
         before = memory_of(it)
         with connections(port, 1100):
             for _ in range(150):
                 OldAgent(url)
             began = time.monotonic()
             late = OldAgent(url)
-            assert "acknowledged" in late.stop().text
-            assert "acknowledged" in agent.stop().text  # its session is in use: it is kept
+            assert "STOP is in force" in late.stop().text
+            assert "STOP is in force" in agent.stop().text  # its session is in use: it is kept
             assert time.monotonic() - began < 5.0
         assert memory_of(it) - before < 60_000
         assert len(it.text) < 5_000
