@@ -48,7 +48,6 @@ class TcpLink:
         self._limits = limits
         self._by_peer: dict[Peer, Connection] = {}
         self._changes: list[PeerChange] = []
-        self._ended = 0  # connections
 
     @property
     def lost(self) -> int:
@@ -70,18 +69,16 @@ class TcpLink:
         received: list[tuple[Peer, bytes]] = []
         for _ in range(limit):
             ready = self._selector.select(0) if len(received) < limit else ()
-            before = self._ended
+            before = len(self._by_peer)
             for key, events in ready:
                 if isinstance(key.data, Connection) and (
                     reason := self._serve(key.data, events, received)
                 ):
                     self._on_ended(key.data, reason)
-            if not ready or self._ended > before:
+            if not ready or len(self._by_peer) < before:
                 break
             if not all(isinstance(key.data, Connection) for key, _ in ready):
                 self._on_ready()
-            if self._ended > before:
-                break
         return received
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
@@ -154,7 +151,6 @@ class TcpLink:
     def _end(self, connection: Connection, words: str | None) -> None:
         """Close a connection; with ``words``, note the change to DOWN."""
         del self._by_peer[connection.peer]
-        self._ended += 1
         self._lost += connection.queue.dropped
         self._selector.unregister(connection.socket)
         connection.socket.close()

@@ -21,8 +21,7 @@ from mav_tasks.links.link_limits import LinkLimits
 from mav_tasks.links.tcp import Connection, TcpLink, reason_of, resolve
 from mav_tasks.links.url import UrlOptions
 
-BACKLOG = 64  # connections that the system queues until they are accepted
-AT_ONCE = 32  # connections accepted between two calls of ``poll``
+BACKLOG = 1024  # connections that the system queues until they are accepted
 SPARE = 8  # connections beyond the limit
 LINES = 20  # in LINES_WITHIN
 LINES_WITHIN = 60.0  # s
@@ -55,7 +54,7 @@ class TcpInLink(TcpLink):
         super().__init__(url, limits)
         self._is_heard: Callable[[Peer], bool] = lambda _peer: True
         self._is_signed = False
-        self._accepted = 0  # since the last ``poll``
+        self._polled_at = boot_time()
         self._told: deque[float] = deque(maxlen=LINES)
         self._is_accepting = False
         self._accept_again()
@@ -82,7 +81,7 @@ class TcpInLink(TcpLink):
             for guest in self._guests():
                 if guest.since < longest:
                     self._turn_away(guest, f"{self._limits.unheard:g} s are over")
-        self._accepted = 0
+        self._polled_at = boot_time()
         self._accept_again()
 
     def close(self) -> None:
@@ -90,7 +89,10 @@ class TcpInLink(TcpLink):
         self._socket.close()
 
     def _on_ready(self) -> None:
-        """Accept a connection."""
+        """Accept a connection; without room for it, leave it waiting until the next ``poll``."""
+        if not self._make_room():
+            self._pause()
+            return
         try:
             sock, address = self._socket.accept()
         except (BlockingIOError, InterruptedError, ConnectionError):
@@ -98,31 +100,34 @@ class TcpInLink(TcpLink):
         except OSError:  # no descriptors left: the selector would report it again and again
             self._pause()
             return
-        self._accepted += 1
-        if self._accepted >= AT_ONCE:
-            self._pause()
         peer = (str(address[0]), int(address[1]))
         try:
-            # A peer whose old connection from the same address has not ended yet will retry.
-            if peer in self._by_peer:
+            # A peer whose old connection from the same address has not ended yet, or not for the
+            # engine, will retry.
+            if peer in self._by_peer or any(each.peer == peer for each in self._changes):
                 raise ConnectionRefusedError
-            self._make_room()
             self._add(sock, peer, "")
         except OSError:
             self.refused += 1
             sock.close()
 
-    def _make_room(self) -> None:
-        """Close a guest if the link is full."""
+    def _make_room(self) -> bool:
+        """Close a guest if the link is full; return whether there is room now.
+
+        A guest that has come since the last ``poll`` stays: its first packet is on its way.
+        """
         count, most = len(self._by_peer), self._limits.connections
         if count < most:
-            return
-        guests = self._guests()
-        unheard = [guest for guest in guests if not self._is_heard(guest.peer)]
-        guests = unheard or (guests if count >= most + SPARE else [])
+            return True
+        has_room = count < most + SPARE
+        unheard = [guest for guest in self._guests() if not self._is_heard(guest.peer)]
+        guests = unheard or ([] if has_room else self._guests())
         if guests:
             oldest = first_of_crowd(guests, lambda guest: guest.peer[0])
-            self._turn_away(oldest, "the link is full")
+            if oldest.since < self._polled_at:
+                self._turn_away(oldest, "the link is full")
+                return True
+        return has_room
 
     def _guests(self) -> list[Connection]:
         """Return the connections that were not heard, or are too many, the oldest first."""

@@ -143,11 +143,12 @@ def _of_server() -> Iterator[Row]:
         by_udp = stack.enter_context(_stops_by_udp(udp))
         for kind in ("", "strangers"):
             yield from _rows("UDP link", kind, it, by_udp, udp, APART)
-        for kind in LINKS:
-            stop = _stop_by_tcp(signed_tcp, SECRET)
-            yield from _rows("TCP link, signed", kind, it, stop, signed_tcp, APART)
-        for kind in LINKS:
-            yield from _rows("TCP link", kind, it, _stop_by_tcp(open_tcp), open_tcp, APART)
+        for name, port, secret in (("signed", signed_tcp, SECRET), ("unsigned", open_tcp, None)):
+            for kind in LINKS:
+                with _stops_by_tcp(port, secret) as stop:
+                    yield from _rows(f"TCP link, {name}", kind, it, stop, port, APART)
+                stop = _stop_by_new_tcp(port, secret)
+                yield from _rows(f"TCP link, {name}, new client", kind, it, stop, port, APART)
         yield from _rows("serial line", "noise", it, by_udp, far, APART)
         for kind in ("silent", "half a request"):
             yield from _rows("metrics", kind, it, by_udp, metrics, APART)
@@ -162,8 +163,6 @@ def _of_page() -> Iterator[Row]:
             stop = _stop_by_http(port)
             while stop() is None:
                 time.sleep(0.2)
-            goals = {"goals": [{"kind": "move", "distance": 1}], "delay": 5000}
-            _asked(port, "/api/v1/vehicles/1/tasks", goals)
             for kind in ("", *PAGES):
                 yield from _rows("page", kind, it, stop, port, APART_HTTP)
 
@@ -286,22 +285,49 @@ def _stops_by_udp(port: int) -> Iterator[Stop]:
         yield stop
 
 
-def _stop_by_tcp(port: int, secret: bytes | None = None) -> Stop:
+@contextmanager
+def _stops_by_tcp(port: int, secret: bytes | None) -> Iterator[Stop]:
+    """Stop on a connection that was there before the load."""
+    senders = _senders()
+    with socket.create_connection((HOST, port), PATIENCE) as connection:
+
+        def stop() -> float | None:
+            connection.settimeout(0.0)
+            with suppress(OSError):
+                while connection.recv(65536):
+                    pass
+            connection.settimeout(PATIENCE)
+            return _stop_on(connection, senders, secret, time.perf_counter())
+
+        stop()
+        yield stop
+
+
+def _stop_by_new_tcp(port: int, secret: bytes | None) -> Stop:
     senders = _senders()
 
     def stop() -> float | None:
-        packet = next(senders).encode(STOP)
-        if secret is not None:
-            packet = signed(packet, secret, link_id=1, timestamp=timestamp_at(time.time()))
         began = time.perf_counter()
         try:
             with socket.create_connection((HOST, port), PATIENCE) as connection:
-                connection.sendall(packet)
-                return _acknowledged(lambda: connection.recv(2048), began)
+                return _stop_on(connection, senders, secret, began)
         except OSError:
             return None
 
     return stop
+
+
+def _stop_on(
+    connection: socket.socket, senders: Iterator[Encoder], secret: bytes | None, began: float
+) -> float | None:
+    packet = next(senders).encode(STOP)
+    if secret is not None:
+        packet = signed(packet, secret, link_id=1, timestamp=timestamp_at(time.time()))
+    try:
+        connection.sendall(packet)
+    except OSError:
+        return None
+    return _acknowledged(lambda: connection.recv(2048), began)
 
 
 def _asked(port: int, path: str, body: object, **headers: str) -> bytes:

@@ -18,6 +18,7 @@ from .child import HOST, READY
 
 SESSION = {"protocolVersion": "2025-11-25", "capabilities": {}, "clientInfo": {"name": "a"}}
 LARGE = b'{"text": "x", "more": [' + b'{"a":1},' * 280_000 + b"1]}"
+TASK = b'{"goals": [{"kind": "wait", "duration": 1}], "delay": 5000}'
 SESSIONS_AT_ONCE = 4
 
 
@@ -112,9 +113,7 @@ KINDS: dict[str, Callable[[int], None]] = {
     "churn": lambda port: _churn(port, 500.0),
     "unread streams": lambda port: _held(port, 300, _http(port, "GET", "/api/v1/events")),
     "large bodies": lambda port: _posted(port, "/api/v1/plans", LARGE, at_once=2),
-    "changes": lambda port: _posted(
-        port, "/api/v1/tasks/1", b'{"label": "x"}', method="PATCH", at_once=2
-    ),
+    "changes": lambda port: _posted(port, "/api/v1/vehicles/1/tasks", TASK, at_once=2),
     "sessions": lambda port: _posted(port, "/mcp", _opening(), at_once=SESSIONS_AT_ONCE),
     "noise": lambda fd: _noise(fd, 100_000),
 }
