@@ -210,11 +210,13 @@ def _server(folder: Path, *options: str) -> Iterator[Running]:
 def _started(folder: Path, name: str, *command: str, ready: str) -> Iterator[tuple[Running, str]]:
     """Run a command for a ``with`` block; yield it, and what it said once it was ready."""
     log = folder / f"{name}.log"
+    environment = os.environ | {"XDG_CONFIG_HOME": str(folder), "XDG_STATE_HOME": str(folder)}
+    environment.pop(SERVER_FROM, None)  # no setting of a server
     with log.open("wb") as output:
         process = subprocess.Popen(
             [sys.executable, "-m", "mav_tasks.cli", *command],
             cwd=os.environ.get(SERVER_FROM, ROOT),
-            env={**os.environ, "XDG_CONFIG_HOME": str(folder), "XDG_STATE_HOME": str(folder)},
+            env=environment,
             stdout=output,
             stderr=subprocess.STDOUT,
         )
