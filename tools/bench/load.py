@@ -17,7 +17,7 @@ import tempfile
 import time
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -85,6 +85,7 @@ def measure() -> list[Row]:
 
 def _rows(thing: str, kind: str, it: Running, stop: Stop, target: int, apart: float) -> list[Row]:
     fds = (target,) if kind == "noise" else ()
+    load: AbstractContextManager[object]
     if not kind:
         load = nullcontext()
     elif kind == "strangers":
@@ -129,7 +130,8 @@ def _of_server() -> Iterator[Row]:
         _run(*given, given=f"{SECRET.hex()}\n")
         far, near = os.openpty()
         tty.setraw(near)
-        udp, signed_tcp, open_tcp, metrics = (free_port() for _ in range(4))
+        udp = free_port()
+        signed_tcp, open_tcp, metrics = _free_tcp_ports(3)
         it = stack.enter_context(
             _server(
                 folder,
@@ -236,6 +238,12 @@ def _started(folder: Path, name: str, *command: str, ready: str) -> Iterator[tup
 def _run(*command: str, given: str) -> None:
     words = [sys.executable, "-m", "mav_tasks.cli", *command]
     subprocess.run(words, cwd=ROOT, input=given, text=True, check=True, capture_output=True)
+
+
+def _free_tcp_ports(count: int) -> list[int]:
+    with ExitStack() as stack:
+        made = [stack.enter_context(socket.create_server((HOST, 0))) for _ in range(count)]
+        return [each.getsockname()[1] for each in made]
 
 
 # STOP
