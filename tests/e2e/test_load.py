@@ -225,14 +225,14 @@ class OldAgent:
     """An agent of a version of the protocol that has sessions."""
 
     def __init__(self, url: str) -> None:
-        self._client = httpx.Client(timeout=30, headers=FOR_AGENTS)
-        self._url = url
+        self._url, self._headers = url, dict(FOR_AGENTS)
         opened = self.post({"id": 1, "method": "initialize", "params": OPENING})
         assert opened.status_code == 200, opened.text
-        self._client.headers["mcp-session-id"] = opened.headers["mcp-session-id"]
+        self._headers["mcp-session-id"] = opened.headers["mcp-session-id"]
 
     def post(self, message: dict[str, Any]) -> httpx.Response:
-        return self._client.post(self._url, json={"jsonrpc": "2.0"} | message)
+        sent = {"jsonrpc": "2.0"} | message
+        return httpx.post(self._url, json=sent, headers=self._headers, timeout=30)
 
     def stop(self) -> httpx.Response:
         params = {"name": "stop", "arguments": {}}
