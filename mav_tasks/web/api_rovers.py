@@ -8,7 +8,7 @@ from mav_tasks.web.fields import Field
 from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_text import NAME, text_field, with_plan
+from mav_tasks.web.plan_text import NAME, text_field
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 
@@ -159,7 +159,7 @@ def operations(services: Services) -> list[Operation]:
             may="fence",
             body=FENCE,
             answer="Count",
-            reading=with_plan,
+            reading="plan",
         ),
         Operation("DELETE", f"{one}/fence", "Remove the fence", clear_fence, "fence"),
         Operation("GET", f"{one}/rally", "The rally points", rally, answer="Places"),
@@ -171,7 +171,7 @@ def operations(services: Services) -> list[Operation]:
             may="fence",
             body=RALLY,
             answer="Count",
-            reading=with_plan,
+            reading="plan",
         ),
     ]
 

@@ -14,7 +14,7 @@ from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_text import NAME, text_field, with_plan, with_preview
+from mav_tasks.web.plan_text import NAME, text_field
 from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 from mav_tasks.web.submissions import (
@@ -166,7 +166,7 @@ def operations(services: Services) -> list[Operation]:
             submit_mission,
             may="mission",
             body=[*FILE, *TERMS],
-            reading=with_plan,
+            reading="plan",
             answer="Task",
             status=201,
             headers=KEYED,
@@ -189,7 +189,7 @@ def operations(services: Services) -> list[Operation]:
             submit_mission,
             may="mission",
             body=[*FILE, *TERMS],
-            reading=with_plan,
+            reading="plan",
             answer="Task",
             status=201,
             headers=KEYED,
@@ -201,7 +201,7 @@ def operations(services: Services) -> list[Operation]:
             preview,
             body=FILE,
             answer="Plan",
-            reading=with_preview,
+            reading="preview",
         ),
         Operation("GET", one, "One task", task, answer="Task"),
         Operation(

@@ -1,26 +1,21 @@
 """An operation of the API: declared once, for its route, its checks and the OpenAPI document."""
 
-import asyncio
-import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
 from mav_tasks.tasks.task import MAX_TASK_ID
-from mav_tasks.web.apart import apart
-from mav_tasks.web.fields import Field, read_body
-from mav_tasks.web.guard import SMALL_BODY
+from mav_tasks.web.bodies import read
+from mav_tasks.web.fields import Field
 from mav_tasks.web.identity import Identity
 from mav_tasks.web.problems import Problem, invalid, not_found, problem_of
 
 ROOT = "/api/v1"
-MOST_PARTS = 300_000  # lists and objects of a body: a plan file of 6,000 items has some 20,000
 MAX_VEHICLE = 255  # system ids of MAVLink
 WORDS = {"vehicle": "rover", "task": "task"}
 
@@ -64,8 +59,6 @@ class Call:
         return int(self.path["task"])
 
 
-Parts = dict[str, Any]
-Reading = Callable[[Parts], Parts]
 #: returns a JSON value, a Response, or None for an answer without contents
 Handler = Callable[[Call], Awaitable[Any]]
 
@@ -75,8 +68,8 @@ class Operation:
     """``path`` is below ROOT; "{vehicle}" and "{task}" in it are numbers.
 
     ``may``: what the role must permit; "": anybody; "own": the handler checks. ``body``: None: the
-    request has none. ``reading``: a function of a module that reads more of it. ``answer``: the
-    name of the answer's schema; "": no contents.
+    request has none. ``reading``: what reads more of it, one of READINGS. ``answer``: the name of
+    the answer's schema; "": no contents.
     """
 
     method: str
@@ -90,7 +83,7 @@ class Operation:
     status: int = 200
     headers: Sequence[Field] = ()
     description: str = ""
-    reading: Reading | None = None
+    reading: str = ""
 
     async def run(self, request: Request) -> Response:
         """Answer a request."""
@@ -117,7 +110,7 @@ class Operation:
                 raise not_found(f"there is no {WORDS[name]} {number}: ids are 1 to {most}")
         body: Mapping[str, Any] = {}
         if self.body is not None:
-            body = await _body_of(request, self.body, self.reading)
+            body = await read(await request.body(), self.body, self.reading)
         return Call(
             identity,
             request.state.session,
@@ -126,44 +119,6 @@ class Operation:
             body,
             request.headers,
         )
-
-
-async def _body_of(request: Request, fields: Sequence[Field], more: Reading | None) -> Parts:
-    """Return the declared parts of a body; a large one, or a file, is read elsewhere."""
-    data = await request.body()
-    if len(data) > SMALL_BODY:
-        return cast(Parts, await apart(read_parts, data, fields, more))
-    if more is None:
-        return read_parts(data, fields, None)
-    async with _reading:  # one at a time: a STOP waits for one of them at most
-        return await asyncio.to_thread(read_parts, data, fields, more)
-
-
-_reading = asyncio.Lock()
-
-
-def read_parts(data: bytes, fields: Sequence[Field], more: Reading | None) -> Parts:
-    """Return the declared parts of a body. Raise Problem, or what ``more`` raises."""
-    if data.count(b"[") + data.count(b"{") > MOST_PARTS:  # nothing here has so many
-        raise Problem(413, "Too large", f"the body has more than {MOST_PARTS} parts")
-    try:
-        value = json.loads(data, object_pairs_hook=_object_of) if data else {}
-    except Problem:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
-    body = read_body(fields, value)
-    return body if more is None else more(body)
-
-
-def _object_of(parts: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object. Raise Problem if a name comes twice: parsers differ in which counts."""
-    found: dict[str, Any] = {}
-    for name, value in parts:
-        if name in found:
-            raise invalid(f"{shortened(name)[1:-1]}: it comes twice")
-        found[name] = value
-    return found
 
 
 def _queried(field: Field, query: Mapping[str, str]) -> Any:

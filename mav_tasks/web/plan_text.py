@@ -1,5 +1,6 @@
 """Parses the mission files of requests."""
 
+from collections.abc import Callable
 from typing import Any
 
 from starlette.responses import JSONResponse
@@ -12,6 +13,7 @@ from mav_tasks.web.plan_preview import preview_of
 
 LONGEST = 6_000_000  # characters; QGroundControl writes some 900 for an item
 MOST_LINES = 200_000  # QGroundControl writes some 30 for an item
+Parts = dict[str, Any]
 NAME = Field("name", "string", "name of the file, for messages", False, 0, 255)
 
 
@@ -20,7 +22,7 @@ def text_field(meaning: str, *, is_required: bool = True) -> Field:
     return Field("text", "string", meaning, is_required, 1, LONGEST)
 
 
-def with_plan(body: dict[str, Any]) -> dict[str, Any]:
+def _with_plan(body: Parts) -> Parts:
     """Return the parts of a request, with "plan" in place of the text, if there is one.
 
     Raise PlanFileError, with the file's name, if it is invalid.
@@ -28,12 +30,12 @@ def with_plan(body: dict[str, Any]) -> dict[str, Any]:
     return body | ({} if body["text"] is None else {"text": "", "plan": _parsed(body)})
 
 
-def with_preview(body: dict[str, Any]) -> dict[str, Any]:
-    """Return the "answer" that shows the file of a request. Raise PlanFileError as above."""
-    return {"answer": JSONResponse(preview_of(_parsed(body))).body}
+def _with_preview(body: Parts) -> Parts:
+    """Return the "answer", JSON, that shows the file of a request; raise as above."""
+    return {"answer": bytes(JSONResponse(preview_of(_parsed(body))).body).decode()}
 
 
-def _parsed(body: dict[str, Any]) -> PlanFile:
+def _parsed(body: Parts) -> PlanFile:
     text, name = body["text"], body["name"] or "text"
     try:
         if text.count("\n") > MOST_LINES:
@@ -44,3 +46,11 @@ def _parsed(body: dict[str, Any]) -> PlanFile:
     except PlanFileError as error:
         raise PlanFileError(f"{name}: {error}") from None
     return plan
+
+
+#: what reads more of a body than its JSON
+READINGS: dict[str, Callable[[Parts], Parts]] = {
+    "": lambda body: body,
+    "plan": _with_plan,
+    "preview": _with_preview,
+}

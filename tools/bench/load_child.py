@@ -5,7 +5,6 @@ Each kind is bounded in connections and rate, and goes on until SIGTERM.
 
 import json
 import os
-import random
 import select
 import signal
 import socket
@@ -74,12 +73,11 @@ def _posted(port: int, path: str, body: bytes, *, method: str = "POST", at_once:
 
 def _noise(fd: int, rate: int) -> None:
     """Write noise to a line, so many bytes a second, and read what comes."""
-    source = random.Random(1)
     os.set_blocking(fd, False)
     _ready()
     while True:
         with suppress(BlockingIOError):
-            os.write(fd, source.randbytes(rate // 100))
+            os.write(fd, os.urandom(rate // 100))
         with suppress(BlockingIOError):
             os.read(fd, 65536)
         time.sleep(0.01)
