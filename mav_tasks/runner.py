@@ -11,6 +11,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from math import inf
 from typing import Protocol, cast
 
@@ -34,7 +35,15 @@ from mav_tasks.engine.inputs import (
 )
 from mav_tasks.engine.snapshot import Reach
 from mav_tasks.link_reader import DRAIN, LinkReader
-from mav_tasks.links.base import TEND_PERIOD, Link, PacedLink, PeerChange, PeerState, StreamLink
+from mav_tasks.links.base import (
+    TEND_PERIOD,
+    Link,
+    ListeningLink,
+    PacedLink,
+    PeerChange,
+    PeerState,
+    StreamLink,
+)
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.observer import EngineObserver
@@ -78,11 +87,13 @@ def link_changed(link: Link, side: LinkSide, policy: LinkPolicy = TAKES_ALL) -> 
     )
 
 
-def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion:
-    """Return the engine input for a change of a peer."""
+def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion | None:
+    """Return the engine input for a change of a peer; None if the engine knows it."""
     match change.state:
         case PeerState.UP | PeerState.DOWN as state:
             return PeerChanged(link.name, change.peer, up=state is PeerState.UP)
+        case PeerState.HEARD:
+            return None
         case state:
             return Congestion(link.name, change.peer, is_congested=state is PeerState.CONGESTED)
 
@@ -200,6 +211,9 @@ class Runner:
             for link, side in self._sides:
                 policy = self._policies.get(link.name, TAKES_ALL)
                 self._guarded(link_changed(link, side, policy))
+                if isinstance(link, ListeningLink):
+                    is_heard = partial(self._pump.engine.has_heard, link.name)
+                    link.watch(is_heard, is_signed=not policy.takes_unsigned)
             self._reader = LinkReader(self._sides, note=self._note)
             for link, _ in self._sides:
                 self._loop.add_reader(link.fileno(), self._on_readable, self._reader)
@@ -283,7 +297,9 @@ class Runner:
                 is_lost = change.state is PeerState.DOWN
                 level = logging.WARNING if is_lost else logging.INFO
                 log.log(level, "link %s %s", link.name, change.words)
-            self._guarded(peer_changed(link, change))
+            item = peer_changed(link, change)
+            if item is not None:
+                self._guarded(item)
 
     def _tend(self, loop: asyncio.AbstractEventLoop) -> None:
         if self._over is None or self._over.done():

@@ -46,7 +46,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
-    "mav_tasks.links": frozenset({"mav_tasks.clock", "mav_tasks.errors"}),
+    "mav_tasks.links": frozenset({"mav_tasks.clock", "mav_tasks.crowd", "mav_tasks.errors"}),
     "mav_tasks.store": frozenset(
         {
             "mav_tasks.clock",
@@ -214,8 +214,18 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
             "mav_tasks.errors",
         }
     ),
+    "mav_tasks.crowd": frozenset(),
+    "mav_tasks.http_connections": frozenset(
+        {"mav_tasks.crowd", "mav_tasks.logs", "mav_tasks.settings"}
+    ),
     "mav_tasks.agents": frozenset(
-        {"mav_tasks.client", "mav_tasks.mavlink", "mav_tasks.tasks", "mav_tasks.errors"}
+        {
+            "mav_tasks.client",
+            "mav_tasks.http_connections",
+            "mav_tasks.mavlink",
+            "mav_tasks.tasks",
+            "mav_tasks.errors",
+        }
     ),
     "mav_tasks.qgc_actions": frozenset(
         {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
@@ -223,6 +233,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.web": frozenset(
         {
             "mav_tasks.histogram",
+            "mav_tasks.crowd",
+            "mav_tasks.http_connections",
             "mav_tasks.metrics",
             "mav_tasks.engine",
             "mav_tasks.key_ring",

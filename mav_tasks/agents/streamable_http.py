@@ -5,21 +5,28 @@ that name this address as their host, from pages of this address if a browser se
 from elsewhere cannot use a rover through a browser on this machine.
 """
 
-import socket
+import logging
 from collections.abc import Callable
 from ipaddress import ip_address
 from typing import Any, NamedTuple
 
-import uvicorn
 from mcp.server.lowlevel import Server
 from mcp.server.transport_security import TransportSecuritySettings
 
+from mav_tasks.agents.http_sessions import HttpSessions
 from mav_tasks.errors import LinkOpenError, UsageError
+from mav_tasks.http_connections import (
+    HttpLimits,
+    HttpServer,
+    allow_files,
+    listening,
+    under_load,
+)
 
 PATH = "/mcp"
 LOCALHOST = "localhost"
 LAST_PORT = 65_535
-SHUTDOWN = 1  # s for open requests when the process ends
+LONGEST_BODY = 128 * 1024  # bytes, for some 2,000 goals
 
 
 class Place(NamedTuple):
@@ -63,34 +70,24 @@ async def serve_http(server: Server[Any], place: Place, tell: Callable[[str], No
 
     Raise LinkOpenError if the port is in use.
     """
-    listening = _listening(place)
-    place = place._replace(port=listening.getsockname()[1])
+    limits = allow_files(HttpLimits())
+    try:
+        bound = listening(place.host, place.port)
+    except OSError as error:
+        raise LinkOpenError(f"--http {place.authority}: {error.strerror}") from error
+    place = place._replace(port=bound.getsockname()[1])
     hosts = {place.authority, *(f"{name}:{place.port}" for name in ("127.0.0.1", LOCALHOST))}
     protection = TransportSecuritySettings(
         enable_dns_rebinding_protection=True,
         allowed_hosts=sorted(hosts),
         allowed_origins=sorted(f"http://{host}" for host in hosts),
     )
-    app = server.streamable_http_app(streamable_http_path=PATH, transport_security=protection)
-    settings = uvicorn.Config(
-        app,
-        log_config=None,
-        access_log=False,
-        timeout_graceful_shutdown=SHUTDOWN,
-        server_header=False,
+    app = server.streamable_http_app(
+        streamable_http_path=PATH,
+        transport_security=protection,
+        max_request_body_size=LONGEST_BODY,
     )
     tell(f"http://{place.authority}{PATH}")
-    await uvicorn.Server(settings).serve(sockets=[listening])
-
-
-def _listening(place: Place) -> socket.socket:
-    family = socket.AF_INET6 if ":" in place.host else socket.AF_INET
-    listening = socket.socket(family, socket.SOCK_STREAM)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind((place.host, place.port))
-        listening.listen()
-    except OSError as error:
-        listening.close()
-        raise LinkOpenError(f"--http {place.authority}: {error.strerror}") from error
-    return listening
+    logging.getLogger("mcp").setLevel(logging.WARNING)  # it has a line for each session
+    with under_load():
+        await HttpServer(HttpSessions(app), limits).serve(sockets=[bound])

@@ -33,7 +33,7 @@ from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.figures import Figures
-from mav_tasks.engine.inputs import Input, LinkSide, Outgoing
+from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Peer
 from mav_tasks.engine.missions.any_uploads import AnyUploads
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionServers
@@ -306,6 +306,13 @@ class Engine:
                 f" {self._door.left_out} requests"
             ),
         )
+
+    def has_heard(self, link: str, peer: Peer) -> bool:
+        """Return whether a client or a rover at an endpoint has sent a valid packet."""
+        client = self._gcs.client((link, peer))
+        if client is not None:
+            return client.is_heard
+        return self._vehicles.links.has_vehicle_at(link, peer)
 
     def reach(self, *, now: float) -> Reach:
         """Return which vehicles are heard, also those that another gateway has, and are ours."""

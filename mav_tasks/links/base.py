@@ -1,6 +1,6 @@
 """The interfaces of links, between the server and its peers."""
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Protocol, runtime_checkable
@@ -54,6 +54,7 @@ class PeerState(Enum):
     """States of a peer of a stream link."""
 
     UP = auto()
+    HEARD = auto()  # a valid packet has come: for the log
     DOWN = auto()
     CONGESTED = auto()  # packets to the peer pile up
     CLEAR = auto()  # no longer congested
@@ -101,9 +102,14 @@ class CountingLink(Link, Protocol):
 
 @runtime_checkable
 class ListeningLink(Link, Protocol):
+    """A link to which others connect. Who sends nothing valid makes room for others."""
+
     @property
     def refused(self) -> int:
-        """Number of connections that were refused."""
+        """Number of connections that were closed for others, or without a valid packet."""
+
+    def watch(self, is_heard: Callable[[Peer], bool], *, is_signed: bool) -> None:
+        """Take whether a valid packet of a peer has come; ``is_signed``: only signed ones count."""
 
 
 TEND_PERIOD = 0.05  # s

@@ -26,6 +26,8 @@ class Connection:
         self.peer = peer
         self.queue = OutQueue(max_age=limits.max_age)
         self.is_blocked = False  # the socket's buffer is full: waits until it is writable
+        self.since = boot_time()
+        self.is_told = False  # whether the log says that it is connected
 
     def __repr__(self) -> str:
         return f"Connection({self.peer}, {self.queue})"

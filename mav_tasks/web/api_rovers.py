@@ -12,7 +12,7 @@ from mav_tasks.web.fields import Field
 from mav_tasks.web.flights import Flights
 from mav_tasks.web.goal_places import places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_text import NAME, plan_of, text_field
+from mav_tasks.web.plan_text import NAME, text_field
 from mav_tasks.web.problems import invalid
 from mav_tasks.web.services import Services
 from mav_tasks.web.stops import Stop
@@ -116,7 +116,7 @@ def operations(services: Services) -> list[Operation]:
         return {"shapes": shapes_of(await client.fence_file(vehicle=known(call)))}
 
     async def set_fence(call: Call, client: Client) -> object:
-        plan = await _fence_of(call)
+        plan = _fence_of(call)
         return {"items": await client.set_fence(plan, vehicle=known(call))}
 
     async def clear_fence(call: Call, client: Client) -> None:
@@ -128,7 +128,7 @@ def operations(services: Services) -> list[Operation]:
         return {"places": places}
 
     async def set_rally(call: Call, client: Client) -> object:
-        plan = await plan_of(call.body)
+        plan = call.body["plan"]
         return {"items": await client.set_rally_points(plan, vehicle=known(call))}
 
     one = "/vehicles/{vehicle}"
@@ -176,7 +176,13 @@ def operations(services: Services) -> list[Operation]:
         Operation("GET", f"{one}/mission", "The staged mission", mission, answer="Path"),
         Operation("GET", f"{one}/fence", "The fence", fence, answer="Fence"),
         Operation(
-            "PUT", f"{one}/fence", "Set the fence", asks(set_fence), body=FENCE, answer="Count"
+            "PUT",
+            f"{one}/fence",
+            "Set the fence",
+            asks(set_fence),
+            body=FENCE,
+            answer="Count",
+            reading="plan",
         ),
         Operation("DELETE", f"{one}/fence", "Remove the fence", asks(clear_fence)),
         Operation("GET", f"{one}/rally", "The rally points", rally, answer="Places"),
@@ -187,16 +193,18 @@ def operations(services: Services) -> list[Operation]:
             asks(set_rally),
             body=RALLY,
             answer="Count",
+            reading="plan",
         ),
     ]
 
 
-async def _fence_of(call: Call) -> PlanFile:
+def _fence_of(call: Call) -> PlanFile:
     """Return the fence of a request. Raise Problem unless it has exactly one form of it."""
     given = [name for name in ("text", "circle", "polygon") if call.body[name] is not None]
     if len(given) != 1:
         raise invalid("expected one of text, circle, polygon")
     if given == ["text"]:
-        return await plan_of(call.body)
+        plan: PlanFile = call.body["plan"]
+        return plan
     value = call.body[given[0]]
     return circle_of(value) if given == ["circle"] else polygon_of(value)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from starlette.responses import Response
+
 from mav_tasks.client.aio import AnyRover, Client
 from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.plan_sources import Plan
@@ -12,7 +14,7 @@ from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
 from mav_tasks.web.operation import Call, Operation
-from mav_tasks.web.plan_text import NAME, plan_of, preview_response, text_field
+from mav_tasks.web.plan_text import NAME, text_field
 from mav_tasks.web.services import Services
 from mav_tasks.web.submissions import (
     AFTER,
@@ -89,11 +91,11 @@ def operations(services: Services) -> list[Operation]:
         return await add(call, by, goals, places_of_goals(goals))
 
     async def submit_mission(call: Call, by: Client) -> Any:
-        plan = await plan_of(call.body)
+        plan = call.body["plan"]
         return await add(call, by, plan, places_of_items(plan.items))
 
     async def preview(call: Call) -> Any:
-        return await preview_response(call.body)
+        return Response(call.body["answer"], media_type="application/json")
 
     async def status_of(call: Call) -> TaskStatus:
         """Return a task's status. The server of any rover knows the tasks of all rovers."""
@@ -103,7 +105,7 @@ def operations(services: Services) -> list[Operation]:
         return await client.status(call.task, vehicle=rovers[0].id)
 
     async def task(call: Call) -> Any:
-        return live.task_form(await status_of(call))
+        return live.task_form(await status_of(call), is_whole=True)
 
     async def timing(call: Call) -> Any:
         status = await status_of(call)
@@ -145,14 +147,15 @@ def operations(services: Services) -> list[Operation]:
             f"Submit {what} as one task{whose}",
             asks(handler),
             body=[*body, *TERMS],
+            reading=reading,
             answer="Task",
             status=201,
             headers=KEYED,
         )
         for rover, whose in RUNS_ON.items()
-        for name, what, handler, body in (
-            ("tasks", "goals", submit_task, (GOALS,)),
-            ("missions", "a mission file", submit_mission, FILE),
+        for name, what, handler, body, reading in (
+            ("tasks", "goals", submit_task, (GOALS,), ""),
+            ("missions", "a mission file", submit_mission, FILE, "plan"),
         )
     ]
     return [
@@ -164,6 +167,7 @@ def operations(services: Services) -> list[Operation]:
             preview,
             body=FILE,
             answer="Plan",
+            reading="preview",
         ),
         Operation("GET", one, "One task", task, answer="Task"),
         Operation(

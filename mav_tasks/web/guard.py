@@ -24,6 +24,7 @@ METHODS = SAFE | {"POST", "PUT", "PATCH", "DELETE"}
 API = "/api/"
 SESSION = "/api/v1/session"
 STOP = "/api/v1/stop"
+PAUSE = "/pause"
 METRICS = "/metrics"
 
 SMALL_BODY = 64 * 1024  # bytes
@@ -155,6 +156,8 @@ class Guard:
         if scope["method"] not in SAFE:
             schemes = ("http", "https") if host in self._behind_tls else ("http",)
             _check_origin(headers, {f"{scheme}://{host}" for scheme in schemes})
+        elif scope["path"].startswith(API):  # or a page elsewhere could use up the user's requests
+            _check_site(headers)
         length = _length_of(headers, most=_most_bytes(scope["path"]))
         identity, session = self._identity(scope, headers)
         scope.setdefault("state", {})
@@ -167,6 +170,8 @@ class Guard:
         is_stop = scope["path"] == STOP and scope["method"] == "POST"
         if not is_stop:  # STOP is never rate-limited
             who = scope["client"][0] if identity is None else identity.name
+            if scope["path"].endswith(PAUSE) and scope["method"] == "POST":
+                who = f"pause {who}"  # no other requests keep a pause back
             wait = self._rates.wait_of(who)
             if wait:
                 words = f"too many requests: try again in {wait} s"
@@ -214,15 +219,24 @@ def _headers_of(scope: Scope) -> dict[str, str]:
 
 def _check_origin(headers: dict[str, str], own: set[str]) -> None:
     """Raise Problem if a page of another origin than ours sent a request that changes something."""
-    origin = headers.get("origin")
-    site = headers.get("sec-fetch-site", "same-origin")
-    if site not in ("same-origin", "none") or origin not in (None, *own):
-        words = f"a page of {(origin or 'another site')[:80]} may not do this"
-        raise Problem(403, "Cross-site request", words)
+    _check_site(headers)
+    if headers.get("origin") not in (None, *own):
+        raise _cross_site(headers)
     kind = headers.get("content-type", "").partition(";")[0].strip().lower()
     has_body = headers.get("content-length", "0") != "0" or "transfer-encoding" in headers
     if has_body and kind != "application/json":
         raise Problem(415, "Wrong media type", "expected Content-Type: application/json")
+
+
+def _check_site(headers: dict[str, str]) -> None:
+    """Raise Problem if a browser says that a page of another site sent the request."""
+    if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
+        raise _cross_site(headers)
+
+
+def _cross_site(headers: dict[str, str]) -> Problem:
+    words = f"a page of {headers.get('origin', 'another site')[:80]} may not do this"
+    return Problem(403, "Cross-site request", words)
 
 
 def _length_of(headers: dict[str, str], *, most: int) -> int:

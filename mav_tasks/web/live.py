@@ -36,7 +36,9 @@ UNREACHED = 3.0  # s without a packet
 PREARM = "prearm"
 PREARM_LASTS = 35.0  # s; an autopilot repeats what is wrong every 30 s
 PLAN = "plan of "  # the description of a mission
-PLACES = 5000  # tasks whose places are remembered
+PLACES = 100_000  # of all tasks together, that are remembered
+LOOKED_UP = 5000  # tasks
+FEW = 100  # places of a task that queues and events show; the task itself shows more
 MOST_TOLD = 20_000
 
 
@@ -50,6 +52,7 @@ class Live:
         self.stops = Stops(client, self._publish_stop)
         self.queues: dict[int, QueueStatus] = {}
         self.places: dict[int, list[Place]] = {}
+        self._places_count = 0
         self._rows = QueueRows()
         self._server = server
         self._origins = Origins()
@@ -101,13 +104,19 @@ class Live:
         ]
 
     def queue_form(self, queue: QueueStatus) -> dict[str, Any]:
-        """Return a queue as JSON, with the places of its tasks."""
+        """Return a queue as JSON, with the places of its tasks if they are few."""
         tasks = [*queue.waiting, *([] if queue.current is None else [queue.current])]
-        return queue_form(queue, goals={each.id: self.places_of(each) for each in tasks})
+        return queue_form(queue, goals={each.id: self._few_places_of(each) for each in tasks})
 
-    def task_form(self, status: TaskStatus) -> dict[str, Any]:
-        """Return a task as JSON, with its places."""
-        return task_form(status, goals={status.id: self.places_of(status)})
+    def task_form(self, status: TaskStatus, *, is_whole: bool = False) -> dict[str, Any]:
+        """Return a task as JSON, with its places if they are few, or it is to be whole."""
+        places = self.places_of(status) if is_whole else self._few_places_of(status)
+        return task_form(status, goals={status.id: places})
+
+    def _few_places_of(self, status: TaskStatus) -> list[Place] | None:
+        """Return the places of a task; [] if they are many."""
+        places = self.places_of(status)
+        return places if places is None or len(places) <= FEW else []
 
     def places_of(self, status: TaskStatus) -> list[Place] | None:
         """Return the places that a task drives to; None: not known (yet)."""
@@ -115,14 +124,16 @@ class Live:
         is_plan = what_of(status).startswith(PLAN) and not status.is_over
         if known is None and is_plan and status.id not in self._looked_up:
             self._looked_up[status.id] = None
-            _shorten(self._looked_up, PLACES)
+            _shorten(self._looked_up, LOOKED_UP)
             self.on_unknown_places(status.id)
         return known or places_of_words(what_of(status))
 
     def remember_places(self, task_id: int, places: list[Place]) -> None:
         """Keep the places of a task that was submitted here."""
+        self._places_count += len(places) - len(self.places.pop(task_id, ()))
         self.places[task_id] = places
-        _shorten(self.places, PLACES)
+        while self._places_count > PLACES:
+            self._places_count -= len(self.places.pop(next(iter(self.places))))
 
     def show_again(self, task_id: int) -> None:
         """Publish the queue of a task again: its places are known now."""

@@ -1,7 +1,5 @@
 """An operation of the API: declared once, for its route, its checks and the OpenAPI document."""
 
-import asyncio
-import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,16 +8,14 @@ from starlette.convertors import Convertor, register_url_convertor
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from mav_tasks.client.goal_form import shortened
 from mav_tasks.errors import MavTasksError
 from mav_tasks.tasks.task import MAX_TASK_ID
-from mav_tasks.web.fields import Field, read_body
-from mav_tasks.web.guard import SMALL_BODY
+from mav_tasks.web.bodies import read
+from mav_tasks.web.fields import Field
 from mav_tasks.web.identity import LOCAL, Identity
-from mav_tasks.web.problems import Problem, invalid, not_found, problem_of
+from mav_tasks.web.problems import invalid, not_found, problem_of
 
 ROOT = "/api/v1"
-MOST_PARTS = 300_000  # lists and objects of a body: a plan file of 6,000 items has some 20,000
 MAX_VEHICLE = 255  # system ids of MAVLink
 WORDS = {"vehicle": "rover", "task": "task"}
 
@@ -71,8 +67,9 @@ Handler = Callable[[Call], Awaitable[Any]]
 class Operation:
     """``path`` is below ROOT; "{vehicle}" and "{task}" in it are numbers.
 
-    ``body``: None: the request has none. ``answer``: the name of the answer's schema; "": no
-    contents. Whether a user may do it, the task server decides.
+    ``body``: None: the request has none. ``reading``: what reads more of it, one of READINGS.
+    ``answer``: the name of the answer's schema; "": no contents. Whether a user may do it, the task
+    server decides.
     """
 
     method: str
@@ -85,6 +82,7 @@ class Operation:
     status: int = 200
     headers: Sequence[Field] = ()
     description: str = ""
+    reading: str = ""
 
     async def run(self, request: Request) -> Response:
         """Answer a request."""
@@ -105,7 +103,7 @@ class Operation:
                 raise not_found(f"there is no {WORDS[name]} {number}: ids are 1 to {most}")
         body: Mapping[str, Any] = {}
         if self.body is not None:
-            body = read_body(self.body, await _json_of(request))
+            body = await read(await request.body(), self.body, self.reading)
         return Call(
             request.state.identity or LOCAL,  # None: only to log in
             request.state.session,
@@ -114,40 +112,6 @@ class Operation:
             body,
             request.headers,
         )
-
-
-async def _json_of(request: Request) -> object:
-    data = await request.body()
-    if not data:
-        return {}
-    try:
-        if len(data) <= SMALL_BODY:
-            return _parsed(data)
-        if data.count(b"[") + data.count(b"{") > MOST_PARTS:  # nothing here has so many
-            raise Problem(413, "Too large", f"the body has more than {MOST_PARTS} parts")
-        async with _parsing:  # one at a time: a STOP waits for one of them at most
-            return await asyncio.to_thread(_parsed, data)
-    except Problem:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise Problem(400, "Invalid JSON", f"the request's body is not JSON: {error}") from None
-
-
-_parsing = asyncio.Lock()
-
-
-def _parsed(data: bytes) -> object:
-    return json.loads(data, object_pairs_hook=_object_of)
-
-
-def _object_of(parts: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object. Raise Problem if a name comes twice: parsers differ in which counts."""
-    found: dict[str, Any] = {}
-    for name, value in parts:
-        if name in found:
-            raise invalid(f"{shortened(name)[1:-1]}: it comes twice")
-        found[name] = value
-    return found
 
 
 def _queried(field: Field, query: Mapping[str, str]) -> Any:

@@ -1,6 +1,6 @@
-"""Parses the mission files of requests in a thread, so that a STOP does not wait for them."""
+"""Parses the mission files of requests."""
 
-import asyncio
+from collections.abc import Callable
 from typing import Any
 
 from starlette.responses import JSONResponse
@@ -13,10 +13,8 @@ from mav_tasks.web.plan_preview import preview_of
 
 LONGEST = 6_000_000  # characters; QGroundControl writes some 900 for an item
 MOST_LINES = 200_000  # QGroundControl writes some 30 for an item
+Parts = dict[str, Any]
 NAME = Field("name", "string", "name of the file, for messages", False, 0, 255)
-
-
-_one_at_a_time = asyncio.Lock()
 
 
 def text_field(meaning: str, *, is_required: bool = True) -> Field:
@@ -24,19 +22,20 @@ def text_field(meaning: str, *, is_required: bool = True) -> Field:
     return Field("text", "string", meaning, is_required, 1, LONGEST)
 
 
-async def plan_of(body: Any) -> PlanFile:
-    """Return the parsed file of a request. Raise PlanFileError, with its name, if it is invalid."""
-    async with _one_at_a_time:
-        return await asyncio.to_thread(_parsed, body)
+def _with_plan(body: Parts) -> Parts:
+    """Return the parts of a request, with "plan" in place of the text, if there is one.
+
+    Raise PlanFileError, with the file's name, if it is invalid.
+    """
+    return body | ({} if body["text"] is None else {"text": "", "plan": _parsed(body)})
 
 
-async def preview_response(body: Any) -> JSONResponse:
-    """Return the answer that shows the file of a request. Raise PlanFileError if it is invalid."""
-    async with _one_at_a_time:
-        return await asyncio.to_thread(lambda: JSONResponse(preview_of(_parsed(body))))
+def _with_preview(body: Parts) -> Parts:
+    """Return the "answer", JSON, that shows the file of a request; raise as above."""
+    return {"answer": bytes(JSONResponse(preview_of(_parsed(body))).body).decode()}
 
 
-def _parsed(body: Any) -> PlanFile:
+def _parsed(body: Parts) -> PlanFile:
     text, name = body["text"], body["name"] or "text"
     try:
         if text.count("\n") > MOST_LINES:
@@ -47,3 +46,11 @@ def _parsed(body: Any) -> PlanFile:
     except PlanFileError as error:
         raise PlanFileError(f"{name}: {error}") from None
     return plan
+
+
+#: what reads more of a body than its JSON
+READINGS: dict[str, Callable[[Parts], Parts]] = {
+    "": lambda body: body,
+    "plan": _with_plan,
+    "preview": _with_preview,
+}

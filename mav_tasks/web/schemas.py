@@ -124,7 +124,8 @@ TASK = whole(
         "ended_at": or_null(TEXT, "ISO 8601"),
         "goals": {
             "anyOf": [listed(ref("Place")), {"type": "null"}],
-            "description": "places that it drives to; null: not known",
+            "description": "places that it drives to; null: not known; empty: many, which only"
+            " the answer to GET /tasks/{task} has",
         },
     }
 )

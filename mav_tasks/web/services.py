@@ -1,7 +1,6 @@
 """The objects that the operations of the API share."""
 
 import asyncio
-from collections import Counter
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -34,8 +33,6 @@ class Services:
     journal: Journal | None = None
     tiles: Tiles | None = None
     records: Records | None = None
-    #: open event streams by the names of their users
-    streams: Counter[str] = field(default_factory=Counter)
     #: one reader of the journal at a time: several would take the interpreter from the event loop
     _reading: asyncio.Lock = field(default_factory=asyncio.Lock)
     _looking: set[asyncio.Task[None]] = field(default_factory=set)

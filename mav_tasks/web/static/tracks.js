@@ -25,6 +25,7 @@ let goalLayer = null;
 let isLoading = false;
 const tracks = new Map();
 const goals = new Map();
+const long = new Map(); // goals of tasks that have many, by task
 
 /** Draw into two layers of the map. "on": its "point", "here" and "placed". */
 export function begin(layerOfTracks, layerOfGoals, on) {
@@ -134,13 +135,30 @@ export function drawGoals() {
   removeOthers(goals);
 }
 
+/** The goals of a task, null if they are not here yet: a queue has no long lists of them. */
+function goalsOf(task) {
+  if (!task.goals || task.goals.length) return task.goals;
+  let known = long.get(task.id);
+  if (!known) {
+    if (long.size >= MOST_TASKS) long.delete(long.keys().next().value);
+    long.set(task.id, (known = { goals: null }));
+    get(`/tasks/${task.id}`).then((whole) => {
+      known.goals = whole.goals;
+      goals.get(task.vehicle).queue = null; // draw them
+      change("queues");
+    }).catch(() => long.delete(task.id));
+  }
+  return known.goals;
+}
+
 function drawQueue(layer, queue, vehicle, most) {
   const from = place.here(vehicle);
   let left = most;
   for (const task of [queue.current, ...queue.waiting.slice(0, MOST_TASKS)]) {
-    if (!task || !task.goals) continue;
+    const of = task && goalsOf(task);
+    if (!of) continue;
     const isNow = task === queue.current;
-    const places = task.goals.slice(0, left).map((each) => place.point(each, vehicle)).filter(Boolean);
+    const places = of.slice(0, left).map((each) => place.point(each, vehicle)).filter(Boolean);
     left -= places.length;
     const colour = taskColour(task.id);
     if (isNow && from && places.length) L.polyline([from, ...places.slice(Math.max(0, task.item - 1))], { color: colour, weight: 2, dashArray: "6 6", interactive: false }).addTo(layer);

@@ -4,7 +4,6 @@ import select
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 
 import pytest
@@ -71,7 +70,8 @@ class Watched:
 
     @property
     def states(self) -> list[PeerState]:
-        return [change.state for change in self.changes]
+        """What the engine is told."""
+        return [change.state for change in self.changes if change.state is not PeerState.HEARD]
 
     def heard(self, peer: Peer) -> bytes:
         return b"".join(data for who, data in self.pieces if who == peer)
@@ -128,7 +128,8 @@ def test_who_comes_and_goes_is_told_in_order_and_in_words(listening: TcpInLink) 
     assert watched.heard(peer) == b"last words"
     name = f"{HOST}:{peer[1]}"
     assert watched.changes == [
-        PeerChange(peer, PeerState.UP, f"{name} connected"),
+        PeerChange(peer, PeerState.UP),
+        PeerChange(peer, PeerState.HEARD, f"{name} connected"),
         PeerChange(peer, PeerState.DOWN, f"{name} disconnected: closed by the other end"),
     ]
 
@@ -190,20 +191,97 @@ def test_one_that_comes_again_from_the_same_place_does_so_after_it_has_gone(
     assert told[:2] == [[PeerState.DOWN], [PeerState.UP]]
 
 
-def test_connections_are_bounded() -> None:
-    listening = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=replace(TO_CLIENTS, connections=3))
-    watched, clients = up(listening, 3)
-    with dial(listening) as late:
-        watched.until(lambda: listening.refused == 1)
-        with suppress(ConnectionError):
-            assert late.recv(1) == b""
-    clients.pop().close()
-    watched.until(lambda: PeerState.DOWN in watched.states)
-    clients.append(dial(listening))
-    watched.until(lambda: watched.states.count(PeerState.UP) == 4)
+@pytest.fixture
+def small() -> Iterator[TcpInLink]:
+    """A link for three connections, and guests for 0.2 s."""
+    limits = replace(TO_CLIENTS, connections=3, unheard=0.2)
+    link = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=limits)
+    yield link
+    link.close()
+
+
+def is_open(sock: socket.socket) -> bool:
+    sock.settimeout(0.0)
+    try:
+        return sock.recv(1) != b""
+    except BlockingIOError:
+        return True
+    except ConnectionError:
+        return False
+
+
+def test_who_sends_nothing_valid_gives_way_the_oldest_first(small: TcpInLink) -> None:
+    heard = set[Peer]()
+    small.watch(heard.__contains__, is_signed=False)
+    watched, silent = up(small, 3)
+    for _ in range(50):  # far more than there is room for, and nobody is refused
+        late = dial(small)
+        heard.add(late.getsockname())
+        watched.until(lambda late=late: late.getsockname() in _up_at(watched))  # type: ignore[misc]
+        heard.discard(late.getsockname())
+        silent.append(late)
+    assert [is_open(each) for each in silent] == [False] * 50 + [True] * 3
+    assert small.refused == 50
+    words = {change.words for change in watched.changes if change.state is PeerState.DOWN}
+    assert f"{HOST}: a connection ended without a valid packet: the link is full" in words
+    assert len(watched.changes) > 100
+    assert len({change.words for change in watched.changes}) < 50  # the log counts the same ones
+    for client in silent:
+        client.close()
+
+
+def _up_at(watched: Watched) -> set[Peer]:
+    return {change.peer for change in watched.changes if change.state is PeerState.UP}
+
+
+def test_an_address_with_few_connections_loses_none_to_one_with_many(small: TcpInLink) -> None:
+    small.watch(lambda _peer: False, is_signed=False)
+    watched = Watched(small)
+    with socket.socket() as other:
+        other.bind(("127.0.0.2", 0))
+        other.connect((HOST, small.port))
+        watched.until(lambda: watched.states == [PeerState.UP])
+        crowd = [dial(small) for _ in range(20)]
+        watched.until(lambda: watched.states.count(PeerState.UP) == 21)
+        assert is_open(other)
+        for each in crowd:
+            each.close()
+
+
+@pytest.mark.parametrize("is_signed", [True, False])
+def test_who_is_silent_on_a_link_for_signed_packets_is_closed(
+    small: TcpInLink, *, is_signed: bool
+) -> None:
+    """On others it may listen: anybody could send a valid packet there."""
+    heard = set[Peer]()
+    small.watch(heard.__contains__, is_signed=is_signed)
+    watched, (silent, valid) = up(small, 2)
+    heard.add(valid.getsockname())
+    end = time.monotonic() + 0.5
+    watched.until(lambda: time.monotonic() > end)
+    assert is_open(valid)
+    assert is_open(silent) is not is_signed
+    for each in (silent, valid):
+        each.close()
+
+
+def test_beyond_the_limit_there_is_a_place_for_a_short_time_also_for_a_stop(
+    small: TcpInLink,
+) -> None:
+    """All places are taken by clients that are heard."""
+    small.watch(lambda _peer: True, is_signed=False)
+    watched, clients = up(small, 3)
+    for number in range(30):
+        with dial(small) as late:
+            late.sendall(b"stop")
+            peer = late.getsockname()
+            watched.until(lambda peer=peer: watched.heard(peer) == b"stop")  # type: ignore[misc]
+            if number % 2:
+                clients.append(late.dup())  # stays
+    watched.until(lambda: small.refused == 15)
+    assert [is_open(each) for each in clients] == [True] * 3 + [False] * 15
     for client in clients:
         client.close()
-    listening.close()
 
 
 @pytest.mark.parametrize("limits", [TO_VEHICLES, TO_CLIENTS])

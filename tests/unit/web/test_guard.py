@@ -223,6 +223,25 @@ async def test_too_many_requests_are_refused_but_a_stop_never_is(
 
 
 @awaited
+async def test_nothing_uses_up_the_requests_that_a_pause_needs(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+
+    async def looked(**headers: str) -> int:
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        return (await rig.client.get("/api/v1/vehicles", headers=named)).status_code
+
+    many = int(rates.AT_ONCE) - 50  # later ones are answered slowly
+    codes = {await looked(sec_fetch_site="cross-site") for _ in range(many)}
+    assert codes == {403}  # a page of another site, with a picture from this address
+    assert await looked(sec_fetch_site="same-origin") == 200
+    while await looked() == 200:  # a program that asks without end
+        pass
+    for _ in range(5):
+        paused = await rig.client.post("/api/v1/vehicles/1/pause", headers=JSON, content="{}")
+        assert paused.status_code == 200
+
+
+@awaited
 async def test_headers_that_come_twice_and_strange_methods_are_refused(tmp_path: Path) -> None:
     rig = Rig(tmp_path)
     for name, one, two in (

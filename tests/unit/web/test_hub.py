@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.web.hub import UNREAD, Hub, Reader
+from mav_tasks.web.hub import READERS, UNREAD, Hub, Reader
 from tests.kit.awaited import awaited
 
 
@@ -144,3 +144,46 @@ async def test_a_stream_whose_browser_is_gone_before_its_first_event_does_not_co
     for _ in range(3):
         it.open(None).frames()  # nobody asks for an event
     assert it.readers == 0
+
+
+async def taken(reader: Reader) -> Stream:
+    """Return the stream of a reader that has taken its first event."""
+    stream = Stream(reader)
+    await anext(stream.frames)
+    return stream
+
+
+async def has_ended(stream: Stream) -> bool:
+    """Return whether a stream ends behind what it still gives."""
+    try:
+        async with asyncio.timeout(0.05):
+            async for _ in stream.frames:
+                pass
+    except TimeoutError:
+        return False
+    return True
+
+
+@awaited
+async def test_there_is_room_for_a_user_with_few_streams_and_one_with_many_loses_its_oldest() -> (
+    None
+):
+    it = hub()
+    anna = await taken(it.open(None, user="anna"))
+    eves = [await taken(it.open(None, user="eve")) for _ in range(READERS + 20)]
+    late = await taken(it.open(None, user="bob"))
+    assert it.readers == READERS
+    assert not await has_ended(anna)
+    assert not await has_ended(late)
+    assert [await has_ended(each) for each in (eves[0], eves[-1])] == [True, False]
+
+
+@awaited
+async def test_large_events_are_kept_and_left_unread_up_to_some_bytes() -> None:
+    it = hub()
+    slow = await taken(it.open(None))
+    for number in range(2, 102):
+        it.publish("task", {"id": number, "text": "x" * 500_000})
+    assert len(await anext(slow.frames)) < 1_000  # the snapshot instead of all of them
+    assert (await read(it.open("a1-92")))[0][0] == "snapshot"
+    assert [event[1] for event in await read(it.open("a1-95"))][:2] == ["a1-96", "a1-97"]
