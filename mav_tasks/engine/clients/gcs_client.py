@@ -67,8 +67,8 @@ class GcsClient:
         self.is_one_of_many = False
         #: key of the packet in hand, or of the last one
         self.signed_by = UNSIGNED
-        #: s that the packet in hand may have lain here before it was read
-        self.waited = 0.0
+        #: when the packet in hand arrived, s, and for how long it may have waited to be handled
+        self.arrived, self.waited = now, 0.0
         #: source address of the packet in hand
         self.source: Address | None = None
         #: its submitter, and what that submitter may do
@@ -167,7 +167,7 @@ class GcsClient:
     def heard(self, packet: Packet, *, now: float) -> None:
         source = packet.source
         sender = self._senders.get(source) or self.sender(source)
-        sender.line.place(packet.seq, now=now)
+        sender.line.place(packet.seq, now=self.arrived)
         self.is_passing = not self.is_heard
         if now - self.heard_at > BACK_AFTER:
             self._informed.clear()

@@ -33,14 +33,14 @@ SILENT = 3.0  # s, after which a new client may replace this one; heartbeats com
 class Received(NamedTuple):
     """A packet of a client. ``message`` is None if its id is not in the dialect.
 
-    ``waited``: seconds that it may have lain on this machine before it was read.
+    ``arrived``: when it arrived on this machine, s, as ``Packets`` tells.
     """
 
     client: GcsClient
     packet: Packet
     message: m.Message | None
     key: Key
-    waited: float
+    arrived: float
 
 
 class GcsSide:
@@ -135,7 +135,7 @@ class GcsSide:
         return (link, peer) in self._clients
 
     def receive(
-        self, link: str, peer: Peer, packet: Packet, *, now: float, waited: float = 0.0
+        self, link: str, peer: Peer, packet: Packet, *, arrived: float, now: float
     ) -> Received | None:
         """Return a client's packet, decoded; None if it is to be ignored."""
         message = None
@@ -156,17 +156,18 @@ class GcsSide:
             client = self._admit(link, peer, message, is_signed=is_signed, now=now)
             if client is None:
                 return None
-        client.waited = waited
+        client.arrived, client.waited = arrived, now - arrived
         if packet.source != client.source or key is not client.signed_by:
             self._know(client, packet.source, key, now=now)
         if message is not None:
             client.heard(packet, now=now)
-        return Received(client, packet, message, key, waited)
+        return Received(client, packet, message, key, arrived)
 
     def hear_out(self, received: Received, *, now: float) -> None:
         """Restore a client's address, key and rights of this packet, one of several in a batch."""
-        received.client.waited = received.waited
-        self._know(received.client, received.packet.source, received.key, now=now)
+        client = received.client
+        client.arrived, client.waited = received.arrived, now - received.arrived
+        self._know(client, received.packet.source, received.key, now=now)
 
     def _know(self, client: GcsClient, source: Address, key: Key, *, now: float) -> None:
         """Set the address and key of a client's packet in hand, and the rights that follow."""
