@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection
 from math import inf
 from typing import NamedTuple
 
-from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
 from mav_tasks.engine.clients.rights import RightsBook
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
 from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged
@@ -152,8 +152,7 @@ class GcsSide:
         if client is None:
             if message is None:  # bytes without a checked CRC make no client
                 return None
-            is_signed = key is not UNSIGNED
-            client = self._admit(link, peer, message, is_signed=is_signed, now=now)
+            client = self._admit(link, peer, packet, message, key=key, now=now)
             if client is None:
                 return None
         client.arrived, client.waited = arrived, now - arrived
@@ -244,7 +243,9 @@ class GcsSide:
     def _add(
         self, link: str, peer: Peer, *, is_configured: bool, now: float, is_connected: bool = False
     ) -> GcsClient:
-        self._has_room(now=now)  # a configured or connected client is added even if there is none
+        self._has_room(
+            NO_STANDING, now=now
+        )  # a configured or connected client is added even if there is none
         client = self._new(
             link, peer, is_configured=is_configured, is_connected=is_connected, now=now
         )
@@ -264,41 +265,44 @@ class GcsSide:
         )
 
     def _admit(
-        self, link: str, peer: Peer, message: m.Message, *, is_signed: bool, now: float
+        self, link: str, peer: Peer, packet: Packet, message: m.Message, *, key: Key, now: float
     ) -> GcsClient | None:
         """Add a client and return it, or None if too many are active. A STOP needs no room.
 
         Otherwise a sender that keeps changing its endpoint would displace all clients, and have
-        telemetry sent to all its endpoints. Signed clients come first: anybody can pose as many
-        unsigned ones.
+        telemetry sent to all its endpoints. Who may do more comes first, and of those who may do
+        the same the signed ones: anybody can pose as many unsigned ones.
         """
         if self._newcomers is None:
             most = float(self._settings.clients.max_clients)
             self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most, now=now)
+        client = self._new(link, peer, is_configured=False, is_connected=False, now=now)
+        self._know(client, packet.source, key, now=now)
+        is_signed = key is not UNSIGNED
         may_come = is_signed or self._newcomers.take(now=now)
-        if may_come and self._has_room(is_signed=is_signed, now=now):
-            is_one_of_many = self._is_crowd(len(self._clients)) and not is_signed
-            client = self._add(link, peer, is_configured=False, now=now)
-            client.is_one_of_many = is_one_of_many
+        if may_come and self._has_room(client.standing, now=now):
+            client.is_one_of_many = self._is_crowd(len(self._clients)) and not is_signed
+            self._clients[link, peer] = client
             return client
-        if is_stop(message):
-            return self._new(link, peer, is_configured=False, is_connected=False, now=now)
-        return None
+        return client if is_stop(message) else None
 
     def _is_crowd(self, clients: int) -> bool:
         return clients > self._settings.clients.max_clients // CROWDED
 
-    def _has_room(self, *, now: float, is_signed: bool = False) -> bool:
-        """Whether there is room for one more client; make room by forgetting a silent one."""
+    def _has_room(self, standing: tuple[int, bool], *, now: float) -> bool:
+        """Whether there is room for a client of this standing; perhaps forget one in its place.
+
+        That one has a lower standing, or the same and is silent.
+        """
         if len(self._clients) < self._settings.clients.max_clients:
             return True
         others = [
             client
             for client in self.clients
             if not client.is_configured
-            and (now - client.heard_at >= SILENT or (is_signed and client.signed_by is UNSIGNED))
+            and (client.standing, now - client.heard_at < SILENT) < (standing, True)
         ]
-        silent = min(others, key=lambda client: client.heard_at, default=None)
+        silent = min(others, key=lambda client: (client.standing, client.heard_at), default=None)
         if silent is None:
             return False
         self._drop(silent.key, silent)

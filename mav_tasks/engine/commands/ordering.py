@@ -10,6 +10,7 @@ it may read old packets of one link after newer ones of another.
 
 from math import isfinite
 
+from mav_tasks.engine.clients.rights import SUBMITTER
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import Kind
 from mav_tasks.errors import Rejection
@@ -29,7 +30,12 @@ AGAIN = "wait 4 s and repeat it if you mean it"
 
 
 def require_newer(asked: CommandRequest, *, now: float) -> None:
-    """Raise Rejection (STALE) for a command that is older than the rover's last halt."""
+    """Raise Rejection (STALE) for a command that is older than the rover's last halt.
+
+    A command of an observer is not even remembered: whoever executes it refuses it, however new.
+    """
+    if not asked.rights.reach(SUBMITTER):
+        return
     words = why_older(asked, now=now)
     if words:
         raise Rejection(TaskReason.STALE, words)
