@@ -41,7 +41,14 @@ class LinkReader:
         for link, side in sides:
             self._selector.register(link.fileno(), selectors.EVENT_READ, (link, side))
         self._streams = {link.name: link for link, _ in sides if isinstance(link, StreamLink)}
+        # looked up once: to ask a protocol takes longer than to read a datagram
+        self._timed = {link.name: link for link, _ in sides if isinstance(link, TimedLink)}
         self._clients = {link.name for link, side in sides if side is LinkSide.CLIENTS}
+        self._stamped = {
+            link.name: link
+            for link, side in sides
+            if side is LinkSide.CLIENTS and isinstance(link, StampedLink)
+        }
         self._gone: dict[str, tuple[StreamLink, list[PeerChange]]] = {}
         self._stalled_at, self._settled_at = inf, -inf  # the last stall
         self._offset = 0.0  # of the wall clock
@@ -115,7 +122,7 @@ class LinkReader:
 
     def _arrivals(self, link: Link, times: Sequence[float], count: int) -> Sequence[float]:
         """Return when datagrams arrived: as the link says, or after it was last seen empty."""
-        if link.name not in self._clients or isinstance(link, TimedLink):
+        if link.name not in self._clients or link.name in self._timed:
             return times
         since = self._empty_at[link.name]
         if link.is_stream and self._clock() < self._settled_at:
@@ -129,10 +136,10 @@ class LinkReader:
 
     def _received(self, link: Link, most: int) -> tuple[list[tuple[Peer, bytes]], Sequence[float]]:
         """Return what a link has, with the times that it tells."""
-        if isinstance(link, TimedLink):
-            return link.receive_timed(most)
-        if link.name in self._clients and isinstance(link, StampedLink):
-            return link.receive_stamped(most)
+        if timed := self._timed.get(link.name):
+            return timed.receive_timed(most)
+        if stamped := self._stamped.get(link.name):
+            return stamped.receive_stamped(most)
         stream = self._streams.get(link.name)
         if stream is None:
             return link.receive(most), ()

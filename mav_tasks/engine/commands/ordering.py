@@ -30,12 +30,7 @@ AGAIN = "wait 4 s and repeat it if you mean it"
 
 
 def require_newer(asked: CommandRequest, *, now: float) -> None:
-    """Raise Rejection (STALE) for a command that is older than the rover's last halt.
-
-    A command of an observer is not even remembered: whoever executes it refuses it, however new.
-    """
-    if not asked.rights.reach(SUBMITTER):
-        return
+    """Raise Rejection (STALE) for a command that is older than the rover's last halt."""
     words = why_older(asked, now=now)
     if words:
         raise Rejection(TaskReason.STALE, words)
@@ -45,7 +40,10 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     """Return why a command is older than the last halt, "" if it is newer; remember it.
 
     Call this for each copy, even one recognised in another way: the next copy is recognised by it.
+    A command of an observer is not remembered: whoever executes it refuses it, however new.
     """
+    if not asked.rights.reach(SUBMITTER):
+        return ""
     halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
     is_old = asked.client.is_late
     halts.was_asked_to_go_on()

@@ -7,6 +7,7 @@ millisecond later. The STOP was acknowledged, and the rover drove on.
 import pytest
 
 from mav_tasks.engine.inputs import Packets
+from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
 from tests.kit.client import (
@@ -25,7 +26,7 @@ from tests.kit.client import (
     set_mode,
 )
 from tests.kit.mission import Item, Upload
-from tests.kit.world import CLIENT_LINK, World, at
+from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 SECOND = "server:second"
