@@ -1,13 +1,15 @@
 """The link between the gateways of a fleet: packets of and for each other's clients, by Carrier.
 
 Each datagram is a byte that says whether it goes to a gateway or comes back from one, the number of
-the client at the gateway to which that one is connected, and the packet.
+the client at the gateway to which that one is connected, the seconds that the packet had waited at
+that gateway, and the packet.
 """
 
 import logging
 import struct
 
-from mav_tasks.engine.clients.elsewhere import BACK, TOWARDS
+from mav_tasks.clock import boot_time
+from mav_tasks.engine.clients.elsewhere import ARRIVED, BACK, TOWARDS
 from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.fleet_io.carrier import Carrier
 from mav_tasks.fleet_io.keeper import Trouble
@@ -15,12 +17,12 @@ from mav_tasks.links.base import Peer
 
 log = logging.getLogger("mav_tasks")
 
-_HEAD = struct.Struct(">cI")
+_HEAD = struct.Struct(">cId")
 _TO, _BACK = b">", b"<"
 
 
 class FleetLink:
-    """Implements ``StampedLink``; see ``engine/clients/elsewhere.py`` for its peers."""
+    """See ``engine/clients/elsewhere.py`` for its peers."""
 
     name = FLEET_LINK
     peers: tuple[Peer, ...] = ()
@@ -43,16 +45,13 @@ class FleetLink:
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
         """Return up to ``limit`` datagrams, with their senders."""
-        datagrams, _ = self.receive_stamped(limit, longest=0.0)
-        return datagrams
+        return self.receive_timed(limit)[0]
 
-    def receive_stamped(
-        self, limit: int, *, longest: float
-    ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
-        """Return datagrams as ``receive`` does, and the most that each was under way, s."""
-        del longest  # the carrier measures, stalls of this process included
+    def receive_timed(self, limit: int) -> tuple[list[tuple[Peer, bytes]], list[float]]:
+        """Return datagrams as ``receive`` does, and the earliest time at which each can have
+        arrived at the first gateway, by this machine's ``boot_time``."""
         found: list[tuple[Peer, bytes]] = []
-        waited: list[float] = []
+        arrived: list[float] = []
         for each in self._carrier.take(limit):
             if isinstance(each, Trouble):
                 if each.words is not None:
@@ -60,21 +59,24 @@ class FleetLink:
                 continue
             if len(each.payload) < _HEAD.size:
                 continue
-            kind, number = _HEAD.unpack_from(each.payload)
+            kind, number, waited = _HEAD.unpack_from(each.payload)
             data = each.payload[_HEAD.size :]
             if kind in (_TO, _BACK):
                 way = (BACK,) if kind == _BACK else ()
                 found.append(((*way, each.sender, number), data))
-                waited.append(each.waited)
-        return found, waited
+                arrived.append(each.at - each.waited - waited)
+        return found, arrived
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
         """Send a packet on its way to another gateway, or back to one; never block."""
         if not isinstance(peer, tuple):
             return
         *way, gateway, number = peer
-        kind = _TO if way == [TOWARDS] else _BACK
-        self._carrier.send(gateway, _HEAD.pack(kind, number) + data, first=first)
+        kind, waited = _BACK, 0.0
+        if way == [TOWARDS]:
+            kind, waited = _TO, boot_time() - ARRIVED.unpack_from(data)[0]
+            data = data[ARRIVED.size :]
+        self._carrier.send(gateway, _HEAD.pack(kind, number, waited) + data, first=first)
 
     def close(self) -> None:
         """Do nothing: the carrier is closed after the store."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
+    AtOnce,
     Input,
     KeysChanged,
     LinkSide,
@@ -81,10 +82,13 @@ class InMemoryServer:
         if self.pump.is_over:
             return
         self._now = now
-        for link in self._links.values():
-            datagrams = link.receive(len(link.arrived))
-            if datagrams:
-                self.pump.handle(Packets(link.name, datagrams), now=now)
+        found = [
+            Packets(link.name, *link.receive_timed(len(link.arrived)))
+            for link in self._links.values()
+            if link.arrived
+        ]
+        if found:
+            self.pump.handle(AtOnce(tuple(found)) if len(found) > 1 else found[0], now=now)
         due = self.engine.next_deadline()
         if due is not None and due <= now:
             self.pump.handle_deadline(now=now)

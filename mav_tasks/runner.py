@@ -20,14 +20,12 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
     FLEET_LINK,
     AtOnce,
-    Backlog,
     Congestion,
     Input,
     KeysChanged,
     LinkChanged,
     LinkSide,
     Outgoing,
-    Packets,
     PeerChanged,
     SettingsChanged,
     Shutdown,
@@ -58,7 +56,6 @@ LEARNT = 0.2  # weight of the latest sample in the moving average: one may be sl
 SLOWER = 4.0  # a slow sample counts as at most this multiple of the estimate
 TURN = 1e-3  # s, for which datagrams are handled even if a setpoint is due
 STOOD_STILL = 0.3  # s between two callbacks: a stall; older telemetry must not steer
-WALL_EVEN = 0.1  # s, by which the wall clock's offset may differ, for stamps to tell an age
 WALL_STEP = 0.5  # s, a change of the wall clock's offset that is reported
 
 HANGUP = 0.2  # s after SIGHUP, when the runner checks whether the terminal is gone
@@ -187,7 +184,6 @@ class Runner:
         self._due = inf  # when the timer fires, in the engine's time
         self._reader: LinkReader | None = None
         self._ran_at = inf  # when the last callback began
-        self._wall_seen = 0.0  # the wall clock's offset then
         self._over: asyncio.Future[int] | None = None
         #: s to handle a datagram of a link and send the results: longer with many clients
         self._each_takes = dict.fromkeys(self._links, EACH_TAKES)
@@ -214,7 +210,7 @@ class Runner:
                 if isinstance(link, ListeningLink):
                     is_heard = partial(self._pump.engine.has_heard, link.name)
                     link.watch(is_heard, is_signed=not policy.takes_unsigned)
-            self._reader = LinkReader(self._sides, note=self._note)
+            self._reader = LinkReader(self._sides, clock=self._clock, note=self._note)
             for link, _ in self._sides:
                 self._loop.add_reader(link.fileno(), self._on_readable, self._reader)
             if self._store_fd is not None:
@@ -247,49 +243,46 @@ class Runner:
         """Read all readable links together, so that the order of callbacks does not matter."""
         self._wake()
         clients, vehicles = reader.readable()
-        of_each = [reader.read(link, now=self._ran_at) for link in clients]
-        of_clients = [packets for packets in of_each if packets.datagrams]
-        if len(of_clients) > 1 and self._time_for(of_clients) <= TURN:
-            self._guarded(AtOnce(tuple(of_clients)))
-        else:
-            for packets in of_clients:
-                self._take_in(packets)
+        if clients:
+            self._take_in(reader, clients)
         for link in vehicles:
-            self._take_in(reader.read(link, now=self._ran_at))
+            self._take_in(reader, [link])
         reader.note_gone()
+        if self._streams:  # they have no stamps
+            reader.look()
 
     def _wake(self) -> None:
         """Check whether this process has stalled: if so, handle the backlog first."""
         now, before = self._clock(), self._ran_at
-        wall, wall_before = time.time() - now, self._wall_seen
-        self._ran_at, self._wall_seen = now, wall
+        self._ran_at = now
         if self._reader is None or now - before <= STOOD_STILL:
             return
         self._due = inf  # the timer must be set again: the loop's clock stood still while suspended
-        wall_is_even = abs(wall - wall_before) < WALL_EVEN
-        packets = self._reader.read_late(now - before, wall_is_even=wall_is_even, now=now)
-        self._guarded(Backlog(packets) if packets else None)
+        packets = self._reader.read_late(before)
+        self._guarded(AtOnce(packets) if packets else None)
         self._reader.note_gone()
 
-    def _time_for(self, several: Sequence[Packets]) -> float:
-        return sum(len(each.datagrams) * self._each_takes[each.link] for each in several)
+    def _take_in(self, reader: LinkReader, links: Sequence[Link]) -> None:
+        """Handle a share of what these links have, so that no setpoint waits for all of it.
 
-    def _take_in(self, packets: Packets) -> None:
-        """Handle packets in portions, so that no setpoint waits for all of them."""
+        The rest stays in the kernel until the next turn, which is at once.
+        """
         assert self._over is not None
-        link, datagrams, waited = packets.link, packets.datagrams, packets.waited
-        while datagrams and not self._over.done():
-            began = self._clock()
-            each = self._each_takes[link]
-            count = max(1, int(min(max(self._due - began, TURN) / each, DRAIN)))
-            now_in, datagrams = datagrams[:count], datagrams[count:]
-            self._guarded(Packets(link, now_in, waited[:count]))
-            waited = waited[count:]
-            ended = self._clock()
-            took = min((ended - began) / len(now_in), SLOWER * each)
-            self._each_takes[link] = each + LEARNT * (took - each)
-            if datagrams and self._due <= ended:
-                self._guarded(None)
+        if self._over.done():
+            return
+        began = self._clock()
+        room = max(self._due - began, TURN) / sum(self._each_takes[link.name] for link in links)
+        packets = reader.read(links, max(1, int(min(room, DRAIN))))
+        if not packets:
+            return
+        self._guarded(AtOnce(packets) if len(packets) > 1 else packets[0])
+        ended = self._clock()
+        for each in packets:
+            estimate = self._each_takes[each.link]
+            took = (ended - began) / sum(len(other.datagrams) for other in packets)
+            self._each_takes[each.link] += LEARNT * (min(took, SLOWER * estimate) - estimate)
+        if self._due <= ended:
+            self._guarded(None)
 
     def _note(self, link: StreamLink, changes: list[PeerChange]) -> None:
         for change in changes:
@@ -309,6 +302,8 @@ class Runner:
         for link in self._streams:
             link.poll()
             self._note(link, link.take_changes())
+        if self._reader is not None:
+            self._reader.look()
 
     def _hear(self, lease: Lease, loop: asyncio.AbstractEventLoop) -> None:
         """Report to the fleet which vehicles are heard, again and again."""

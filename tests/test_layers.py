@@ -170,7 +170,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         }
     ),
     "mav_tasks.fleet_link": frozenset(
-        {"mav_tasks.engine", "mav_tasks.fleet_io", "mav_tasks.links"}
+        {"mav_tasks.clock", "mav_tasks.engine", "mav_tasks.fleet_io", "mav_tasks.links"}
     ),
     "mav_tasks.gateway": frozenset(
         {

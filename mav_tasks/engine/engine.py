@@ -187,7 +187,7 @@ class Engine:
             case inputs.Committed(through=through):
                 self._submissions.committed(through, now=now)
                 self._vehicles.commit(through, now=now)
-            case inputs.AtOnce(packets=several) | inputs.Backlog(packets=several):
+            case inputs.AtOnce(packets=several):
                 self._reception.receive(several, now=now)
             case inputs.LinkChanged(side=side):
                 self._intake.change_link(item)

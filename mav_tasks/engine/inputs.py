@@ -27,28 +27,18 @@ class LinkSide(Enum):
 class Packets:
     """Datagrams of one link, or pieces of its streams, in the order in which they arrived.
 
-    ``waited`` has, for each of them, the seconds that it lay (or may have lain) on this machine
-    before it was read. It is empty if each was read on arrival.
+    ``arrived`` has the time at which each of them arrived on this machine; where nobody knows that,
+    a time from which on it can have arrived. It is empty if each was read on arrival.
     """
 
     link: str
     datagrams: Sequence[tuple[Peer, bytes]]
-    waited: Sequence[float] = ()
+    arrived: Sequence[float] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class AtOnce:
-    """Packets of several links that were read in one go: their relative order is unknown."""
-
-    packets: tuple[Packets, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Backlog:
-    """Everything that arrived on all links while the server was stalled, clients' links first.
-
-    It may include packets that arrived just now. ``waited`` says how late each one is.
-    """
+    """Packets of several links that were read in one go, in the order of their arrival."""
 
     packets: tuple[Packets, ...]
 
@@ -214,7 +204,6 @@ class Shutdown:
 Input = (
     Packets
     | AtOnce
-    | Backlog
     | LinkChanged
     | KeysChanged
     | PeerChanged

@@ -32,15 +32,14 @@ class PacketReader:
 
     def packets(
         self, item: Packets, counts: DecodeCounts, *, now: float
-    ) -> list[tuple[Peer, Packet, float | None]]:
-        """Return (sender, packet, seconds that it waited) for each packet, in order.
+    ) -> list[tuple[Peer, Packet, float]]:
+        """Return (sender, packet, its arrival) for each packet, in order.
 
-        The seconds are None if they were not measured. Bytes that belong to no packet go to
-        ``counts``.
+        Bytes that belong to no packet go to ``counts``.
         """
         streams = self._streams.get(item.link)
-        taken: list[tuple[Peer, Packet, float | None]] = []
-        for (peer, data), waited in zip(item.datagrams, item.waited or repeat(None), strict=False):
+        taken: list[tuple[Peer, Packet, float]] = []
+        for (peer, data), arrived in zip(item.datagrams, item.arrived or repeat(now), strict=False):
             if streams is None:
                 packets = split_datagram(data)
                 if len(packets) != 1 or len(packets[0].raw) != len(data):
@@ -51,7 +50,7 @@ class PacketReader:
                 packets = splitter.feed(data, now=now)
                 counts.noise += splitter.noise - before
             for packet in packets:
-                taken.append((peer, packet, waited))  # noqa: PERF401  # nearly always one
+                taken.append((peer, packet, arrived))  # noqa: PERF401  # nearly always one
         return taken
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.door import Door
@@ -61,7 +62,7 @@ class Reception:
         return f"Reception({self.intake!r})"
 
     def receive(self, items: Sequence[Packets], *, now: float) -> None:
-        """Handle packets that arrived at one moment; those that halt a rover come first."""
+        """Handle packets in the order of their arrival; those that halt a rover come first."""
         received: list[Received] = []
         others: list[Packets] = []
         for item in items:
@@ -71,6 +72,8 @@ class Reception:
                 received += self._received(item, now=now)
             else:
                 others.append(item)
+        if len(items) > 1:
+            received.sort(key=attrgetter("arrived"))
         if len(received) > 1:
             for each in self._halts_first(received):
                 self.gcs.hear_out(each, now=now)
@@ -84,11 +87,9 @@ class Reception:
     def _received(self, item: Packets, *, now: float) -> list[Received]:
         let_in = self.gates.let_in(item, now=now)
         taken = self.intake.packets(let_in, self.gcs.counts, now=now)
-        may_have_waited = self.vehicles.may_have_waited(now=now)
         received: list[Received] = []
-        for peer, packet, measured in taken:
-            waited = may_have_waited if measured is None else measured
-            each = self.gcs.receive(item.link, peer, packet, waited=waited, now=now)
+        for peer, packet, arrived in taken:
+            each = self.gcs.receive(item.link, peer, packet, arrived=arrived, now=now)
             if each is not None:
                 received.append(each)
         return received

@@ -41,12 +41,21 @@ class Link(Protocol):
 class StampedLink(Link, Protocol):
     """A link on which the kernel stamps each datagram with its arrival time."""
 
-    def receive_stamped(
-        self, limit: int, *, longest: float
-    ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
-        """Return the datagrams as ``receive`` does, and how long each waited to be read, s.
+    def receive_stamped(self, limit: int) -> tuple[list[tuple[Peer, bytes]], list[float]]:
+        """Return the datagrams as ``receive`` does, and when each arrived.
 
-        ``longest``, s, is the upper limit, and the value for a datagram without a stamp.
+        That is in s by the wall clock; -inf for a datagram without a stamp.
+        """
+
+
+@runtime_checkable
+class TimedLink(Link, Protocol):
+    """A link that knows for itself when each datagram arrived."""
+
+    def receive_timed(self, limit: int) -> tuple[list[tuple[Peer, bytes]], list[float]]:
+        """Return the datagrams as ``receive`` does, and when each arrived, by the server's clock.
+
+        Where that is uncertain, it is the earliest time.
         """
 
 

@@ -126,6 +126,7 @@ class MemoryNet:
     def arrive(self, link: "MemoryLink", source: str, data: bytes) -> None:
         """Put one datagram into its link; override it to observe the traffic."""
         link.arrived.append((source, data))
+        link.times.append(self.now)
 
 
 class MemoryLink:
@@ -141,6 +142,7 @@ class MemoryLink:
         self.name = name
         self.peers = peers
         self.arrived: deque[tuple[Peer, bytes]] = deque()
+        self.times: deque[float] = deque()  # of their arrival
 
     def __repr__(self) -> str:
         return f"MemoryLink({self.name})"
@@ -150,7 +152,13 @@ class MemoryLink:
         return self._number
 
     def receive(self, limit: int) -> list[tuple[Peer, bytes]]:
-        return [self.arrived.popleft() for _ in range(min(limit, len(self.arrived)))]
+        return self.receive_timed(limit)[0]
+
+    def receive_timed(self, limit: int) -> tuple[list[tuple[Peer, bytes]], list[float]]:
+        """Return datagrams as ``receive`` does, and when each arrived in the net's time."""
+        count = min(limit, len(self.arrived))
+        taken = [self.arrived.popleft() for _ in range(count)]
+        return taken, [self.times.popleft() for _ in range(count)]
 
     def send(self, peer: Peer, data: bytes) -> None:
         self._net.send(self.name, str(peer), data)
@@ -158,3 +166,4 @@ class MemoryLink:
     def close(self) -> None:
         """Drop the datagrams that have arrived."""
         self.arrived.clear()
+        self.times.clear()

@@ -5,6 +5,7 @@ import struct
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
+from math import inf
 
 SO_TIMESTAMPNS = 35  # Linux, asm-generic/socket.h; also the type of the control message
 _TIMESPEC = struct.Struct("@ll")  # s, ns
@@ -18,10 +19,10 @@ def ask_for_stamps(sock: socket.socket) -> None:
             sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
-def stamp_in(control: Iterable[tuple[int, int, bytes]]) -> float | None:
-    """Return the arrival time of a datagram, s since 1970; None if there is no stamp."""
+def stamp_in(control: Iterable[tuple[int, int, bytes]]) -> float:
+    """Return the arrival time of a datagram, s since 1970; -inf if there is no stamp."""
     for level, kind, data in control:
-        if (level, kind, len(data)) == (socket.SOL_SOCKET, SO_TIMESTAMPNS, _TIMESPEC.size):
+        if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(data) == _TIMESPEC.size:
             seconds, nanoseconds = _TIMESPEC.unpack(data)
             return float(seconds + nanoseconds * 1e-9)
-    return None
+    return -inf

@@ -1,7 +1,6 @@
 """A UDP link, listening or dialling: one socket, any number of peers."""
 
 import socket
-import time
 from zlib import crc32
 
 from mav_tasks.errors import LinkOpenError, LinkUrlError
@@ -107,24 +106,21 @@ class UdpLink:
             self.lost += 1
         return received
 
-    def receive_stamped(
-        self, limit: int, *, longest: float
-    ) -> tuple[list[tuple[Peer, bytes]], list[float]]:
-        """Return the datagrams as ``receive`` does, and how long each waited to be read, s."""
+    def receive_stamped(self, limit: int) -> tuple[list[tuple[Peer, bytes]], list[float]]:
+        """Return the datagrams as ``receive`` does, and the kernel's stamp of each."""
         received: list[tuple[Peer, bytes]] = []
-        waited: list[float] = []
+        stamps: list[float] = []
+        receive = self._socket.recvmsg
         try:
             for _ in range(limit):
-                data, control, _, peer = self._socket.recvmsg(MAX_DATAGRAM, ROOM)
-                stamp = stamp_in(control)
-                age = longest if stamp is None else time.time() - stamp
+                data, control, _, peer = receive(MAX_DATAGRAM, ROOM)
                 received.append((peer, data))
-                waited.append(min(max(0.0, age), longest))
+                stamps.append(stamp_in(control))
         except (BlockingIOError, InterruptedError):
             pass
         except OSError:
             self.lost += 1
-        return received, waited
+        return received, stamps
 
     def send(self, peer: Peer, data: bytes) -> None:
         """Send one datagram; drop it if the system refuses it."""

@@ -9,7 +9,6 @@ from math import inf
 
 from mav_tasks.engine.inputs import (
     AtOnce,
-    Backlog,
     Congestion,
     Input,
     LinkChanged,
@@ -42,7 +41,7 @@ class FieldNotes:
     def on_input(self, item: Input | None, *, now: float) -> None:
         """Log new peers, new links and congestion; log the counts every PERIOD."""
         match item:
-            case AtOnce(packets=several) | Backlog(packets=several):
+            case AtOnce(packets=several):
                 for each in several:
                     self.on_input(each, now=now)
             case Packets(link=link):

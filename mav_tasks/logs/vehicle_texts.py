@@ -7,7 +7,6 @@ from math import inf
 
 from mav_tasks.engine.inputs import (
     AtOnce,
-    Backlog,
     Input,
     LinkChanged,
     LinkSide,
@@ -77,7 +76,7 @@ class VehicleTexts:
         if now >= self._due:
             self._handle_deadline(now)
         match item:
-            case AtOnce(packets=several) | Backlog(packets=several):
+            case AtOnce(packets=several):
                 for each in several:
                     self.on_input(each, now=now)
             case Packets() if item.link in self._links:

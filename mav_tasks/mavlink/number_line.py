@@ -4,6 +4,8 @@ A sender counts its packets upwards. One with a lower number than the last was o
 it had left before the packet that came first, however late it comes.
 """
 
+from array import array
+
 BEHIND = 0x80  # of 256 numbers; one that is farther behind looks as if it were ahead
 #: s and packets, one after the other and all behind, after which the sender has begun anew
 ANEW_AFTER, ANEW = 2.0, 3
@@ -19,9 +21,9 @@ class NumberLine:
     def __init__(self) -> None:
         self.last = -1  #: the highest number so far, counted on beyond 255; -1: none has come
         self._first = -1  # number that came
-        self._passed = [0.0] * 256  # s, when each number came, or a higher one
-        self._came = [-1] * 256  # which numbers came themselves, before any higher one
-        self._ahead_by = [0] * 256  # by how many these were ahead
+        self._passed = array("d", [0.0]) * 256  # s, when each number came, or a higher one
+        self._came = array("q", [-1]) * 256  # which numbers came themselves, before any higher one
+        self._ahead_by = array("h", [0]) * 256  # by how many these were ahead
         self._behind: list[tuple[int, float]] = []  # number and s, of those since the last ahead
         self.heard_at = 0.0  #: s, when the last packet came
         self._is_at_0 = False  # the last one was number 0, after a silence

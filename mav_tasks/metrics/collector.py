@@ -13,7 +13,6 @@ from mav_tasks.clock import boot_time
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import (
     AtOnce,
-    Backlog,
     Committed,
     HaltNotStored,
     Input,
@@ -49,6 +48,7 @@ WAITS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 300.0, 900.0, 36
 COMMITS = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0, 5.0)
 
 INTERRUPTED = frozenset({TaskState.PAUSED, TaskState.HELD})
+STALLED = 0.3  # s; what waited longer to be read waited while the server was stalled
 
 #: label values, not yet as text, and the figure
 Raw = tuple[tuple[object, ...], float | Distribution]
@@ -126,7 +126,6 @@ class Collector:
         self._on_input: dict[type, Callable[[Any, float], None]] = {
             Packets: self._receive,
             AtOnce: self._receive_several,
-            Backlog: self._receive_backlog,
             Committed: self._commit,
             StoreFailed: self._fail,
             HaltNotStored: self._note_halt_not_stored,
@@ -268,15 +267,11 @@ class Collector:
             size += len(data)
         counts.received_bytes += size
 
-    def _receive_several(self, item: AtOnce | Backlog, now: float) -> None:
+    def _receive_several(self, item: AtOnce, now: float) -> None:
         for packets in item.packets:
             self._receive(packets, now)
-
-    def _receive_backlog(self, item: Backlog, now: float) -> None:
-        self._receive_several(item, now)
-        self._stops.waited = max(
-            (max(each.waited, default=0.0) for each in item.packets), default=0
-        )
+        oldest = min((at for packets in item.packets for at in packets.arrived), default=now)
+        self._stops.waited = now - oldest if now - oldest > STALLED else 0.0
 
     def _commit(self, item: Committed, now: float) -> None:
         self._durable, self._store_fault = item.through, ""

@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
-from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import AtOnce, Input, Packets
 
 MOST = 32_000_000  # bytes, about
@@ -24,7 +23,7 @@ E = TypeVar("E")
 
 def room_of(item: Input | None) -> int:
     """Return the approximate size of an input in memory, bytes."""
-    if isinstance(item, AtOnce | inputs.Backlog):
+    if isinstance(item, AtOnce):
         return sum(map(room_of, item.packets), SMALL)
     if not isinstance(item, Packets):
         return SMALL

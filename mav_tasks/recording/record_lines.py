@@ -5,9 +5,8 @@ this format, the writer's version and machine, ``now`` at the start in monotonic
 restored state, and the row formats (``store/codec``). Each following line is an array::
 
     ["task", row]                           a restored task; the first line has their number
-    ["packets", now, link, [[peer, data in base64], ...], [s waited, ...]]  the last if any waited
+    ["packets", now, link, [[peer, data in base64], ...], [arrival, ...]]  the last if any has one
     ["at once", now, [link, ...], ...]      packets of several links, each from ``link`` on
-    ["backlog", now, [link, ...], ...]      likewise
     ["deadline", now]                       a call of Engine.handle_deadline
     ["link", now, ...], ["peer", ...]       the other inputs, with their fields in order
     ["vehicles taken", now, [vehicle, ...], restored state, [row of a task, ...]]
@@ -38,7 +37,7 @@ from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.task import Task
 
-FORMAT = 2
+FORMAT = 3
 MAGIC = "mav-tasks record"  # the key in the first line whose value is the format's number
 MISSING = b"?"  # stands for a secret
 DIGEST = 8  # bytes of the digest of one turn's packets
@@ -107,8 +106,6 @@ def input_of(line: Sequence[Any]) -> Input | None:
             return _packets_of(*values)
         case "at once":
             return inputs.AtOnce(tuple(_packets_of(*each) for each in values))
-        case "backlog":
-            return inputs.Backlog(tuple(_packets_of(*each) for each in values))
         case "link":
             link, side, up, peers, *rest = values
             return inputs.LinkChanged(link, LinkSide[side], up, tuple(map(peer_of, peers)), *rest)
@@ -174,8 +171,6 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["packets", now, *_packets_to_json(item)]
         case inputs.AtOnce(packets=packets):
             return ["at once", now, *map(_packets_to_json, packets)]
-        case inputs.Backlog(packets=packets):
-            return ["backlog", now, *map(_packets_to_json, packets)]
         case inputs.LinkChanged():
             peers = [_peer_to_json(peer) for peer in item.peers]
             end = [item.is_local, item.is_stream, item.takes_unsigned, item.key, item.capacity]
@@ -219,14 +214,14 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
 
 def _packets_to_json(item: Packets) -> list[Any]:
     pairs = [[_peer_to_json(peer), _base64(data)] for peer, data in item.datagrams]
-    return [item.link, pairs, *([list(item.waited)] if item.waited else [])]
+    return [item.link, pairs, *([list(item.arrived)] if item.arrived else [])]
 
 
-def _packets_of(link: str, datagrams: Sequence[Any], waited: Sequence[float] = ()) -> Packets:
+def _packets_of(link: str, datagrams: Sequence[Any], arrived: Sequence[float] = ()) -> Packets:
     pairs = [(peer_of(peer), a2b_base64(data, strict_mode=True)) for peer, data in datagrams]
-    if waited and len(waited) != len(pairs):
-        raise ValueError("waiting times and datagrams differ in number")
-    return Packets(link, pairs, waited)
+    if arrived and len(arrived) != len(pairs):
+        raise ValueError("arrivals and datagrams differ in number")
+    return Packets(link, pairs, arrived)
 
 
 def _key_of(name: str, role: str, fingerprint: str, is_in_use: bool) -> Key:

@@ -108,7 +108,7 @@ def _of_record(record: Record, *, with_packets: bool) -> Iterator[Item]:
 
 def _stamped(content: TlogContent, item: Input, now: float) -> Iterator[tuple[str, bytes]]:
     """Yield the link and the log's form of each packet of an input; other inputs have none."""
-    if isinstance(item, inputs.AtOnce | inputs.Backlog):
+    if isinstance(item, inputs.AtOnce):
         for each in item.packets:
             yield from _stamped(content, each, now)
     else:

@@ -62,7 +62,7 @@ class Tlog:
         if isinstance(item, Packets):
             if not self._backlog.put((now, item), room_of(item)):
                 self._too_many.lose(len(item.datagrams), "the disk is too slow")
-        elif isinstance(item, inputs.AtOnce | inputs.Backlog):
+        elif isinstance(item, inputs.AtOnce):
             for each in item.packets:
                 self.on_input(each, now=now)
         elif isinstance(item, inputs.WallClock | inputs.LinkChanged | inputs.PeerChanged):

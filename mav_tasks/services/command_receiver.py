@@ -16,7 +16,7 @@ SAME_PACKET = 5.0  # s, the very same packet again: the same answer
 REPEATED = 2.5  # s in which a client repeats what it has no answer to, MAVSDK at 0.5, 1.0 and 1.5
 COPIED = 3.5  # s after a copy in which the next one comes: QGroundControl waits 3 s for an answer
 DOUBLED = 30.0  # s, the same for what is a copy beyond doubt: a net may hold it for long
-REMEMBERED = 256  # packets of one client
+REMEMBERED = 256  # packets of one endpoint
 
 
 class Command(NamedTuple):
@@ -70,19 +70,26 @@ class Answer(NamedTuple):
 class Pending:
     """A command taken in; ``answer`` is None until it has been answered."""
 
-    __slots__ = ("answer", "at", "command")
+    __slots__ = ("answer", "at", "command", "receiver")
 
-    def __init__(self, command: Command, at: float) -> None:
+    def __init__(
+        self, command: Command, at: float, receiver: "CommandReceiver | None" = None
+    ) -> None:
         self.command = command
         self.at = at
+        self.receiver = receiver
         self.answer: Answer | None = None
 
 
 class CommandReceiver:
-    """The memory of one client's commands."""
+    """The memory of one client's commands, which several at one endpoint may share."""
 
-    def __init__(self) -> None:
-        self._packets: OrderedDict[bytes, Pending] = OrderedDict()
+    def __init__(
+        self, packets: OrderedDict[bytes, Pending] | None = None, *, most: int = REMEMBERED
+    ) -> None:
+        """``most``: packets that are remembered."""
+        self._packets = OrderedDict() if packets is None else packets
+        self._most = most
 
     def same_packet(self, packet: bytes, *, now: float) -> Pending | None:
         """Return the command that this very packet brought in before."""
@@ -93,8 +100,8 @@ class CommandReceiver:
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
         self._packets.pop(packet, None)
-        pending = self._packets[packet] = Pending(command, now)
-        if len(self._packets) > REMEMBERED:
+        pending = self._packets[packet] = Pending(command, now, self)
+        if len(self._packets) > self._most:
             self._packets.popitem(last=False)
         return pending
 
@@ -136,7 +143,8 @@ class CommandReceiver:
     def _equals(self, command: Command, *, within: float, now: float) -> Iterator[Pending]:
         """Yield the equal commands of the last so many seconds, the latest first."""
         for pending in reversed(self._packets.values()):
-            if now - pending.at <= within and _equal(pending.command, command):
+            is_recent = pending.receiver is self and now - pending.at <= within
+            if is_recent and _equal(pending.command, command):
                 yield pending
 
 

@@ -221,11 +221,11 @@ class PendingTasks:
 
     def handle_deadline(self, *, now: float) -> None:
         """Expire tasks whose deadline has passed, and settle those whose start time has come."""
-        for at, task_id in self.times.take_over(now=now):
+        for task_id in self.times.take_over(now=now):
             task = self._waiting(task_id)
-            if task is not None and self.times.deadline(task.terms) == at:  # not modified since
+            if task is not None:
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
-        for _, task_id in self.times.take_starts(now=now):
+        for task_id in self.times.take_starts(now=now):
             task = self._waiting(task_id)
             if task is not None:
                 self._settle(task, now=now)
@@ -345,6 +345,7 @@ class PendingTasks:
     def leave(self, task: Task) -> None:
         """Remove a task that starts or ends."""
         del self._waiters[task.id]
+        self.times.forget((task.id,))
         self.queue(task.vehicle).discard(task.id)
         self._of_vehicle[task.vehicle] -= 1
         self._leave_owner(task.submitter.owner)
@@ -359,7 +360,7 @@ class PendingTasks:
             task = self._registry[task_id]
             self._leave_owner(task.submitter.owner)
             self._part(task_id, task.terms.after)
-        self.times.forget(set(gone))
+        self.times.forget(gone)
         self._queues.pop(vehicle, None)
         self._of_vehicle.pop(vehicle, None)
         self.woken.discard(vehicle)

@@ -1,24 +1,61 @@
 """Start times and deadlines of waiting tasks, in monotonic time."""
 
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 from heapq import heapify, heappop, heappush
 from math import inf
 
 from mav_tasks.tasks.task import Task, TaskId, Terms
 
+SPARE = 64  # outdated entries of a heap that do not matter
 
-class Times:
-    """Heaps of start times and deadlines. Outdated entries stay until due; callers skip them."""
+
+class _Schedule:
+    """One time for each task. Its memory follows the number of tasks, and not that of changes."""
 
     def __init__(self) -> None:
-        self._starts: list[tuple[float, TaskId]] = []
-        self._deadlines: list[tuple[float, TaskId]] = []
+        self._times: dict[TaskId, float] = {}
+        self._heap: list[tuple[float, TaskId]] = []  # with outdated entries
+
+    def __repr__(self) -> str:
+        return f"{len(self._times)}"
+
+    def put(self, task_id: TaskId, at: float | None) -> None:
+        """Set a task's time in place of an earlier one; None or -inf: it has none."""
+        if at is None or at == -inf:
+            self._times.pop(task_id, None)
+            return
+        self._times[task_id] = at
+        heappush(self._heap, (at, task_id))
+        if len(self._heap) > 2 * len(self._times) + SPARE:
+            self._heap = [(at, task_id) for task_id, at in self._times.items()]
+            heapify(self._heap)
+
+    def first(self) -> float:
+        """Return the earliest time; inf without one."""
+        while self._heap and self._times.get(self._heap[0][1]) != self._heap[0][0]:
+            heappop(self._heap)
+        return self._heap[0][0] if self._heap else inf
+
+    def take(self, *, now: float) -> list[TaskId]:
+        """Remove the times that have come, and return their tasks."""
+        due: list[TaskId] = []
+        while self.first() <= now:
+            due.append(heappop(self._heap)[1])
+            del self._times[due[-1]]
+        return due
+
+
+class Times:
+    """The start times and deadlines of all waiting tasks."""
+
+    def __init__(self) -> None:
+        self._starts, self._deadlines = _Schedule(), _Schedule()
         self._wall_offset = 0.0
         #: when the first entry is due; inf without one
         self.next_at = inf
 
     def __repr__(self) -> str:
-        return f"Times({len(self._starts)} starts, {len(self._deadlines)} deadlines)"
+        return f"Times({self._starts} starts, {self._deadlines} deadlines)"
 
     def start(self, terms: Terms) -> float:
         """Return the monotonic time before which a task does not start; -inf without one."""
@@ -43,51 +80,37 @@ class Times:
         deadline = self.deadline(task.terms)
         return deadline is not None and deadline <= now
 
-    def note(self, task: Task) -> None:
-        """Add the start time and the deadline of a waiting task."""
-        terms = task.terms
-        if terms.start_utc is not None or terms.start_at is not None:
-            heappush(self._starts, (self.start(terms), task.id))
-            self._look()
-        deadline = self.deadline(terms)
-        if deadline is not None:
-            heappush(self._deadlines, (deadline, task.id))
-            self._look()
+    def note(self, *tasks: Task) -> None:
+        """Take the start times and deadlines of waiting tasks, in place of their earlier ones."""
+        for task in tasks:
+            self._starts.put(task.id, self.start(task.terms))
+            self._deadlines.put(task.id, self.deadline(task.terms))
+        self._look()
 
-    def forget(self, tasks: Container[TaskId]) -> None:
-        """Forget the times of these tasks."""
-        for heap in (self._starts, self._deadlines):
-            heap[:] = [entry for entry in heap if entry[1] not in tasks]
-            heapify(heap)
+    def forget(self, tasks: Iterable[TaskId]) -> None:
+        """Forget the times of these tasks, which do not wait any more."""
+        for task_id in tasks:
+            self._starts.put(task_id, None)
+            self._deadlines.put(task_id, None)
         self._look()
 
     def _look(self) -> None:
-        first_start = self._starts[0][0] if self._starts else inf
-        self.next_at = min(first_start, self._deadlines[0][0] if self._deadlines else inf)
+        self.next_at = min(self._starts.first(), self._deadlines.first())
 
-    def take_over(self, *, now: float) -> list[tuple[float, TaskId]]:
-        """Remove and return the deadlines that have passed, with their tasks."""
+    def take_over(self, *, now: float) -> list[TaskId]:
+        """Return the tasks whose deadline has passed, each once."""
         return self._take(self._deadlines, now)
 
-    def take_starts(self, *, now: float) -> list[tuple[float, TaskId]]:
-        """Remove and return the start times that have come, with their tasks."""
+    def take_starts(self, *, now: float) -> list[TaskId]:
+        """Return the tasks whose start time has come, each once."""
         return self._take(self._starts, now)
 
-    def _take(self, heap: list[tuple[float, TaskId]], now: float) -> list[tuple[float, TaskId]]:
-        due: list[tuple[float, TaskId]] = []
-        while heap and heap[0][0] <= now:
-            due.append(heappop(heap))
+    def _take(self, schedule: _Schedule, now: float) -> list[TaskId]:
+        due = schedule.take(now=now)
         self._look()
         return due
 
     def set_wall_offset(self, offset: float, tasks: Iterable[Task]) -> None:
-        """Set UTC minus monotonic time, s, and rebuild the times of all waiting tasks."""
+        """Set UTC minus monotonic time, s, which moves the times of all waiting tasks."""
         self._wall_offset = offset
-        tasks = list(tasks)
-        deadlines = [(self.deadline(task.terms), task.id) for task in tasks]
-        self._deadlines = [(at, task_id) for at, task_id in deadlines if at is not None]
-        heapify(self._deadlines)
-        starts = [(self.start(task.terms), task.id) for task in tasks]
-        self._starts = [(due, task_id) for due, task_id in starts if due > -inf]
-        heapify(self._starts)
-        self._look()
+        self.note(*tasks)

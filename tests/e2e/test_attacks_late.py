@@ -5,11 +5,13 @@ What the engine makes of a backlog is in ``scenarios/attacks``; here is that it 
 
 import os
 import signal
+from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from mav_tasks.engine.inputs import Backlog
+from mav_tasks.engine.inputs import AtOnce, Packets
 from mav_tasks.recording.reading import read
 from mav_tasks.recording.record_lines import input_of
 from tests.kit.processes import command_long, free_udp_ports, stand, submit, wait_for, wait_until
@@ -61,17 +63,24 @@ def test_what_waited_on_all_links_comes_as_a_whole_with_its_age(tmp_path: Path) 
         wait_until(lambda: running.speed() < 0.01, within=TIMEOUT, what="the rover to stand")
         running.server.end()
     (path,) = records.glob("*.decisions.gz")
-    inputs = [input_of(entry.values) for entry in read(path).entries() if entry.kind != "out"]
-    (backlog,) = [item for item in inputs if isinstance(item, Backlog)]
+    entries = [entry for entry in read(path).entries() if entry.kind == "at once"]
+    inputs = [(entry.now, input_of(entry.values)) for entry in entries]
     ages = {
-        command: waited
-        for packets in backlog.packets
-        for (_, data), waited in zip(packets.datagrams, packets.waited, strict=True)
+        command: now - arrived
+        for now, item in inputs
+        if isinstance(item, AtOnce)
+        for packets in item.packets
+        for (_, data), arrived in zip(packets.datagrams, timed(packets), strict=True)
         for command in (STOP, CONTINUE)
         if is_command(data, command)
     }
     assert STOPPED <= ages[CONTINUE] < STOPPED + 1.0
     assert ages[STOP] < 0.5
+
+
+def timed(packets: Packets) -> Sequence[float]:
+    """Return the arrivals of packets; those of rovers have none."""
+    return packets.arrived or [inf] * len(packets.datagrams)
 
 
 def say(link: Any, command: int, *params: float) -> None:

@@ -98,7 +98,7 @@ class Beacon:
         return self._next_at
 
     def turn(self, *, now: float) -> None:
-        self._link.arrived.clear()
+        self._link.receive(len(self._link.arrived))
         if now >= self._next_at:
             self._next_at = now + 1.0
             beat = common.MAVLink_heartbeat_message(10, 3, 1, 0, 4, 3)

@@ -106,12 +106,13 @@ class World(VirtualWorld):
         realism: Realism = EXACT,
         heading: float = 0.0,
         first_id: int = 1,
+        more_links: tuple[str, ...] = (),
     ) -> None:
         """Create a world; ``records`` is a folder for a record of each server.
 
         Rovers start at a ``heading`` in degrees, and have system ids from ``first_id`` on. With
-        ``rover_key`` they sign, and accept only signed packets. The other arguments are
-        InMemoryServer's.
+        ``rover_key`` they sign, and accept only signed packets. ``more_links``: to clients, besides
+        CLIENT_LINK. The other arguments are InMemoryServer's.
         """
         self._policies, self._keys, self._wall_offset = policies, keys, wall_offset
         self.seed = seed
@@ -155,6 +156,8 @@ class World(VirtualWorld):
             self.join(party)
         names = tuple(f"rover{number}" for number in numbers)
         self._names, self._settings = names, settings
+        self._more_links = [self.net.link(name) for name in more_links]
+        self.watched.to_clients |= set(more_links)
         self._records = records
         self.recorders: list[Decisions] = []
         self.server = self._new_server(store, None)
@@ -421,6 +424,7 @@ class World(VirtualWorld):
             policies=self._policies,
             keys=self._keys,
             wall_offset=self._wall_offset,
+            others=self._more_links,
             now=self.now,
         )
 

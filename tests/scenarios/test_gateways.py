@@ -16,7 +16,15 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.signing_lead import STEP
 from mav_tasks.tasks.task import Task
 from rover_sim.personas import PX4, Mode, Persona
-from tests.kit.client import ACCEPTED, GUIDED, FakeClient, setpoint
+from tests.kit.client import (
+    ACCEPTED,
+    GUIDED,
+    PAUSE_CONTINUE,
+    TEMPORARILY_REJECTED,
+    FakeClient,
+    command_long,
+    setpoint,
+)
 from tests.kit.gateways.engines import FleetWorld, Gateway
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
@@ -334,6 +342,26 @@ def test_a_gateway_that_stands_still_sends_nothing_when_it_goes_on(fleet: Fleet)
     assert sent == []
     assert not fleet.world.serves(stale, 1)
     assert fleet.task(task).state is S.HELD
+
+
+def test_a_resume_that_waited_at_another_gateway_undoes_no_newer_pause(fleet: Fleet) -> None:
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    fleet.client.pause()
+    fleet.world.run(4.0)
+    far, before = fleet.clients[fleet.other.name], fleet.world.truth.north
+    fleet.world.freeze(fleet.other.name)
+    far.send(command_long(PAUSE_CONTINUE, 1))
+    fleet.world.run(0.1)
+    fleet.client.pause()
+    fleet.world.run(0.1)
+    fleet.other.is_frozen = False
+    fleet.world.run(3.0)
+    assert far.acks_of(PAUSE_CONTINUE) == [(TEMPORARILY_REJECTED, R.STALE)]
+    assert abs(fleet.world.truth.north - before) < 0.01
+    fleet.world.run(1.5)
+    far.proceed()
+    fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=20)
 
 
 def test_a_short_loss_of_the_database_stops_the_rover_and_the_task_goes_on(fleet: Fleet) -> None:

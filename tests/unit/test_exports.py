@@ -48,7 +48,6 @@ def test_what_can_come_into_the_engine() -> None:
     assert [kind.__name__ for kind in Input.__args__] == [
         "Packets",
         "AtOnce",
-        "Backlog",
         "LinkChanged",
         "KeysChanged",
         "PeerChanged",

@@ -3,9 +3,8 @@
 import select
 from contextlib import closing
 
-import pytest
-
 from mav_tasks.clock import boot_time
+from mav_tasks.engine.clients.elsewhere import ARRIVED
 from mav_tasks.engine.inputs import LinkSide
 from mav_tasks.fleet_link import FleetLink
 from mav_tasks.link_reader import LinkReader
@@ -24,7 +23,7 @@ def test_what_a_turn_leaves_keeps_the_link_readable(postgres: PostgresServer) ->
     with carriers(postgres.new_database(), "a", "b") as (a, b):
         there, here = FleetLink(a), FleetLink(b)
         for number in range(MANY):
-            there.send(("to", "b", 1), b"%d" % number)
+            there.send(("to", "b", 1), arrived(b"%d" % number))
         wait_until(lambda: b.counts.arrived == MANY, within=LIMIT)
         found = []
         while is_readable(here):
@@ -37,25 +36,27 @@ def test_what_a_turn_leaves_keeps_the_link_readable(postgres: PostgresServer) ->
 def test_a_stop_overtakes_what_waits_for_the_loop(postgres: PostgresServer) -> None:
     with carriers(postgres.new_database(), "a", "b") as (a, b):
         there, here = FleetLink(a), FleetLink(b)
-        there.send(("to", "b", 1), b"telemetry")
+        there.send(("to", "b", 1), arrived(b"telemetry"))
         wait_until(lambda: b.counts.arrived == 1, within=LIMIT)
-        there.send(("to", "b", 1), b"stop", first=True)
+        there.send(("to", "b", 1), arrived(b"stop"), first=True)
         wait_until(lambda: b.counts.arrived == 2, within=LIMIT)
         assert [data for _, data in here.receive(64)] == [b"stop", b"telemetry"]
 
 
-@pytest.mark.parametrize("wall_is_even", [True, False], ids=["plain", "clock-set"])
-def test_the_time_for_which_the_loop_stood_still_counts(
-    postgres: PostgresServer, *, wall_is_even: bool
-) -> None:
+def test_the_time_counts_for_which_it_waited_there_and_here(postgres: PostgresServer) -> None:
     with carriers(postgres.new_database(), "a", "b") as (a, b):
         there, here = FleetLink(a), FleetLink(b)
-        there.send(("to", "b", 1), b"stop", first=True)
+        came_at = boot_time() - 5.0
+        there.send(("to", "b", 1), arrived(b"continue", at=came_at), first=True)
         wait_until(lambda: b.counts.arrived == 1, within=LIMIT)
-        read_at = boot_time()
-        wait_until(lambda: boot_time() > read_at + 0.2, within=LIMIT)
-        reader = LinkReader([(here, LinkSide.CLIENTS)], note=lambda _link, _changes: None)
+        sides = [(here, LinkSide.CLIENTS)]
+        reader = LinkReader(sides, clock=boot_time, note=lambda _link, _changes: None)
         with closing(reader):
-            (found,) = reader.read_late(0.1, wall_is_even=wall_is_even, now=boot_time())
-        assert [data for _, data in found.datagrams] == [b"stop"]
-        assert found.waited[0] > 0.2
+            (found,) = reader.read([here])
+        assert [data for _, data in found.datagrams] == [b"continue"]
+        assert came_at - 0.5 < found.arrived[0] <= came_at
+
+
+def arrived(data: bytes, *, at: float | None = None) -> bytes:
+    """Return a packet as the engine gives it to the link."""
+    return ARRIVED.pack(boot_time() if at is None else at) + data

@@ -7,6 +7,7 @@ import asyncio
 import os
 import signal
 import socket
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import ExitStack
 from math import inf
@@ -17,7 +18,7 @@ import pytest
 
 from mav_tasks.clock import boot_time
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import AtOnce, Backlog, Packets, Peer
+from mav_tasks.engine.inputs import AtOnce, Packets, Peer
 from mav_tasks.links.base import Link, PeerChange, PeerState
 from mav_tasks.links.udp import UdpLink, UdpUrl
 from mav_tasks.runner import Runner
@@ -160,45 +161,55 @@ def test_all_that_came_while_it_stood_still_is_handed_over_as_a_whole(pairs: lis
         bench.engine.inputs.clear()
         for number in range(100):
             rover.says(bytes([number]))
+        began = boot_time()
         other.says(b"continue")
         sleep(STOOD)  # noqa: ASYNC251 - the loop is to stand still
         one.says(b"stop")
-        await bench.until(lambda: bench.has(Backlog))
-        (backlog,) = bench.engine.take(Backlog)
-        assert isinstance(backlog, Backlog)
+        await bench.until(lambda: bench.has(AtOnce))
+        (backlog,) = bench.engine.take(AtOnce)
+        assert isinstance(backlog, AtOnce)
         assert not bench.has(Packets)
         by_link = {packets.link: packets for packets in backlog.packets}
         assert list(by_link)[-1] == rover.link.name  # clients first
         assert by_link[one.link.name].datagrams == [(one.peer, b"stop")]
-        assert by_link[one.link.name].waited[0] < 0.2
+        assert began + STOOD < by_link[one.link.name].arrived[0] < boot_time()
         assert by_link[other.link.name].datagrams == [(other.peer, b"continue")]
-        assert STOOD < by_link[other.link.name].waited[0] < STOOD + 0.3
+        assert began - 0.01 < by_link[other.link.name].arrived[0] < began + 0.1
         assert len(by_link[rover.link.name].datagrams) == 100
-        assert len(by_link[rover.link.name].waited) == 100
         one.says(b"now")
         await bench.until(lambda: bench.has(Packets))
-        assert bench.engine.take(Packets) == [Packets(one.link.name, [(one.peer, b"now")])]
+        (packets,) = bench.engine.take(Packets)
+        assert isinstance(packets, Packets)
+        assert packets.datagrams == [(one.peer, b"now")]
 
     bench.run(script)
 
 
-def test_of_a_clock_that_was_set_meanwhile_all_counts_as_old(
-    pairs: list[Pair], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("step", [5.0, -5.0, 0.001, -0.001])
+def test_a_clock_that_was_set_makes_nothing_newer(
+    pairs: list[Pair], monkeypatch: pytest.MonkeyPatch, step: float
 ) -> None:
     one = pairs[0]
     bench = Bench(clients=[one.link], vehicles=[])
-    stepped = 0.0
-    monkeypatch.setattr("mav_tasks.runner.time.time", lambda: boot_time() + 1e9 + stepped)
+    wall, stepped = time.time, 0.0
+    monkeypatch.setattr("mav_tasks.runner.time.time", lambda: wall() + stepped)
 
     async def script() -> None:
         nonlocal stepped
-        await asyncio.sleep(0.1)
-        one.says(b"continue")
-        bench.shift, stepped = ASLEEP, 5.0
-        await bench.until(lambda: bench.has(Backlog))
-        (backlog,) = bench.engine.take(Backlog)
-        assert isinstance(backlog, Backlog)
-        assert backlog.packets[0].waited[0] == pytest.approx(ASLEEP, abs=0.5)
+        for word in (b"before", b"after"):
+            await asyncio.sleep(0.1)
+            bench.engine.inputs.clear()
+            said_at = boot_time()
+            one.says(word)
+            stepped += step
+            await bench.until(lambda: bench.has(Packets))
+            (packets,) = bench.engine.take(Packets)
+            assert isinstance(packets, Packets)
+            assert packets.arrived[0] <= said_at + 0.001
+            step_is_over = word == b"after"
+            if step_is_over:
+                assert packets.arrived[0] > said_at - 0.2
+            stepped -= step * step_is_over
 
     bench.run(script)
 
@@ -211,19 +222,20 @@ def test_what_stuck_at_the_sender_of_a_stream_is_as_old_as_what_was_here() -> No
         await asyncio.sleep(0.1)
         stream.comes([PeerChange("peer", PeerState.UP)], b"on")
         bench.shift = ASLEEP
-        await bench.until(lambda: bench.has(Backlog))
+        await bench.until(lambda: bench.has(AtOnce))
         stream.comes([], b"and on")
         await bench.until(lambda: bench.has(Packets))
         await asyncio.sleep(0.6)
         stream.comes([], b"now")
         await bench.until(lambda: bench.count(Packets) == 2)
-        (backlog,) = bench.engine.take(Backlog)
-        assert isinstance(backlog, Backlog)
+        (backlog,) = bench.engine.take(AtOnce)
+        assert isinstance(backlog, AtOnce)
         late, fresh = bench.engine.take(Packets)
         assert isinstance(late, Packets)
+        assert isinstance(fresh, Packets)
         for packets in (*backlog.packets, late):
-            assert packets.waited[0] == pytest.approx(ASLEEP, abs=0.5)
-        assert fresh == Packets("stream", [("peer", b"now")])
+            assert packets.arrived[0] == pytest.approx(boot_time(), abs=1.5)  # before it slept
+        assert fresh.arrived[0] == pytest.approx(boot_time() + ASLEEP, abs=0.5)
 
     bench.run(script)
 
@@ -235,6 +247,7 @@ def test_what_several_clients_say_at_once_is_handed_over_as_a_whole_and_before_v
     bench = Bench(clients=[one.link, other.link], vehicles=[rover.link])
 
     async def script() -> None:
+        await asyncio.sleep(0.12)
         for each, word in ((rover, b"beat"), (other, b"continue"), (one, b"stop")):
             each.says(word)
         await bench.until(lambda: bench.has(Packets))
@@ -243,5 +256,7 @@ def test_what_several_clients_say_at_once_is_handed_over_as_a_whole_and_before_v
         said = {packets.link: packets.datagrams[0][1] for packets in at_once.packets}
         assert said == {one.link.name: b"stop", other.link.name: b"continue"}
         assert beat == Packets(rover.link.name, [(rover.peer, b"beat")])
+        arrived = {packets.link: packets.arrived[0] for packets in at_once.packets}
+        assert arrived[other.link.name] < arrived[one.link.name]
 
     bench.run(script)

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
+from struct import Struct
 from typing import TypeGuard
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -40,6 +41,8 @@ NOT_PASSED_ON = "STOP waits for the fleet's database. Use the rover's own gatewa
 #: client of ours: there goes what it sends, from there comes what it is sent. The peer of another
 #: gateway's client is that gateway's name and number only
 TOWARDS, BACK = "to", "from"
+#: before each packet towards a gateway: when it arrived here, s, by which it counts as old there
+ARRIVED = Struct(">d")
 LENGTH = 3
 
 
@@ -143,7 +146,7 @@ class Elsewhere:
 
     def pass_to(self, gateway: str, client: GcsClient, packet: Packet) -> None:
         """Pass a client's packet on to a gateway, which answers it."""
-        self._send_on(gateway, client.key, packet.raw, is_first=False)
+        self._send_on(gateway, client.key, packet.raw, arrived=client.arrived, is_first=False)
 
     def _target_of(self, received: Received) -> int | None:
         """Return whom a packet is for; a STOP to the server's own system is for all."""
@@ -163,7 +166,7 @@ class Elsewhere:
         return Packets(
             item.link,
             [item.datagrams[place] for place in places],
-            [item.waited[place] for place in places] if item.waited else (),
+            [item.arrived[place] for place in places] if item.arrived else (),
         )
 
     def _note_stop(self, received: Received, *, now: float) -> None:
@@ -195,10 +198,12 @@ class Elsewhere:
                         each.owed.difference_update(theirs if is_for_all else {packet.system_id})
 
     def _pass_on(self, gateway: str, received: Received) -> None:
-        is_first = is_stop(received.message)
-        self._send_on(gateway, received.client.key, received.packet.raw, is_first=is_first)
+        key, raw, is_first = received.client.key, received.packet.raw, is_stop(received.message)
+        self._send_on(gateway, key, raw, arrived=received.arrived, is_first=is_first)
 
-    def _send_on(self, gateway: str, key: tuple[str, Peer], raw: bytes, *, is_first: bool) -> None:
+    def _send_on(
+        self, gateway: str, key: tuple[str, Peer], raw: bytes, *, arrived: float, is_first: bool
+    ) -> None:
         number = self._numbers.get(key)
         if number is None:
             if len(self._clients) >= MOST:
@@ -207,7 +212,7 @@ class Elsewhere:
             number = self._last = self._last + 1
             self._numbers[key], self._clients[number] = number, key
         there = TOWARDS, gateway, number
-        self._queue.append(Outgoing(FLEET_LINK, there, raw, is_first))
+        self._queue.append(Outgoing(FLEET_LINK, there, ARRIVED.pack(arrived) + raw, is_first))
 
 
 def _is_back(peer: Peer) -> TypeGuard[tuple[str, str, int]]:

@@ -5,8 +5,8 @@ limit only STOP packets are let in.
 """
 
 import re
-from collections.abc import Callable, Sequence
-from itertools import islice
+from collections.abc import Callable
+from itertools import islice, repeat
 
 from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets, Peer
 from mav_tasks.mavlink.enums import MavCmd
@@ -24,8 +24,6 @@ MOST_BUCKETS = 1024
 MOST_STOPS = 16  # from one datagram: routers put several packets into one
 WITHIN = 1.0  # s, whose datagrams may come in one burst
 SIZE = 64  # each so many bytes count as one more datagram, as many packets may be in one
-
-Datagrams = Sequence[tuple[Peer, bytes]]
 
 
 class FloodGates:
@@ -61,17 +59,7 @@ class FloodGates:
     def let_in(self, item: Packets, *, now: float) -> Packets:
         """Return the datagrams within the limit, and the STOPs of the others."""
         gate = self._gates.get(item.link)
-        if gate is None:
-            return item
-        if not item.waited:
-            kept = gate.let_in(item.datagrams, now=now)
-            return item if kept is item.datagrams else Packets(item.link, kept)
-        waiting = [
-            (each, waited)
-            for datagram, waited in zip(item.datagrams, item.waited, strict=True)
-            for each in gate.let_in([datagram], now=now)
-        ]
-        return Packets(item.link, [each for each, _ in waiting], [waited for _, waited in waiting])
+        return item if gate is None else gate.let_in(item, now=now)
 
 
 def stops_in(data: bytes) -> bytes:
@@ -107,24 +95,26 @@ class FloodGate:
         self._rate = rate
         self._buckets.clear()
 
-    def let_in(self, datagrams: Datagrams, *, now: float) -> Datagrams:
-        """Return the datagrams within the limit: the same object if all are."""
+    def let_in(self, item: Packets, *, now: float) -> Packets:
+        """Return the datagrams within the limit, and the STOPs of the others."""
         buckets = self._buckets
         let_in: list[tuple[Peer, bytes]] = []
-        left_out = 0
-        for each in datagrams:
+        times: list[float] = []
+        is_whole = True
+        for each, arrived in zip(item.datagrams, item.arrived or repeat(now), strict=False):
             bucket = buckets.get(each[0])
             if bucket is None:
                 bucket = self._bucket_of(each[0], now=now)
             peer, data = each
-            if bucket.take(tokens=1 + len(data) // SIZE, now=now):
-                let_in.append(each)
-                continue
-            left_out += 1
-            if stops := stops_in(data):
-                let_in.append((peer, stops))
-        self.left_out += len(datagrams) - len(let_in)
-        return let_in if left_out else datagrams
+            if not bucket.take(tokens=1 + len(data) // SIZE, now=now):
+                is_whole = False
+                if not (stops := stops_in(data)):
+                    continue
+                each = peer, stops
+            let_in.append(each)
+            times.append(arrived)
+        self.left_out += len(item.datagrams) - len(let_in)
+        return item if is_whole else Packets(item.link, let_in, times)
 
     def _bucket_of(self, peer: Peer, *, now: float) -> TokenBucket:
         if not self._is_known(peer):

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Collection
 from math import inf
 
-from mav_tasks.engine.clients.rights import NOTHING, Rights
-from mav_tasks.engine.clients.sender import Sender
+from mav_tasks.engine.clients.rights import NOTHING, SUBMITTER, Rights
+from mav_tasks.engine.clients.sender import Memory, Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.engine.packet_sender import PacketSender
@@ -33,6 +33,7 @@ MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 ELSEWHERE = 0.5  # s between messages of one type to a client at another gateway
 MAX_SENDERS = 32  # addresses at one endpoint whose commands are remembered: there may be a router
+NO_STANDING = (0, False)  # of a client that has said nothing yet
 
 
 class GcsClient:
@@ -67,8 +68,8 @@ class GcsClient:
         self.is_one_of_many = False
         #: key of the packet in hand, or of the last one
         self.signed_by = UNSIGNED
-        #: s that the packet in hand may have lain here before it was read
-        self.waited = 0.0
+        #: when the packet in hand arrived, s, and for how long it may have waited to be handled
+        self.arrived, self.waited = now, 0.0
         #: source address of the packet in hand
         self.source: Address | None = None
         #: its submitter, and what that submitter may do
@@ -98,7 +99,9 @@ class GcsClient:
         self.requests = self.changes = TokenBucket(rate=0.0, burst=0.0, now=now)
         self._limits_of: dict[str, list[TokenBucket]] = {}  # by role: the key may change
         self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE, now=now)
+        self._memory = Memory()
         self._senders: dict[Address, Sender] = {}
+        self._observers: Sender | None = None
 
     def __repr__(self) -> str:
         names = " ".join(map(str, self._addresses)) or "unheard"
@@ -108,6 +111,11 @@ class GcsClient:
         self.thinner.default_interval = settings.stream_interval
         self.statuses.apply(rate=settings.status_rate)
         self._texts.apply(rate=settings.text_rate)
+
+    @property
+    def standing(self) -> tuple[int, bool]:
+        """What it may do, and whether it signs: what makes room for it, or has to make room."""
+        return self.rights.rank, self.signed_by is not UNSIGNED
 
     @property
     def is_late(self) -> bool:
@@ -156,18 +164,21 @@ class GcsClient:
         return task_id in self._followed
 
     def sender(self, source: Address) -> Sender:
-        """Return the ``Sender`` of one address at this endpoint."""
+        """Return the ``Sender`` of the address of the packet in hand; one for all observers."""
+        if not self.rights.reach(SUBMITTER):
+            self._observers = self._observers or Sender.of_observers()
+            return self._observers
         sender = self._senders.get(source)
         if sender is None:
             if len(self._senders) >= MAX_SENDERS:
                 del self._senders[next(iter(self._senders))]
-            sender = self._senders[source] = Sender()
+            sender = self._senders[source] = Sender(self._memory)
         return sender
 
     def heard(self, packet: Packet, *, now: float) -> None:
         source = packet.source
-        sender = self._senders.get(source) or self.sender(source)
-        sender.line.place(packet.seq, now=now)
+        if self.rights.reach(SUBMITTER):
+            self.sender(source).line.place(packet.seq, now=self.arrived)
         self.is_passing = not self.is_heard
         if now - self.heard_at > BACK_AFTER:
             self._informed.clear()

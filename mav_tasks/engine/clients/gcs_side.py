@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection
 from math import inf
 from typing import NamedTuple
 
-from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
 from mav_tasks.engine.clients.rights import RightsBook
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
 from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged
@@ -33,14 +33,14 @@ SILENT = 3.0  # s, after which a new client may replace this one; heartbeats com
 class Received(NamedTuple):
     """A packet of a client. ``message`` is None if its id is not in the dialect.
 
-    ``waited``: seconds that it may have lain on this machine before it was read.
+    ``arrived``: when it arrived on this machine, s, as ``Packets`` tells.
     """
 
     client: GcsClient
     packet: Packet
     message: m.Message | None
     key: Key
-    waited: float
+    arrived: float
 
 
 class GcsSide:
@@ -135,7 +135,7 @@ class GcsSide:
         return (link, peer) in self._clients
 
     def receive(
-        self, link: str, peer: Peer, packet: Packet, *, now: float, waited: float = 0.0
+        self, link: str, peer: Peer, packet: Packet, *, arrived: float, now: float
     ) -> Received | None:
         """Return a client's packet, decoded; None if it is to be ignored."""
         message = None
@@ -152,21 +152,21 @@ class GcsSide:
         if client is None:
             if message is None:  # bytes without a checked CRC make no client
                 return None
-            is_signed = key is not UNSIGNED
-            client = self._admit(link, peer, message, is_signed=is_signed, now=now)
+            client = self._admit(link, peer, packet, message, key=key, now=now)
             if client is None:
                 return None
-        client.waited = waited
+        client.arrived, client.waited = arrived, now - arrived
         if packet.source != client.source or key is not client.signed_by:
             self._know(client, packet.source, key, now=now)
         if message is not None:
             client.heard(packet, now=now)
-        return Received(client, packet, message, key, waited)
+        return Received(client, packet, message, key, arrived)
 
     def hear_out(self, received: Received, *, now: float) -> None:
         """Restore a client's address, key and rights of this packet, one of several in a batch."""
-        received.client.waited = received.waited
-        self._know(received.client, received.packet.source, received.key, now=now)
+        client = received.client
+        client.arrived, client.waited = received.arrived, now - received.arrived
+        self._know(client, received.packet.source, received.key, now=now)
 
     def _know(self, client: GcsClient, source: Address, key: Key, *, now: float) -> None:
         """Set the address and key of a client's packet in hand, and the rights that follow."""
@@ -243,7 +243,9 @@ class GcsSide:
     def _add(
         self, link: str, peer: Peer, *, is_configured: bool, now: float, is_connected: bool = False
     ) -> GcsClient:
-        self._has_room(now=now)  # a configured or connected client is added even if there is none
+        self._has_room(
+            NO_STANDING, now=now
+        )  # a configured or connected client is added even if there is none
         client = self._new(
             link, peer, is_configured=is_configured, is_connected=is_connected, now=now
         )
@@ -263,41 +265,44 @@ class GcsSide:
         )
 
     def _admit(
-        self, link: str, peer: Peer, message: m.Message, *, is_signed: bool, now: float
+        self, link: str, peer: Peer, packet: Packet, message: m.Message, *, key: Key, now: float
     ) -> GcsClient | None:
         """Add a client and return it, or None if too many are active. A STOP needs no room.
 
         Otherwise a sender that keeps changing its endpoint would displace all clients, and have
-        telemetry sent to all its endpoints. Signed clients come first: anybody can pose as many
-        unsigned ones.
+        telemetry sent to all its endpoints. Who may do more comes first, and of those who may do
+        the same the signed ones: anybody can pose as many unsigned ones.
         """
         if self._newcomers is None:
             most = float(self._settings.clients.max_clients)
             self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most, now=now)
+        client = self._new(link, peer, is_configured=False, is_connected=False, now=now)
+        self._know(client, packet.source, key, now=now)
+        is_signed = key is not UNSIGNED
         may_come = is_signed or self._newcomers.take(now=now)
-        if may_come and self._has_room(is_signed=is_signed, now=now):
-            is_one_of_many = self._is_crowd(len(self._clients)) and not is_signed
-            client = self._add(link, peer, is_configured=False, now=now)
-            client.is_one_of_many = is_one_of_many
+        if may_come and self._has_room(client.standing, now=now):
+            client.is_one_of_many = self._is_crowd(len(self._clients)) and not is_signed
+            self._clients[link, peer] = client
             return client
-        if is_stop(message):
-            return self._new(link, peer, is_configured=False, is_connected=False, now=now)
-        return None
+        return client if is_stop(message) else None
 
     def _is_crowd(self, clients: int) -> bool:
         return clients > self._settings.clients.max_clients // CROWDED
 
-    def _has_room(self, *, now: float, is_signed: bool = False) -> bool:
-        """Whether there is room for one more client; make room by forgetting a silent one."""
+    def _has_room(self, standing: tuple[int, bool], *, now: float) -> bool:
+        """Whether there is room for a client of this standing; perhaps forget one in its place.
+
+        That one has a lower standing, or the same and is silent.
+        """
         if len(self._clients) < self._settings.clients.max_clients:
             return True
         others = [
             client
             for client in self.clients
             if not client.is_configured
-            and (now - client.heard_at >= SILENT or (is_signed and client.signed_by is UNSIGNED))
+            and (client.standing, now - client.heard_at < SILENT) < (standing, True)
         ]
-        silent = min(others, key=lambda client: client.heard_at, default=None)
+        silent = min(others, key=lambda client: (client.standing, client.heard_at), default=None)
         if silent is None:
             return False
         self._drop(silent.key, silent)

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink.number_line import NumberLine
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import COPIED, DOUBLED, CommandReceiver
+from mav_tasks.services.command_receiver import COPIED, DOUBLED, CommandReceiver, Pending
 
-REMEMBERED = 1024  # commands; a gimbal in motion gets 20 a second
+REMEMBERED = 1024  # commands of one endpoint; a gimbal in motion gets 20 a second
 COPIES = 32  # of one command
+OBSERVED = 16  # packets of observers at one endpoint
 
 
 class _Said(NamedTuple):
@@ -20,16 +21,32 @@ class _Said(NamedTuple):
     packets: frozenset[bytes]  # the latest copies
 
 
-class Sender:
-    """The memory of the commands and sequence numbers of one address."""
+class Memory:
+    """What one endpoint has sent: of bounded size, however many addresses are there."""
 
     def __init__(self) -> None:
-        self.commands = CommandReceiver()
+        self.packets: OrderedDict[bytes, Pending] = OrderedDict()
+        self.words: OrderedDict[Hashable, _Said] = OrderedDict()
+
+
+class Sender:
+    """The commands and sequence numbers of one address."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.commands = CommandReceiver(memory.packets)
         self.line = NumberLine()
-        self._said: OrderedDict[Hashable, _Said] = OrderedDict()
+        self._said = memory.words
 
     def __repr__(self) -> str:
-        return f"Sender({self.line!r}, {len(self._said)} words)"
+        return f"Sender({self.line!r})"
+
+    @classmethod
+    def of_observers(cls) -> "Sender":
+        """Return what stands for all observers at an endpoint: nothing of theirs lets a rover go,
+        so that neither their numbers nor their words are remembered."""
+        it = cls(Memory())
+        it.commands = CommandReceiver(most=OBSERVED)
+        return it
 
     def first_epoch(
         self,
@@ -46,7 +63,7 @@ class Sender:
         has halted the vehicle. An identical packet is then a copy even if its sender seems to have
         restarted, because the network may deliver all its packets a second time.
         """
-        said = self._said.get(content)
+        said = self._said.get((self, content))
         if said is None:
             return None
         if said.life != self.line.lives and not (is_anothers and packet.raw in said.packets):
@@ -56,18 +73,18 @@ class Sender:
 
     def has_said(self, content: Hashable, packet: Packet) -> bool:
         """Return whether this very packet came before, since the sender last restarted."""
-        said = self._said.get(content)
+        said = self._said.get((self, content))
         return said is not None and said.life == self.line.lives and packet.raw in said.packets
 
     def last_copy_at(self, content: Hashable) -> float:
         """Return when the last copy of this command came, s; -inf: none came."""
-        said = self._said.get(content)
+        said = self._said.get((self, content))
         return -inf if said is None or said.life != self.line.lives else said.at
 
     def says(self, content: Hashable, packet: Packet, *, epoch: int, now: float) -> None:
         """Remember a command, or one more copy of it."""
-        before = self._said.pop(content, None)
+        before = self._said.pop((self, content), None)
         packets = frozenset() if before is None or len(before.packets) >= COPIES else before.packets
-        self._said[content] = _Said(self.line.lives, epoch, now, packets | {packet.raw})
+        self._said[self, content] = _Said(self.line.lives, epoch, now, packets | {packet.raw})
         if len(self._said) > REMEMBERED:
             self._said.popitem(last=False)

@@ -186,7 +186,7 @@ class AnyRover:
         vehicle = self._vehicles.get(choice.vehicle)
         assert vehicle is not None, "it was chosen among them"
         asked = AnyRequest(client, vehicle, packet, pending, self._vehicles.our_address)
-        if has_left_before_halt(asked, anybodys=True, now=now):
+        if has_left_before_halt(asked, anybodys=True):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
         goal = driven_by(vehicle, wish.goal)
         draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)

@@ -37,6 +37,8 @@ class CommandRequest:
         #: submitter and rights at arrival: later the endpoint may sign with another key
         self.submitter: Submitter = client.who
         self.rights = client.rights
+        #: when it arrived, s
+        self.arrived = client.arrived
         #: the sender's earlier commands and sequence numbers
         self.sender = client.sender(packet.source)
         #: the parsed message

@@ -272,7 +272,7 @@ class Commands:
             return
         held_at = asked.vehicle.hold_before.since
         # a "go to" from before the HOLD, or a copy of one, does not undo it
-        is_older = has_left_before_halt(asked, now=now)
+        is_older = has_left_before_halt(asked)
         is_older |= asked.receiver.older_copy(asked.command, before=held_at, now=now)
         self._submissions.submit(asked, now=now)
         if not is_older:

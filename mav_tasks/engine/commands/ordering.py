@@ -1,12 +1,16 @@
 """Refuses a command that lets a rover go if it is older than the rover's last halt.
 
-It is older if its first copy came before the halt, if its sequence number shows that it was sent
-before the halt, if it names another halt epoch than the present one, or if it waited while the
-server was stalled. The refusal tells the client to send it again.
+It is older if its first copy arrived before the server had handled the halt, if its number shows
+that it was sent before the halt, if it names another halt epoch than the present one, or if it
+waited while the server was stalled. The refusal tells the client to send it again.
+
+A packet arrives when the kernel gets it, on whatever link. When the server reads it says nothing:
+it may read old packets of one link after newer ones of another.
 """
 
 from math import isfinite
 
+from mav_tasks.engine.clients.rights import SUBMITTER
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.policy import Kind
 from mav_tasks.errors import Rejection
@@ -36,12 +40,15 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     """Return why a command is older than the last halt, "" if it is newer; remember it.
 
     Call this for each copy, even one recognised in another way: the next copy is recognised by it.
+    A command of an observer is not remembered: whoever executes it refuses it, however new.
     """
+    if not asked.rights.reach(SUBMITTER):
+        return ""
     halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
     is_old = asked.client.is_late
     halts.was_asked_to_go_on()
     number = sender.line.number_of(packet.seq)
-    sent_after = sender.line.sent_after(number, now=now)
+    sent_after = sender.line.sent_after(number, now=asked.arrived)
     named = _epoch_in(asked.command)
     content = (asked.command.target, asked.command.command, repr(asked.command.params))
     copies = asked.command.confirmation
@@ -56,7 +63,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     if elsewhere is not None:
         first = elsewhere if first is None else min(first, elsewhere)
     if first is None and copies:  # the first copy was lost; it was sent before this one
-        sent_after = min(sent_after, now - min(copies * COPIED, DOUBLED))
+        sent_after = min(sent_after, asked.arrived - min(copies * COPIED, DOUBLED))
     # The sender of the last halt sent this after it. It is no repeat of an older command if that
     # halt was undone since, if the halt has the same command number (no stock client has two of one
     # number under way), or if no copy came for REPEATED s.
@@ -86,16 +93,16 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     return f"{halts.words} came later: {AGAIN}"
 
 
-def has_left_before_halt(asked: CommandRequest, *, now: float, anybodys: bool = False) -> bool:
+def has_left_before_halt(asked: CommandRequest, *, anybodys: bool = False) -> bool:
     """Return whether this command's sender sent it before its own last halt.
 
     With ``anybodys`` also whether it may have been sent before the last halt of any sender.
     """
     halts, line = asked.vehicle.tasks.halts, asked.sender.line
     number = line.number_of(asked.packet.seq)
-    if halts.by is asked.sender and number < halts.number:
-        return True
-    return anybodys and line.sent_after(number, now=now) <= halts.at
+    if halts.by is asked.sender and number != halts.number:
+        return number < halts.number
+    return anybodys and line.sent_after(number, now=asked.arrived) <= halts.at
 
 
 def note_halt(asked: CommandRequest, *, before: int) -> None:

@@ -125,7 +125,7 @@ class Submissions:
         if self.questions.hold(draft.terms.after, again, refuse, now=now):
             return
         waits = bool(vehicle.tasks.paused)  # then nothing moves before a command to continue
-        if has_left_before_halt(asked, anybodys=not waits, now=now):
+        if has_left_before_halt(asked, anybodys=not waits):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
         task = self.take_in(
             asked.rights,

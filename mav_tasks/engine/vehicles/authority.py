@@ -13,6 +13,7 @@ from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind
 
 STREAM_GAP = 0.5  # s between the setpoints of a stream: OFFBOARD needs at least 2 Hz
+MOST_MODES = 64  # remembered: a client can make up any number
 ANY_MODE = -1  # key for commands by which the vehicle may choose any mode
 
 
@@ -88,7 +89,10 @@ class Authority:
         Only the last client that asked may drive: the vehicle would obey neither of two at once.
         """
         self._asked_mode, self._asked_at = mode, now
+        self._passed_on.pop(mode, None)
         self._passed_on[mode] = now
+        if len(self._passed_on) > MOST_MODES:
+            del self._passed_on[next(iter(self._passed_on))]
         if mode == self._persona.control_mode:
             self._granted = {client}
             self._mode_is_ours = self._mode_is_ours or present_mode == mode

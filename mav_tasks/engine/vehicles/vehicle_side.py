@@ -107,8 +107,6 @@ class VehicleSide:
         self.deadline_heap = DeadlineHeap(timers)
         #: note that a vehicle that was only looked at is about to be changed
         self.mark_dirty = self.deadline_heap.mark_dirty
-        self._old_until = -inf
-        self._stood_for = 0.0  # s, how long this process stalled before that
         self._noted: set[str] = set()
         self._answer: Packet | None = None  # the last answer to our TIMESYNC
         self._asked: deque[int] = deque(maxlen=ASKED)  # time stamps of our TIMESYNC requests, ns
@@ -343,15 +341,10 @@ class VehicleSide:
         )
         if due + self._settings.watch.late_tick >= now:
             return
-        self._old_until, self._stood_for = now + OLD_NEWS, now - due
         for vehicle in self.all:
             self.deadline_heap.mark_dirty(vehicle)
-            vehicle.control.outdated(until=self._old_until)
+            vehicle.control.outdated(until=now + OLD_NEWS)
             vehicle.joint.check_late(now=now)
-
-    def may_have_waited(self, *, now: float) -> float:
-        """Return for how many seconds a packet that is read now may have waited."""
-        return self._stood_for if now < self._old_until else 0.0
 
     def _change_of_lease(self, *, now: float) -> None:
         """Stop the vehicles that another gateway may get, or let their tasks go on."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from mav_tasks.engine.clients.elsewhere import BACK, TOWARDS
+from mav_tasks.engine.clients.elsewhere import ARRIVED, BACK, TOWARDS
 from mav_tasks.engine.inputs import (
     FLEET_LINK,
     FleetChanged,
@@ -86,14 +86,17 @@ class FleetLink(MemoryLink):
     def __init__(self, world: "FleetWorld", gateway: str) -> None:
         super().__init__(world.net, FLEET_LINK, (), 0)
         self._world, self._gateway = world, gateway
-        self.under_way: deque[tuple[float, Peer, bytes]] = deque()
+        self.under_way: deque[tuple[float, Peer, bytes, float]] = deque()
         self.sent = 0
         self._kept: list[tuple[Peer, bytes]] = []  # until the database is reached
 
     def send(self, peer: Peer, data: bytes) -> None:
         assert isinstance(peer, tuple)
+        raw, arrived = data, self._world.now
+        if peer[0] == TOWARDS:
+            raw, (arrived,) = data[ARRIVED.size :], ARRIVED.unpack_from(data)
         if not self._is_reached():  # as the real one: a STOP waits, and the rest is lost
-            if is_stop(data):
+            if is_stop(raw):
                 self._kept.append((peer, data))
             return
         self.sent += 1
@@ -105,7 +108,7 @@ class FleetLink(MemoryLink):
             origin = (BACK, self._gateway, number)
         other = self._world.gateways.get(there)
         if other is not None and not other.is_dead:
-            other.mail.under_way.append((self._world.now + CARRIED, origin, data))
+            other.mail.under_way.append((self._world.now + CARRIED, origin, raw, arrived))
 
     def next_arrival(self) -> float | None:
         if not self._is_reached():
@@ -121,8 +124,9 @@ class FleetLink(MemoryLink):
         for peer, data in kept:
             self.send(peer, data)
         while self.under_way and self.under_way[0][0] <= now:
-            _, peer, data = self.under_way.popleft()
+            _, peer, data, arrived = self.under_way.popleft()
             self.arrived.append((peer, data))
+            self.times.append(arrived)
 
     def _is_reached(self) -> bool:
         own = self._world.gateways.get(self._gateway)

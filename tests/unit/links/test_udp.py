@@ -4,6 +4,7 @@ import select
 import socket
 import time
 from collections.abc import Iterator
+from math import inf
 from typing import cast
 
 import pytest
@@ -225,36 +226,25 @@ def test_clients_dial_from_any_port(other: socket.socket) -> None:
         link.close()
 
 
-def test_each_datagram_says_how_long_it_waited(listening: UdpLink, other: socket.socket) -> None:
+def test_each_datagram_says_when_it_arrived(listening: UdpLink, other: socket.socket) -> None:
+    began = time.time()
     other.sendto(b"old", address_of(listening))
     wait_for(listening)
     sent = time.monotonic()
     while time.monotonic() < sent + 0.2:
         select.select([], [], [], 0.2)
     other.sendto(b"new", address_of(listening))
-    datagrams, waited = listening.receive_stamped(64, longest=10.0)
+    datagrams, stamps = listening.receive_stamped(64)
     assert [data for _, data in datagrams] == [b"old", b"new"]
-    assert 0.2 <= waited[0] < 5.0
-    assert waited[1] < waited[0] - 0.1
+    assert began - 0.01 < stamps[0] < stamps[1] - 0.1 < time.time()
 
 
-def test_no_datagram_waited_for_longer_than_it_can_have(
-    listening: UdpLink, other: socket.socket, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    now = time.time()
-    for step, expected in ((3600.0, 1.0), (-3600.0, 0.0)):  # s, a wall clock that is set
-        other.sendto(b"word", address_of(listening))
-        wait_for(listening)
-        monkeypatch.setattr("mav_tasks.links.udp.time.time", lambda step=step: now + step)
-        assert listening.receive_stamped(64, longest=1.0)[1] == [expected]
-
-
-def test_what_has_no_stamp_counts_as_having_waited_for_the_longest(
+def test_a_datagram_without_a_stamp_may_have_arrived_at_any_time(
     monkeypatch: pytest.MonkeyPatch, other: socket.socket
 ) -> None:
     monkeypatch.setattr("mav_tasks.links.udp.ask_for_stamps", lambda sock: None)
     link = UdpLink(UdpUrl("udpin", HOST, 0))
     other.sendto(b"word", address_of(link))
     wait_for(link)
-    assert link.receive_stamped(64, longest=3.0) == ([(other.getsockname(), b"word")], [3.0])
+    assert link.receive_stamped(64) == ([(other.getsockname(), b"word")], [-inf])
     link.close()

@@ -8,7 +8,6 @@ import pytest
 
 from mav_tasks.engine.inputs import (
     AtOnce,
-    Backlog,
     Committed,
     Congestion,
     FleetChanged,
@@ -67,7 +66,7 @@ INPUTS: list[Input | None] = [
     *(Packets("link", [(peer, b"\x00\xfd\xff"), (peer, b"")]) for peer in PEERS),
     Packets("link", [("x", b"1"), ("y", b"2")], [0.1 + 0.2, 0.0]),
     AtOnce((Packets("a", [("x", b"1")]), Packets("b", [("y", b"2")]))),
-    Backlog((Packets("a", [("x", b"1")], [20.5]), Packets("b", [(("h", 1), b"")]))),
+    AtOnce((Packets("a", [("x", b"1")], [20.5]), Packets("b", [(("h", 1), b"")]))),
     LinkChanged("udpin:x", LinkSide.CLIENTS, up=True, peers=(("h", 1), "x"), is_local=False),
     LinkChanged("tcp", LinkSide.VEHICLES, up=False, is_stream=True),
     PeerChanged("tcp", ("h", 1), up=True),

@@ -235,8 +235,8 @@ BAD_LINES: dict[str, Callable[[list[Any]], list[Any]]] = {
     "line 2 is unreadable": lambda lines: [lines[0], ["link", "now"]],
     "line 3 is unreadable: cannot": lambda lines: [*lines[:2], 5],
     "unreadable header": lambda lines: [{**lines[0], "settings": {"x": 1}}],
-    "unreadable header: KeyError": lambda lines: [{"mav-tasks record": 2, "version": "x"}],
-    "its format is 3; this version reads 2": lambda lines: [{"mav-tasks record": 3}],
+    "unreadable header: KeyError": lambda lines: [{"mav-tasks record": 3, "version": "x"}],
+    "its format is 2; this version reads 3": lambda lines: [{"mav-tasks record": 2}],
     "recorded by version 0.0.1, whose events have another format": lambda lines: [
         {**lines[0], "rows": {}, "version": "0.0.1"}
     ],
@@ -289,7 +289,7 @@ def test_a_file_that_is_none_is_said_so(tmp_path: Path) -> None:
     ("data", "words"),
     [
         (b"\0" * 10**8, "too long for a record"),
-        (b'{"mav-tasks record":2}\n' + b"[]," * 3 * 10**7, "too long for a record"),
+        (b'{"mav-tasks record":3}\n' + b"[]," * 3 * 10**7, "too long for a record"),
         (b"\n" * 10**7, "not a record of decisions"),
         (b"[" * 10**6 + b"\n" + b"\n" * 10**7, "not a record of decisions"),
     ],

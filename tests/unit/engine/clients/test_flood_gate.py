@@ -1,5 +1,7 @@
 """What passes the gate when it lets nothing more in: STOP, in whatever form, and nothing else."""
 
+from collections.abc import Hashable, Sequence
+
 import pytest
 from pymavlink.dialects.v20 import common
 
@@ -47,13 +49,20 @@ OTHERS = {
 def full() -> FloodGate:
     """Return a gate of which strangers have used up all."""
     gate = FloodGate(rate=10.0, is_known=lambda _: False)
-    gate.let_in([(number, BEAT) for number in range(int(STRANGERS))], now=0.0)
+    passed(gate, [(number, BEAT) for number in range(int(STRANGERS))], now=0.0)
     return gate
+
+
+def passed(
+    gate: FloodGate, datagrams: list[tuple[Hashable, bytes]], *, now: float
+) -> Sequence[tuple[Hashable, bytes]]:
+    """Return what a gate lets in."""
+    return gate.let_in(Packets("link", datagrams), now=now).datagrams
 
 
 @pytest.mark.parametrize("form", STOPS)
 def test_a_stop_is_let_in(full: FloodGate, form: str) -> None:
-    ((who, alone),) = full.let_in([("somebody", STOPS[form])], now=0.0)
+    ((who, alone),) = passed(full, [("somebody", STOPS[form])], now=0.0)
     (packet,) = split_datagram(alone)
     assert (who, packet.raw) == ("somebody", alone)
     assert packet.message_id in (75, 76)
@@ -63,28 +72,30 @@ def test_a_signed_stop_is_let_in_whole(full: FloodGate) -> None:
     mav = common.MAVLink(None, 255, 190)
     mav.signing.secret_key, mav.signing.sign_outgoing = b"s" * 32, True
     stop = command_long(STOP).pack(mav)
-    assert full.let_in([("somebody", BEAT + stop + BEAT)], now=0.0) == [("somebody", stop)]
+    assert passed(full, [("somebody", BEAT + stop + BEAT)], now=0.0) == [("somebody", stop)]
 
 
 def test_each_of_several_stops_in_one_datagram_is_let_in_up_to_a_number(full: FloodGate) -> None:
     stops = [packed(command_long(STOP, target=(number, 191))) for number in (1, 2, 3)]
-    assert full.let_in([("somebody", BEAT.join(stops))], now=0.0) == [("somebody", b"".join(stops))]
-    ((_, many),) = full.let_in([("somebody", stops[0] * 100)], now=0.0)
+    assert passed(full, [("somebody", BEAT.join(stops))], now=0.0) == [
+        ("somebody", b"".join(stops))
+    ]
+    ((_, many),) = passed(full, [("somebody", stops[0] * 100)], now=0.0)
     assert many == stops[0] * MOST_STOPS
 
 
 def test_a_datagram_of_many_packets_counts_as_many(full: FloodGate) -> None:
     many = BEAT * 2000
-    assert full.let_in([("somebody", many)], now=1.0) == []
-    assert full.let_in([("somebody", BEAT * 10)] * 200, now=1.0) == [("somebody", BEAT * 10)] * 125
+    assert passed(full, [("somebody", many)], now=1.0) == []
+    assert passed(full, [("somebody", BEAT * 10)] * 200, now=1.0) == [("somebody", BEAT * 10)] * 125
 
 
 @pytest.mark.parametrize("what", OTHERS)
 def test_nothing_else_is_though_it_has_the_number_of_stop_in_it(full: FloodGate, what: str) -> None:
-    assert full.let_in([("somebody", OTHERS[what])], now=0.0) == []
+    assert passed(full, [("somebody", OTHERS[what])], now=0.0) == []
 
 
-def test_what_is_let_in_keeps_how_long_it_waited() -> None:
+def test_what_is_let_in_keeps_when_it_arrived() -> None:
     gates = FloodGates(is_client=lambda *_: True, settings=Clients(packet_rate=20.0))
     gates.change_link(LinkChanged("link", LinkSide.CLIENTS, up=True))
     stop = STOPS["v2"]
