@@ -5,12 +5,19 @@ from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
-from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetPositionTargetLocalNed
+from mav_tasks.mavlink.messages import (
+    CommandInt,
+    CommandLong,
+    Heartbeat,
+    Message,
+    SetPositionTargetLocalNed,
+)
 from mav_tasks.services.mission_item import NOT_GIVEN
-from mav_tasks.services.persona import Persona
+from mav_tasks.services.persona import DRIVEN, Persona, persona_of
 
 CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
 DEFAULT_SPEED = -1.0
+HOLD_OF_PX4 = 3.0  # its sub mode; its main mode has the number of an ArduPilot's HOLD
 
 
 class Speeds(NamedTuple):
@@ -110,7 +117,13 @@ class Orders:
         return self._command(MavCmd.DO_SET_MODE, *self._persona.mode_params(mode))
 
     def hold(self) -> CommandLong:
-        return self.mode(self._persona.hold_mode)
+        """Return the command that asks for HOLD, and means it in any autopilot's language.
+
+        An ArduPilot reads mode 4, and no third parameter (4.6.3). A PX4 that has just taken its
+        place reads main mode 4, sub mode 3: without the 3 it would start its mission.
+        """
+        enabled, mode, _ = self._persona.mode_params(self._persona.hold_mode)
+        return self._command(MavCmd.DO_SET_MODE, enabled, mode, HOLD_OF_PX4)
 
     def our_mode(self) -> CommandLong:
         """Return the command that asks for the mode in which setpoints are followed."""
@@ -144,6 +157,20 @@ class Orders:
         self, command: MavCmd, param1: float, param2: float = 0.0, param3: float = 0.0
     ) -> CommandLong:
         return CommandLong(*self._target, command, 0, param1, param2, param3, 0, 0, 0, 0)
+
+
+def halting(target: Address, heartbeat: Heartbeat) -> CommandLong | None:
+    """Return what asks a vehicle that is not served to stay where it is; None: no such command.
+
+    ArduPilots that are no rovers give mode numbers other meanings, but all that fly or dive have
+    this command. None is disarmed: it may be in the air.
+    """
+    persona = persona_of(heartbeat)
+    if persona is None:
+        return None
+    if persona.has_main_modes or heartbeat.type in DRIVEN:
+        return Orders(target, persona).hold()
+    return CommandLong(*target, MavCmd.NAV_LOITER_UNLIM, 0, 0, 0, 0, nan, 0, 0, 0)
 
 
 def moves(message: Message) -> bool:

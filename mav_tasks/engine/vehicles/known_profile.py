@@ -44,6 +44,10 @@ class KnownProfile:
         is_off = self.chosen is not None and self.chosen.loss_stop == "no"
         return "its profile says that it does not stop without setpoints" if is_off else ""
 
+    def has_other_firmware(self, identity: VehicleIdentity) -> bool:
+        """Return whether it has reported another firmware before."""
+        return self._identity is not None and self._identity.firmware != identity.firmware
+
     def identify(self, identity: VehicleIdentity) -> None:
         self._identity = identity
         self._choose()

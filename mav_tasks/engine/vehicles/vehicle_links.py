@@ -12,8 +12,8 @@ from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.codec import Packer
-from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.codec import Decoder, Packer, target_of
+from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import INTERVAL
 from mav_tasks.settings import Settings
@@ -152,6 +152,15 @@ class VehicleLinks:
         self._budgets.clear()
         self._forget_if_empty(place)
 
+    def withdraw(self, system_id: int) -> None:
+        """Drop what is about to leave for a vehicle: another one answers at its address."""
+        place = self.router.place_of(system_id)
+        self._queue[:] = [
+            each
+            for each in self._queue
+            if (each.link, each.peer) != place or _target_of(each.data) != system_id
+        ]
+
     def may_arm(self, name: str) -> bool:
         """Return whether we may arm vehicles on a link of this name."""
         arming = self._settings.arming
@@ -224,6 +233,12 @@ class VehicleLinks:
         ):
             self._left.discard(place)
             self._outlets.pop(place, None)
+
+
+def _target_of(data: bytes) -> int:
+    """Return the system that one of our packets is for, 0 if it names none."""
+    message = Decoder().decode(split_datagram(data)[0])
+    return 0 if message is None else target_of(message).system_id
 
 
 def _named(peer: Peer) -> str:

@@ -16,10 +16,10 @@ from mav_tasks.engine.snapshot import Reach
 from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.deadline_heap import DeadlineHeap
-from mav_tasks.engine.vehicles.hands import Word
+from mav_tasks.engine.vehicles.hands import BUTTONS, Word
 from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.strangers import MOTION, Beat, Moved, Strangers
-from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.vehicle import Vehicle, kind_of
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -27,7 +27,8 @@ from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import gcs_heartbeat
-from mav_tasks.services.persona import Persona, persona_of
+from mav_tasks.services.orders import halting
+from mav_tasks.services.persona import DRIVEN, Persona, persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
@@ -75,7 +76,6 @@ USED = frozenset(
     | SETPOINTS
 )
 NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
-DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 
 
 class VehicleSide:
@@ -125,6 +125,8 @@ class VehicleSide:
         #: those that it has, and since when; None: all
         self._ours: dict[int, float] | None = {} if is_shared else None
         self._strangers = Strangers()
+        #: the ids at which another vehicle answers now; the reader clears it
+        self.gone: list[int] = []
         #: the links and endpoints
         self.links = VehicleLinks(
             self._vehicles,
@@ -161,6 +163,9 @@ class VehicleSide:
         unheard = [tasks for tasks in self.unheard if system_id in (0, tasks.vehicle)]
         for tasks in unheard:
             tasks.stop(clear=clear, actor=actor, now=now)
+            beat = self._strangers.successors.get(tasks.vehicle)
+            if beat is not None and now - beat.at <= GONE:
+                self._ask_to_hold(beat)
         return [tasks.vehicle for tasks in unheard]
 
     @property
@@ -213,15 +218,19 @@ class VehicleSide:
             system_id, halted_before=now - GONE
         )
 
-    def forget(self, system_id: int) -> None:
+    def _drop(self, system_id: int, *, now: float) -> bool:
+        """Drop all control of a vehicle. Return whether it was driven."""
+        vehicle = self._vehicles.pop(system_id, None)
+        was_driven = vehicle is not None and vehicle.shut(now=now)
+        self.links.forget(system_id)
+        self.deadline_heap.forget(system_id)
+        return was_driven
+
+    def forget(self, system_id: int, *, now: float) -> None:
         """Forget a vehicle, which another gateway may have from here on."""
         assert self._ours is not None, "a server without a fleet has all vehicles"
         del self._ours[system_id]
-        vehicle = self._vehicles.pop(system_id, None)
-        if vehicle is not None:
-            vehicle.requests.shut()  # another part may still have this object
-        self.links.forget(system_id)
-        self.deadline_heap.forget(system_id)
+        self._drop(system_id, now=now)
         self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
         if self._answer is not None and self._answer.system_id == system_id:
             self._answer = None
@@ -308,12 +317,19 @@ class VehicleSide:
             vehicle = self._meet(link, peer, packet, message, now=now)
             if vehicle is None:
                 return None
-        elif self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
-            isinstance(message, m.Heartbeat)
-            and packet.component_id == AUTOPILOT
-            and self.links.moves(vehicle, link, peer, now=now)
-        ):
-            return None
+        else:
+            is_beat = isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT
+            if is_beat and getattr(message, "autopilot", 0) == MavAutopilot.INVALID:
+                return None  # from a program that uses the rover's address
+            if self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
+                is_beat and self.links.moves(vehicle, link, peer, now=now)
+            ):
+                return None
+            if packet.component_id == AUTOPILOT and vehicle.is_another(message, now=now):
+                shown = message if isinstance(message, m.Heartbeat) else vehicle.heartbeat
+                vehicle = self._succeed(vehicle, Beat(link, peer, packet, shown, now), now=now)
+                if vehicle is None:
+                    return None
         if isinstance(message, m.Timesync) and message.ts1 in self._asked:
             self._answer = packet
             if message.tc1 and packet.component_id == AUTOPILOT:
@@ -324,8 +340,6 @@ class VehicleSide:
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
             if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
-                if message.autopilot == MavAutopilot.INVALID:
-                    return None  # from a program that uses the rover's address
                 if vehicle.is_overtaken(message, now=now):
                     return vehicle  # an old mode or arming state is not news
                 vehicle.last_heartbeat = packet
@@ -376,11 +390,44 @@ class VehicleSide:
             outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=is_ours)
             outlet.send_unfenced(self._question, self.our_address, is_ours=is_ours)
 
+    def _succeed(self, old: Vehicle, beat: Beat, *, now: float) -> Vehicle | None:
+        """Meet another vehicle at a known address: nothing of the old one's control survives."""
+        number, kind, tasks = old.system_id, kind_of(beat.message), old.tasks
+        self.links.withdraw(number)
+        was_driven = self._drop(number, now=now)
+        self.gone.append(number)
+        self._fleet.succeeded(number, was_driven=was_driven, now=now)
+        if kind != old.kind:
+            tasks.terms.forget_which()
+        self._strangers.changed(number, kind, now=now)
+        words = "is another vehicle now: look which one it is"
+        if not self._strangers.is_alone(beat, kind):
+            words = "shares its id with another vehicle: neither is driven. Give one another id"
+        if tasks.held is not None:
+            words += f". Task {tasks.held.id} is held: press {BUTTONS}, then Continue"
+        elif tasks.paused:
+            words += ". To let it do what waits, press Continue"
+        self._registry.record(VehicleNoted(number, words, now))
+        return self._meet(*beat[:4], now=now)
+
+    def _ask_to_hold(self, beat: Beat) -> None:
+        """Ask what answers at a vehicle's address, and is not served, to stay where it is."""
+        way = self.links.meets(beat.link, beat.peer)
+        message = halting(beat.packet.source, beat.message)
+        if way is not None and message is not None:
+            way[0].send(message, self.our_address, first=True)
+
     def _meet(
         self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
     ) -> Vehicle | None:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
         persona = self._persona_of(packet, heartbeat, now=now)
+        if packet.component_id == AUTOPILOT and heartbeat.autopilot != MavAutopilot.INVALID:
+            beat = Beat(link_name, peer, packet, heartbeat, now)
+            if not self._strangers.is_alone(beat, kind_of(heartbeat)):
+                if persona is not None and self._fleet.is_to_stand(packet.system_id):
+                    self._ask_to_hold(beat)
+                return None
         if persona is None:
             return None
         way = self.links.meets(link_name, peer)

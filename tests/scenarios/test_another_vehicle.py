@@ -1,0 +1,212 @@
+"""Another autopilot at a known address is another vehicle, whatever the first one was doing."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Conditions
+from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode, Persona
+from rover_sim.vehicle import Vehicle
+from tests.kit.client import ACCEPTED, ARM, MOVE, SET_MODE
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, ways_of
+from tests.scenarios.conftest import MakeWorld
+
+PERSONAS = {"ardupilot": PROMPT, "px4": PROMPT_PX4}
+#: (param2, param3) that mean HOLD to each
+HOLDS = {"ardupilot": {(4.0, 0.0), (4.0, 3.0)}, "px4": {(4.0, 3.0)}}
+DIRECTIONS = [("ardupilot", "px4"), ("px4", "ardupilot")]
+COPTER = 2  # MAV_TYPE_QUADROTOR
+ROVER, ARDUPILOT, PX4, GCS, NO_AUTOPILOT = 10, 3, 12, 6, 8
+DELAY = Conditions().delay
+LOITER = 17  # MAV_CMD_NAV_LOITER_UNLIM
+
+directions = pytest.mark.parametrize(("old", "new"), DIRECTIONS, ids=lambda name: name)
+
+
+class Swapped:
+    """A world in which another rover answers at the first one's address, and what it is sent."""
+
+    def __init__(
+        self,
+        world: World,
+        persona: Persona,
+        *,
+        mode: Mode = Mode.HOLD,
+        at_first_beat: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Put an armed rover there; it stands, and would drive if it were asked for a mission.
+
+        ``at_first_beat`` is called so that the server reads what it sends in the turn in which it
+        reads the new rover's first heartbeat.
+        """
+        self.world = world
+        self.persona = persona
+        self._at_first_beat = at_first_beat
+        self.met_at: float | None = None  # when the server reads that heartbeat
+        self.got: list[Any] = []  # since then
+        self._decoder = common.MAVLink(None)
+        self.rover = world.replace_rover(switched_on=world.now - 60.0, persona=persona)
+        self.rover.autopilot.operator_arm(True, now=world.now)
+        self.rover.autopilot.operator_mode(mode, now=world.now)
+        self.start = self.place()
+        self.modes: set[Mode] = set()
+        world.watch(lambda _now: self.modes.add(self.rover.autopilot.mode))
+        world.watched.loses = self._look_at_sent
+        world.watched.on_arrival = self._look_at_arrived
+
+    def place(self) -> tuple[float, float]:
+        truth = self.rover.truth
+        return round(truth.north, 3), round(truth.east, 3)
+
+    def _look_at_sent(self, source: str, target: str, data: bytes) -> bool:
+        is_beat = (source, target) == ("rover1", VEHICLE_LINK) and data[7] == 0
+        if is_beat and self.met_at is None:
+            self.met_at = self.world.now + DELAY
+            self.world.observer.meets(ways_of(self.persona))
+            self._at_first_beat()
+        return False
+
+    def _look_at_arrived(self, name: str, _source: str, data: bytes) -> None:
+        is_since = self.met_at is not None and self.world.now >= self.met_at + DELAY
+        if is_since and name == "rover1" and data[7] in (MODE_COMMAND, SETPOINT):
+            self.got.append(self._decoder.decode(bytearray(data)))
+
+    def asked_modes(self) -> set[tuple[float, float]]:
+        """Return (param2, param3) of each DO_SET_MODE that has arrived."""
+        return {
+            (message.param2, message.param3)
+            for message in self.got
+            if message.get_msgId() == MODE_COMMAND and message.command == SET_MODE
+        }
+
+    def armings(self) -> list[float]:
+        return [m.param1 for m in self.got if m.get_msgId() == MODE_COMMAND and m.command == ARM]
+
+    def check_untouched(self) -> None:
+        """Assert that nothing has driven it, and that it was asked for nothing but HOLD."""
+        assert self.asked_modes() <= HOLDS[self.persona.name]
+        assert self.modes <= {Mode.HOLD, Mode.MANUAL}
+        assert self.place() == self.start
+        assert 1.0 not in self.armings()
+        moving = [m for m in self.got if m.get_msgId() == SETPOINT and abs(m.vx) + abs(m.vy) > 0.01]
+        assert moving == []
+
+
+def running(world: World) -> None:
+    world.client.move(9.0)
+    world.client.move(9.0)
+    world.until_state(1, S.EXECUTING)
+    world.run(2)
+
+
+def lost(world: World) -> None:
+    """It would go on by itself."""
+    running(world)
+    world.fault(Faults(silent=True))
+    world.run(1.5)
+
+
+def paused(world: World) -> None:
+    running(world)
+    world.client.pause()
+    world.run(3)
+
+
+def held(world: World) -> None:
+    running(world)
+    world.rover.autopilot.reboot(now=world.now)
+    world.until_state(1, S.HELD)
+
+
+def waiting(world: World) -> None:
+    world.client.pause()
+    world.run(1)
+    world.client.move(9.0)
+    world.run(1)
+
+
+def scheduled(world: World) -> None:
+    world.client.command(MOVE, 9.0, 0, 0, 0, 0, 8.0)
+    world.run(1)
+
+
+def idle(world: World) -> None:
+    world.run(1)
+
+
+def stopped(world: World) -> None:
+    running(world)
+    world.client.stop()
+    world.run(3)
+
+
+STATES = [running, lost, paused, held, waiting, scheduled, idle, stopped]
+WORDS: dict[str, Callable[[World], object]] = {
+    "nothing": lambda _world: None,
+    "STOP": lambda world: world.client.stop(),
+    "pause": lambda world: world.client.pause(),
+    "resume": lambda world: world.client.proceed(),
+    "arm": lambda world: world.client.arm(),
+}
+
+
+@directions
+@pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
+@pytest.mark.parametrize("word", WORDS)
+def test_nothing_of_the_old_ones_control_reaches_the_new_one(
+    make_world: MakeWorld, old: str, new: str, state: Callable[[World], None], word: str
+) -> None:
+    """The word is read in the turn in which the new one is first heard."""
+    world = make_world(persona=PERSONAS[old])
+    state(world)
+    was_stopped = world.paused() is R.STOPPED
+    swapped = Swapped(world, PERSONAS[new], at_first_beat=lambda: WORDS[word](world))
+    world.run(15)
+    assert swapped.met_at is not None
+    swapped.check_untouched()
+    waits = [task for task in world.tasks() if task.state not in (S.KILLED, S.COMPLETED)]
+    if word == "STOP" or (was_stopped and word != "resume"):
+        assert world.paused() is R.STOPPED
+    elif waits:
+        assert world.paused() in (R.RESTARTED, R.TAKEOVER)
+    if word != "STOP" and state in (running, lost, paused, held):
+        assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    notes = [note.text for note in world.events(VehicleNoted) if "another vehicle" in note.text]
+    assert len(notes) == 1
+
+
+@directions
+def test_stop_is_said_in_the_language_of_what_is_there_now(
+    make_world: MakeWorld, old: str, new: str
+) -> None:
+    world = make_world(persona=PERSONAS[old])
+    swapped = Swapped(world, PERSONAS[new], mode=Mode.MANUAL)
+    world.run(3)
+    sent = world.client.stop()
+    world.run(0.5)
+    assert sent.result == ACCEPTED
+    swapped.check_untouched()
+    assert swapped.rover.autopilot.mode is Mode.HOLD
+
+
+@directions
+def test_a_person_decides_that_the_tasks_are_for_the_new_one(
+    make_world: MakeWorld, old: str, new: str
+) -> None:
+    world = make_world(persona=PERSONAS[old])
+    waiting(world)
+    swapped = Swapped(world, PERSONAS[new])
+    world.run(8)
+    swapped.check_untouched()
+    world.client.proceed()
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+    assert swapped.place()[0] == pytest.approx(swapped.start[0] + 9.0, abs=0.1)
