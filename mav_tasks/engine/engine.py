@@ -341,7 +341,7 @@ class Engine:
         """Forget vehicles that another gateway hears, unless something came between."""
         strays = self.reach(now=now).strays
         for vehicle in sorted(strays.intersection(vehicles)):
-            self._vehicles.forget(vehicle, now=now)
+            self._vehicles.forget(vehicle)
             tasks = self._fleet.forget(vehicle, now=now)
             self._deduplicator.forget_vehicle(vehicle, tasks)
             self._assignments.forget(vehicle, tasks)

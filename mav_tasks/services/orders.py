@@ -4,17 +4,13 @@ from math import copysign, cos, isfinite, nan, sin
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavCmd, MavFrame
-from mav_tasks.mavlink.messages import (
-    CommandInt,
-    CommandLong,
-    Heartbeat,
-    Message,
-    SetPositionTargetLocalNed,
-)
+from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavType
+from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetPositionTargetLocalNed
 from mav_tasks.services.mission_item import NOT_GIVEN
-from mav_tasks.services.persona import DRIVEN, Persona, persona_of
+from mav_tasks.services.persona import Persona
 
+#: others give the mode numbers other meanings
+DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
 DEFAULT_SPEED = -1.0
 HOLD_OF_PX4 = 3.0  # its sub mode; its main mode has the number of an ArduPilot's HOLD
@@ -132,6 +128,15 @@ class Orders:
     def arming(self, *, arm: bool) -> CommandLong:
         return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
 
+    def staying_there(self, kind: int) -> CommandLong:
+        """Return what asks a vehicle of any MAV_TYPE to stay where it is; it is never disarmed.
+
+        An ArduPilot that flies or dives has other mode numbers, but this command.
+        """
+        if self._persona.has_main_modes or kind in DRIVEN:
+            return self.hold()
+        return self._command(MavCmd.NAV_LOITER_UNLIM, 0.0)
+
     def staying(self, *, changes_mode: bool) -> CommandInt:
         """Return the "go to" without a place: a vehicle that drives to one in HOLD stays here.
 
@@ -157,20 +162,6 @@ class Orders:
         self, command: MavCmd, param1: float, param2: float = 0.0, param3: float = 0.0
     ) -> CommandLong:
         return CommandLong(*self._target, command, 0, param1, param2, param3, 0, 0, 0, 0)
-
-
-def halting(target: Address, heartbeat: Heartbeat) -> CommandLong | None:
-    """Return what asks a vehicle that is not served to stay where it is; None: no such command.
-
-    ArduPilots that are no rovers give mode numbers other meanings, but all that fly or dive have
-    this command. None is disarmed: it may be in the air.
-    """
-    persona = persona_of(heartbeat)
-    if persona is None:
-        return None
-    if persona.has_main_modes or heartbeat.type in DRIVEN:
-        return Orders(target, persona).hold()
-    return CommandLong(*target, MavCmd.NAV_LOITER_UNLIM, 0, 0, 0, 0, nan, 0, 0, 0)
 
 
 def moves(message: Message) -> bool:

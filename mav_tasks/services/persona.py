@@ -7,21 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isnan
 
-from mav_tasks.mavlink.enums import (
-    MavAutopilot,
-    MavFrame,
-    MavModeFlag,
-    MavType,
-    PositionTargetTypemask,
-)
+from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, MavModeFlag, PositionTargetTypemask
 from mav_tasks.mavlink.messages import Heartbeat
 from mav_tasks.services import turning_kind
 from mav_tasks.settings import Turning
 
 T = PositionTargetTypemask
 
-#: MAV_TYPE of those that are driven; others give the mode numbers other meanings
-DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 NO_MODE = -1
 MAIN_BITS, SUB_BITS = 16, 24  # where PX4's custom_mode has its main and its sub mode
 VELOCITY_ONLY = int(T.X_IGNORE | T.Y_IGNORE | T.Z_IGNORE | T.AX_IGNORE | T.AY_IGNORE | T.AZ_IGNORE)

@@ -49,19 +49,6 @@ class Fleet:
                 self._registry.record(QueuePaused(vehicle, R.RESTARTED, SERVER, self.began_at))
         return tasks
 
-    def succeeded(self, vehicle: int, *, was_driven: bool, now: float) -> None:
-        """Note that another vehicle answers at this id: its tasks wait, as after a restart."""
-        tasks = self.of(vehicle)
-        if was_driven:
-            self._was_driven.add(vehicle)
-        if tasks.halts.is_by_word:
-            self._halted[vehicle] = tasks.halts.last
-        tasks.belong_to_another(now=now)
-
-    def is_to_stand(self, vehicle: int) -> bool:
-        """Return whether a vehicle that is not served must stand: STOP, or it was driven."""
-        return vehicle in self._was_driven or self.of(vehicle).is_stopped
-
     def was_driven(self, vehicle: int) -> bool:
         """Return whether a task was driving a vehicle when the last run ended; True only once."""
         was_driven = vehicle in self._was_driven

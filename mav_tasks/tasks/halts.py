@@ -39,7 +39,7 @@ WORDS = frozenset(
 
 
 class LastHalt(NamedTuple):
-    """The last halt before a vehicle was met: of an earlier run, or of the one that it replaces."""
+    """The last halt of an earlier run."""
 
     reason: TaskReason
     at: float  # s, of this run's clock
@@ -76,11 +76,6 @@ class Halts:
     def is_by_word(self) -> bool:
         """Whether the last halt was a command, and not seen in the vehicle's telemetry."""
         return self._reason in WORDS
-
-    @property
-    def last(self) -> LastHalt:
-        """The last halt, for a vehicle that is met after it."""
-        return LastHalt(self._reason, self.at)
 
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it repeats the last one and does not count."""

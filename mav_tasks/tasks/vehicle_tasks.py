@@ -10,7 +10,6 @@ from math import inf
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.driving.displacement import LedAway
 from mav_tasks.tasks.driving.jump import JumpWatch
 from mav_tasks.tasks.driving.mission_sequencer import goal_of, present_goal, skipped_to
 from mav_tasks.tasks.events import SERVER, QueueContinued
@@ -91,9 +90,7 @@ class VehicleTasks(Lineup):
         self.hold(R.FRAME_RESET, now=now)
         self._wait_for_somebody(now=now)
         self.stopping_after_kill = False
-        self.seen, self.bounds.home = None, None
-        self._jumps, self.displaced = JumpWatch(), LedAway()
-        self.terms.cruises(None)
+        self.bounds.home = None
 
     def unidentified(self, *, now: float) -> None:
         """Pause these tasks: their vehicle has a unique id, and this one reports none."""

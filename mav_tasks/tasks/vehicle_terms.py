@@ -44,6 +44,11 @@ class VehicleTerms:
         return f"VehicleTerms({self._vehicle}, speed={self._speed}, uid={self._uid!r})"
 
     @property
+    def uid(self) -> str:
+        """The unique id of the vehicle of these tasks, "" if it is not known."""
+        return self._uid
+
+    @property
     def has_uid(self) -> bool:
         """Whether the unique id of the vehicle of these tasks is known."""
         return bool(self._uid)

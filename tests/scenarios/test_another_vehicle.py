@@ -1,6 +1,7 @@
 """Another autopilot at a known address is another vehicle, whatever the first one was doing."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,7 +14,6 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode, Persona
-from rover_sim.vehicle import Vehicle
 from tests.kit.client import ACCEPTED, ARM, MOVE, SET_MODE
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, ways_of
@@ -26,6 +26,8 @@ DIRECTIONS = [("ardupilot", "px4"), ("px4", "ardupilot")]
 COPTER = 2  # MAV_TYPE_QUADROTOR
 ROVER, ARDUPILOT, PX4, GCS, NO_AUTOPILOT = 10, 3, 12, 6, 8
 DELAY = Conditions().delay
+RELEASE, REQUEST, VERSION = 54013, 512, 148
+PARAMETER = 20  # PARAM_REQUEST_READ
 LOITER = 17  # MAV_CMD_NAV_LOITER_UNLIM
 
 directions = pytest.mark.parametrize(("old", "new"), DIRECTIONS, ids=lambda name: name)
@@ -102,7 +104,7 @@ class Swapped:
 
 def running(world: World) -> None:
     world.client.move(9.0)
-    world.client.move(9.0)
+    world.client.move(8.0)
     world.until_state(1, S.EXECUTING)
     world.run(2)
 
@@ -210,3 +212,202 @@ def test_a_person_decides_that_the_tasks_are_for_the_new_one(
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
     assert swapped.place()[0] == pytest.approx(swapped.start[0] + 9.0, abs=0.1)
+
+
+def beat_of(kind: int, autopilot: int, *, seq: int = 0) -> bytes:
+    """Return a heartbeat of a vehicle with the first rover's id."""
+    mav = common.MAVLink(None, 1, 1)
+    mav.seq = seq
+    raw: bytes = common.MAVLink_heartbeat_message(kind, autopilot, 1, 0, 4, 3).pack(mav)
+    return raw
+
+
+def forge(world: World, kind: int, autopilot: int) -> None:
+    """Let the server hear a heartbeat at the first rover's address."""
+    world.from_vehicle_side(beat_of(kind, autopilot), peer="rover1")
+    world.run(0.01)
+
+
+def notes_of(world: World) -> list[str]:
+    return [note.text for note in world.events(VehicleNoted)]
+
+
+@pytest.mark.parametrize(
+    ("persona", "forged"),
+    [(PROMPT, PX4), (PROMPT_PX4, ARDUPILOT)],
+    ids=["ardupilot", "px4"],
+)
+@pytest.mark.parametrize("kind", [ROVER, COPTER])
+def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
+    make_world: MakeWorld, persona: Persona, forged: int, kind: int
+) -> None:
+    world = make_world(persona=persona)
+    running(world)
+    forge(world, kind, forged)
+    world.run(5)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert world.state(2)[0] is S.QUEUED
+    assert any("is another vehicle now" in text for text in notes_of(world))
+    place = world.pose()
+    world.run(20)
+    assert world.pose() == place
+    world.client.command(RELEASE, 1, 1)
+    world.run(1)
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+
+
+@pytest.mark.parametrize("word", ["STOP", "pause"])
+def test_two_that_alternate_undo_no_halt_and_drive_nothing(
+    make_world: MakeWorld, word: str
+) -> None:
+    world = make_world()
+    running(world)
+    WORDS[word](world)
+    world.run(3)
+    place = world.pose()
+    kept = len(world.server.store.events)
+    for _ in range(2000):
+        forge(world, ROVER, PX4)
+        forge(world, ROVER, ARDUPILOT)
+    world.run(15)
+    assert world.pose() == place
+    assert world.paused() is (R.STOPPED if word == "STOP" else R.RESTARTED)
+    assert len(world.server.store.events) - kept < 30
+    assert any("shares its id with another vehicle" in text for text in notes_of(world))
+
+
+def test_stop_reaches_both_of_two_that_alternate(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    world.observers.clear()  # whose rules are for one vehicle at one id
+    for _ in range(5):
+        forge(world, ROVER, ARDUPILOT)
+        forge(world, ROVER, PX4)
+    world.rover.autopilot.operator_arm(True, now=world.now)
+    world.rover.autopilot.operator_mode(Mode.MANUAL, now=world.now)
+    for kind in (PX4, ARDUPILOT):
+        forge(world, ROVER, kind)
+        world.client.stop()
+        world.run(0.3)
+        assert world.rover.autopilot.mode is Mode.HOLD
+        world.rover.autopilot.operator_mode(Mode.MANUAL, now=world.now)
+    world.run(15)
+    assert world.paused() is R.STOPPED
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "words"),
+    [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})],
+    ids=["ardupilot", "px4"],
+)
+def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
+    world: World, autopilot: int, words: set[tuple[int, float, float]]
+) -> None:
+    """A copter may be in the air: it is not disarmed either. Then the rover is back."""
+    running(world)
+    world.observers.clear()  # whose rules are for a rover
+    world.leave(world.rover_parties[0])
+    got: list[Any] = []
+    decoder = common.MAVLink(None)
+    forge(world, COPTER, autopilot)
+    world.watched.on_arrival = lambda _name, _source, data: got.append(
+        decoder.decode(bytearray(data))
+    )
+
+    def passes(seconds: int) -> None:
+        for _ in range(seconds):
+            forge(world, COPTER, autopilot)
+            world.run(0.99)
+
+    def commands() -> set[tuple[int, float, float]]:
+        assert not [message for message in got if message.get_msgId() == SETPOINT]
+        sent = [message for message in got if message.get_msgId() == MODE_COMMAND]
+        return {(message.command, message.param2, message.param3) for message in sent}
+
+    passes(3)
+    assert commands() <= words  # it was in the place of a driven one
+    got.clear()
+    passes(3)
+    assert commands() == set()
+    world.client.stop()
+    passes(1)
+    assert commands() == words
+    world.client.arm()
+    world.client.proceed()
+    world.client.move(1.0)
+    passes(5)
+    assert commands() == words
+    assert world.state(1)[0] is S.KILLED
+    world.join(world.rover_parties[0])
+    world.run(20)
+    assert world.paused() is R.STOPPED
+    assert world.stands()
+    world.client.proceed()
+    world.until_idle(tasks=2)
+
+
+def test_a_ground_station_at_the_rovers_address_is_no_vehicle(world: World) -> None:
+    running(world)
+    world.from_vehicle_side(beat_of(GCS, NO_AUTOPILOT), peer="rover1")
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+
+
+def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -> None:
+    """A client asks for the version: nothing else shows that the rover was exchanged."""
+    running(world)
+    world.client.pause()
+    world.run(10)
+    world.replace_rover(switched_on=0.0)
+    world.run(2)
+    world.client.command(REQUEST, VERSION, target=(1, 1))
+    world.run(1)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert world.paused() is R.RESTARTED
+    assert any("is another vehicle now" in text for text in notes_of(world))
+
+
+def test_two_of_one_make_that_share_an_id_are_not_served_in_turns(world: World) -> None:
+    """Both answer each request for the version; each answer tells of another one."""
+    world.run(5)
+    kept = len(world.server.store.events)
+    for number in range(500):
+        mav = common.MAVLink(None, 1, 1)
+        mav.seq = number % 256
+        version = common.MAVLink_autopilot_version_message(
+            0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 1000 + number % 2
+        )
+        world.from_vehicle_side(version.pack(mav), peer="rover1")
+        world.run(0.01)
+    assert len(world.server.store.events) - kept < 40
+    assert any("shares its id with another vehicle" in text for text in notes_of(world))
+
+
+def test_new_firmware_is_the_same_rover_and_is_asked_anew(make_world: MakeWorld) -> None:
+    older = replace(PROMPT, flight_sw_version=4 << 24 | 5 << 16 | 7 << 8 | 255)
+    world = make_world(persona=older)
+    waiting(world)
+    asked: list[str] = []
+    decoder = common.MAVLink(None)
+
+    def look(_name: str, _source: str, data: bytes) -> None:
+        if data[7] == PARAMETER:
+            asked.append(decoder.decode(bytearray(data)).param_id)
+
+    world.watched.on_arrival = look
+    world.run(10)
+    asked.clear()
+    world.replace_rover(switched_on=0.0, persona=PROMPT, is_same=True)
+    world.run(2)
+    assert asked == []
+    world.client.command(REQUEST, VERSION, target=(1, 1))
+    world.run(3)
+    assert "SERVO1_FUNCTION" in asked
+    assert not any("another vehicle" in text for text in notes_of(world))
+    assert world.paused() is R.OPERATOR
+    world.client.proceed()
+    world.until_idle(tasks=1)

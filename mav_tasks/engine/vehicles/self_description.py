@@ -39,7 +39,7 @@ class SelfDescription:
 
     def receive_identity(self, identity: VehicleIdentity, *, now: float) -> None:
         self._parts.requests.is_identified = True
-        if self._known.has_other_firmware(identity):
+        if self._known.identity not in (None, identity):  # new firmware: what it did is asked again
             self._parts.forget_firmware()
         self._known.identify(identity)
         self._use_profile(now=now)

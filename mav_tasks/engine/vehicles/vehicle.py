@@ -12,7 +12,6 @@ from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.authority import Authority, Before
 from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
-from mav_tasks.engine.vehicles.facts import client_driving
 from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.joint_control import JointControl
@@ -30,7 +29,7 @@ from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.battery import charge_of
 from mav_tasks.services.command_sender import Standing
-from mav_tasks.services.heartbeat import HeartbeatMonitor
+from mav_tasks.services.heartbeat import HeartbeatMonitor, kind_of
 from mav_tasks.services.identity import identity_of, uid_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
@@ -46,11 +45,6 @@ REORDERED = 127  # packets by which a network may reorder one, as far as numbers
 SILENT = 0.5  # s without any packet of the autopilot
 REORDERED_WITHIN = 3.5  # s; after a longer silence a smaller number means a restart
 MOVING = frozenset({Kind.GO, Kind.MOTION, Kind.ACTION})
-
-
-def kind_of(heartbeat: m.Heartbeat) -> bytes:
-    """Return what tells one kind of vehicle from another: its type and its autopilot."""
-    return bytes((heartbeat.type, heartbeat.autopilot))
 
 
 class Vehicle:
@@ -92,7 +86,6 @@ class Vehicle:
             lease,
         )
         self.system_id = system_id
-        self.kind = kind_of(heartbeat)
         self.tasks, self.requests, self.control = tasks, requests, requests.control
         self.where, self.shown = parts.where, parts.shown
         self.hold_before, self.start_mark = parts.hold_before, parts.start_mark
@@ -163,29 +156,26 @@ class Vehicle:
         self._last_beat = self._number, now
         return False
 
-    def is_another(self, message: m.Message | None, *, now: float) -> bool:
-        """Return whether a message of its autopilot shows that another vehicle answers."""
-        if isinstance(message, m.Heartbeat):
-            return kind_of(message) != self.kind
+    def shows_another(self, message: m.Message | None, *, now: float) -> bool:
+        """Return whether its autopilot sends what another vehicle would; note its unique id."""
+        terms = self.tasks.terms
         if isinstance(message, m.AutopilotVersion):
-            return self.tasks.terms.is_another(uid_of(message), now=now)
-        return False
+            return terms.is_another(uid_of(message), now=now)
+        if not isinstance(message, m.Heartbeat) or kind_of(message) == kind_of(
+            self._monitor.latest
+        ):
+            return False
+        terms.forget_which()
+        return True
 
-    def shut(self, *, now: float) -> bool:
+    def shut(self) -> bool:
         """Send it nothing any more. Return whether it was driven, by the server or a client.
 
         Another part may still have this object.
         """
-        is_driven = self.control.is_engaged or client_driving(self.parts, now=now) is not None
         self.requests.shut()
         self.pilot.close()
-        self.hold_before.forget()
-        return is_driven
-
-    @property
-    def heartbeat(self) -> m.Heartbeat:
-        """Its last heartbeat."""
-        return self._monitor.latest
+        return self.control.is_engaged or self.parts.authority.has_any_grant
 
     def comes_anew(self) -> None:
         """Note a new connection: sequence numbers may restart, and it may be another vehicle."""

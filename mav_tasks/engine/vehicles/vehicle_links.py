@@ -12,8 +12,8 @@ from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.codec import Decoder, Packer, target_of
-from mav_tasks.mavlink.packet import Packet, split_datagram
+from mav_tasks.mavlink.codec import Packer
+from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import INTERVAL
 from mav_tasks.settings import Settings
@@ -128,8 +128,10 @@ class VehicleLinks:
         return link in self._links
 
     def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
-        """Return the sender to a new vehicle's endpoint, and whether it is new, or None if full."""
-        link = self._links[link_name]
+        """Return the sender to a vehicle's endpoint, and whether it is new; None: full, or down."""
+        link = self._links.get(link_name)
+        if link is None:
+            return None
         outlet = link.outlets.get(peer)
         if outlet is not None:
             return outlet, False
@@ -153,12 +155,10 @@ class VehicleLinks:
         self._forget_if_empty(place)
 
     def withdraw(self, system_id: int) -> None:
-        """Drop what is about to leave for a vehicle: another one answers at its address."""
+        """Drop what waits to leave for a vehicle's endpoint, except HOLD: another one is there."""
         place = self.router.place_of(system_id)
         self._queue[:] = [
-            each
-            for each in self._queue
-            if (each.link, each.peer) != place or _target_of(each.data) != system_id
+            each for each in self._queue if each.is_first or (each.link, each.peer) != place
         ]
 
     def may_arm(self, name: str) -> bool:
@@ -233,12 +233,6 @@ class VehicleLinks:
         ):
             self._left.discard(place)
             self._outlets.pop(place, None)
-
-
-def _target_of(data: bytes) -> int:
-    """Return the system that one of our packets is for, 0 if it names none."""
-    message = Decoder().decode(split_datagram(data)[0])
-    return 0 if message is None else target_of(message).system_id
 
 
 def _named(peer: Peer) -> str:

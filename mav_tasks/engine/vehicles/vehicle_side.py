@@ -16,19 +16,19 @@ from mav_tasks.engine.snapshot import Reach
 from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.deadline_heap import DeadlineHeap
-from mav_tasks.engine.vehicles.hands import BUTTONS, Word
+from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.strangers import MOTION, Beat, Moved, Strangers
-from mav_tasks.engine.vehicles.vehicle import Vehicle, kind_of
+from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_links import VehicleLinks
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.heartbeat import gcs_heartbeat
-from mav_tasks.services.orders import halting
-from mav_tasks.services.persona import DRIVEN, Persona, persona_of
+from mav_tasks.services.heartbeat import gcs_heartbeat, kind_of
+from mav_tasks.services.orders import DRIVEN, Orders
+from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
@@ -47,6 +47,11 @@ GONE = 5.0
 LISTENS = 1.0
 MOST_NOTES = 256
 MOST_NAMED = 5  # tasks named in one text
+ANOTHER = (
+    "is another vehicle now. If its tasks are for this one, press a Held button for each held"
+    " one, then Continue"
+)
+SHARED = "shares its id with another vehicle: none is driven before one is alone. Change one id"
 
 #: messages that only a controller of the vehicle sends
 SETPOINTS = frozenset(
@@ -75,6 +80,7 @@ USED = frozenset(
     }
     | SETPOINTS
 )
+NO_AUTOPILOT = MavAutopilot.INVALID
 NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
 
 
@@ -163,9 +169,7 @@ class VehicleSide:
         unheard = [tasks for tasks in self.unheard if system_id in (0, tasks.vehicle)]
         for tasks in unheard:
             tasks.stop(clear=clear, actor=actor, now=now)
-            beat = self._strangers.successors.get(tasks.vehicle)
-            if beat is not None and now - beat.at <= GONE:
-                self._ask_to_hold(beat)
+            self._ask_to_hold(self._strangers.take_beat(tasks.vehicle, now=now))
         return [tasks.vehicle for tasks in unheard]
 
     @property
@@ -218,19 +222,19 @@ class VehicleSide:
             system_id, halted_before=now - GONE
         )
 
-    def _drop(self, system_id: int, *, now: float) -> bool:
+    def _drop(self, system_id: int) -> bool:
         """Drop all control of a vehicle. Return whether it was driven."""
         vehicle = self._vehicles.pop(system_id, None)
-        was_driven = vehicle is not None and vehicle.shut(now=now)
+        was_driven = vehicle is not None and vehicle.shut()
         self.links.forget(system_id)
         self.deadline_heap.forget(system_id)
         return was_driven
 
-    def forget(self, system_id: int, *, now: float) -> None:
+    def forget(self, system_id: int) -> None:
         """Forget a vehicle, which another gateway may have from here on."""
         assert self._ours is not None, "a server without a fleet has all vehicles"
         del self._ours[system_id]
-        self._drop(system_id, now=now)
+        self._drop(system_id)
         self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
         if self._answer is not None and self._answer.system_id == system_id:
             self._answer = None
@@ -306,6 +310,8 @@ class VehicleSide:
             self._note_intruder(link, packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
+        from_autopilot = packet.component_id == AUTOPILOT
+        beat = message if isinstance(message, m.Heartbeat) and from_autopilot else None
         if vehicle is None:
             if isinstance(message, MOTION) and packet.component_id == AUTOPILOT:
                 self._strangers.note_motion(packet.system_id, Moved(link, peer, message, now))
@@ -315,21 +321,17 @@ class VehicleSide:
                 self._note_other(Beat(link, peer, packet, message, now))
                 return None
             vehicle = self._meet(link, peer, packet, message, now=now)
-            if vehicle is None:
-                return None
-        else:
-            is_beat = isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT
-            if is_beat and getattr(message, "autopilot", 0) == MavAutopilot.INVALID:
-                return None  # from a program that uses the rover's address
-            if self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
-                is_beat and self.links.moves(vehicle, link, peer, now=now)
-            ):
-                return None
-            if packet.component_id == AUTOPILOT and vehicle.is_another(message, now=now):
-                shown = message if isinstance(message, m.Heartbeat) else vehicle.heartbeat
-                vehicle = self._succeed(vehicle, Beat(link, peer, packet, shown, now), now=now)
-                if vehicle is None:
-                    return None
+        elif beat is not None and beat.autopilot == NO_AUTOPILOT:
+            return None  # from a program that uses the rover's address
+        elif self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
+            beat is not None and self.links.moves(vehicle, link, peer, now=now)
+        ):
+            return None
+        elif from_autopilot and vehicle.shows_another(message, now=now):
+            shown = beat or vehicle.parts.monitor.latest
+            vehicle = self._succeed(Beat(link, peer, packet, shown, now), now=now)
+        if vehicle is None:
+            return None
         if isinstance(message, m.Timesync) and message.ts1 in self._asked:
             self._answer = packet
             if message.tc1 and packet.component_id == AUTOPILOT:
@@ -339,8 +341,8 @@ class VehicleSide:
             vehicle.count(packet.seq, now=now)
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
-            if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
-                if vehicle.is_overtaken(message, now=now):
+            if beat is not None:
+                if vehicle.is_overtaken(beat, now=now):
                     return vehicle  # an old mode or arming state is not news
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
@@ -390,44 +392,47 @@ class VehicleSide:
             outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=is_ours)
             outlet.send_unfenced(self._question, self.our_address, is_ours=is_ours)
 
-    def _succeed(self, old: Vehicle, beat: Beat, *, now: float) -> Vehicle | None:
+    def _succeed(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Meet another vehicle at a known address: nothing of the old one's control survives."""
-        number, kind, tasks = old.system_id, kind_of(beat.message), old.tasks
+        number = beat.packet.system_id
         self.links.withdraw(number)
-        was_driven = self._drop(number, now=now)
+        was_driven = self._drop(number)
         self.gone.append(number)
-        self._fleet.succeeded(number, was_driven=was_driven, now=now)
-        if kind != old.kind:
-            tasks.terms.forget_which()
-        self._strangers.changed(number, kind, now=now)
-        words = "is another vehicle now: look which one it is"
-        if not self._strangers.is_alone(beat, kind):
-            words = "shares its id with another vehicle: neither is driven. Give one another id"
-        if tasks.held is not None:
-            words += f". Task {tasks.held.id} is held: press {BUTTONS}, then Continue"
-        elif tasks.paused:
-            words += ". To let it do what waits, press Continue"
-        self._registry.record(VehicleNoted(number, words, now))
-        return self._meet(*beat[:4], now=now)
+        self._fleet.of(number).belong_to_another(now=now)
+        self._registry.record(VehicleNoted(number, ANOTHER, now))
+        if was_driven:
+            self._ask_to_hold(beat)
+        return self._meet(*beat[:4], was_driven=was_driven, now=now)
 
-    def _ask_to_hold(self, beat: Beat) -> None:
-        """Ask what answers at a vehicle's address, and is not served, to stay where it is."""
-        way = self.links.meets(beat.link, beat.peer)
-        message = halting(beat.packet.source, beat.message)
-        if way is not None and message is not None:
+    def _ask_to_hold(self, beat: Beat | None) -> None:
+        """Ask what is not served, or only just heard, to stay where it is."""
+        way = None if beat is None else self.links.meets(beat.link, beat.peer)
+        if beat is not None and way is not None:
+            orders = Orders(beat.packet.source, persona_of(beat.message) or ARDUPILOT)
+            message = orders.staying_there(beat.message.type)
             way[0].send(message, self.our_address, first=True)
 
     def _meet(
-        self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
+        self,
+        link_name: str,
+        peer: Peer,
+        packet: Packet,
+        heartbeat: m.Heartbeat,
+        *,
+        was_driven: bool = False,
+        now: float,
     ) -> Vehicle | None:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
         persona = self._persona_of(packet, heartbeat, now=now)
-        if packet.component_id == AUTOPILOT and heartbeat.autopilot != MavAutopilot.INVALID:
-            beat = Beat(link_name, peer, packet, heartbeat, now)
-            if not self._strangers.is_alone(beat, kind_of(heartbeat)):
-                if persona is not None and self._fleet.is_to_stand(packet.system_id):
-                    self._ask_to_hold(beat)
-                return None
+        tasks = self._fleet.get(packet.system_id)
+        is_of_autopilot = packet.component_id == AUTOPILOT and heartbeat.autopilot != NO_AUTOPILOT
+        if tasks is not None and is_of_autopilot:
+            which = kind_of(heartbeat), tasks.terms.uid
+            if not self._strangers.is_alone(packet.system_id, which, now=now):
+                self._note_once(packet.system_id, SHARED, now=now)
+                persona = None
+            if persona is None:
+                self._strangers.note_beat(Beat(link_name, peer, packet, heartbeat, now))
         if persona is None:
             return None
         way = self.links.meets(link_name, peer)
@@ -457,7 +462,7 @@ class VehicleSide:
         number = packet.system_id
         for moved in self._strangers.take_motion(number, link_name, peer, now=now):
             vehicle.recall(moved.message, at=moved.at)
-        was_driven = self._fleet.was_driven(number)
+        was_driven |= self._fleet.was_driven(number)
         halt = self._fleet.last_halt(number, now=now)
         vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
         vehicle.joint.step(now)
