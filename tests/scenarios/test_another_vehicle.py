@@ -14,9 +14,11 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode, Persona
-from tests.kit.client import ACCEPTED, ARM, MOVE, SET_MODE
-from tests.kit.px4 import PROMPT_PX4
-from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, ways_of
+from tests.kit.client import ACCEPTED, ARM, GUIDED, MOVE, SET_MODE, setpoint
+from tests.kit.mission import Item, Upload
+from tests.kit.observer import Observer
+from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
+from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, at, ways_of
 from tests.scenarios.conftest import MakeWorld
 
 PERSONAS = {"ardupilot": PROMPT, "px4": PROMPT_PX4}
@@ -26,7 +28,7 @@ DIRECTIONS = [("ardupilot", "px4"), ("px4", "ardupilot")]
 COPTER = 2  # MAV_TYPE_QUADROTOR
 ROVER, ARDUPILOT, PX4, GCS, NO_AUTOPILOT = 10, 3, 12, 6, 8
 DELAY = Conditions().delay
-RELEASE, REQUEST, VERSION = 54013, 512, 148
+WAYPOINT, RELEASE, REQUEST, VERSION = 16, 54013, 512, 148
 PARAMETER = 20  # PARAM_REQUEST_READ
 LOITER = 17  # MAV_CMD_NAV_LOITER_UNLIM
 
@@ -158,11 +160,16 @@ WORDS: dict[str, Callable[[World], object]] = {
     "resume": lambda world: world.client.proceed(),
     "arm": lambda world: world.client.arm(),
 }
+#: each state with the words that mean most, and the other words where there is something to undo
+CASES = [(state, word) for state in STATES for word in ("nothing", "STOP")] + [
+    (state, word) for state in (running, waiting, stopped) for word in ("pause", "resume", "arm")
+]
 
 
 @directions
-@pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
-@pytest.mark.parametrize("word", WORDS)
+@pytest.mark.parametrize(
+    ("state", "word"), CASES, ids=[f"{state.__name__}-{word}" for state, word in CASES]
+)
 def test_nothing_of_the_old_ones_control_reaches_the_new_one(
     make_world: MakeWorld, old: str, new: str, state: Callable[[World], None], word: str
 ) -> None:
@@ -171,7 +178,7 @@ def test_nothing_of_the_old_ones_control_reaches_the_new_one(
     state(world)
     was_stopped = world.paused() is R.STOPPED
     swapped = Swapped(world, PERSONAS[new], at_first_beat=lambda: WORDS[word](world))
-    world.run(15)
+    world.run(10)
     assert swapped.met_at is not None
     swapped.check_untouched()
     waits = [task for task in world.tasks() if task.state not in (S.KILLED, S.COMPLETED)]
@@ -212,6 +219,58 @@ def test_a_person_decides_that_the_tasks_are_for_the_new_one(
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
     assert swapped.place()[0] == pytest.approx(swapped.start[0] + 9.0, abs=0.1)
+
+
+@directions
+def test_a_client_that_drove_the_old_one_does_not_drive_the_new_one(
+    make_world: MakeWorld, old: str, new: str
+) -> None:
+    """Its stream goes on, and the new one is armed in the mode that follows set-points."""
+    world = make_world(persona=PERSONAS[old])
+    if old == "px4":
+        world.client.stream(setpoint(0.5), rate=20)
+    world.client.arm()
+    world.run(0.5)
+    world.client.command(SET_MODE, 1, 6 if old == "px4" else GUIDED, target=(1, 1))
+    world.run(0.5)
+    if old != "px4":
+        world.client.stream(setpoint(0.5), rate=20)
+    world.run(2)
+    assert world.truth.forward_speed > 0.3
+    # a set-point that passes while the heartbeat is on its way is nobody's fault
+    world.observers[0] = Observer()
+    swapped = Swapped(world, PERSONAS[new], mode=Mode.GUIDED)
+    world.run(10)
+    assert not [m for m in swapped.got if m.get_msgId() == SETPOINT and abs(m.vx) > 0.01]
+    assert world.stands()
+    assert swapped.asked_modes() <= HOLDS[new]
+    assert swapped.rover.autopilot.mode is Mode.HOLD
+
+
+def test_a_mission_that_was_to_start_at_arming_does_not_start_on_the_new_one(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    upload = Upload(world.client, [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))])
+    world.until(lambda: upload.result is not None, within=5)
+    ask_mode(world.client, MISSION)
+    world.run(0.5)
+    swapped = Swapped(world, PROMPT)
+    world.run(10)
+    swapped.check_untouched()
+    assert world.state(1) == (S.BLOCKED, R.NONE)
+
+
+def test_an_upload_that_the_change_cut_off_can_be_made_again(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    items = [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))]
+    Upload(world.client, items)
+    Swapped(world, PROMPT)
+    world.run(20)
+    world.client.roles.clear()
+    upload = Upload(world.client, items)
+    world.until(lambda: upload.result is not None, within=5)
+    assert upload.result == 0
 
 
 def beat_of(kind: int, autopilot: int, *, seq: int = 0) -> bytes:
@@ -270,7 +329,7 @@ def test_two_that_alternate_undo_no_halt_and_drive_nothing(
     world.run(3)
     place = world.pose()
     kept = len(world.server.store.events)
-    for _ in range(2000):
+    for _ in range(300):
         forge(world, ROVER, PX4)
         forge(world, ROVER, ARDUPILOT)
     world.run(15)
