@@ -89,7 +89,7 @@ class Parts:
 
         It may also have just restarted.
         """
-        unidentified = self.tasks.terms.has_uid and not self.requests.is_identified
+        unidentified = bool(self.tasks.terms.uid) and not self.requests.is_identified
         return unidentified or self.undecided is not None or now < self.listens_until
 
     def note(self, text: str, *, now: float) -> None:

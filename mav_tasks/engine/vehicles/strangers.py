@@ -54,13 +54,14 @@ class Strangers:
     def __repr__(self) -> str:
         return f"Strangers({sorted(self._beats.keys() | self._moved.keys())})"
 
-    def is_alone(self, system_id: int, which: Hashable, *, now: float) -> bool:
+    def is_alone(self, beat: Beat, which: Hashable) -> bool:
         """Note which vehicle is heard at an id. Return whether it may be served."""
-        before, since = self._which.get(system_id, (which, -inf))
+        self.note_beat(beat)
+        before, since = self._which.get(beat.packet.system_id, (which, -inf))
         if which != before:
-            since = now + (ALONE if now - since < ALONE else 0.0)
-        self._which[system_id] = which, since
-        return now >= since
+            since = beat.at + ALONE * (beat.at - since < ALONE)
+        self._which[beat.packet.system_id] = which, since
+        return beat.at >= since
 
     def note_beat(self, beat: Beat) -> None:
         """Keep the heartbeat of a vehicle that another gateway has, or that is not served."""

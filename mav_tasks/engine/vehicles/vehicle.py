@@ -381,6 +381,6 @@ class Vehicle:
     def _ask_for_rates(self, *, now: float) -> None:
         if self._was_heard:  # a silent vehicle cannot answer: ask it nothing
             self.requests.ask_which(now=now)
-            if self.tasks.terms.has_uid and self.requests.has_not_said_which(now=now):
+            if self.tasks.terms.uid and self.requests.has_not_said_which(now=now):
                 self.tasks.unidentified(now=now)
             self.requests.ask_for_rates(now=now)

@@ -169,7 +169,8 @@ class VehicleSide:
         unheard = [tasks for tasks in self.unheard if system_id in (0, tasks.vehicle)]
         for tasks in unheard:
             tasks.stop(clear=clear, actor=actor, now=now)
-            self._ask_to_hold(self._strangers.take_beat(tasks.vehicle, now=now))
+            if beat := self._strangers.take_beat(tasks.vehicle, now=now):
+                self._ask_to_hold(beat)
         return [tasks.vehicle for tasks in unheard]
 
     @property
@@ -195,7 +196,7 @@ class VehicleSide:
             self._ours[vehicle] = now
             beat = self._strangers.take_beat(vehicle, now=now)
             if beat is not None:
-                self._meet(*beat[:4], now=now)
+                self._meet(beat, now=now)
 
     def reach(self, *, now: float) -> Reach:
         """Return the vehicles that are heard, those that this gateway has, and can forget."""
@@ -310,39 +311,40 @@ class VehicleSide:
             self._note_intruder(link, packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
-        from_autopilot = packet.component_id == AUTOPILOT
-        beat = message if isinstance(message, m.Heartbeat) and from_autopilot else None
+        from_autopilot, beat = packet.component_id == AUTOPILOT, None
+        if isinstance(message, m.Heartbeat) and from_autopilot:
+            beat = Beat(link, peer, packet, message, now)
         if vehicle is None:
-            if isinstance(message, MOTION) and packet.component_id == AUTOPILOT:
+            if isinstance(message, MOTION) and from_autopilot:
                 self._strangers.note_motion(packet.system_id, Moved(link, peer, message, now))
-            if not isinstance(message, m.Heartbeat):
+            if beat is None:
                 return None
             if self._ours is not None and packet.system_id not in self._ours:
-                self._note_other(Beat(link, peer, packet, message, now))
+                self._note_other(beat)
                 return None
-            vehicle = self._meet(link, peer, packet, message, now=now)
-        elif beat is not None and beat.autopilot == NO_AUTOPILOT:
+            vehicle = self._meet(beat, now=now)
+        elif beat and beat.message.autopilot == NO_AUTOPILOT:
             return None  # from a program that uses the rover's address
         elif self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
-            beat is not None and self.links.moves(vehicle, link, peer, now=now)
+            beat and self.links.moves(vehicle, link, peer, now=now)
         ):
             return None
         elif from_autopilot and vehicle.shows_another(message, now=now):
-            shown = beat or vehicle.parts.monitor.latest
-            vehicle = self._succeed(Beat(link, peer, packet, shown, now), now=now)
+            latest = vehicle.parts.monitor.latest
+            vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
         if vehicle is None:
             return None
         if isinstance(message, m.Timesync) and message.ts1 in self._asked:
             self._answer = packet
-            if message.tc1 and packet.component_id == AUTOPILOT:
+            if message.tc1 and from_autopilot:
                 offset = vehicle.where.motion.clock.offset
                 offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
-        if packet.component_id == AUTOPILOT:
+        if from_autopilot:
             vehicle.count(packet.seq, now=now)
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
-            if beat is not None:
-                if vehicle.is_overtaken(beat, now=now):
+            if beat:
+                if vehicle.is_overtaken(beat.message, now=now):
                     return vehicle  # an old mode or arming state is not news
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
@@ -380,7 +382,7 @@ class VehicleSide:
 
     def _note_other(self, beat: Beat) -> None:
         """Note a vehicle that this gateway hears, but does not have: it may get it."""
-        if self._persona_of(beat.packet, beat.message, now=beat.at) is not None:
+        if self._persona_of(beat) is not None:
             self._strangers.note_beat(beat)
 
     def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
@@ -396,43 +398,28 @@ class VehicleSide:
         """Meet another vehicle at a known address: nothing of the old one's control survives."""
         number = beat.packet.system_id
         self.links.withdraw(number)
-        was_driven = self._drop(number)
+        if self._drop(number):
+            self._ask_to_hold(beat)
         self.gone.append(number)
         self._fleet.of(number).belong_to_another(now=now)
         self._registry.record(VehicleNoted(number, ANOTHER, now))
-        if was_driven:
-            self._ask_to_hold(beat)
-        return self._meet(*beat[:4], was_driven=was_driven, now=now)
+        return self._meet(beat, now=now)
 
-    def _ask_to_hold(self, beat: Beat | None) -> None:
+    def _ask_to_hold(self, beat: Beat) -> None:
         """Ask what is not served, or only just heard, to stay where it is."""
-        way = None if beat is None else self.links.meets(beat.link, beat.peer)
-        if beat is not None and way is not None:
+        if way := self.links.meets(beat.link, beat.peer):
             orders = Orders(beat.packet.source, persona_of(beat.message) or ARDUPILOT)
-            message = orders.staying_there(beat.message.type)
-            way[0].send(message, self.our_address, first=True)
+            way[0].send(orders.staying_there(beat.message.type), self.our_address, first=True)
 
-    def _meet(
-        self,
-        link_name: str,
-        peer: Peer,
-        packet: Packet,
-        heartbeat: m.Heartbeat,
-        *,
-        was_driven: bool = False,
-        now: float,
-    ) -> Vehicle | None:
+    def _meet(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
-        persona = self._persona_of(packet, heartbeat, now=now)
-        tasks = self._fleet.get(packet.system_id)
-        is_of_autopilot = packet.component_id == AUTOPILOT and heartbeat.autopilot != NO_AUTOPILOT
-        if tasks is not None and is_of_autopilot:
+        link_name, peer, packet, heartbeat, _ = beat
+        persona, tasks = self._persona_of(beat), self._fleet.get(packet.system_id)
+        if tasks and heartbeat.autopilot != NO_AUTOPILOT:
             which = kind_of(heartbeat), tasks.terms.uid
-            if not self._strangers.is_alone(packet.system_id, which, now=now):
+            if not self._strangers.is_alone(beat, which):
                 self._note_once(packet.system_id, SHARED, now=now)
-                persona = None
-            if persona is None:
-                self._strangers.note_beat(Beat(link_name, peer, packet, heartbeat, now))
+                return None
         if persona is None:
             return None
         way = self.links.meets(link_name, peer)
@@ -462,15 +449,16 @@ class VehicleSide:
         number = packet.system_id
         for moved in self._strangers.take_motion(number, link_name, peer, now=now):
             vehicle.recall(moved.message, at=moved.at)
-        was_driven |= self._fleet.was_driven(number)
+        was_driven = self._fleet.was_driven(number)
         halt = self._fleet.last_halt(number, now=now)
         vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
         vehicle.joint.step(now)
         return vehicle
 
-    def _persona_of(self, packet: Packet, heartbeat: m.Heartbeat, *, now: float) -> Persona | None:
+    def _persona_of(self, beat: Beat) -> Persona | None:
         """Return the persona of the autopilot that sends a heartbeat; None: it is not driven."""
-        if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
+        _, _, packet, heartbeat, now = beat
+        if heartbeat.type in NOT_VEHICLES:
             return None
         if packet.system_id in (0, self.our_address.system_id):
             return None  # 0 addresses every vehicle, and our own id belongs to no vehicle
