@@ -328,14 +328,14 @@ def test_two_that_alternate_undo_no_halt_and_drive_nothing(
     WORDS[word](world)
     world.run(3)
     place = world.pose()
-    kept = len(world.server.store.events)
+    kept = len(world.events(object))
     for _ in range(300):
         forge(world, ROVER, PX4)
         forge(world, ROVER, ARDUPILOT)
     world.run(15)
     assert world.pose() == place
     assert world.paused() is (R.STOPPED if word == "STOP" else R.RESTARTED)
-    assert len(world.server.store.events) - kept < 30
+    assert len(world.events(object)) - kept < 30
     assert any("shares its id with another vehicle" in text for text in notes_of(world))
 
 
@@ -433,7 +433,7 @@ def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -
 def test_two_of_one_make_that_share_an_id_are_not_served_in_turns(world: World) -> None:
     """Both answer each request for the version; each answer tells of another one."""
     world.run(5)
-    kept = len(world.server.store.events)
+    kept = len(world.events(object))
     for number in range(500):
         mav = common.MAVLink(None, 1, 1)
         mav.seq = number % 256
@@ -442,7 +442,7 @@ def test_two_of_one_make_that_share_an_id_are_not_served_in_turns(world: World) 
         )
         world.from_vehicle_side(version.pack(mav), peer="rover1")
         world.run(0.01)
-    assert len(world.server.store.events) - kept < 40
+    assert len(world.events(object)) - kept < 40
     assert any("shares its id with another vehicle" in text for text in notes_of(world))
 
 
