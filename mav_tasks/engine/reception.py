@@ -97,6 +97,8 @@ class Reception:
     def _receive_from_vehicles(self, item: Packets, *, now: float) -> None:
         for peer, packet, _ in self.intake.packets(item, self.vehicles.counts, now=now):
             vehicle = self.vehicles.receive(item.link, peer, packet, now=now)
+            while self.vehicles.gone:
+                self.forget(self.vehicles.gone.pop())
             if vehicle is not None:
                 if self.restarts.begins_anew(packet, now=now):
                     self.gcs.continue_numbers(packet)
@@ -137,7 +139,7 @@ class Reception:
         self.elsewhere.obeyed(vehicle)
 
     def forget(self, vehicle: int) -> None:
-        """Forget a vehicle, which another gateway may have from here on."""
+        """Forget a vehicle, which another gateway, or another vehicle, has the id of from now."""
         self.desks.forget(vehicle)
         self.reports.forget(vehicle)
         self.restarts.forget(vehicle)

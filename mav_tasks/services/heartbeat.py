@@ -8,6 +8,11 @@ from mav_tasks.mavlink.messages import Heartbeat
 INTERVAL = 1.0  # s, MAVLink guide
 
 
+def kind_of(heartbeat: Heartbeat) -> tuple[int, int]:
+    """Return what tells one kind of vehicle from another."""
+    return heartbeat.type, heartbeat.autopilot
+
+
 class HeartbeatMonitor:
     """What a vehicle's heartbeats say, and whether they still come."""
 

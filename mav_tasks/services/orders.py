@@ -4,13 +4,16 @@ from math import copysign, cos, isfinite, nan, sin
 from typing import NamedTuple
 
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavCmd, MavFrame
+from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavType
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message, SetPositionTargetLocalNed
 from mav_tasks.services.mission_item import NOT_GIVEN
 from mav_tasks.services.persona import Persona
 
+#: others give the mode numbers other meanings
+DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 CHANGE_MODE = 1.0  # MAV_DO_REPOSITION_FLAGS
 DEFAULT_SPEED = -1.0
+HOLD_OF_PX4 = 3.0  # its sub mode; its main mode has the number of an ArduPilot's HOLD
 
 
 class Speeds(NamedTuple):
@@ -110,7 +113,13 @@ class Orders:
         return self._command(MavCmd.DO_SET_MODE, *self._persona.mode_params(mode))
 
     def hold(self) -> CommandLong:
-        return self.mode(self._persona.hold_mode)
+        """Return the command that asks for HOLD, and means it in any autopilot's language.
+
+        An ArduPilot reads mode 4, and no third parameter (4.6.3). A PX4 that has just taken its
+        place reads main mode 4, sub mode 3: without the 3 it would start its mission.
+        """
+        enabled, mode, _ = self._persona.mode_params(self._persona.hold_mode)
+        return self._command(MavCmd.DO_SET_MODE, enabled, mode, HOLD_OF_PX4)
 
     def our_mode(self) -> CommandLong:
         """Return the command that asks for the mode in which setpoints are followed."""
@@ -118,6 +127,15 @@ class Orders:
 
     def arming(self, *, arm: bool) -> CommandLong:
         return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
+
+    def staying_there(self, kind: int) -> CommandLong:
+        """Return what asks a vehicle of any MAV_TYPE to stay where it is; it is never disarmed.
+
+        An ArduPilot that flies or dives has other mode numbers, but this command.
+        """
+        if self._persona.has_main_modes or kind in DRIVEN:
+            return self.hold()
+        return self._command(MavCmd.NAV_LOITER_UNLIM, 0.0)
 
     def staying(self, *, changes_mode: bool) -> CommandInt:
         """Return the "go to" without a place: a vehicle that drives to one in HOLD stays here.

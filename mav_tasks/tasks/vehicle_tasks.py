@@ -84,22 +84,31 @@ class VehicleTasks(Lineup):
             else:
                 self.suspended_ids[task.id] = None
 
-    def identified(self, uid: str, *, now: float) -> None:
-        """Note the vehicle's unique id. If it is another vehicle, pause these tasks."""
-        if self.terms.is_another(uid, now=now):
-            self._may_be_another(now=now)
+    def belong_to_another(self, *, now: float) -> None:
+        """Hold and pause these tasks: another vehicle answers at the address of theirs."""
+        self._end_cancelling(now=now)
+        self.hold(R.FRAME_RESET, now=now)
+        self._wait_for_somebody(now=now)
+        self.stopping_after_kill = False
+        self.bounds.home = None
 
     def unidentified(self, *, now: float) -> None:
         """Pause these tasks: their vehicle has a unique id, and this one reports none."""
         self.terms.forget_which()
-        self._may_be_another(now=now)
+        self._wait_for_somebody(now=now)
 
-    def _may_be_another(self, *, now: float) -> None:
-        self.released = None
+    def _wait_for_somebody(self, *, now: float) -> None:
+        """Start nothing before somebody has looked which vehicle this is."""
+        self.halt(R.RESTARTED, actor=SERVER, now=now)
         if self.is_driving or self.room.count(self.vehicle):
-            self.halt(R.RESTARTED, actor=SERVER, now=now)
             self.executor.pause(R.OPERATOR, actor=SERVER, now=now)
             self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
+
+    def _end_cancelling(self, *, now: float) -> None:
+        active = self.active
+        if active is not None and active.state is S.CANCELLING:
+            self.executor.let_go(actor=SERVER, now=now)
+            self._ended(active.id, now=now)
 
     def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> Task:
         """Add a task that runs at once; all others wait until the queue is resumed.
@@ -277,10 +286,7 @@ class VehicleTasks(Lineup):
         disarmed it, no takeover.
         """
         self.released = None
-        active = self.active
-        if active is not None and active.state is S.CANCELLING:
-            self.executor.let_go(actor=SERVER, now=now)
-            self._ended(active.id, now=now)
+        self._end_cancelling(now=now)
         if not self.suspended_ids and self.executor.begins_again(now=now):
             return True
         self.hold(R.FRAME_RESET, now=now)

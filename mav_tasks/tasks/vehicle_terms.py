@@ -33,7 +33,8 @@ class VehicleTerms:
         self._executor = executor
         self._bounds = bounds
         self._settings = settings
-        self._uid = ""  # unique id, "" until it was heard
+        #: the unique id of the vehicle of these tasks, "" until it was heard
+        self.uid = ""
         self._speed: float | None = None  # m/s, of goals that name none; None: the settings' one
         self._cruise: float | None = None  # m/s, the vehicle's own cruise speed
         self._stop: tuple[float, float] | None = None  # m/s and m of a measured stop
@@ -41,16 +42,11 @@ class VehicleTerms:
         self.may_be_armed = True
 
     def __repr__(self) -> str:
-        return f"VehicleTerms({self._vehicle}, speed={self._speed}, uid={self._uid!r})"
-
-    @property
-    def has_uid(self) -> bool:
-        """Whether the unique id of the vehicle of these tasks is known."""
-        return bool(self._uid)
+        return f"VehicleTerms({self._vehicle}, speed={self._speed}, uid={self.uid!r})"
 
     def restore(self, *, speed: float | None, uid: str, may_be_armed: bool) -> None:
         """Load the values of an earlier run."""
-        self._speed, self._uid, self.may_be_armed = speed, uid, may_be_armed
+        self._speed, self.uid, self.may_be_armed = speed, uid, may_be_armed
         self._apply_driving()
 
     def apply(self, settings: Settings) -> None:
@@ -92,15 +88,15 @@ class VehicleTerms:
 
         A vehicle that does not know its id reports "", which changes nothing.
         """
-        if not uid or uid == self._uid:
+        if not uid or uid == self.uid:
             return False
-        before, self._uid = self._uid, uid
+        before, self.uid = self.uid, uid
         self._registry.record(VehicleIdentified(self._vehicle, uid, now))
         return bool(before)
 
     def forget_which(self) -> None:
         """Forget the unique id: the vehicle reports none, but the vehicle of these tasks did."""
-        self._uid = ""
+        self.uid = ""
 
     def set_home(self, place: GlobalPlace, frame: Frame, *, actor: str, now: float) -> None:
         """Set the vehicle's home, which holds until it reboots."""

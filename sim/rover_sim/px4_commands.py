@@ -23,6 +23,7 @@ STANDARD_MODES = {SAFE_RECOVERY: Mode.RTL, MISSION: Mode.AUTO}  # the others are
 CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS
 NOT_GIVEN = 0x7FFFFFFF  # x and y of COMMAND_INT: INT32_MAX stands for NaN
 MISTAKEN_NAN = 0x7FF80000  # a float's NaN that was sent as an integer
+AUTO = 4  # main mode; without a sub mode it is the mission
 NOTHING, REBOOT, REBOOT_TO_BOOTLOADER = 0.0, 1.0, 3.0  # param1 of PREFLIGHT_REBOOT_SHUTDOWN
 
 
@@ -87,6 +88,8 @@ class Px4Commands:
         sub = 0.0 if math.isnan(sub) else sub
         if not all(0 <= value <= 255 for value in (base_mode, main, sub)):  # NaN fails, too
             return MavResult.DENIED
+        if int(main) == AUTO and not sub:  # as its commander does
+            return _done(self._flight.request_mode(Mode.AUTO, now=now))
         return self.set_mode(int(base_mode), int(main) << 16 | int(sub) << 24, now)
 
     def set_mode(self, base_mode: int, custom_mode: int, now: float) -> MavResult:

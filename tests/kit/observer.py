@@ -289,6 +289,11 @@ class Observer:
         self.armed, self.mode = False, -1
         self._moved_last = self._zero_in_mode = self._brakes = False
 
+    def meets(self, ways: Ways) -> None:
+        """Note that a rover of another make shows itself, of which the server knows nothing."""
+        self.ways = ways
+        self.server_restarted()
+
     def check(self, *, now: float = float("inf")) -> None:
         """Raise AssertionError if there were violations."""
         self._check_stop(now)

@@ -29,7 +29,7 @@ from rover_sim.realism import EXACT, Realism
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.client import ACK, REQUEST, FakeClient
-from tests.kit.observer import ARDUPILOT_WAYS, PX4_WAYS, Observer
+from tests.kit.observer import ARDUPILOT_WAYS, PX4_WAYS, Observer, Ways
 from tests.kit.store import LateStore
 
 E = TypeVar("E")
@@ -59,12 +59,14 @@ def kinematic_body(start: Pose) -> Body:
     return KinematicBody(start=start, slip=0.1, seed=None)
 
 
-def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
-    """Return another vehicle with the same system id but another unique id."""
+def twin_of(
+    number: int, *, start: Pose, now: float, persona: Persona = PROMPT, is_same: bool = False
+) -> Vehicle:
+    """Return another vehicle with the same system id but another unique id, unless ``is_same``."""
     body = kinematic_body(start)
     autopilot = Autopilot(
-        system_id=99,
-        persona=PROMPT,
+        system_id=number if is_same else 99,
+        persona=persona,
         origin=DEFAULT_ORIGIN,
         unix_offset=0.0,
         truth=body.state,
@@ -74,6 +76,23 @@ def twin_of(number: int, *, start: Pose, now: float) -> Vehicle:
     )
     autopilot.address = Address(number, 1)
     return Vehicle(body=body, autopilot=autopilot, now=now)
+
+
+def preset(vehicle: Vehicle, persona: Persona) -> None:
+    """Give a rover the parameters of the scenarios."""
+    if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
+        # by default a PX4 rover drives home when setpoints stop, and the server does not
+        # drive it; tests of that restore the default
+        vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
+    if persona.speed_parameter == PX4.speed_parameter:
+        vehicle.autopilot.parameters[PX4.speed_parameter] = -1.0  # no limit by the rover
+    if persona.name == ARDUPILOT.name:  # scenarios set the speeds that matter to them
+        vehicle.autopilot.parameters["CRUISE_SPEED"] = SETTINGS_SPEED
+
+
+def ways_of(persona: Persona) -> Ways:
+    """Return the ways of a make of rover."""
+    return ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
 
 
 def is_ready_to_be_driven(rover: Vehicle) -> bool:
@@ -136,18 +155,10 @@ class World(VirtualWorld):
                 key=rover_key,
                 realism=realism,  # EXACT: most scenarios were written for exact arithmetic
             )
-            if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:
-                # by default a PX4 rover drives home when setpoints stop, and the server does not
-                # drive it; tests of that restore the default
-                vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
-            if persona.speed_parameter == PX4.speed_parameter:
-                vehicle.autopilot.parameters[PX4.speed_parameter] = -1.0  # no limit by the rover
-            if persona.name == ARDUPILOT.name:  # scenarios set the speeds that matter to them
-                vehicle.autopilot.parameters["CRUISE_SPEED"] = SETTINGS_SPEED
+            preset(vehicle, persona)
             link = self.net.link(f"rover{number}")
-            ways = ARDUPILOT_WAYS if persona.name == ARDUPILOT.name else PX4_WAYS
             observer = self.watched.observers[link.name] = Observer(
-                number, ways, is_ready=partial(is_ready_to_be_driven, vehicle)
+                number, ways_of(persona), is_ready=partial(is_ready_to_be_driven, vehicle)
             )
             self.rovers.append(vehicle)
             self.observers.append(observer)
@@ -261,11 +272,24 @@ class World(VirtualWorld):
         """Arm or disarm at the first rover."""
         self.rover.autopilot.operator_arm(armed, now=self.now)
 
-    def replace_rover(self, *, switched_on: float) -> None:
-        """Replace the first rover by one with another unique id, at the same place and address."""
+    def replace_rover(
+        self, *, switched_on: float, persona: Persona = PROMPT, is_same: bool = False
+    ) -> Vehicle:
+        """Replace the first rover by one with another unique id, at the same place and address.
+
+        ``is_same``: its unique id is the same, as after new firmware. Return the new one.
+        """
         there = self.truth
         start = Pose(north=there.north, east=there.east, yaw=there.yaw)
-        self.rovers[0] = self.rover_parties[0].vehicle = twin_of(1, start=start, now=switched_on)
+        rover = twin_of(1, start=start, now=switched_on, persona=persona, is_same=is_same)
+        self.put_rover(rover, persona)
+        return rover
+
+    def put_rover(self, rover: Vehicle, persona: Persona) -> None:
+        """Let this vehicle answer at the first rover's address from now on."""
+        preset(rover, persona)
+        self.rovers[0] = self.rover_parties[0].vehicle = rover
+        self.observer.is_ready = partial(is_ready_to_be_driven, rover)
 
     def fault(self, faults: Faults) -> None:
         """Set faults of the first rover; ``Faults()`` clears them."""

@@ -15,7 +15,8 @@ class KnownProfile:
     def __init__(self, persona: Persona) -> None:
         self._by_default = persona
         self._profiles: tuple[VehicleProfile, ...] = ()
-        self._identity: VehicleIdentity | None = None
+        #: what it has reported last
+        self.identity: VehicleIdentity | None = None
         #: the profile of this vehicle, or None
         self.chosen: VehicleProfile | None = None
         self._told = ""
@@ -45,7 +46,7 @@ class KnownProfile:
         return "its profile says that it does not stop without setpoints" if is_off else ""
 
     def identify(self, identity: VehicleIdentity) -> None:
-        self._identity = identity
+        self.identity = identity
         self._choose()
 
     def apply(self, profiles: tuple[VehicleProfile, ...], system_id: int) -> None:
@@ -86,13 +87,13 @@ class KnownProfile:
         if self.chosen is not None:
             words = f"uses the profile of {self.chosen.probed[:10]}"
             return f"{words}: does not stop without setpoints" if self.why_drives_on else words
-        if self._identity is None or not self._profiles:
+        if self.identity is None or not self._profiles:
             return ""
         latest = max(self._profiles, key=lambda each: each.probed)
         return f"ignores the profile: it is {self._why_not(latest)}"
 
     def _why_not(self, profile: VehicleProfile) -> str:
-        identity = self._identity
+        identity = self.identity
         if identity is None:
             return "of a rover that has not reported its identity"
         if profile.autopilot != self._by_default.name:

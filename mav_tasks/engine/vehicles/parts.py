@@ -89,7 +89,7 @@ class Parts:
 
         It may also have just restarted.
         """
-        unidentified = self.tasks.terms.has_uid and not self.requests.is_identified
+        unidentified = bool(self.tasks.terms.uid) and not self.requests.is_identified
         return unidentified or self.undecided is not None or now < self.listens_until
 
     def note(self, text: str, *, now: float) -> None:
@@ -103,15 +103,19 @@ class Parts:
 
     def forget_answers(self) -> None:
         """Forget everything that the vehicle said of itself before its restart."""
+        self.requests.ask_which_again()
+        self.forget_firmware()
+        self.failsafes = OwnFailsafes()
+        self.where.forget()
+        self.sticks.forget()
+
+    def forget_firmware(self) -> None:
+        """Forget what belongs to the vehicle's firmware: it is asked again."""
         requests = self.requests
-        requests.ask_which_again()
         requests.intervals.ask_all_again()
         requests.loss_failsafe.forget()
         requests.turning.forget()
         requests.cruise.forget()
-        self.failsafes = OwnFailsafes()
-        self.where.forget()
-        self.sticks.forget()
 
     def forget_start(self) -> None:
         """Forget that a mission starts with the arming: it changed, or is unwanted."""

@@ -38,8 +38,9 @@ class SelfDescription:
         return bool(failsafe.awaits_answer or failsafe.why_off or self._known.why_drives_on)
 
     def receive_identity(self, identity: VehicleIdentity, *, now: float) -> None:
-        self._parts.tasks.identified(identity.uid, now=now)
         self._parts.requests.is_identified = True
+        if self._known.identity not in (None, identity):  # new firmware: what it did is asked again
+            self._parts.forget_firmware()
         self._known.identify(identity)
         self._use_profile(now=now)
 

@@ -29,8 +29,8 @@ from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.battery import charge_of
 from mav_tasks.services.command_sender import Standing
-from mav_tasks.services.heartbeat import HeartbeatMonitor
-from mav_tasks.services.identity import identity_of
+from mav_tasks.services.heartbeat import HeartbeatMonitor, kind_of
+from mav_tasks.services.identity import identity_of, uid_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleSeen
@@ -155,6 +155,27 @@ class Vehicle:
             return True
         self._last_beat = self._number, now
         return False
+
+    def shows_another(self, message: m.Message | None, *, now: float) -> bool:
+        """Return whether its autopilot sends what another vehicle would; note its unique id."""
+        terms = self.tasks.terms
+        if isinstance(message, m.AutopilotVersion):
+            return terms.is_another(uid_of(message), now=now)
+        if not isinstance(message, m.Heartbeat) or kind_of(message) == kind_of(
+            self._monitor.latest
+        ):
+            return False
+        terms.forget_which()
+        return True
+
+    def shut(self) -> bool:
+        """Send it nothing any more. Return whether it was driven, by the server or a client.
+
+        Another part may still have this object.
+        """
+        self.requests.shut()
+        self.pilot.close()
+        return self.control.is_engaged or self.parts.authority.has_any_grant
 
     def comes_anew(self) -> None:
         """Note a new connection: sequence numbers may restart, and it may be another vehicle."""
@@ -360,6 +381,6 @@ class Vehicle:
     def _ask_for_rates(self, *, now: float) -> None:
         if self._was_heard:  # a silent vehicle cannot answer: ask it nothing
             self.requests.ask_which(now=now)
-            if self.tasks.terms.has_uid and self.requests.has_not_said_which(now=now):
+            if self.tasks.terms.uid and self.requests.has_not_said_which(now=now):
                 self.tasks.unidentified(now=now)
             self.requests.ask_for_rates(now=now)

@@ -128,8 +128,10 @@ class VehicleLinks:
         return link in self._links
 
     def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
-        """Return the sender to a new vehicle's endpoint, and whether it is new, or None if full."""
-        link = self._links[link_name]
+        """Return the sender to a vehicle's endpoint, and whether it is new; None: full, or down."""
+        link = self._links.get(link_name)
+        if link is None:
+            return None
         outlet = link.outlets.get(peer)
         if outlet is not None:
             return outlet, False
@@ -151,6 +153,13 @@ class VehicleLinks:
             del self._rivals[rival]
         self._budgets.clear()
         self._forget_if_empty(place)
+
+    def withdraw(self, system_id: int) -> None:
+        """Drop what waits to leave for a vehicle's endpoint, except HOLD: another one is there."""
+        place = self.router.place_of(system_id)
+        self._queue[:] = [
+            each for each in self._queue if each.is_first or (each.link, each.peer) != place
+        ]
 
     def may_arm(self, name: str) -> bool:
         """Return whether we may arm vehicles on a link of this name."""

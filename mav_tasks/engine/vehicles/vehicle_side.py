@@ -26,8 +26,9 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.heartbeat import gcs_heartbeat
-from mav_tasks.services.persona import Persona, persona_of
+from mav_tasks.services.heartbeat import gcs_heartbeat, kind_of
+from mav_tasks.services.orders import DRIVEN, Orders
+from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, VehicleNoted, VehicleSeen
 from mav_tasks.tasks.fleet import Fleet
@@ -46,6 +47,11 @@ GONE = 5.0
 LISTENS = 1.0
 MOST_NOTES = 256
 MOST_NAMED = 5  # tasks named in one text
+ANOTHER = (
+    "is another vehicle now. If its tasks are for this one, press a Held button for each held"
+    " one, then Continue"
+)
+SHARED = "shares its id with another vehicle: none is driven before one is alone. Change one id"
 
 #: messages that only a controller of the vehicle sends
 SETPOINTS = frozenset(
@@ -74,8 +80,8 @@ USED = frozenset(
     }
     | SETPOINTS
 )
+NO_AUTOPILOT = MavAutopilot.INVALID
 NOT_VEHICLES = frozenset({MavType.GCS, MavType.ONBOARD_CONTROLLER})
-DRIVEN = frozenset({MavType.GROUND_ROVER, MavType.SURFACE_BOAT})
 
 
 class VehicleSide:
@@ -123,6 +129,8 @@ class VehicleSide:
         #: those that it has, and since when; None: all
         self._ours: dict[int, float] | None = {} if is_shared else None
         self._strangers = Strangers()
+        #: the ids at which another vehicle answers now; the reader clears it
+        self.gone: list[int] = []
         #: the links and endpoints
         self.links = VehicleLinks(
             self._vehicles,
@@ -159,6 +167,8 @@ class VehicleSide:
         unheard = [tasks for tasks in self.unheard if system_id in (0, tasks.vehicle)]
         for tasks in unheard:
             tasks.stop(clear=clear, actor=actor, now=now)
+            if beat := self._strangers.take_beat(tasks.vehicle, now=now):
+                self._ask_to_hold(beat)
         return [tasks.vehicle for tasks in unheard]
 
     @property
@@ -184,7 +194,7 @@ class VehicleSide:
             self._ours[vehicle] = now
             beat = self._strangers.take_beat(vehicle, now=now)
             if beat is not None:
-                self._meet(*beat[:4], now=now)
+                self._meet(beat, now=now)
 
     def reach(self, *, now: float) -> Reach:
         """Return the vehicles that are heard, those that this gateway has, and can forget."""
@@ -211,15 +221,19 @@ class VehicleSide:
             system_id, halted_before=now - GONE
         )
 
+    def _drop(self, system_id: int) -> bool:
+        """Drop all control of a vehicle. Return whether it was driven."""
+        vehicle = self._vehicles.pop(system_id, None)
+        was_driven = vehicle is not None and vehicle.shut()
+        self.links.forget(system_id)
+        self.deadline_heap.forget(system_id)
+        return was_driven
+
     def forget(self, system_id: int) -> None:
         """Forget a vehicle, which another gateway may have from here on."""
         assert self._ours is not None, "a server without a fleet has all vehicles"
         del self._ours[system_id]
-        vehicle = self._vehicles.pop(system_id, None)
-        if vehicle is not None:
-            vehicle.requests.shut()  # another part may still have this object
-        self.links.forget(system_id)
-        self.deadline_heap.forget(system_id)
+        self._drop(system_id)
         self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
         if self._answer is not None and self._answer.system_id == system_id:
             self._answer = None
@@ -295,36 +309,40 @@ class VehicleSide:
             self._note_intruder(link, packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
+        from_autopilot, beat = packet.component_id == AUTOPILOT, None
+        if isinstance(message, m.Heartbeat) and from_autopilot:
+            beat = Beat(link, peer, packet, message, now)
         if vehicle is None:
-            if isinstance(message, MOTION) and packet.component_id == AUTOPILOT:
+            if isinstance(message, MOTION) and from_autopilot:
                 self._strangers.note_motion(packet.system_id, Moved(link, peer, message, now))
-            if not isinstance(message, m.Heartbeat):
+            if beat is None:
                 return None
             if self._ours is not None and packet.system_id not in self._ours:
-                self._note_other(Beat(link, peer, packet, message, now))
+                self._note_other(beat)
                 return None
-            vehicle = self._meet(link, peer, packet, message, now=now)
-            if vehicle is None:
-                return None
+            vehicle = self._meet(beat, now=now)
+        elif beat and beat.message.autopilot == NO_AUTOPILOT:
+            return None  # from a program that uses the rover's address
         elif self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
-            isinstance(message, m.Heartbeat)
-            and packet.component_id == AUTOPILOT
-            and self.links.moves(vehicle, link, peer, now=now)
+            beat and self.links.moves(vehicle, link, peer, now=now)
         ):
+            return None
+        elif from_autopilot and vehicle.shows_another(message, now=now):
+            latest = vehicle.parts.monitor.latest
+            vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
+        if vehicle is None:
             return None
         if isinstance(message, m.Timesync) and message.ts1 in self._asked:
             self._answer = packet
-            if message.tc1 and packet.component_id == AUTOPILOT:
+            if message.tc1 and from_autopilot:
                 offset = vehicle.where.motion.clock.offset
                 offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
-        if packet.component_id == AUTOPILOT:
+        if from_autopilot:
             vehicle.count(packet.seq, now=now)
         vehicle.requests.intervals.heard(packet.message_id)
         if message is not None:
-            if isinstance(message, m.Heartbeat) and packet.component_id == AUTOPILOT:
-                if message.autopilot == MavAutopilot.INVALID:
-                    return None  # from a program that uses the rover's address
-                if vehicle.is_overtaken(message, now=now):
+            if beat:
+                if vehicle.is_overtaken(beat.message, now=now):
                     return vehicle  # an old mode or arming state is not news
                 vehicle.last_heartbeat = packet
             vehicle.receive(message, packet.component_id, now=now)
@@ -357,7 +375,7 @@ class VehicleSide:
 
     def _note_other(self, beat: Beat) -> None:
         """Note a vehicle that this gateway hears, but does not have: it may get it."""
-        if self._persona_of(beat.packet, beat.message, now=beat.at) is not None:
+        if self._persona_of(beat) is not None:
             self._strangers.note_beat(beat)
 
     def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
@@ -369,11 +387,32 @@ class VehicleSide:
             outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=is_ours)
             outlet.send_unfenced(self._question, self.our_address, is_ours=is_ours)
 
-    def _meet(
-        self, link_name: str, peer: Peer, packet: Packet, heartbeat: m.Heartbeat, *, now: float
-    ) -> Vehicle | None:
+    def _succeed(self, beat: Beat, *, now: float) -> Vehicle | None:
+        """Meet another vehicle at a known address: nothing of the old one's control survives."""
+        number = beat.packet.system_id
+        self.links.withdraw(number)
+        if self._drop(number):
+            self._ask_to_hold(beat)
+        self.gone.append(number)
+        self._fleet.of(number).belong_to_another(now=now)
+        self._registry.record(VehicleNoted(number, ANOTHER, now))
+        return self._meet(beat, now=now)
+
+    def _ask_to_hold(self, beat: Beat) -> None:
+        """Ask what is not served, or only just heard, to stay where it is."""
+        if way := self.links.meets(beat.link, beat.peer):
+            orders = Orders(beat.packet.source, persona_of(beat.message) or ARDUPILOT)
+            way[0].send(orders.staying_there(beat.message.type), self.our_address, first=True)
+
+    def _meet(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
-        persona = self._persona_of(packet, heartbeat, now=now)
+        link_name, peer, packet, heartbeat, _ = beat
+        persona, tasks = self._persona_of(beat), self._fleet.get(packet.system_id)
+        if tasks and heartbeat.autopilot != NO_AUTOPILOT:
+            which = kind_of(heartbeat), tasks.terms.uid
+            if not self._strangers.is_alone(beat, which):
+                self._note_once(packet.system_id, SHARED, now=now)
+                return None
         if persona is None:
             return None
         way = self.links.meets(link_name, peer)
@@ -409,9 +448,10 @@ class VehicleSide:
         vehicle.joint.step(now)
         return vehicle
 
-    def _persona_of(self, packet: Packet, heartbeat: m.Heartbeat, *, now: float) -> Persona | None:
+    def _persona_of(self, beat: Beat) -> Persona | None:
         """Return the persona of the autopilot that sends a heartbeat; None: it is not driven."""
-        if packet.component_id != AUTOPILOT or heartbeat.type in NOT_VEHICLES:
+        _, _, packet, heartbeat, now = beat
+        if heartbeat.type in NOT_VEHICLES:
             return None
         if packet.system_id in (0, self.our_address.system_id):
             return None  # 0 addresses every vehicle, and our own id belongs to no vehicle

@@ -219,13 +219,6 @@ class TestTheQueue:
 
 
 class TestTheVehicle:
-    def test_another_one_behind_its_id_runs_nothing_unasked(self) -> None:
-        fleet, _ = restored(in_state(S.QUEUED), uids={1: "aa"})
-        fleet.of(1).identified("aa", now=11.0)
-        assert fleet.of(1).paused is R.NONE
-        fleet.of(1).identified("bb", now=12.0)
-        assert fleet.of(1).paused is R.RESTARTED
-
     def test_has_the_speed_that_was_set(self) -> None:
         rig, rover = Rig(), Rover()
         rig.fleet.restore(Restored(speeds={1: 1.25}), now=rig.now)

@@ -401,15 +401,6 @@ class TestProceed:
         assert rig.state(2) is S.EXECUTING
 
 
-def test_another_vehicle_behind_the_same_id_runs_nothing_unasked() -> None:
-    rig = active()
-    rig.tasks.identified("aa", now=rig.now)
-    rig.tasks.identified("", now=rig.now)
-    assert rig.tasks.paused is R.NONE
-    rig.tasks.identified("bb", now=rig.now)
-    assert (rig.states(), rig.tasks.paused) == ([S.PAUSED], R.RESTARTED)
-
-
 def test_a_set_speed_is_that_of_the_running_task_and_of_those_that_name_none() -> None:
     rig, rover = Rig(), Rover()
     rig.submit(Move(20.0, speed=0.3))

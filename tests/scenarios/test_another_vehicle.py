@@ -1,0 +1,472 @@
+"""Another autopilot at a known address is another vehicle, whatever the first one was doing."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.links.memory import Conditions
+from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode, Persona
+from tests.kit.client import ACCEPTED, ARM, GUIDED, MOVE, SET_MODE, setpoint
+from tests.kit.mission import Item, Upload
+from tests.kit.observer import Observer
+from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
+from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, at, ways_of
+from tests.scenarios.conftest import MakeWorld
+
+PERSONAS = {"ardupilot": PROMPT, "px4": PROMPT_PX4}
+#: (param2, param3) that mean HOLD to each
+HOLDS = {"ardupilot": {(4.0, 0.0), (4.0, 3.0)}, "px4": {(4.0, 3.0)}}
+DIRECTIONS = [("ardupilot", "px4"), ("px4", "ardupilot")]
+COPTER = 2  # MAV_TYPE_QUADROTOR
+ROVER, ARDUPILOT, PX4, GCS, NO_AUTOPILOT = 10, 3, 12, 6, 8
+DELAY = Conditions().delay
+WAYPOINT, RELEASE, REQUEST, VERSION = 16, 54013, 512, 148
+PARAMETER = 20  # PARAM_REQUEST_READ
+LOITER = 17  # MAV_CMD_NAV_LOITER_UNLIM
+
+directions = pytest.mark.parametrize(("old", "new"), DIRECTIONS, ids=lambda name: name)
+
+
+class Swapped:
+    """A world in which another rover answers at the first one's address, and what it is sent."""
+
+    def __init__(
+        self,
+        world: World,
+        persona: Persona,
+        *,
+        mode: Mode = Mode.HOLD,
+        at_first_beat: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Put an armed rover there; it stands, and would drive if it were asked for a mission.
+
+        ``at_first_beat`` is called so that the server reads what it sends in the turn in which it
+        reads the new rover's first heartbeat.
+        """
+        self.world = world
+        self.persona = persona
+        self._at_first_beat = at_first_beat
+        self.met_at: float | None = None  # when the server reads that heartbeat
+        self.got: list[Any] = []  # since then
+        self._decoder = common.MAVLink(None)
+        self.rover = world.replace_rover(switched_on=world.now - 60.0, persona=persona)
+        self.rover.autopilot.operator_arm(True, now=world.now)
+        self.rover.autopilot.operator_mode(mode, now=world.now)
+        self.start = self.place()
+        self.modes: set[Mode] = set()
+        world.watch(lambda _now: self.modes.add(self.rover.autopilot.mode))
+        world.watched.loses = self._look_at_sent
+        world.watched.on_arrival = self._look_at_arrived
+
+    def place(self) -> tuple[float, float]:
+        truth = self.rover.truth
+        return round(truth.north, 3), round(truth.east, 3)
+
+    def _look_at_sent(self, source: str, target: str, data: bytes) -> bool:
+        is_beat = (source, target) == ("rover1", VEHICLE_LINK) and data[7] == 0
+        if is_beat and self.met_at is None:
+            self.met_at = self.world.now + DELAY
+            self.world.observer.meets(ways_of(self.persona))
+            self._at_first_beat()
+        return False
+
+    def _look_at_arrived(self, name: str, _source: str, data: bytes) -> None:
+        is_since = self.met_at is not None and self.world.now >= self.met_at + DELAY
+        if is_since and name == "rover1" and data[7] in (MODE_COMMAND, SETPOINT):
+            self.got.append(self._decoder.decode(bytearray(data)))
+
+    def asked_modes(self) -> set[tuple[float, float]]:
+        """Return (param2, param3) of each DO_SET_MODE that has arrived."""
+        return {
+            (message.param2, message.param3)
+            for message in self.got
+            if message.get_msgId() == MODE_COMMAND and message.command == SET_MODE
+        }
+
+    def armings(self) -> list[float]:
+        return [m.param1 for m in self.got if m.get_msgId() == MODE_COMMAND and m.command == ARM]
+
+    def check_untouched(self) -> None:
+        """Assert that nothing has driven it, and that it was asked for nothing but HOLD."""
+        assert self.asked_modes() <= HOLDS[self.persona.name]
+        assert self.modes <= {Mode.HOLD, Mode.MANUAL}
+        assert self.place() == self.start
+        assert 1.0 not in self.armings()
+        moving = [m for m in self.got if m.get_msgId() == SETPOINT and abs(m.vx) + abs(m.vy) > 0.01]
+        assert moving == []
+
+
+def running(world: World) -> None:
+    world.client.move(9.0)
+    world.client.move(8.0)
+    world.until_state(1, S.EXECUTING)
+    world.run(2)
+
+
+def lost(world: World) -> None:
+    """It would go on by itself."""
+    running(world)
+    world.fault(Faults(silent=True))
+    world.run(1.5)
+
+
+def paused(world: World) -> None:
+    running(world)
+    world.client.pause()
+    world.run(3)
+
+
+def held(world: World) -> None:
+    running(world)
+    world.rover.autopilot.reboot(now=world.now)
+    world.until_state(1, S.HELD)
+
+
+def waiting(world: World) -> None:
+    world.client.pause()
+    world.run(1)
+    world.client.move(9.0)
+    world.run(1)
+
+
+def scheduled(world: World) -> None:
+    world.client.command(MOVE, 9.0, 0, 0, 0, 0, 8.0)
+    world.run(1)
+
+
+def idle(world: World) -> None:
+    world.run(1)
+
+
+def stopped(world: World) -> None:
+    running(world)
+    world.client.stop()
+    world.run(3)
+
+
+STATES = [running, lost, paused, held, waiting, scheduled, idle, stopped]
+WORDS: dict[str, Callable[[World], object]] = {
+    "nothing": lambda _world: None,
+    "STOP": lambda world: world.client.stop(),
+    "pause": lambda world: world.client.pause(),
+    "resume": lambda world: world.client.proceed(),
+    "arm": lambda world: world.client.arm(),
+}
+#: each state with the words that mean most, and the other words where there is something to undo
+CASES = [(state, word) for state in STATES for word in ("nothing", "STOP")] + [
+    (state, word) for state in (running, waiting, stopped) for word in ("pause", "resume", "arm")
+]
+
+
+@directions
+@pytest.mark.parametrize(
+    ("state", "word"), CASES, ids=[f"{state.__name__}-{word}" for state, word in CASES]
+)
+def test_nothing_of_the_old_ones_control_reaches_the_new_one(
+    make_world: MakeWorld, old: str, new: str, state: Callable[[World], None], word: str
+) -> None:
+    """The word is read in the turn in which the new one is first heard."""
+    world = make_world(persona=PERSONAS[old])
+    state(world)
+    was_stopped = world.paused() is R.STOPPED
+    swapped = Swapped(world, PERSONAS[new], at_first_beat=lambda: WORDS[word](world))
+    world.run(10)
+    assert swapped.met_at is not None
+    swapped.check_untouched()
+    waits = [task for task in world.tasks() if task.state not in (S.KILLED, S.COMPLETED)]
+    if word == "STOP" or (was_stopped and word != "resume"):
+        assert world.paused() is R.STOPPED
+    elif waits:
+        assert world.paused() in (R.RESTARTED, R.TAKEOVER)
+    if word != "STOP" and state in (running, lost, paused, held):
+        assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    notes = [note.text for note in world.events(VehicleNoted) if "another vehicle" in note.text]
+    assert len(notes) == 1
+
+
+@directions
+def test_stop_is_said_in_the_language_of_what_is_there_now(
+    make_world: MakeWorld, old: str, new: str
+) -> None:
+    world = make_world(persona=PERSONAS[old])
+    swapped = Swapped(world, PERSONAS[new], mode=Mode.MANUAL)
+    world.run(3)
+    sent = world.client.stop()
+    world.run(0.5)
+    assert sent.result == ACCEPTED
+    swapped.check_untouched()
+    assert swapped.rover.autopilot.mode is Mode.HOLD
+
+
+@directions
+def test_a_person_decides_that_the_tasks_are_for_the_new_one(
+    make_world: MakeWorld, old: str, new: str
+) -> None:
+    world = make_world(persona=PERSONAS[old])
+    waiting(world)
+    swapped = Swapped(world, PERSONAS[new])
+    world.run(8)
+    swapped.check_untouched()
+    world.client.proceed()
+    world.until_idle(tasks=1)
+    assert world.state(1)[0] is S.COMPLETED
+    assert swapped.place()[0] == pytest.approx(swapped.start[0] + 9.0, abs=0.1)
+
+
+@directions
+def test_a_client_that_drove_the_old_one_does_not_drive_the_new_one(
+    make_world: MakeWorld, old: str, new: str
+) -> None:
+    """Its stream goes on, and the new one is armed in the mode that follows set-points."""
+    world = make_world(persona=PERSONAS[old])
+    if old == "px4":
+        world.client.stream(setpoint(0.5), rate=20)
+    world.client.arm()
+    world.run(0.5)
+    world.client.command(SET_MODE, 1, 6 if old == "px4" else GUIDED, target=(1, 1))
+    world.run(0.5)
+    if old != "px4":
+        world.client.stream(setpoint(0.5), rate=20)
+    world.run(2)
+    assert world.truth.forward_speed > 0.3
+    # a set-point that passes while the heartbeat is on its way is nobody's fault
+    world.observers[0] = Observer()
+    swapped = Swapped(world, PERSONAS[new], mode=Mode.GUIDED)
+    world.run(10)
+    assert not [m for m in swapped.got if m.get_msgId() == SETPOINT and abs(m.vx) > 0.01]
+    assert world.stands()
+    assert swapped.asked_modes() <= HOLDS[new]
+    assert swapped.rover.autopilot.mode is Mode.HOLD
+
+
+def test_a_mission_that_was_to_start_at_arming_does_not_start_on_the_new_one(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    upload = Upload(world.client, [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))])
+    world.until(lambda: upload.result is not None, within=5)
+    ask_mode(world.client, MISSION)
+    world.run(0.5)
+    swapped = Swapped(world, PROMPT)
+    world.run(10)
+    swapped.check_untouched()
+    assert world.state(1) == (S.BLOCKED, R.NONE)
+
+
+def test_an_upload_that_the_change_cut_off_can_be_made_again(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    items = [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))]
+    Upload(world.client, items)
+    Swapped(world, PROMPT)
+    world.run(20)
+    world.client.roles.clear()
+    upload = Upload(world.client, items)
+    world.until(lambda: upload.result is not None, within=5)
+    assert upload.result == 0
+
+
+def beat_of(kind: int, autopilot: int, *, seq: int = 0) -> bytes:
+    """Return a heartbeat of a vehicle with the first rover's id."""
+    mav = common.MAVLink(None, 1, 1)
+    mav.seq = seq
+    raw: bytes = common.MAVLink_heartbeat_message(kind, autopilot, 1, 0, 4, 3).pack(mav)
+    return raw
+
+
+def forge(world: World, kind: int, autopilot: int) -> None:
+    """Let the server hear a heartbeat at the first rover's address."""
+    world.from_vehicle_side(beat_of(kind, autopilot), peer="rover1")
+    world.run(0.01)
+
+
+def notes_of(world: World) -> list[str]:
+    return [note.text for note in world.events(VehicleNoted)]
+
+
+@pytest.mark.parametrize(
+    ("persona", "forged"),
+    [(PROMPT, PX4), (PROMPT_PX4, ARDUPILOT)],
+    ids=["ardupilot", "px4"],
+)
+@pytest.mark.parametrize("kind", [ROVER, COPTER])
+def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
+    make_world: MakeWorld, persona: Persona, forged: int, kind: int
+) -> None:
+    world = make_world(persona=persona)
+    running(world)
+    forge(world, kind, forged)
+    world.run(5)
+    assert world.stands()
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert world.state(2)[0] is S.QUEUED
+    assert any("is another vehicle now" in text for text in notes_of(world))
+    place = world.pose()
+    world.run(20)
+    assert world.pose() == place
+    world.client.command(RELEASE, 1, 1)
+    world.run(1)
+    world.client.proceed()
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+
+
+@pytest.mark.parametrize("word", ["STOP", "pause"])
+def test_two_that_alternate_undo_no_halt_and_drive_nothing(
+    make_world: MakeWorld, word: str
+) -> None:
+    world = make_world()
+    running(world)
+    WORDS[word](world)
+    world.run(3)
+    place = world.pose()
+    kept = len(world.events(object))
+    for _ in range(300):
+        forge(world, ROVER, PX4)
+        forge(world, ROVER, ARDUPILOT)
+    world.run(15)
+    assert world.pose() == place
+    assert world.paused() is (R.STOPPED if word == "STOP" else R.RESTARTED)
+    assert len(world.events(object)) - kept < 30
+    assert any("shares its id with another vehicle" in text for text in notes_of(world))
+
+
+def test_stop_reaches_both_of_two_that_alternate(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    world.observers.clear()  # whose rules are for one vehicle at one id
+    for _ in range(5):
+        forge(world, ROVER, ARDUPILOT)
+        forge(world, ROVER, PX4)
+    world.rover.autopilot.operator_arm(True, now=world.now)
+    world.rover.autopilot.operator_mode(Mode.MANUAL, now=world.now)
+    for kind in (PX4, ARDUPILOT):
+        forge(world, ROVER, kind)
+        world.client.stop()
+        world.run(0.3)
+        assert world.rover.autopilot.mode is Mode.HOLD
+        world.rover.autopilot.operator_mode(Mode.MANUAL, now=world.now)
+    world.run(15)
+    assert world.paused() is R.STOPPED
+    assert world.rover.autopilot.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "words"),
+    [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})],
+    ids=["ardupilot", "px4"],
+)
+def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
+    world: World, autopilot: int, words: set[tuple[int, float, float]]
+) -> None:
+    """A copter may be in the air: it is not disarmed either. Then the rover is back."""
+    running(world)
+    world.observers.clear()  # whose rules are for a rover
+    world.leave(world.rover_parties[0])
+    got: list[Any] = []
+    decoder = common.MAVLink(None)
+    forge(world, COPTER, autopilot)
+    world.watched.on_arrival = lambda _name, _source, data: got.append(
+        decoder.decode(bytearray(data))
+    )
+
+    def passes(seconds: int) -> None:
+        for _ in range(seconds):
+            forge(world, COPTER, autopilot)
+            world.run(0.99)
+
+    def commands() -> set[tuple[int, float, float]]:
+        assert not [message for message in got if message.get_msgId() == SETPOINT]
+        sent = [message for message in got if message.get_msgId() == MODE_COMMAND]
+        return {(message.command, message.param2, message.param3) for message in sent}
+
+    passes(3)
+    assert commands() <= words  # it was in the place of a driven one
+    got.clear()
+    passes(3)
+    assert commands() == set()
+    world.client.stop()
+    passes(1)
+    assert commands() == words
+    world.client.arm()
+    world.client.proceed()
+    world.client.move(1.0)
+    passes(5)
+    assert commands() == words
+    assert world.state(1)[0] is S.KILLED
+    world.join(world.rover_parties[0])
+    world.run(20)
+    assert world.paused() is R.STOPPED
+    assert world.stands()
+    world.client.proceed()
+    world.until_idle(tasks=2)
+
+
+def test_a_ground_station_at_the_rovers_address_is_no_vehicle(world: World) -> None:
+    running(world)
+    world.from_vehicle_side(beat_of(GCS, NO_AUTOPILOT), peer="rover1")
+    world.until_idle(tasks=2)
+    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
+
+
+def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -> None:
+    """A client asks for the version: nothing else shows that the rover was exchanged."""
+    running(world)
+    world.client.pause()
+    world.run(10)
+    world.replace_rover(switched_on=0.0)
+    world.run(2)
+    world.client.command(REQUEST, VERSION, target=(1, 1))
+    world.run(1)
+    assert world.state(1) == (S.HELD, R.FRAME_RESET)
+    assert world.paused() is R.RESTARTED
+    assert any("is another vehicle now" in text for text in notes_of(world))
+
+
+def test_two_of_one_make_that_share_an_id_are_not_served_in_turns(world: World) -> None:
+    """Both answer each request for the version; each answer tells of another one."""
+    world.run(5)
+    kept = len(world.events(object))
+    for number in range(500):
+        mav = common.MAVLink(None, 1, 1)
+        mav.seq = number % 256
+        version = common.MAVLink_autopilot_version_message(
+            0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 1000 + number % 2
+        )
+        world.from_vehicle_side(version.pack(mav), peer="rover1")
+        world.run(0.01)
+    assert len(world.events(object)) - kept < 40
+    assert any("shares its id with another vehicle" in text for text in notes_of(world))
+
+
+def test_new_firmware_is_the_same_rover_and_is_asked_anew(make_world: MakeWorld) -> None:
+    older = replace(PROMPT, flight_sw_version=4 << 24 | 5 << 16 | 7 << 8 | 255)
+    world = make_world(persona=older)
+    waiting(world)
+    asked: list[str] = []
+    decoder = common.MAVLink(None)
+
+    def look(_name: str, _source: str, data: bytes) -> None:
+        if data[7] == PARAMETER:
+            asked.append(decoder.decode(bytearray(data)).param_id)
+
+    world.watched.on_arrival = look
+    world.run(10)
+    asked.clear()
+    world.replace_rover(switched_on=0.0, persona=PROMPT, is_same=True)
+    world.run(2)
+    assert asked == []
+    world.client.command(REQUEST, VERSION, target=(1, 1))
+    world.run(3)
+    assert "SERVO1_FUNCTION" in asked
+    assert not any("another vehicle" in text for text in notes_of(world))
+    assert world.paused() is R.OPERATOR
+    world.client.proceed()
+    world.until_idle(tasks=1)
