@@ -3,7 +3,7 @@
 Every client may stop a rover: STOP, pause, HOLD, disarm. A refusal names the rule that it follows.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.signatures import UNSIGNED
@@ -27,6 +27,7 @@ R = TaskReason
 OBSERVER, SUBMITTER, OPERATOR, SAFETY = ROLES
 RANKS = {role: rank for rank, role in enumerate(ROLES)}
 NO_LIMIT = Limits()
+NUMBERS = tuple(each.name for each in fields(Limits) if each.name != "tasks")
 SAME = 1 + 1e-6  # tolerance: a limit that was sent as a float32 is that limit
 
 
@@ -35,6 +36,7 @@ class Rights(NamedTuple):
 
     role: str
     limits: Limits
+    key: str = ""  # whose limits these are, for refusals; "": the role's
 
     @property
     def rank(self) -> int:
@@ -107,7 +109,7 @@ NOTHING = Rights(OBSERVER, NO_LIMIT)
 
 
 class RightsBook:
-    """The rights of all roles, by key and address."""
+    """The rights of all clients, by key and address; a key may have limits of its own."""
 
     def __init__(self, roles: Roles) -> None:
         self._roles = roles
@@ -119,12 +121,21 @@ class RightsBook:
     def of(self, key: Key, submitter: Submitter) -> Rights:
         """Return the rights of a submitter whose packet was signed with this key."""
         if key is not UNSIGNED:
-            return self._by_role[key.role]
+            of_role = self._by_role[key.role]
+            if not isinstance(key.limits, Limits):
+                return of_role
+            return Rights(key.role, tighter(of_role.limits, key.limits), f"key {key.name}")
         addresses = self._roles.addresses
         if not addresses:
             return self._by_role[self._roles.unsigned]
         by_address = addresses.get(submitter.address, self._roles.unsigned)
         return self._by_role[addresses.get(submitter.place, by_address)]
+
+
+def tighter(one: Limits, other: Limits) -> Limits:
+    """Return limits within which both are kept."""
+    numbers = {name: min(getattr(one, name), getattr(other, name)) for name in NUMBERS}
+    return Limits(tuple(kind for kind in one.tasks if kind in other.tasks), **numbers)
 
 
 def _kinds_of(goal: Goal) -> list[str]:
