@@ -5,6 +5,7 @@ come. It ignores pauses, pre-emption, tasks of other vehicles, and aging. A fore
 answer to a client, and computes nothing until it is asked.
 """
 
+from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 from math import isnan, nan
 
@@ -14,10 +15,13 @@ from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Pose, Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
+from mav_tasks.tasks.view import VehicleView
 
 S = TaskState
 
 FORESEEN = 500  # tasks; those behind them get no estimate
+#: ready tasks up to which their end is computed for a decision, which holds up setpoints
+FEW = 20
 
 #: seconds until a task starts and until it ends; NaN: not known
 Times = tuple[float, float]
@@ -60,7 +64,7 @@ class Forecast:
 
     def _play(self, times: dict[TaskId, Times]) -> None:
         self._line_up(times)
-        clock, pose = self._when_free()
+        clock, pose, _ = self._when_free()
         self._note_empty(clock, pose)
         while not isnan(clock) and (self._ready or self._due) and len(times) < FORESEEN:
             if not self._ready:
@@ -72,7 +76,7 @@ class Forecast:
             if not self._ready:
                 continue
             task = self._registry[heappop(self._ready)[1]]
-            seconds, pose = time_left(task.goal, task.progress, self._known._replace(pose=pose))
+            seconds, pose, _ = time_left(task.goal, task.progress, self._known._replace(pose=pose))
             times[task.id] = (clock, clock + seconds)
             clock += seconds
             self._done.add(task.id)
@@ -140,10 +144,24 @@ class Forecast:
         return time_left(active.goal, active.progress, self._known)
 
 
-def known_of(tasks: VehicleTasks) -> Known:
-    """Return the inputs for an estimate of a vehicle's tasks."""
-    seen = tasks.seen
+def known_of(tasks: VehicleTasks, seen: VehicleView | None = None) -> Known:
+    """Return the inputs for an estimate of a vehicle's tasks, as it is seen now or was last."""
+    seen = seen or tasks.seen
     if seen is None:
         return Known(tasks.terms.driving)
     pose = None if seen.motion is None else seen.motion.pose
     return Known(tasks.terms.driving, pose, seen.home, seen.origin)
+
+
+def foreseen(
+    tasks: VehicleTasks,
+    registry: TaskRegistry,
+    view: Callable[..., VehicleView],
+    *,
+    now: float,
+) -> Known:
+    """Return from where a new task will be driven: where those before it end, or from here."""
+    here = known_of(tasks, view(now=now))
+    is_soon = len(tasks.queue) <= FEW
+    then = Forecast(tasks, registry, now=now).when_empty().pose if is_soon else None
+    return here._replace(pose=then or here.pose)

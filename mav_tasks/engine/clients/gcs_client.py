@@ -117,12 +117,14 @@ class GcsClient:
 
     def submitter(self, source: Address) -> Submitter:
         """Return the submitter for packets of ``source`` from this endpoint."""
-        submitter = self._submitters.get((source, self.signed_by.name))
+        key = self.signed_by
+        submitter = self._submitters.get((source, key.fingerprint))
         if submitter is None:
             if len(self._submitters) >= MAX_ADDRESSES:
                 self._submitters.clear()
-            submitter = Submitter(self.outlet.link, self.endpoint, *source, self.signed_by.name)
-            self._submitters[source, self.signed_by.name] = submitter
+            fingerprint = key.fingerprint if key.name else ""
+            submitter = Submitter(self.outlet.link, self.endpoint, *source, key.name, fingerprint)
+            self._submitters[source, key.fingerprint] = submitter
         return submitter
 
     def take_rights(self, rights: Rights, *, now: float) -> None:

@@ -3,13 +3,16 @@
 Every client may stop a rover: STOP, pause, HOLD, disarm. A refusal names the rule that it follows.
 """
 
+from collections.abc import Callable
 from dataclasses import fields, replace
+from math import isnan
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import ROLES, Limits, Roles
+from mav_tasks.tasks.driving.estimate import MOST_STEPS, Known, time_left
 from mav_tasks.tasks.goal import (
     Goal,
     Nothing,
@@ -20,7 +23,7 @@ from mav_tasks.tasks.goal import (
     speed_named_by,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task
 
 R = TaskReason
 
@@ -29,6 +32,9 @@ RANKS = {role: rank for rank, role in enumerate(ROLES)}
 NO_LIMIT = Limits()
 NUMBERS = tuple(each.name for each in fields(Limits) if each.name != "tasks")
 SAME = 1 + 1e-6  # tolerance: a limit that was sent as a float32 is that limit
+UNKNOWN_WAY = (
+    f"the rover's position, its home or the place is not known, or it has over {MOST_STEPS} steps"
+)
 
 
 class Rights(NamedTuple):
@@ -62,46 +68,56 @@ class Rights(NamedTuple):
         """Return a Rejection that names the role."""
         return Rejection(reason, f"role {self.role} {words}")
 
+    def beyond(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
+        """Return the Rejection of what is beyond a limit; it names the key, or else the role."""
+        return Rejection(reason, f"{self.key or f'role {self.role}'} {words}")
+
     def check_priority(self, priority: int) -> None:
         """Raise Rejection if the role may not submit tasks of this priority."""
         most = self.limits.max_priority
         if priority > most:
-            raise self.refusal(f"may use priority {most} at most, not {priority}")
+            raise self.beyond(f"may use priority {most} at most, not {priority}")
 
     def check_preemptive(self) -> None:
         """Raise Rejection unless the role may submit pre-emptive tasks."""
         self.require(OPERATOR, "make a task pre-emptive")
 
-    def checked(self, draft: Draft, *, waiting: int) -> Draft:
-        """Return the draft, bounded to the role's speed; raise Rejection if it is not allowed.
+    def checked(self, draft: Draft, *, waiting: int, known: Callable[[], Known]) -> Draft:
+        """Return the draft, bounded to the client's limits; raise Rejection if it is not allowed.
 
-        ``waiting``: how many tasks of its submitter wait already.
+        ``waiting``: how many tasks of its submitter wait already. ``known``: from where its rover
+        will drive it, as far as that can be told.
         """
         self.require(SUBMITTER, "submit tasks")
         self.check_priority(draft.terms.priority)
-        kinds = () if self.limits.tasks == NO_LIMIT.tasks else _kinds_of(draft.goal)
+        limits, goal = self.limits, draft.goal
+        kinds = () if limits.tasks == NO_LIMIT.tasks else _kinds_of(goal)
         for kind in kinds:
-            if kind not in self.limits.tasks:
-                raise self.refusal(f"may not submit a {kind}, only {', '.join(self.limits.tasks)}")
-        if RANKS[self.role] < RANKS[OPERATOR] and _performs(draft.goal):
+            if kind not in limits.tasks:
+                raise self.beyond(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
+        if not self.reach(OPERATOR) and _performs(goal):
             raise self.refusal("may not send a plan that contains rover commands")
         if draft.terms.is_preemptive:
             self.check_preemptive()
-        if waiting >= self.limits.quota:
-            raise self.refusal(f"may have at most {self.limits.quota} waiting tasks", R.QUOTA)
-        top = self.limits.max_speed
-        if top >= NO_LIMIT.max_speed:
+        if waiting >= limits.quota:
+            raise self.beyond(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
+        top, most = limits.max_speed, limits.max_distance
+        has_top, has_most = top < NO_LIMIT.max_speed, most < NO_LIMIT.max_distance
+        if has_top and _fastest(goal) > top * SAME:
+            raise self.beyond(f"may drive {top:g} m/s at most, not {_fastest(goal):g}")
+        metres = time_left(goal, Progress(), known()).metres if has_most else 0.0
+        if isnan(metres):
+            raise self.beyond(f"may drive {most:g} m at most in a task: {UNKNOWN_WAY}")
+        if has_most and metres > most * SAME:
+            raise self.beyond(f"may drive {most:g} m at most in a task, not {metres:.2f}")
+        if not has_top and not has_most:
             return draft
-        fastest = _fastest(draft.goal)
-        if fastest > top * SAME:
-            raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
-        return replace(draft, terms=self.bounded(draft.terms))
-
-    def bounded(self, terms: Terms) -> Terms:
-        """Return the terms with the role's top speed, which limits any speed set later."""
-        if self.limits.max_speed >= NO_LIMIT.max_speed:
-            return terms
-        return replace(terms, top_speed=self.limits.max_speed)
+        terms = replace(
+            draft.terms,
+            top_speed=top if has_top else None,
+            max_distance=most if has_most else None,
+        )
+        return replace(draft, terms=terms)
 
 
 #: rights of a client that has sent nothing yet

@@ -24,7 +24,7 @@ from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.events import Event, TaskSubmitted
 from mav_tasks.tasks.fleet import Fleet
-from mav_tasks.tasks.forecast import Forecast
+from mav_tasks.tasks.forecast import FEW, Forecast
 from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Plan, SingleGoal, Step
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
@@ -39,8 +39,6 @@ LOOK = 1.0  # s between two looks at the vehicles of waiting tasks
 #: s for which a vehicle must have failed: longer than a radio takes to come back
 GRACE = 5.0
 MOST_AT_ONCE = 10  # tasks assigned again in one look; the others a second later: it takes time
-#: ready tasks of a vehicle up to which their end is computed for a choice, which holds up setpoints
-FORESEEN = 20
 
 
 class Assignments:
@@ -184,7 +182,7 @@ class Assignments:
 
     def _when_empty(self, tasks: VehicleTasks, *, now: float) -> Estimate:
         """Return when and where a vehicle's tasks are over; computed once for each batch."""
-        if len(tasks.queue) > FORESEEN:
+        if len(tasks.queue) > FEW:
             return UNKNOWN
         as_of = now, self._registry.last_event_of(tasks.vehicle)
         known = self._foreseen.get(tasks.vehicle)
