@@ -174,6 +174,10 @@ def test_a_jump_goes_one_further_behind_a_home() -> None:
         (lambda: TaskOptions(deadline=nan), "deadline nan"),
         (lambda: wire.items_of_goals([Move(nan)]), "distance"),
         (lambda: wire.items_of_goals([Move("2")]), "distance is not a number"),  # type: ignore[arg-type]
+        (lambda: wire.items_of_goals([Move(2.0, 1e-46)]), "speed 1e-46 is too small to send"),
+        (lambda: wire.items_of_goals([GoTo(None, 1e-300)]), "speed 1e-300 is too small to send"),
+        (lambda: wire.items_of_goals([Wait(1e39)]), "duration 1e.39 is too large to send"),
+        (lambda: TaskOptions(deadline=1e-46), "deadline 1e-46 is too small to send"),
         (lambda: wire.items_of_goals(["move"]), "'move': expected a goal"),  # type: ignore[list-item]
         (lambda: wire.items_of_goals([Drive(1.0, inf, 1.0)]), "yaw_rate"),
         (lambda: wire.items_of_goals([Wait(inf)]), "duration"),
