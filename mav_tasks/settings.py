@@ -5,7 +5,7 @@ parameter and its options of ``mav-tasks serve``. Nothing else repeats them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from math import pi, radians
 
@@ -430,6 +430,16 @@ class Limits:
         Number(1, 1e5, "1/s"),
         "maximum rate of requests per client; STOP is never limited",
     )
+
+    def within(self, other: "Limits") -> "Limits":
+        """Return limits that keep within both these and others."""
+        least = {
+            each.name: min(getattr(self, each.name), getattr(other, each.name))
+            for each in fields(self)
+        }
+        return Limits(
+            **least | {"tasks": tuple(kind for kind in self.tasks if kind in other.tasks)}
+        )
 
 
 @dataclass(frozen=True, slots=True)

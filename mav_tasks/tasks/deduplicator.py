@@ -194,7 +194,7 @@ class SubmissionDeduplicator:
 
     def _by_nonce(self, draft: Draft, *, now: float) -> Known | None:
         key = _key(draft.submitter, draft.marks.nonce)
-        task_id = self._nonces.get(key) or self._nonces.get((draft.submitter.key, *key[1:]))
+        task_id = self._nonces.get(key)
         task = None if task_id is None else self._registry.get(task_id)
         if task_id is None or task is None or _is_long_over(task, now=now):
             self._nonces.pop(key, None)
@@ -227,12 +227,8 @@ def _is_long_over(task: Task, *, now: float) -> bool:
 
 
 def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
-    """Return a key without the endpoint: a client may come back from another one.
-
-    A task of an older version has only the name of its submitter's key.
-    """
-    owner = submitter.fingerprint or submitter.key
-    return owner, submitter.system_id, submitter.component_id, nonce
+    """Return a key without the endpoint: a client may come back from another one."""
+    return submitter.fingerprint, submitter.system_id, submitter.component_id, nonce
 
 
 def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:

@@ -4,7 +4,7 @@ It never changes the task's state: it returns the outcome, which the executor re
 """
 
 from dataclasses import replace
-from math import copysign, isnan
+from math import copysign
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving, Settings
@@ -41,7 +41,6 @@ S, R = TaskState, TaskReason
 MISSES = 3
 #: how much farther than its way may be a task may drive to correct it: as a factor, and m
 CORRECTIONS, SLACK = 1.05, 0.2
-SAME = 1 + 1e-6  # a limit that was sent as a float32 is that limit
 KEEP_EACH = 1.0  # s between two writes of a driven task's progress
 
 
@@ -141,8 +140,10 @@ class Drive:
         longest = self._settings.driving.max_distance
         if here.target is not None and distance(motion.pose, here.target) > longest:
             return Becomes(S.FAILED, R.BAD_PARAMETER)
-        if self._is_too_long(task, here, seen, motion, now=now):
-            return Becomes(S.FAILED, R.NOT_ALLOWED)
+        if task.terms.max_distance is not None:
+            known = Known(self._settings.driving, motion.pose, seen.home, seen.origin)
+            if end := self._end_of_way(task, time_left(task.goal, here, known).metres, now=now):
+                return end
         if not self._bounds.allows_stage(
             present_goal(task.goal, here), here, motion.pose, seen.origin
         ):
@@ -153,24 +154,14 @@ class Drive:
         self._begin_leg(now=now)
         return here
 
-    def _is_too_long(
-        self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
-    ) -> bool:
-        """Return whether a task may drive farther from here than its submitter may; say so."""
-        most = task.terms.max_distance
-        if most is None:
-            return False
-        known = Known(self._settings.driving, motion.pose, seen.home, seen.origin)
-        metres = self._driven + time_left(task.goal, progress, known).metres
-        if metres <= (_with_corrections(most) if self._driven else most * SAME):
-            return False
-        way = "unknown" if isnan(metres) else f"{metres:.1f} m"
-        self._note_limit(task, f"its way from here is {way}", now=now)
-        return True
-
-    def _note_limit(self, task: Task, words: str, *, now: float) -> None:
-        words = f"task {task.id} may drive {task.terms.max_distance:g} m: {words}"
+    def _end_of_way(self, task: Task, left: float, *, now: float) -> Becomes | None:
+        """Return the end of a task that drives farther than its submitter may, and say so."""
+        most, way = task.terms.max_distance, self._driven + left
+        if most is None or way <= most * CORRECTIONS + SLACK:
+            return None
+        words = f"task {task.id} may drive {most:g} m: its way is {way:.1f} m"
         self._registry.record(VehicleNoted(task.vehicle, words, now))
+        return Becomes(S.FAILED, R.NOT_ALLOWED)
 
     def go_on(
         self,
@@ -184,10 +175,8 @@ class Drive:
     ) -> Demand | Becomes:
         """Return this tick's demand, or the outcome; ``executed`` is the s of EXECUTING so far."""
         self._driven += abs(self._last_velocity.forward) * elapsed
-        most = task.terms.max_distance
-        if most is not None and self._driven > _with_corrections(most):
-            self._note_limit(task, f"it has driven {self._driven:.1f} m", now=now)
-            return Becomes(S.FAILED, R.NOT_ALLOWED)
+        if end := self._end_of_way(task, 0.0, now=now):
+            return end
         if self._course is None:  # another step of a plan begins
             steering = steering_of(seen, self._bounds)
             if not seen.still and not may_go_on_rolling(
@@ -357,11 +346,6 @@ class Drive:
             return
         course.look(motion, elapsed=0.0)
         self._registry.advance(task.id, course.progress, now=now)
-
-
-def _with_corrections(most: float) -> float:
-    """Return the metres that a task may drive in fact, if its way may have ``most``."""
-    return most * CORRECTIONS + SLACK
 
 
 def _refused(task: Task) -> Becomes:

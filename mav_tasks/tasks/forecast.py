@@ -5,7 +5,6 @@ come. It ignores pauses, pre-emption, tasks of other vehicles, and aging. A fore
 answer to a client, and computes nothing until it is asked.
 """
 
-from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 from math import isnan, nan
 
@@ -15,7 +14,6 @@ from mav_tasks.tasks.queue import Rank
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Pose, Task, TaskId
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
-from mav_tasks.tasks.view import VehicleView
 
 S = TaskState
 
@@ -57,10 +55,16 @@ class Forecast:
 
         UNKNOWN if nothing can run, or there are too many.
         """
+        if len(self._tasks.queue) > FEW:
+            return UNKNOWN
         if self._times is None:
             self._times = {}
             self._play(self._times)
         return self._empty or UNKNOWN
+
+    def known_when_empty(self) -> Known:
+        """Return from where a new task is driven: where those before it end, else from here."""
+        return self._known._replace(pose=self.when_empty().pose or self._known.pose)
 
     def _play(self, times: dict[TaskId, Times]) -> None:
         self._line_up(times)
@@ -144,24 +148,10 @@ class Forecast:
         return time_left(active.goal, active.progress, self._known)
 
 
-def known_of(tasks: VehicleTasks, seen: VehicleView | None = None) -> Known:
-    """Return the inputs for an estimate of a vehicle's tasks, as it is seen now or was last."""
-    seen = seen or tasks.seen
+def known_of(tasks: VehicleTasks) -> Known:
+    """Return the inputs for an estimate of a vehicle's tasks."""
+    seen = tasks.seen
     if seen is None:
         return Known(tasks.terms.driving)
     pose = None if seen.motion is None else seen.motion.pose
     return Known(tasks.terms.driving, pose, seen.home, seen.origin)
-
-
-def foreseen(
-    tasks: VehicleTasks,
-    registry: TaskRegistry,
-    view: Callable[..., VehicleView],
-    *,
-    now: float,
-) -> Known:
-    """Return from where a new task will be driven: where those before it end, or from here."""
-    here = known_of(tasks, view(now=now))
-    is_soon = len(tasks.queue) <= FEW
-    then = Forecast(tasks, registry, now=now).when_empty().pose if is_soon else None
-    return here._replace(pose=then or here.pose)

@@ -98,7 +98,7 @@ class Submitter:
     component_id: int
     #: name of the signing key, "" for none
     key: str = ""
-    #: of that key: its name may be given again; "" in a task of an older version
+    #: of that key: its name may be given again
     fingerprint: str = ""
 
     def __hash__(self) -> int:
@@ -116,9 +116,7 @@ class Submitter:
     @property
     def owner(self) -> str:
         """Owner of the client's tasks: its key if it has one, otherwise its link and endpoint."""
-        if self.fingerprint:
-            return self.fingerprint
-        return f"key {self.key}" if self.key else f"{self.link} {self.endpoint}"
+        return self.fingerprint if self.key else f"{self.link} {self.endpoint}"
 
     @property
     def address(self) -> str:

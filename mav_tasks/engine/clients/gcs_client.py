@@ -122,8 +122,8 @@ class GcsClient:
         if submitter is None:
             if len(self._submitters) >= MAX_ADDRESSES:
                 self._submitters.clear()
-            fingerprint = key.fingerprint if key.name else ""
-            submitter = Submitter(self.outlet.link, self.endpoint, *source, key.name, fingerprint)
+            who = key.name, key.name and key.fingerprint
+            submitter = Submitter(self.outlet.link, self.endpoint, *source, *who)
             self._submitters[source, key.fingerprint] = submitter
         return submitter
 

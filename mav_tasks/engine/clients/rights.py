@@ -4,7 +4,7 @@ Every client may stop a rover: STOP, pause, HOLD, disarm. A refusal names the ru
 """
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import isnan
 from typing import NamedTuple
 
@@ -15,26 +15,24 @@ from mav_tasks.settings import ROLES, Limits, Roles
 from mav_tasks.tasks.driving.estimate import MOST_STEPS, Known, time_left
 from mav_tasks.tasks.goal import (
     Goal,
-    Nothing,
     Perform,
     Plan,
     SingleGoal,
     kind_of,
     speed_named_by,
+    steps_of,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Progress, Submitter, Task
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, Terms
 
 R = TaskReason
 
 OBSERVER, SUBMITTER, OPERATOR, SAFETY = ROLES
 RANKS = {role: rank for rank, role in enumerate(ROLES)}
 NO_LIMIT = Limits()
-NUMBERS = tuple(each.name for each in fields(Limits) if each.name != "tasks")
 SAME = 1 + 1e-6  # tolerance: a limit that was sent as a float32 is that limit
-UNKNOWN_WAY = (
-    f"the rover's position, its home or the place is not known, or it has over {MOST_STEPS} steps"
-)
+UNKNOWN_WAY = f"unknown (position, home or place; or over {MOST_STEPS} steps)"
+UNASKED = Terms(priority=-1)  # of what is not there yet
 
 
 class Rights(NamedTuple):
@@ -65,22 +63,16 @@ class Rights(NamedTuple):
             raise self.refusal(f"may not {what}: task {task.id} belongs to {task.submitter}")
 
     def refusal(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
-        """Return a Rejection that names the role."""
-        return Rejection(reason, f"role {self.role} {words}")
-
-    def beyond(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
-        """Return the Rejection of what is beyond a limit; it names the key, or else the role."""
+        """Return a Rejection that names the role, or the key if that has limits of its own."""
         return Rejection(reason, f"{self.key or f'role {self.role}'} {words}")
 
-    def check_priority(self, priority: int) -> None:
-        """Raise Rejection if the role may not submit tasks of this priority."""
+    def check_terms(self, terms: Terms, before: Terms = UNASKED) -> None:
+        """Raise Rejection if terms, of a new task or in place of others, are not allowed."""
         most = self.limits.max_priority
-        if priority > most:
-            raise self.beyond(f"may use priority {most} at most, not {priority}")
-
-    def check_preemptive(self) -> None:
-        """Raise Rejection unless the role may submit pre-emptive tasks."""
-        self.require(OPERATOR, "make a task pre-emptive")
+        if terms.priority > max(most, before.priority):
+            raise self.refusal(f"may use priority {most} at most, not {terms.priority}")
+        if terms.is_preemptive > before.is_preemptive:
+            self.require(OPERATOR, "make a task pre-emptive")
 
     def checked(self, draft: Draft, *, waiting: int, known: Callable[[], Known]) -> Draft:
         """Return the draft, bounded to the client's limits; raise Rejection if it is not allowed.
@@ -89,34 +81,28 @@ class Rights(NamedTuple):
         will drive it, as far as that can be told.
         """
         self.require(SUBMITTER, "submit tasks")
-        self.check_priority(draft.terms.priority)
-        limits, goal = self.limits, draft.goal
+        self.check_terms(draft.terms)
+        limits, goal, steps = self.limits, draft.goal, steps_of(draft.goal)
         kinds = () if limits.tasks == NO_LIMIT.tasks else _kinds_of(goal)
         for kind in kinds:
             if kind not in limits.tasks:
-                raise self.beyond(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
-        if not self.reach(OPERATOR) and _performs(goal):
+                raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
+        if not self.reach(OPERATOR) and any(isinstance(step, Perform) for step in steps):
             raise self.refusal("may not send a plan that contains rover commands")
-        if draft.terms.is_preemptive:
-            self.check_preemptive()
         if waiting >= limits.quota:
-            raise self.beyond(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
+            raise self.refusal(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
         top, most = limits.max_speed, limits.max_distance
-        has_top, has_most = top < NO_LIMIT.max_speed, most < NO_LIMIT.max_distance
-        if has_top and _fastest(goal) > top * SAME:
-            raise self.beyond(f"may drive {top:g} m/s at most, not {_fastest(goal):g}")
-        metres = time_left(goal, Progress(), known()).metres if has_most else 0.0
-        if isnan(metres):
-            raise self.beyond(f"may drive {most:g} m at most in a task: {UNKNOWN_WAY}")
-        if has_most and metres > most * SAME:
-            raise self.beyond(f"may drive {most:g} m at most in a task, not {metres:.2f}")
-        if not has_top and not has_most:
+        fastest = 0.0 if top == NO_LIMIT.max_speed else max(map(speed_named_by, steps), default=0.0)
+        if fastest > top * SAME:
+            raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
+        is_far = most == NO_LIMIT.max_distance
+        metres = 0.0 if is_far else time_left(goal, Progress(), known()).metres
+        if not metres <= most * SAME:  # also if it is not known
+            way = UNKNOWN_WAY if isnan(metres) else f"{metres:.2f} m"
+            raise self.refusal(f"may drive {most:g} m at most in a task, not {way}")
+        if is_far and top == NO_LIMIT.max_speed:
             return draft
-        terms = replace(
-            draft.terms,
-            top_speed=top if has_top else None,
-            max_distance=most if has_most else None,
-        )
+        terms = replace(draft.terms, top_speed=top, max_distance=None if is_far else most)
         return replace(draft, terms=terms)
 
 
@@ -140,7 +126,7 @@ class RightsBook:
             of_role = self._by_role[key.role]
             if not isinstance(key.limits, Limits):
                 return of_role
-            return Rights(key.role, tighter(of_role.limits, key.limits), f"key {key.name}")
+            return Rights(key.role, of_role.limits.within(key.limits), f"key {key.name}")
         addresses = self._roles.addresses
         if not addresses:
             return self._by_role[self._roles.unsigned]
@@ -148,31 +134,11 @@ class RightsBook:
         return self._by_role[addresses.get(submitter.place, by_address)]
 
 
-def tighter(one: Limits, other: Limits) -> Limits:
-    """Return limits within which both are kept."""
-    numbers = {name: min(getattr(one, name), getattr(other, name)) for name in NUMBERS}
-    return Limits(tuple(kind for kind in one.tasks if kind in other.tasks), **numbers)
-
-
 def _kinds_of(goal: Goal) -> list[str]:
     """Return the kinds of tasks in a goal; a plan of one step counts as that step."""
     if not isinstance(goal, Plan):
         return [kind_of(goal)]
     kinds = [kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]
-    if len(kinds) == 1 and not _has_home(goal):
+    if len(kinds) == 1 and not goal.has_home:
         return kinds
     return ["plan", *sorted(set(kinds))]
-
-
-def _has_home(plan: Plan) -> bool:
-    return plan.steps[:1] == (Nothing(),)
-
-
-def _performs(goal: Goal) -> bool:
-    return isinstance(goal, Plan) and any(isinstance(step, Perform) for step in goal.steps)
-
-
-def _fastest(goal: Goal) -> float:
-    """Return the highest speed that a goal names, m/s."""
-    steps = goal.steps if isinstance(goal, Plan) else (goal,)
-    return max((speed_named_by(step) for step in steps), default=0.0)
