@@ -14,7 +14,18 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL, FakeClient, Sent
+from tests.kit.client import (
+    ACCEPTED,
+    DENIED,
+    DRIVE,
+    GUIDED,
+    MANUAL,
+    RTL,
+    FakeClient,
+    Sent,
+    setpoint,
+    sticks,
+)
 from tests.kit.mission import Item, Upload
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at
@@ -23,6 +34,7 @@ from tests.scenarios.conftest import MakeWorld
 UTC = 1.8e9  # s, when the worlds begin
 WAYPOINT, JUMP, OPTIONS, MOVE, SPEED, RETURN = 16, 177, 54014, 54000, 178, 20
 REPOSITION, MISSION_START, SET_CURRENT, RELAY, MODIFY, CANCEL = 192, 300, 224, 181, 54012, 54010
+SERVO = 183
 LOCAL_POSITION = 32
 PRIORITY = 1  # TASK_MODIFY, param2
 BOSS = Key("boss", bytes(range(32)), "operator")
@@ -305,6 +317,45 @@ def test_what_nobody_can_tell_is_refused(make_world: MakeWorld, path: Path) -> N
     sent = agent.command_int(REPOSITION, -1, 0, target=(1, 1), frame=6, **at(1.0, 0))
     assert answer(world, sent) == NOT_ALLOWED
     assert any("not unknown (position" in t for t in agent.texts())
+
+
+@pytest.mark.parametrize(
+    "send",
+    [
+        lambda agent: agent.arm(),
+        lambda agent: agent.mode(GUIDED),
+        lambda agent: agent.mode(MANUAL),
+        lambda agent: agent.command(SERVO, 1, 1500, target=(1, 1)),
+        lambda agent: agent.command(SPEED, 1, 2.0, target=(1, 100)),
+    ],
+)
+@pytest.mark.parametrize("limits", [{"max_speed": 0.5}, {"max_distance": 3.0}])
+def test_a_bounded_key_drives_by_tasks_alone(
+    world: World,
+    limited: Callable[..., FakeClient],
+    send: Callable[[FakeClient], Sent],
+    limits: dict[str, float],
+) -> None:
+    agent = limited("safety", **limits)
+    assert answer(world, send(agent)) == NOT_ALLOWED
+    assert any("its limits of speed or way allow only tasks" in t for t in agent.texts())
+    assert uploaded(world, agent, *places(1.0), of_ours(RELAY, 0, 1)).result == MISSION_DENIED
+    agent.stream(setpoint(1.0), rate=20)
+    agent.stream(sticks(x=900), rate=20)
+    boss = signing(world, BOSS, name="boss")
+    boss.mode(GUIDED)
+    boss.arm()
+    world.run(5.0)
+    assert world.pose() == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
+    assert answer(world, agent.stop()) == (ACCEPTED, 0)
+    assert answer(world, agent.proceed()) == (ACCEPTED, 0)
+
+
+def test_a_key_that_is_bounded_otherwise_drives_itself(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited("operator", quota=2)
+    assert answer(world, agent.mode(GUIDED)) == (ACCEPTED, 0)
 
 
 # number, kind, commands to the rover

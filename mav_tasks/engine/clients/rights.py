@@ -41,6 +41,8 @@ class Rights(NamedTuple):
     role: str
     limits: Limits
     key: str = ""  # whose limits these are, for refusals; "": the role's
+    #: its own limits bound speed or way: it drives by tasks alone, which the server drives
+    is_bound: bool = False
 
     @property
     def rank(self) -> int:
@@ -51,10 +53,15 @@ class Rights(NamedTuple):
         """Whether the client's role is this one or a higher one."""
         return RANKS[self.role] >= RANKS[role]
 
-    def require(self, role: str, what: str) -> None:
-        """Raise Rejection unless the client's role is this one or a higher one."""
+    def require(self, role: str, what: str, *, moves: bool = False) -> None:
+        """Raise Rejection unless the client's role is this one or a higher one.
+
+        ``moves``: it may move a rover, and how fast and how far is not the server's to say.
+        """
         if RANKS[self.role] < RANKS[role]:
             raise self.refusal(f"may not {what}; {role} may")
+        if moves and self.is_bound:
+            raise self.refusal(f"may not {what}: its limits of speed or way allow only tasks")
 
     def require_own(self, task: Task, submitter: Submitter, what: str) -> None:
         """Raise Rejection unless the task is the submitter's own, or the role reaches operator."""
@@ -87,8 +94,8 @@ class Rights(NamedTuple):
         for kind in kinds:
             if kind not in limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
-        if not self.reach(OPERATOR) and any(isinstance(step, Perform) for step in steps):
-            raise self.refusal("may not send a plan that contains rover commands")
+        if any(isinstance(step, Perform) for step in steps):
+            self.require(OPERATOR, "send a plan that contains rover commands", moves=True)
         if waiting >= limits.quota:
             raise self.refusal(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
         top, most = limits.max_speed, limits.max_distance
@@ -126,7 +133,10 @@ class RightsBook:
             of_role = self._by_role[key.role]
             if not isinstance(key.limits, Limits):
                 return of_role
-            return Rights(key.role, of_role.limits.within(key.limits), f"key {key.name}")
+            own = key.limits
+            is_bound = own.max_speed < NO_LIMIT.max_speed
+            is_bound |= own.max_distance < NO_LIMIT.max_distance
+            return Rights(key.role, of_role.limits.within(own), f"key {key.name}", is_bound)
         addresses = self._roles.addresses
         if not addresses:
             return self._by_role[self._roles.unsigned]
