@@ -4,7 +4,7 @@ It never changes the task's state: it returns the outcome, which the executor re
 """
 
 from dataclasses import replace
-from math import copysign
+from math import copysign, isnan
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving, Settings
@@ -159,7 +159,8 @@ class Drive:
         most, way = task.terms.max_distance, self._driven + left
         if most is None or way <= most * CORRECTIONS + SLACK:
             return None
-        words = f"task {task.id} may drive {most:g} m: its way is {way:.1f} m"
+        long = "unknown" if isnan(way) else f"{way:.1f} m"
+        words = f"task {task.id} may drive {most:g} m: its way is {long}"
         self._registry.record(VehicleNoted(task.vehicle, words, now))
         return Becomes(S.FAILED, R.NOT_ALLOWED)
 

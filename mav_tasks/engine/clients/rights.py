@@ -58,7 +58,7 @@ class Rights(NamedTuple):
 
         ``moves``: it may move a rover, and how fast and how far is not the server's to say.
         """
-        if RANKS[self.role] < RANKS[role]:
+        if not self.reach(role):
             raise self.refusal(f"may not {what}; {role} may")
         if moves and self.is_bound:
             raise self.refusal(f"may not {what}: its limits of speed or way allow only tasks")
@@ -130,10 +130,9 @@ class RightsBook:
     def of(self, key: Key, submitter: Submitter) -> Rights:
         """Return the rights of a submitter whose packet was signed with this key."""
         if key is not UNSIGNED:
-            of_role = self._by_role[key.role]
-            if not isinstance(key.limits, Limits):
+            of_role, own = self._by_role[key.role], key.limits
+            if not isinstance(own, Limits):
                 return of_role
-            own = key.limits
             is_bound = own.max_speed < NO_LIMIT.max_speed
             is_bound |= own.max_distance < NO_LIMIT.max_distance
             return Rights(key.role, of_role.limits.within(own), f"key {key.name}", is_bound)

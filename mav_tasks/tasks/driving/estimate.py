@@ -75,7 +75,8 @@ def _time_of_plan(plan: Plan, progress: Progress, known: Known) -> Estimate:
             return Estimate(seconds, pose, metres)
         goal = present_goal(plan, progress)
         took, pose, way = _time_of_goal(goal, progress, known._replace(pose=pose), speed)
-        seconds, metres = seconds + took, metres + way
+        seconds += took
+        metres += way
         after = following(plan, progress)
         if after is None or took != took:  # from an unknown place the rest is unknown, too
             break
@@ -102,10 +103,8 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
             anchor, done = anchor_of(goal, number, at, target), 0.0
             leg = leg_of(goal, Progress(anchor=anchor, leg=number, target=target))
         left = max(0.0, length_of(leg) - done)
-        seconds, metres = (
-            seconds + _seconds(leg, left, known.driving, speed),
-            metres + _way(leg, left),
-        )
+        seconds += _seconds(leg, left, known.driving, speed)
+        metres += _way(leg, left)
         at = _end_of(leg, anchor, target if number == WAY else None)
     return Estimate(seconds, None if pose is None and progress.anchor is None else at, metres)
 
