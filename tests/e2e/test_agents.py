@@ -245,6 +245,9 @@ async def test_the_role_of_the_key_decides(tmp_path: Path) -> None:
             assert "submitter" in await it.refused("resume", epoch=epoch)
 
 
+AS_THE_GUIDE_SAYS = "keys add agent --role submitter --max-distance 50 --max-speed 0.5 --quota 5"
+
+
 @awaited
 async def test_the_server_keeps_the_limits_of_the_key(tmp_path: Path) -> None:
     ring = str(tmp_path / "keys.toml")
@@ -253,6 +256,7 @@ async def test_the_server_keeps_the_limits_of_the_key(tmp_path: Path) -> None:
         called("keys", "add", "small", "--role", "submitter", *limits, "--keys", ring).status == 0
     )
     assert called("keys", "add", "large", "--role", "submitter", "--keys", ring).status == 0
+    assert called(*AS_THE_GUIDE_SAYS.split(), "--keys", ring).status == 0
 
     def asking(key: str, kind: str = "move", **goal: Any) -> dict[str, Any]:
         return {"goals": [{"kind": kind, **goal}], "idempotency_key": key, "start_in": 900}
