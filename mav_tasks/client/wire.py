@@ -44,6 +44,7 @@ NORTH = 360.0  # deg, sent for north: 0 would mean "no heading"
 LEAST_YAW = 1e-4  # deg; a smaller yaw is sent as NORTH
 #: numbers between these are float32s, also in degrees; others become 0 or infinite
 LEAST, MOST = 1e-37, 1e36
+EXACT = ("yaw", "north", "east")  # sent as integers, or else as NORTH
 OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: the configured speed
 
 
@@ -222,7 +223,8 @@ def _numbers(goal: Goal | LocalPlace, **values: float) -> None:
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise ValueError(f"{goal}: {name} is not a number")
-        check_size(name, value)
+        if name not in EXACT:
+            check_size(name, value)
 
 
 def check_size(name: str, value: float) -> None:
