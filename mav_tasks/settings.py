@@ -5,7 +5,7 @@ parameter and its options of ``mav-tasks serve``. Nothing else repeats them.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from math import pi, radians
 
@@ -405,7 +405,7 @@ TASK_KINDS = ("move", "rotate", "drive", "goto", "return", "wait", "plan")
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of a role; they apply to each client separately."""
+    """Limits of a role, or of one key; they apply to each client separately."""
 
     tasks: tuple[str, ...] = setting(
         TASK_KINDS,
@@ -414,6 +414,11 @@ class Limits:
     )
     max_priority: int = setting(10, _count(0, 10), "highest priority of this role's tasks")
     max_speed: float = setting(10.0, Number(0.05, 100, "m/s"), "speed limit of this role's tasks")
+    max_distance: float = setting(
+        1e6,
+        Number(0.1, 1e6, "m"),
+        "maximum way of one of this role's tasks; one of unknown length is refused",
+    )
     quota: int = setting(
         100_000,
         _count(0, 1e6),
@@ -425,6 +430,16 @@ class Limits:
         Number(1, 1e5, "1/s"),
         "maximum rate of requests per client; STOP is never limited",
     )
+
+    def within(self, other: "Limits") -> "Limits":
+        """Return limits that keep within both these and others."""
+        least = {
+            each.name: min(getattr(self, each.name), getattr(other, each.name))
+            for each in fields(self)
+        }
+        return Limits(
+            **least | {"tasks": tuple(kind for kind in self.tasks if kind in other.tasks)}
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,6 +57,9 @@ COMMANDS = {
     'mav-tasks mission upload round.waypoints --every "0 6 * * 1-5 Europe/Zurich"': (
         "tests/e2e/test_schedules.py"
     ),
+    "mav-tasks keys add agent --role submitter --max-distance 50 --max-speed 0.5 --quota 5": (
+        "tests/e2e/test_agents.py"
+    ),
     "mav-tasks submit move 3 --vehicle any": "tests/e2e/test_cli_fleet.py",
     "mav-tasks modify 12 --every never": "tests/e2e/test_schedules.py",
     "mav-tasks cancel --series 12": "tests/e2e/test_schedules.py",

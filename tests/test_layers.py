@@ -163,6 +163,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         {
             "mav_tasks.config",
             "mav_tasks.mavlink",
+            "mav_tasks.setting_keys",
             "mav_tasks.settings",
             "mav_tasks.folders",
             "mav_tasks.whole_file",

@@ -1,8 +1,12 @@
-"""Print the policy table into dialects/README.md; `--check` reports whether it is outdated."""
+"""Print the policy table into dialects/README.md, and who may do what into the guide.
+
+`--check` reports whether one of them is outdated.
+"""
 
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 
 from generated import keep_current
 from mav_tasks.engine.policy import Kind, Row
@@ -12,10 +16,31 @@ from mav_tasks.engine.policy.row import UNKNOWN
 from mav_tasks.settings import ROLES
 
 KINDS = list(Kind)
+QUIET = (Kind.QUESTION, Kind.TELL)  # they change nothing
 HEAD = "| kind | lowest role | purpose | forwarded | commands or messages |\n|---|---|---|---|---|"
 NAMELESS = replace(UNKNOWN, name="all others")
 #: kinds that have a plainer name in the document
 NAMES = {Kind.STICKS: "manual", Kind.WISH: "setting", Kind.TELL: "report"}
+
+#: the limits that hold for the commands and messages of a row, by what the row is about
+TASK = "`tasks`, `max_priority`, `max_speed`, `max_distance`, `quota`"
+LIMITS = {
+    "creates a task": TASK,
+    "uploads a mission": TASK,
+    "starts one's own plan": TASK,
+    "starts a return or the mission, which the server drives": TASK,
+    "changes one's own task": "`max_priority`",
+    "sets the speed of tasks": "`max_speed`",
+}
+#: what depends on the content of a task and on its owner (``engine/clients/rights.py``)
+BY_CONTENT = {
+    "operator": {
+        "does all that with everybody's tasks": "as for one's own",
+        "makes a task pre-emptive, or runs it immediately": TASK,
+        "sends a plan that has commands to the rover": TASK,
+        "starts a plan in a paused queue, or of a rover in a manual mode": TASK,
+    }
+}
 
 Group = tuple[Row, list[str]]
 
@@ -28,6 +53,23 @@ def table() -> str:
     parts = ["| kind | a message of this kind |\n|---|---|", *kinds]
     parts += ["", "Commands:", "", HEAD, *commands, "", "Messages:", "", HEAD, *messages, ""]
     return "\n".join(parts)
+
+
+def rights() -> str:
+    """Return the table of who may do what, with the limits that hold for it."""
+    listed = (of_commands.COMMANDS.values(), of_messages.MESSAGES.values())
+    rows = [*chain(*listed), *of_commands.BY_WORDS, *of_messages.BY_WORDS]
+    lines = ["| lowest role | what | limits |", "|---|---|---|"]
+    for role in ROLES:
+        shown = [row for row in rows if row.role == role and row.kind not in QUIET]
+        abouts = {row.about: LIMITS.get(row.about, "") for row in sorted(shown, key=_kind)}
+        abouts |= BY_CONTENT.get(role, {})
+        lines += [f"| `{role}` | {about} | {limits} |" for about, limits in abouts.items()]
+    return "\n".join([*lines, ""])
+
+
+def _kind(row: Row) -> int:
+    return KINDS.index(row.kind)
 
 
 def _lines(numbered: Iterable[tuple[int, Row]], others: Iterable[Row]) -> Iterator[str]:
@@ -71,4 +113,6 @@ def _way(row: Row) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(keep_current("dialects/README.md", "policy table", "policy_table.py", table()))
+    wire = keep_current("dialects/README.md", "policy table", "policy_table.py", table())
+    guide = keep_current("mav_tasks/GUIDE.md", "table of rights", "policy_table.py", rights())
+    sys.exit(wire or guide)

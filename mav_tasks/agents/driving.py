@@ -5,7 +5,6 @@ from typing import Any
 from mav_tasks.agents import submission
 from mav_tasks.agents.arguments import Argument
 from mav_tasks.agents.forms import DONE, TASK, task_form
-from mav_tasks.agents.limits import Limits
 from mav_tasks.agents.reading import TASK_ID, VEHICLE_ID
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
@@ -155,8 +154,9 @@ STOP = Tool(
 )
 
 
-def driving(limits: Limits) -> tuple[Tool, ...]:
-    """Return the tools that move and stop rovers; their descriptions name the limits."""
+def driving(limits: str) -> tuple[Tool, ...]:
+    """Return the tools that move and stop rovers; ``limits``: those of the agents' key, or ""."""
+    own = f" The server refuses what is beyond your limits: {limits}." if limits else ""
     return (
         Tool(
             "submit",
@@ -166,7 +166,7 @@ def driving(limits: Limits) -> tuple[Tool, ...]:
             "idempotency_key with the same content is the same task, so if you have no answer, or "
             "do not know whether you have submitted it, submit exactly the same again: it is not "
             "driven twice. To drive the same again on purpose, use a new key. The rover does not "
-            f"see obstacles. {limits.words()}".rstrip(),
+            f"see obstacles.{own}",
             SUBMISSION,
             TASK,
             _submit,

@@ -4,9 +4,6 @@ The server may be down at the start or later. Each call looks for it, and raises
 not answer.
 """
 
-import asyncio
-
-from mav_tasks.agents.limits import Limits
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.telemetry import all_show
@@ -15,14 +12,15 @@ from mav_tasks.errors import UsageError
 
 
 class Rovers:
-    """The rovers that agents may use: those of a client, or only the client's default rover."""
+    """The rovers that agents may use: those of a client, or only the client's default rover.
 
-    def __init__(self, client: Client, *, only: int | None, limits: Limits) -> None:
+    ``signer`` is the fingerprint of the client's key, "" for none.
+    """
+
+    def __init__(self, client: Client, *, only: int | None, signer: str = "") -> None:
         self._client = client
         self._only = only
-        self.limits = limits
-        #: held while a task is submitted: one at a time
-        self.submitting = asyncio.Lock()
+        self.signer = signer
 
     async def client(self) -> Client:
         """Return the client once it has found the server. Raise NoAnswer if it finds none."""

@@ -34,13 +34,16 @@ a task with an idempotency_key of your own, then call wait until it has ended. E
 'advice': what to do now. Call stop whenever you are in doubt; a person decides when to resume."""
 
 
-def server_of(rovers: Rovers, *, is_read_only: bool) -> Server[Any]:
-    """Return the MCP server for these rovers; ``is_read_only``: it can only read and stop."""
+def server_of(rovers: Rovers, *, is_read_only: bool, limits: str = "") -> Server[Any]:
+    """Return the MCP server for these rovers; ``is_read_only``: it can only read and stop.
+
+    ``limits``: those of the agents' key, as text.
+    """
     server: Server[Any] = Server(
         "mav-tasks", version=version("mav-tasks"), instructions=INSTRUCTIONS
     )
     durable = None if is_read_only else Durable(rovers)
-    tools = (*READING, STOP) if is_read_only else (*READING, *driving(rovers.limits))
+    tools = (*READING, STOP) if is_read_only else (*READING, *driving(limits))
     calls = Calls(rovers, tools, durable)
     server.add_request_handler("tools/list", PaginatedRequestParams, calls.list)
     server.add_request_handler("tools/call", CallToolRequestParams, calls.call)

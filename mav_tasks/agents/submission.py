@@ -1,4 +1,4 @@
-"""Submits an agent's task: once for each idempotency key, within the limits.
+"""Submits an agent's task: once for each idempotency key. The task server checks its rights.
 
 A single goal is submitted as a plan, too. A plan carries its goals and all its options at once, so
 the server compares all of them with an earlier submission of the same key.
@@ -53,18 +53,13 @@ class Wish:
 async def submit(rovers: Rovers, wish: Wish) -> TaskStatus:
     """Submit a task, or find the task of an earlier submission with this key.
 
-    Raise UsageError beyond a limit, or if the key is used up; Refused, NoAnswer as the client.
+    Raise UsageError if the key is used up; Refused, NoAnswer as the client.
     """
-    async with rovers.submitting:  # else two at once would be one too many for --max-queued
-        return await _submit(await rovers.client(), rovers, wish)
-
-
-async def _submit(client: Client, rovers: Rovers, wish: Wish) -> TaskStatus:
-    numbers = numbers_of(wish.key, label=wish.label)
-    earlier, queued = await _looked_up(client, wish.rover, numbers)
-    if earlier is None:
-        await _check(rovers, wish, queued=queued)
-    elif (earlier.ended_ago or 0.0) > NONCE_KEPT - MARGIN:
+    client = await rovers.client()
+    # a key belongs to its submitter: another one's equal key has another nonce
+    numbers = numbers_of(f"{rovers.signer} {wish.key}".lstrip(), label=wish.label)
+    earlier = await _looked_up(client, wish.rover, numbers)
+    if earlier is not None and (earlier.ended_ago or 0.0) > NONCE_KEPT - MARGIN:
         words = f"it was task {earlier.id}, {state_of(earlier)} {earlier.ended_ago:.0f} s ago"
         raise UsageError(f"{_of(wish)}: {words}. To drive again, use a new key")
     try:
@@ -93,8 +88,8 @@ def _of(wish: Wish) -> str:
     return f"idempotency_key {wish.key!r}"
 
 
-async def _looked_up(client: Client, rover: int, numbers: Numbers) -> tuple[TaskStatus | None, int]:
-    """Return the rover's task with this key, if any, and how many of its tasks are not over.
+async def _looked_up(client: Client, rover: int, numbers: Numbers) -> TaskStatus | None:
+    """Return the rover's task with this key, if any.
 
     The server does not compare the keys of tasks that ended long ago, but it still lists them.
     Raise NoAnswer if some of them are lost on the way: one may be the key's.
@@ -105,14 +100,4 @@ async def _looked_up(client: Client, rover: int, numbers: Numbers) -> tuple[Task
         raise NoAnswer("the finished tasks did not all arrive: nothing was submitted, try again")
     current = () if queue.current is None else (queue.current,)
     tasks = (*current, *queue.waiting, *over)
-    earlier = next((task for task in tasks if task.nonce == numbers.nonce), None)
-    return earlier, queue.waiting_count + len(current)
-
-
-async def _check(rovers: Rovers, wish: Wish, *, queued: int) -> None:
-    """Raise UsageError, with the limit's name, if a new task is beyond a limit."""
-    rovers.limits.check_queue(queued)
-    rovers.limits.check_speed(wish.goals)
-    if rovers.limits.max_distance is not None:  # it may take a second until a position comes
-        (rover,) = (each for each in await rovers.all() if each.id == wish.rover)
-        rovers.limits.check_distance(wish.goals, rover=rover)
+    return next((task for task in tasks if task.nonce == numbers.nonce), None)

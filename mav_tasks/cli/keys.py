@@ -17,11 +17,19 @@ from mav_tasks.cli.options import Json, RingFile
 from mav_tasks.cli.ring import ring_path
 from mav_tasks.errors import KeyRingError, UsageError
 from mav_tasks.key_ring import derivation as how
+from mav_tasks.key_ring.limits import LIMITS, limits_in_words, limits_of, plain_limits
 from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
 from mav_tasks.key_ring.ring_file import change, load
 
 app = group("Add, list and revoke signing keys.")
 LONGEST = 4096  # characters of a passphrase that are read
+
+
+def _limit(name: str, metavar: str) -> Any:
+    """Return the option for a limit of the key, by its declaration."""
+    meaning = LIMITS[name].meaning.replace("this role", "this key")
+    return typer.Option(metavar=metavar, help=f"{meaning[0].upper()}{meaning[1:]}.")
+
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key.")]
 
@@ -52,10 +60,17 @@ def add(
             "MAVProxy) or pbkdf2 (later QGroundControl).",
         ),
     ] = None,
+    max_speed: Annotated[float | None, _limit("max_speed", "M/S")] = None,
+    max_distance: Annotated[float | None, _limit("max_distance", "METRES")] = None,
+    max_priority: Annotated[int | None, _limit("max_priority", "0..10")] = None,
+    quota: Annotated[int | None, _limit("quota", "N")] = None,
+    rate: Annotated[float | None, _limit("rate", "N")] = None,
+    tasks: Annotated[str | None, _limit("tasks", "KIND,...")] = None,
     keys: RingFile = "",
 ) -> None:
     """Add a key; a running server accepts it at once.
 
+    Limits of the key hold beside those of its role: the tighter one counts.
     If standard input is not a terminal, its first line must be the passphrase or the digits.
     """
     if passphrase + hex_ + generate > 1:
@@ -64,6 +79,15 @@ def add(
         words = " or ".join(how.PASSPHRASES)
         raise UsageError(f"--derivation: expected {words}, and --passphrase")
     key_of(name, role, b"")  # check before the user types a passphrase
+    given = {
+        "max_speed": max_speed,
+        "max_distance": max_distance,
+        "max_priority": max_priority,
+        "quota": quota,
+        "rate": rate,
+        "tasks": None if tasks is None else LIMITS["tasks"].shape.read(tasks),
+    }
+    limits = limits_of(name, {limit: each for limit, each in given.items() if each is not None})
     if passphrase:
         derivation = derivation or how.SHA256
         secret = how.from_passphrase(_asked("Passphrase", is_new=True), derivation)
@@ -75,7 +99,8 @@ def add(
     path = ring_path(keys)
 
     def with_it(ring: KeyRing) -> KeyRing:
-        return ring.with_added(Entry(name, role, key, derivation, datetime.now(UTC)))
+        entry = Entry(name, role, key, derivation, datetime.now(UTC), limits=limits)
+        return ring.with_added(entry)
 
     change(path, with_it)
     if derivation == how.GENERATED:
@@ -156,6 +181,7 @@ def _as_json(entry: Entry) -> dict[str, Any]:
         "fingerprint": entry.key.fingerprint,
         "derivation": entry.derivation,
         "usable": entry.is_usable,
+        "limits": plain_limits(entry.limits),
         **{name: None if at is None else at.isoformat() for name, at in dates.items()},
     }
 
@@ -164,7 +190,7 @@ def _show(entries: tuple[Entry, ...]) -> None:
     from rich import table, text  # noqa: PLC0415
 
     shown = table.Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
-    for name in ("key", "role", "fingerprint", "derivation", "created", "revoked"):
+    for name in ("key", "role", "fingerprint", "derivation", "created", "revoked", "limits"):
         shown.add_column(name)
     for entry in entries:
         made, revoked = (
@@ -173,5 +199,6 @@ def _show(entries: tuple[Entry, ...]) -> None:
         shown.add_row(
             *(entry.name, entry.kind, entry.key.fingerprint, entry.derivation, made),
             text.Text(revoked, style="red"),
+            limits_in_words(entry.limits),
         )
     output.show(shown)

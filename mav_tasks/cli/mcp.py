@@ -3,50 +3,38 @@
 import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Reach
-from mav_tasks.cli.session import unfound
+from mav_tasks.cli.session import signing_key, unfound
 from mav_tasks.errors import UsageError
 
 
+def _gone(name: str) -> Any:
+    """Return an option that is refused: the server keeps the limits of agents, by their key."""
+
+    def refuse(value: str) -> str:
+        if value:
+            limit = "quota" if name == "max-queued" else name
+            add = f"mav-tasks keys add agent --role submitter --{limit} {value}"
+            words = f"--{name}: the server keeps the limits of an agent's key: {add}"
+            raise UsageError(f"{words}, then mav-tasks mcp --sign agent")
+        return value
+
+    return typer.Option(f"--{name}", hidden=True, callback=refuse)
+
+
 @dataclass(frozen=True, slots=True)
-class LimitOptions:
-    """Options for what agents may submit."""
+class AgentOptions:
+    """Options for what agents are offered."""
 
     read_only: Annotated[
         bool,
         typer.Option("--read-only", help="Offer only what changes nothing, and STOP."),
     ] = False
-    max_distance: Annotated[
-        float | None,
-        typer.Option(
-            metavar="METRES", min=0.0, help="Refuse a task that may drive farther than this."
-        ),
-    ] = None
-    max_speed: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M/S",
-            min=0.0,
-            help="Refuse a goal that drives faster, or that names no speed.",
-        ),
-    ] = None
-    max_queued: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N", min=1, help="Refuse a task if its rover already has so many tasks."
-        ),
-    ] = None
-
-
-@command
-async def mcp(
-    reach: Reach,
-    limits: LimitOptions,
     http: Annotated[
         str,
         typer.Option(
@@ -54,26 +42,33 @@ async def mcp(
             help="Serve streamable HTTP on this loopback address, instead of standard input and"
             " output.",
         ),
-    ] = "",
-) -> None:
+    ] = ""
+    max_distance: Annotated[str, _gone("max-distance")] = ""
+    max_speed: Annotated[str, _gone("max-speed")] = ""
+    max_queued: Annotated[str, _gone("max-queued")] = ""
+
+
+@command
+async def mcp(reach: Reach, options: AgentOptions) -> None:
     """Offer the task server to AI agents (Model Context Protocol).
 
     An agent's program starts this command and talks to it on standard input and output. With --sign
-    agents have the role of that key. With --vehicle only that rover is offered.
+    agents have the role and the limits of that key. With --vehicle only that rover is offered.
     """
     if find_spec("mcp") is None:
         raise UsageError("mcp needs the MCP SDK: pip install 'mav-tasks[mcp]'")
-    from mav_tasks.agents.limits import Limits  # noqa: PLC0415  # they need the SDK
-    from mav_tasks.agents.rovers import Rovers  # noqa: PLC0415
+    from mav_tasks.agents.rovers import Rovers  # noqa: PLC0415  # they need the SDK
     from mav_tasks.agents.server import server_of  # noqa: PLC0415
     from mav_tasks.agents.stdio import serve_stdio  # noqa: PLC0415
     from mav_tasks.agents.streamable_http import place_of, serve_http  # noqa: PLC0415
+    from mav_tasks.key_ring.limits import limits_in_words  # noqa: PLC0415
 
-    place = place_of(http) if http else None
-    allowed = Limits(limits.max_distance, limits.max_speed, limits.max_queued)
+    place = place_of(options.http) if options.http else None
+    key = signing_key(reach)
+    signer, limits = ("", "") if key is None else (key.fingerprint, limits_in_words(key.limits))
     async with unfound(reach) as client:
-        rovers = Rovers(client, only=reach.vehicle, limits=allowed)
-        server = server_of(rovers, is_read_only=limits.read_only)
+        rovers = Rovers(client, only=reach.vehicle, signer=signer)
+        server = server_of(rovers, is_read_only=options.read_only, limits=limits)
         if place is None:
             await serve_stdio(server)
         else:

@@ -9,6 +9,7 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import News, Text
 from mav_tasks.errors import NoAnswer, UsageError
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.tasks.task import ANY
 
 CHOSEN = " chosen: "  # in the text of a new task (``engine/commands/submissions.py``)
@@ -31,16 +32,21 @@ async def opened(common: Reach) -> AsyncIterator[Client]:
         yield client
 
 
+def signing_key(common: Reach) -> Key | None:
+    """Return the key of ``--sign``; None without it. Raise KeyRingError if there is no such key."""
+    if common.keys and not common.sign:
+        raise UsageError("--keys needs --sign NAME")
+    if not common.sign:
+        return None
+    from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415  # only to sign
+
+    return key_to_sign_with(common.sign, common.keys)
+
+
 @asynccontextmanager
 async def unfound(common: Reach) -> AsyncIterator[Client]:
     """Yield a client whose link is open, without waiting for the server."""
-    if common.keys and not common.sign:
-        raise UsageError("--keys needs --sign NAME")
-    key = None
-    if common.sign:
-        from mav_tasks.cli.ring import key_to_sign_with  # noqa: PLC0415  # only to sign
-
-        key = key_to_sign_with(common.sign, common.keys)
+    key = signing_key(common)
     client = Client(common.server, vehicle=common.vehicle or None, timeout=common.timeout, key=key)
     client.open()
     try:

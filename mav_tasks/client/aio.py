@@ -300,6 +300,8 @@ class Client:
             (TaskProperty.START_DELAY, delay),
         )
         changes += [(name, float(value)) for name, value in named if value is not None]
+        wire.check_size("deadline", deadline or 0.0)
+        wire.check_size("delay", delay or 0.0)
         for name, value in changes:
             await self._control(vehicle, MavCmd.TASK_MODIFY, to_param(task_id), float(name), value)
         if at is not None:

@@ -42,6 +42,9 @@ ON_THE_SPOT = 0.01  # m, acceptance radius if none is given
 STOPPING = 0.01  # s, least hold time of a stop: a waypoint without hold is passed
 NORTH = 360.0  # deg, sent for north: 0 would mean "no heading"
 LEAST_YAW = 1e-4  # deg; a smaller yaw is sent as NORTH
+#: numbers between these are float32s, also in degrees; others become 0 or infinite
+LEAST, MOST = 1e-37, 1e36
+EXACT = ("yaw", "north", "east")  # sent as integers, or else as NORTH
 OWN_DEFAULT = -2.0  # DO_CHANGE_SPEED: the configured speed
 
 
@@ -60,6 +63,7 @@ class TaskOptions:
         for name, value in (("delay", self.delay), ("deadline", self.deadline)):
             if not (isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} {value!r}: expected seconds, 0 or more")
+            check_size(name, value)
 
 
 def repeat_of(every: float | str) -> str:
@@ -219,6 +223,16 @@ def _numbers(goal: Goal | LocalPlace, **values: float) -> None:
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise ValueError(f"{goal}: {name} is not a number")
+        if name not in EXACT:
+            check_size(name, value)
+
+
+def check_size(name: str, value: float) -> None:
+    """Raise ValueError for a number that a float32 makes 0, which means "default", or infinite."""
+    if value and not LEAST <= abs(value) <= MOST:
+        raise ValueError(
+            f"{name} {value:g} is too {'small' if abs(value) < 1 else 'large'} to send"
+        )
 
 
 def _whole(name: str, value: int, low: int, high: int) -> None:

@@ -197,8 +197,7 @@ class Engine:
                 (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
             case inputs.KeysChanged():
                 gone = self.signatures.change_keys(item)
-                if gone:
-                    self._questions.keys_revoked(now=now)
+                self._questions.keys_revoked(now=now)
                 self._vehicles.pause_tasks_of(gone, now=now)
                 for link, peer in self._gcs.forget_unknown():
                     self._passing.end(link, peer, now=now)

@@ -12,7 +12,7 @@ from datetime import datetime
 
 from mav_tasks.errors import KeyRingError
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import ROLES
+from mav_tasks.settings import ROLES, Limits
 
 VEHICLE = "vehicle"  # kind of a key of vehicles; it gives a client no rights
 KINDS = (*ROLES, VEHICLE)
@@ -24,7 +24,10 @@ NAMES = "expected 1 to 32 letters, digits, - and _, beginning with a letter or d
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One key with its metadata; ``kind`` is a role, or VEHICLE."""
+    """One key with its metadata; ``kind`` is a role, or VEHICLE.
+
+    ``limits`` of its holder, beside those of the role; None: no others. The key has them, too.
+    """
 
     name: str
     kind: str
@@ -33,6 +36,10 @@ class Entry:
     created: datetime | None = None
     revoked: datetime | None = None
     retired: bytes = field(default=b"", repr=False)  # the secret of a revoked key
+    limits: Limits | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", replace(self.key, limits=self.limits))
 
     @property
     def is_usable(self) -> bool:
@@ -80,6 +87,8 @@ class KeyRing:
             if each.key.fingerprint == entry.key.fingerprint:
                 was = "was revoked" if each.revoked else "exists already"
                 raise KeyRingError(f"key {entry.name}: this secret {was}, as key {each.name}")
+        if entry.limits is not None and entry.kind == VEHICLE:
+            raise KeyRingError(f"key {entry.name}: the key of a rover has no limits")
         if entry.is_usable and len(self.usable) >= MOST_KEYS:
             raise KeyRingError(f"key {entry.name}: the key ring is full, {MOST_KEYS} keys")
         return KeyRing((*self.entries, entry))

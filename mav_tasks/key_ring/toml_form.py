@@ -8,13 +8,15 @@ from typing import Any
 from mav_tasks.config.toml_file import parsed
 from mav_tasks.errors import ConfigError, KeyRingError
 from mav_tasks.key_ring.derivation import DERIVATIONS, from_hex
+from mav_tasks.key_ring.limits import LIMITS, limits_of, plain_limits
 from mav_tasks.key_ring.ring import Entry, KeyRing, key_of
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.setting_keys.literals import literal
 
 TABLE = "keys"
 FIELDS = (
     *("role", "secret", "fingerprint", "derivation", "created", "revoked"),
-    "retired_secret",
+    *("retired_secret", *LIMITS),
 )
 HEADER = """\
 # The key ring of mav-tasks: secrets. Nobody else may read this file.
@@ -67,7 +69,8 @@ def _entry(name: str, table: Mapping[str, Any]) -> Entry:
         key = Key(name, b"", role=key.role, fingerprint=table["fingerprint"])
     retired = _retired(name, table, key.fingerprint) if "retired_secret" in table else b""
     derivation, created = table.get("derivation", ""), _date(name, table, "created")
-    return Entry(name, str(kind), key, derivation, created, revoked, retired)
+    limits = limits_of(name, {each: table[each] for each in LIMITS if each in table})
+    return Entry(name, str(kind), key, derivation, created, revoked, retired, limits)
 
 
 def _retired(name: str, table: Mapping[str, Any], fingerprint: str) -> bytes:
@@ -125,6 +128,7 @@ def _table(entry: Entry) -> str:
         lines.append(f'retired_secret = "{entry.retired.hex()}"  # for replays of old records only')
     if entry.derivation:
         lines.append(f'derivation = "{entry.derivation}"')
+    lines += [f"{name} = {literal(value)}" for name, value in plain_limits(entry.limits).items()]
     for field, date in (("created", entry.created), ("revoked", entry.revoked)):
         if date is not None:
             lines.append(f"{field} = {date.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}")

@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from mav_tasks.errors import KeyRingError
+from mav_tasks.key_ring.limits import limits_in_words
 from mav_tasks.key_ring.ring import VEHICLE
 from mav_tasks.key_ring.ring_file import Loaded, Mark, load, mark_of
 from mav_tasks.mavlink.signing import Key
@@ -138,8 +139,13 @@ def changes(before: tuple[Key, ...], after: tuple[Key, ...]) -> Iterator[str]:
         elif not now.secret:
             yield f"key {name} was revoked"
         elif was is None:
-            yield f"key {name} was added, role {now.role or VEHICLE}"
+            yield f"key {name} was added, {_rights(now)}"
         elif was.fingerprint != now.fingerprint or not was.secret:
-            yield f"key {name} has a new secret, role {now.role or VEHICLE}"
+            yield f"key {name} has a new secret, {_rights(now)}"
         else:
-            yield f"key {name} has role {now.role or VEHICLE} now"
+            yield f"key {name} has {_rights(now)} now"
+
+
+def _rights(key: Key) -> str:
+    limits = limits_in_words(key.limits)
+    return f"role {key.role or VEHICLE}{f' ({limits})' if limits else ''}"

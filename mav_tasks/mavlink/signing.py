@@ -28,6 +28,7 @@ MOST_STREAMS = 64  # remembered of one key; one more takes the place of the olde
 class Key:
     """A secret of 32 bytes that two ends share; ``role`` is what its holder may do.
 
+    ``limits`` are its own ``settings.Limits``, beside those of the role; None: no others.
     A key is recognised by its ``fingerprint``, which gives nothing of the secret away. One without
     a secret was revoked: nobody signs with it any more.
     """
@@ -36,6 +37,7 @@ class Key:
     secret: bytes = field(repr=False)
     role: str = ""
     fingerprint: str = ""
+    limits: object = None
 
     def __post_init__(self) -> None:
         if not self.fingerprint:

@@ -32,6 +32,7 @@ from mav_tasks.engine import inputs
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Packets
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.recording.surroundings import restored_of, restored_to_json, settings_of
+from mav_tasks.settings import Limits
 from mav_tasks.store.codec import Decoder, Encoder, format_of
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.lifecycle import TaskState
@@ -176,8 +177,7 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             end = [item.is_local, item.is_stream, item.takes_unsigned, item.key, item.capacity]
             return ["link", now, item.link, item.side.name, item.up, peers, *end]
         case inputs.KeysChanged(keys=keys):
-            told = [[key.name, key.role, key.fingerprint, bool(key.secret)] for key in keys]
-            return ["keys", now, told]
+            return ["keys", now, [*map(_key_to_json, keys)]]
         case inputs.PeerChanged(link=link, peer=peer, up=up):
             return ["peer", now, link, _peer_to_json(peer), up]
         case inputs.Congestion(link=link, peer=peer, is_congested=is_congested):
@@ -224,9 +224,15 @@ def _packets_of(link: str, datagrams: Sequence[Any], arrived: Sequence[float] = 
     return Packets(link, pairs, arrived)
 
 
-def _key_of(name: str, role: str, fingerprint: str, is_in_use: bool) -> Key:
+def _key_to_json(key: Key) -> list[Any]:
+    own = [asdict(key.limits)] if isinstance(key.limits, Limits) else []
+    return [key.name, key.role, key.fingerprint, bool(key.secret), *own]
+
+
+def _key_of(name: str, role: str, fingerprint: str, is_in_use: bool, own: Any = None) -> Key:
     """Return a key with MISSING for its secret, or no secret if the key is revoked."""
-    return Key(name, MISSING if is_in_use else b"", role, fingerprint)
+    limits = None if own is None else Limits(**own | {"tasks": tuple(own["tasks"])})
+    return Key(name, MISSING if is_in_use else b"", role, fingerprint, limits)
 
 
 def _base64(data: bytes) -> str:

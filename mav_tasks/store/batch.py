@@ -100,7 +100,7 @@ class Batch:
     def _note_nonce(self, task: Task) -> None:
         if task.choice and task.marks.nonce:
             who, marks = task.submitter, task.marks
-            place = who.key, who.system_id, who.component_id, marks.nonce
+            place = who.fingerprint, who.system_id, who.component_id, marks.nonce
             self.nonces[place] = marks.payload, task.id
 
     def _note(self, event: Event, number: int, body: str, utc: float) -> None:

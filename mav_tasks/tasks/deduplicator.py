@@ -228,7 +228,7 @@ def _is_long_over(task: Task, *, now: float) -> bool:
 
 def _key(submitter: Submitter, nonce: int) -> tuple[str, int, int, int]:
     """Return a key without the endpoint: a client may come back from another one."""
-    return submitter.key, submitter.system_id, submitter.component_id, nonce
+    return submitter.fingerprint, submitter.system_id, submitter.component_id, nonce
 
 
 def _same_place(one: Draft, other: Draft, origin: GlobalPlace | None) -> bool:

@@ -4,13 +4,14 @@ It never changes the task's state: it returns the outcome, which the executor re
 """
 
 from dataclasses import replace
-from math import copysign
+from math import copysign, isnan
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.bounds import Bounds
+from mav_tasks.tasks.driving.estimate import Known, time_left
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.limits import limited, within_fence
@@ -38,6 +39,8 @@ S, R = TaskState, TaskReason
 
 #: times that a vehicle may miss a place that its turning circle does not let it reach
 MISSES = 3
+#: how much farther than its way may be a task may drive to correct it: as a factor, and m
+CORRECTIONS, SLACK = 1.05, 0.2
 KEEP_EACH = 1.0  # s between two writes of a driven task's progress
 
 
@@ -68,6 +71,7 @@ class Drive:
         self._is_coming_back = False  # from outside into the fence
         self._kept_at = 0.0  # when progress was last recorded for the store
         self._kept_as = 0  # the number of that event
+        self._driven = 0.0  # m commanded so far for the active task
 
     def __repr__(self) -> str:
         return f"Drive({self._course!r}, {self._last_velocity})"
@@ -106,6 +110,7 @@ class Drive:
         self, task: Task, seen: VehicleView, motion: Motion, *, now: float
     ) -> Progress | Becomes:
         """Plan the path of a task that starts or resumes where the vehicle stands."""
+        self._driven = task.progress.driven
         here = self._set_out(task, task.progress, seen, motion, now=now)
         if isinstance(here, Becomes):
             return here
@@ -135,6 +140,10 @@ class Drive:
         longest = self._settings.driving.max_distance
         if here.target is not None and distance(motion.pose, here.target) > longest:
             return Becomes(S.FAILED, R.BAD_PARAMETER)
+        if task.terms.max_distance is not None:
+            known = Known(self._settings.driving, motion.pose, seen.home, seen.origin)
+            if end := self._end_of_way(task, time_left(task.goal, here, known).metres, now=now):
+                return end
         if not self._bounds.allows_stage(
             present_goal(task.goal, here), here, motion.pose, seen.origin
         ):
@@ -144,6 +153,16 @@ class Drive:
         self._course = course_of(task.goal, here, seen, driving=driving, steering=steering)
         self._begin_leg(now=now)
         return here
+
+    def _end_of_way(self, task: Task, left: float, *, now: float) -> Becomes | None:
+        """Return the end of a task that drives farther than its submitter may, and say so."""
+        most, way = task.terms.max_distance, self._driven + left
+        if most is None or way <= most * CORRECTIONS + SLACK:
+            return None
+        long = "unknown" if isnan(way) else f"{way:.1f} m"
+        words = f"task {task.id} may drive {most:g} m: its way is {long}"
+        self._registry.record(VehicleNoted(task.vehicle, words, now))
+        return Becomes(S.FAILED, R.NOT_ALLOWED)
 
     def go_on(
         self,
@@ -156,6 +175,9 @@ class Drive:
         now: float,
     ) -> Demand | Becomes:
         """Return this tick's demand, or the outcome; ``executed`` is the s of EXECUTING so far."""
+        self._driven += abs(self._last_velocity.forward) * elapsed
+        if end := self._end_of_way(task, 0.0, now=now):
+            return end
         if self._course is None:  # another step of a plan begins
             steering = steering_of(seen, self._bounds)
             if not seen.still and not may_go_on_rolling(
@@ -309,7 +331,9 @@ class Drive:
 
     def _note_progress(self, task: Task, executed: float, *, now: float) -> None:
         assert self._course is not None
-        self._course.progress = replace(self._course.progress, execution_time=executed)
+        self._course.progress = replace(
+            self._course.progress, execution_time=executed, driven=self._driven
+        )
         self._registry.note_progress(task.id, self._course.progress)
         is_written = self._registry.durable >= self._kept_as  # no backlog for a store that is away
         if now - self._kept_at >= KEEP_EACH and is_written:

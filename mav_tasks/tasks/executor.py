@@ -124,7 +124,7 @@ class Executor:
         task = self._active(S.HELD)
         progress = task.progress
         if again:
-            progress = Progress(execution_time=progress.execution_time)
+            progress = Progress(execution_time=progress.execution_time, driven=progress.driven)
         elif task.reason in (R.FRAME_RESET, R.OFF_TRACK):
             # its line is lost or left for good: keep the distance driven, not the start pose
             progress = replace(progress, anchor=None, frame=None, target=None, path=())

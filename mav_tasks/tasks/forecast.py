@@ -18,6 +18,8 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 S = TaskState
 
 FORESEEN = 500  # tasks; those behind them get no estimate
+#: ready tasks up to which their end is computed for a decision, which holds up setpoints
+FEW = 20
 
 #: seconds until a task starts and until it ends; NaN: not known
 Times = tuple[float, float]
@@ -53,14 +55,20 @@ class Forecast:
 
         UNKNOWN if nothing can run, or there are too many.
         """
+        if len(self._tasks.queue) > FEW:
+            return UNKNOWN
         if self._times is None:
             self._times = {}
             self._play(self._times)
         return self._empty or UNKNOWN
 
+    def known_when_empty(self) -> Known:
+        """Return from where a new task is driven: where those before it end, else from here."""
+        return self._known._replace(pose=self.when_empty().pose or self._known.pose)
+
     def _play(self, times: dict[TaskId, Times]) -> None:
         self._line_up(times)
-        clock, pose = self._when_free()
+        clock, pose, _ = self._when_free()
         self._note_empty(clock, pose)
         while not isnan(clock) and (self._ready or self._due) and len(times) < FORESEEN:
             if not self._ready:
@@ -72,7 +80,7 @@ class Forecast:
             if not self._ready:
                 continue
             task = self._registry[heappop(self._ready)[1]]
-            seconds, pose = time_left(task.goal, task.progress, self._known._replace(pose=pose))
+            seconds, pose, _ = time_left(task.goal, task.progress, self._known._replace(pose=pose))
             times[task.id] = (clock, clock + seconds)
             clock += seconds
             self._done.add(task.id)

@@ -254,10 +254,14 @@ def speed_named_by(step: Step) -> float:
             return 0.0
 
 
+def steps_of(goal: Goal) -> tuple[Step, ...]:
+    """Return the steps of a goal; one that is no plan is its only step."""
+    return goal.steps if isinstance(goal, Plan) else (goal,)
+
+
 def ends_at_home(goal: Goal) -> bool:
     """Return whether the last place that a goal drives to is the vehicle's home."""
-    steps = goal.steps if isinstance(goal, Plan) else (goal,)
-    driven = [step for step in steps if isinstance(step, SingleGoal)]
+    driven = [step for step in steps_of(goal) if isinstance(step, SingleGoal)]
     return isinstance(driven[-1], GoTo) and driven[-1].place is None if driven else False
 
 

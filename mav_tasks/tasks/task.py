@@ -98,6 +98,8 @@ class Submitter:
     component_id: int
     #: name of the signing key, "" for none
     key: str = ""
+    #: of that key: its name may be given again
+    fingerprint: str = ""
 
     def __hash__(self) -> int:
         return hash(self.endpoint)  # nearly unique, and a string caches its hash
@@ -114,7 +116,7 @@ class Submitter:
     @property
     def owner(self) -> str:
         """Owner of the client's tasks: its key if it has one, otherwise its link and endpoint."""
-        return f"key {self.key}" if self.key else f"{self.link} {self.endpoint}"
+        return self.fingerprint if self.key else f"{self.link} {self.endpoint}"
 
     @property
     def address(self) -> str:
@@ -143,6 +145,7 @@ class Terms:
     1970), and expires if it has not started by ``deadline`` (monotonic seconds). ``after`` is the
     id of the task that must complete first, 0 for none. ``is_staged``: it waits for a start
     command. ``top_speed`` in m/s limits any other speed; None: only the settings limit it.
+    ``max_distance`` in m limits the way of the whole task, with all interruptions; None: nothing.
     ``is_cruising``: if the goal names no speed, the task drives at the vehicle's own cruise speed.
     ``label`` is the submitter's name for the task, "" for none; it changes nothing.
 
@@ -165,6 +168,7 @@ class Terms:
     repeat: str = ""
     series: int = 0
     start_within: float | None = None
+    max_distance: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +200,8 @@ class Progress:
     In a plan, ``step`` is the step being driven (-1: not started), and legs are legs of that step.
     ``jumps`` are pairs of a jump's step and how often it was taken. ``pending`` are the steps on
     the way that are still to be done; the first of them has waited for ``pending_for`` seconds.
-    ``speed`` is the last one set by the plan or a client, m/s.
+    ``speed`` is the last one set by the plan or a client, m/s. ``driven`` is the metres that were
+    commanded so far, over all legs.
     """
 
     anchor: Pose | None = None
@@ -211,6 +216,7 @@ class Progress:
     pending_for: float = 0.0
     speed: float | None = None
     path: tuple[Bend, ...] = ()
+    driven: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

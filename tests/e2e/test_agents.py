@@ -160,32 +160,6 @@ async def test_a_key_with_other_content_is_refused(
 
 
 @awaited
-async def test_limits_are_refused_by_their_name_but_not_a_second_try(
-    running: Stand, tmp_path: Path
-) -> None:
-    limits = "--max-distance", "2", "--max-speed", "0.5", "--max-queued", "1"
-    async with agent(running, tmp_path, *limits) as it:
-
-        def asking(key: str, **goal: Any) -> dict[str, Any]:
-            return {"goals": [{"kind": "move", **goal}], "idempotency_key": key, "start_in": 900}
-
-        far = await it.refused("submit", **asking("a", distance=3, speed=0.2))
-        assert far == "--max-distance 2 m: this task may drive 3.0 m"
-        fast = await it.refused("submit", **asking("a", distance=1, speed=0.6))
-        assert fast == "--max-speed 0.5 m/s: a goal asks for 0.6 m/s"
-        assert "name the speed" in await it.refused("submit", **asking("a", distance=1))
-        place = {"goals": [{"kind": "goto", "north": 99, "east": 0, "speed": 0.2}]}
-        away = await it.refused("submit", **asking("a") | place)
-        assert away.startswith("--max-distance 2 m: this task may drive")
-
-        task = await it.call("submit", **asking("a", distance=1, speed=0.2))
-        full = await it.refused("submit", **asking("b", distance=1, speed=0.2))
-        assert full == "--max-queued 1: the rover has 1 tasks; wait for one"
-        assert (await it.call("submit", **asking("a", distance=1, speed=0.2)))["id"] == task["id"]
-        await it.call("cancel", id=task["id"])
-
-
-@awaited
 async def test_an_agent_that_may_only_read_can_stop(running: Stand, tmp_path: Path) -> None:
     async with agent(running, tmp_path, "--read-only") as it:
         tools = {tool.name: tool for tool in (await it.client.list_tools()).tools}
@@ -269,6 +243,56 @@ async def test_the_role_of_the_key_decides(tmp_path: Path) -> None:
             task = await it.call("submit", **goals)
             assert "call resume" in task["advice"]
             assert "submitter" in await it.refused("resume", epoch=epoch)
+
+
+AS_THE_GUIDE_SAYS = "keys add agent --role submitter --max-distance 50 --max-speed 0.5 --quota 5"
+
+
+@awaited
+async def test_the_server_keeps_the_limits_of_the_key(tmp_path: Path) -> None:
+    ring = str(tmp_path / "keys.toml")
+    limits = "--max-distance", "2", "--max-speed", "0.5", "--quota", "1", "--max-priority", "6"
+    assert (
+        called("keys", "add", "small", "--role", "submitter", *limits, "--keys", ring).status == 0
+    )
+    assert called("keys", "add", "large", "--role", "submitter", "--keys", ring).status == 0
+    assert called(*AS_THE_GUIDE_SAYS.split(), "--keys", ring).status == 0
+
+    def asking(key: str, kind: str = "move", **goal: Any) -> dict[str, Any]:
+        return {"goals": [{"kind": kind, **goal}], "idempotency_key": key, "start_in": 900}
+
+    with stand(tmp_path, "--keys", ring) as there:
+        other, own = (("--sign", name, "--keys", ring) for name in ("large", "small"))
+        async with agent(there, tmp_path, *other) as large, agent(there, tmp_path, *own) as it:
+            tools = {tool.name: tool for tool in (await it.client.list_tools()).tools}
+            told = "max_priority 6, max_speed 0.5 m/s, max_distance 2 m, quota 1"
+            assert told in (tools["submit"].description or "")
+            used = await large.call("submit", **asking("patrol-1", distance=12, speed=1.6))
+            for words, asked in {
+                "2 m at most in a task, not 12": asking("patrol-1", distance=12, speed=0.2),
+                "0.5 m/s at most, not 1.6": asking("patrol-1", distance=1, speed=1.6),
+                "2 m at most in a task, not 99": asking("a", "goto", north=99, east=0, speed=0.2),
+                "priority 6 at most, not 7": asking("a", distance=1) | {"priority": 7},
+                "speed 1e-46 is too small": asking("a", distance=1, speed=1e-46),
+            }.items():
+                assert words in await it.refused("submit", **asked)
+            task = await it.call("submit", **asking("patrol-1", distance=1))
+            assert task["id"] != used["id"]
+            assert "at most 1 waiting tasks" in await it.refused(
+                "submit", **asking("b", distance=1)
+            )
+            again = await it.call("submit", **asking("patrol-1", distance=1))
+            assert again["id"] == task["id"]
+            assert "belongs to" in await it.refused("cancel", id=used["id"])
+
+
+def test_the_limits_of_before_name_the_way_of_now(tmp_path: Path) -> None:
+    done = called("mcp", "--max-queued", "5")
+    assert done.status == 2
+    assert done.error == (
+        "mav-tasks: --max-queued: the server keeps the limits of an agent's key: mav-tasks keys"
+        " add agent --role submitter --quota 5, then mav-tasks mcp --sign agent\n"
+    )
 
 
 class GetParams(RequestParams):

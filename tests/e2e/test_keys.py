@@ -65,9 +65,20 @@ def test_a_key_is_made_shown_once_listed_and_revoked(ring: Path) -> None:
     assert (anna["file"], anna["fingerprint"], anna["usable"]) == (str(ring), key.fingerprint, True)
     assert (qgc["name"], qgc["role"], qgc["derivation"]) == ("qgc", "safety", "sha256")
     assert secret not in listed.output
+    assert anna["limits"] == {}
+
+    given = keys(
+        *("add", "agent", "--role", "submitter", "--max-speed", "0.5", "--max-distance", "20"),
+        *("--max-priority", "5", "--quota", "3", "--tasks", "move,goto"),
+        ring=ring,
+    )
+    assert given.status == 0, given.error
+    limits = {"max_speed": 0.5, "max_distance": 20.0, "max_priority": 5, "quota": 3}
+    (agent,) = called("keys", "list", "--json", "--keys", str(ring)).objects[2:]
+    assert agent["limits"] == {"tasks": ["move", "goto"], **limits}
 
     shown = called("keys", "list", "--keys", str(ring))
-    assert shown.lines[0] == f"key ring {ring}, 2 keys"
+    assert shown.lines[0] == f"key ring {ring}, 3 keys"
     assert shown.lines[1].split() == [
         "key",
         "role",
@@ -75,6 +86,7 @@ def test_a_key_is_made_shown_once_listed_and_revoked(ring: Path) -> None:
         "derivation",
         "created",
         "revoked",
+        "limits",
     ]
     assert secret not in shown.output
 
@@ -102,6 +114,8 @@ def test_digits_of_another_end_are_taken_from_a_pipe(ring: Path) -> None:
         (("add", "a", "--role", "safety", "--passphrase"), "geheim", "at least 8 characters"),
         (("add", "a", "--role", "safety", "--hex", "--generate"), "", "choose one of them"),
         (("add", "a", "--role", "safety", "--derivation", "sha256"), "", "and --passphrase"),
+        (("add", "a", "--role", "safety", "--max-speed", "0"), "", "max_speed: not in 0.05..100"),
+        (("add", "a", "--role", "vehicle", "--quota", "1"), "", "key of a rover has no limits"),
         (("list",), "", "does not exist; mav-tasks keys add creates one"),
         (("revoke", "a"), "", "does not exist"),
     ],

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from mav_tasks.agents import submission
-from mav_tasks.agents.limits import Limits
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.submission import Wish
 from mav_tasks.client.idempotency import Numbers, numbers_of
@@ -34,10 +33,10 @@ def world() -> Iterator[RoverWorld]:
 
 
 @asynccontextmanager
-async def agent(world: RoverWorld, **limits: Any) -> AsyncIterator[Rovers]:
+async def agent(world: RoverWorld) -> AsyncIterator[Rovers]:
     """Yield the rovers of one life of an agent."""
     async with world.client() as client:
-        yield Rovers(client, only=None, limits=Limits(**limits))
+        yield Rovers(client, only=None)
 
 
 def submitted(rovers: Rovers, key: str, **other: Any) -> Coroutine[Any, Any, TaskStatus]:
@@ -131,32 +130,5 @@ def test_nothing_is_submitted_while_finished_tasks_may_be_missing(
 
     async def nothing(**_which: Any) -> tuple[TaskStatus, ...]:
         return ()
-
-    world.run(script())
-
-
-def test_tasks_that_come_at_once_are_not_more_than_a_limit(world: RoverWorld) -> None:
-    async def script() -> None:
-        async with agent(world, max_queued=2) as rovers:
-            keys = (submitted(rovers, key) for key in "abcd")
-            answers = await asyncio.gather(*keys, return_exceptions=True)
-        refused = [str(each) for each in answers if isinstance(each, UsageError)]
-        assert refused == ["--max-queued 2: the rover has 2 tasks; wait for one"] * 2
-
-    world.run(script())
-
-
-def test_a_second_try_is_no_further_task_for_a_limit(world: RoverWorld) -> None:
-    async def script() -> None:
-        async with agent(world, max_queued=1, max_distance=1.0) as rovers:
-            goals = [{"kind": "goto", "north": 0.9, "east": 0.0}]
-            task = await rovers.task((await submitted(rovers, "a", goals=goals)).id)
-            with pytest.raises(UsageError, match="--max-queued 1"):
-                await submitted(rovers, "b")
-            assert (await submitted(rovers, "a", goals=goals)).id == task.id
-            await task.done()
-            goals = [{"kind": "goto", "north": -0.9, "east": 0.0}]
-            with pytest.raises(UsageError, match=r"--max-distance 1 m: this task may drive 1\.8 m"):
-                await submitted(rovers, "b", goals=goals)
 
     world.run(script())

@@ -125,7 +125,7 @@ def test_who_has_changed_too_much_is_told_and_others_go_on(make_world: MakeWorld
     world.run(1.2)
     refusals = world.events(SubmissionRefused)
     assert refusals[-1].reason is R.RATE_LIMITED
-    assert refusals[-1].text == "too many changes: role submitter may send 1 per second"
+    assert refusals[-1].text == "role submitter may send 1 changes per second"
     modified = len(world.events(TaskModified))
     assert modified <= RATE * 5 + BURST + MEASURED + 2
     assert other.command(MODIFY, 1, PRIORITY, 9).result != TEMPORARILY_REJECTED

@@ -470,7 +470,7 @@ def test_requests_that_are_too_many_are_refused_but_for_stop(with_roles: MakeRol
     submitter.acks.clear()
     late = submitter.move(1.0)
     assert answer(world, late) == (TEMPORARILY_REJECTED, R.RATE_LIMITED)
-    assert "too many requests: role submitter may send 2 per second" in submitter.texts()
+    assert "role submitter may send 2 requests per second" in submitter.texts()
     assert world.tasks() == ()
     assert len(sent) == 10
     assert answer(world, other.move(1.0)) is not None, "each client for itself"

@@ -102,7 +102,7 @@ def test_every_setting_is_known_by_name() -> None:
         ],
         "Gateway": ["name", "address"],
         "Identity": ["system_id", "component_id"],
-        "Limits": ["tasks", "max_priority", "max_speed", "quota", "rate"],
+        "Limits": ["tasks", "max_priority", "max_speed", "max_distance", "quota", "rate"],
         "Links": ["clients", "push", "vehicles", "insecure", "keys", "unsigned"],
         "Log": ["format", "level"],
         "Metrics": ["listen"],

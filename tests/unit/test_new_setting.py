@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 
-BEFORE = "    max_distance: float = setting("
+BEFORE = "    max_distance: float = setting(\n        10_000.0,"
 ADDED = """\
     creep: float = setting(
         radians(2),

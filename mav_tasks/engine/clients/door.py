@@ -66,8 +66,9 @@ class Door:
             return True
         self.left_out += 1
         if isinstance(message, m.CommandLong | m.CommandInt):
-            words = f"too many {what}: role {rights.role} may send {rate:g} per second"
-            self._refuse(received, message, Rejection(TaskReason.RATE_LIMITED, words), now=now)
+            words = f"may send {rate:g} {what} per second"
+            refusal = rights.refusal(words, TaskReason.RATE_LIMITED)
+            self._refuse(received, message, refusal, now=now)
         return False
 
     def _is_ours(self, source: Address) -> bool:

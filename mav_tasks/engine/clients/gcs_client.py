@@ -97,7 +97,8 @@ class GcsClient:
         ] = {}  # cached: each command needs one
         #: limits of its requests, and of changes; ``_refusals`` limits the refusals that are told
         self.requests = self.changes = TokenBucket(rate=0.0, burst=0.0, now=now)
-        self._limits_of: dict[str, list[TokenBucket]] = {}  # by role: the key may change
+        #: by role and limited key: the key may change
+        self._limits_of: dict[tuple[str, str], list[TokenBucket]] = {}
         self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE, now=now)
         self._memory = Memory()
         self._senders: dict[Address, Sender] = {}
@@ -124,20 +125,23 @@ class GcsClient:
 
     def submitter(self, source: Address) -> Submitter:
         """Return the submitter for packets of ``source`` from this endpoint."""
-        submitter = self._submitters.get((source, self.signed_by.name))
+        key = self.signed_by
+        submitter = self._submitters.get((source, key.fingerprint))
         if submitter is None:
             if len(self._submitters) >= MAX_ADDRESSES:
                 self._submitters.clear()
-            submitter = Submitter(self.outlet.link, self.endpoint, *source, self.signed_by.name)
-            self._submitters[source, self.signed_by.name] = submitter
+            who = key.name, key.name and key.fingerprint
+            submitter = Submitter(self.outlet.link, self.endpoint, *source, *who)
+            self._submitters[source, key.fingerprint] = submitter
         return submitter
 
     def take_rights(self, rights: Rights, *, now: float) -> None:
-        """Set the client's rights, and the rate limit of its role."""
+        """Set the client's rights, and the rate limit of its key or role."""
         self.rights, rate = rights, rights.limits.rate
-        limits = self._limits_of.get(rights.role)
+        place = rights.role, rights.key
+        limits = self._limits_of.get(place)
         if limits is None or limits[0].rate != rate:
-            limits = self._limits_of[rights.role] = [
+            limits = self._limits_of[place] = [
                 TokenBucket(rate=each, burst=rate * AT_ONCE, now=now)
                 for each in (rate, rate * CHANGES)
             ]

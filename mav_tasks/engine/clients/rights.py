@@ -3,24 +3,27 @@
 Every client may stop a rover: STOP, pause, HOLD, disarm. A refusal names the rule that it follows.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
+from math import isnan
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import ROLES, Limits, Roles
+from mav_tasks.tasks.driving.estimate import MOST_STEPS, Known, time_left
 from mav_tasks.tasks.goal import (
     Goal,
-    Nothing,
     Perform,
     Plan,
     SingleGoal,
     kind_of,
     speed_named_by,
+    steps_of,
 )
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
+from mav_tasks.tasks.task import Draft, Progress, Submitter, Task, Terms
 
 R = TaskReason
 
@@ -28,6 +31,8 @@ OBSERVER, SUBMITTER, OPERATOR, SAFETY = ROLES
 RANKS = {role: rank for rank, role in enumerate(ROLES)}
 NO_LIMIT = Limits()
 SAME = 1 + 1e-6  # tolerance: a limit that was sent as a float32 is that limit
+UNKNOWN_WAY = f"unknown (position, home or place; or over {MOST_STEPS} steps)"
+UNASKED = Terms(priority=-1)  # of what is not there yet
 
 
 class Rights(NamedTuple):
@@ -35,6 +40,9 @@ class Rights(NamedTuple):
 
     role: str
     limits: Limits
+    key: str = ""  # whose limits these are, for refusals; "": the role's
+    #: its own limits bound speed or way: it drives by tasks alone, which the server drives
+    is_bound: bool = False
 
     @property
     def rank(self) -> int:
@@ -45,10 +53,15 @@ class Rights(NamedTuple):
         """Whether the client's role is this one or a higher one."""
         return RANKS[self.role] >= RANKS[role]
 
-    def require(self, role: str, what: str) -> None:
-        """Raise Rejection unless the client's role is this one or a higher one."""
-        if RANKS[self.role] < RANKS[role]:
+    def require(self, role: str, what: str, *, moves: bool = False) -> None:
+        """Raise Rejection unless the client's role is this one or a higher one.
+
+        ``moves``: it may move a rover, and how fast and how far is not the server's to say.
+        """
+        if not self.reach(role):
             raise self.refusal(f"may not {what}; {role} may")
+        if moves and self.is_bound:
+            raise self.refusal(f"may not {what}: its limits of speed or way allow only tasks")
 
     def require_own(self, task: Task, submitter: Submitter, what: str) -> None:
         """Raise Rejection unless the task is the submitter's own, or the role reaches operator."""
@@ -57,49 +70,47 @@ class Rights(NamedTuple):
             raise self.refusal(f"may not {what}: task {task.id} belongs to {task.submitter}")
 
     def refusal(self, words: str, reason: TaskReason = R.NOT_ALLOWED) -> Rejection:
-        """Return a Rejection that names the role."""
-        return Rejection(reason, f"role {self.role} {words}")
+        """Return a Rejection that names the role, or the key if that has limits of its own."""
+        return Rejection(reason, f"{self.key or f'role {self.role}'} {words}")
 
-    def check_priority(self, priority: int) -> None:
-        """Raise Rejection if the role may not submit tasks of this priority."""
+    def check_terms(self, terms: Terms, before: Terms = UNASKED) -> None:
+        """Raise Rejection if terms, of a new task or in place of others, are not allowed."""
         most = self.limits.max_priority
-        if priority > most:
-            raise self.refusal(f"may use priority {most} at most, not {priority}")
+        if terms.priority > max(most, before.priority):
+            raise self.refusal(f"may use priority {most} at most, not {terms.priority}")
+        if terms.is_preemptive > before.is_preemptive:
+            self.require(OPERATOR, "make a task pre-emptive")
 
-    def check_preemptive(self) -> None:
-        """Raise Rejection unless the role may submit pre-emptive tasks."""
-        self.require(OPERATOR, "make a task pre-emptive")
+    def checked(self, draft: Draft, *, waiting: int, known: Callable[[], Known]) -> Draft:
+        """Return the draft, bounded to the client's limits; raise Rejection if it is not allowed.
 
-    def checked(self, draft: Draft, *, waiting: int) -> Draft:
-        """Return the draft, bounded to the role's speed; raise Rejection if it is not allowed.
-
-        ``waiting``: how many tasks of its submitter wait already.
+        ``waiting``: how many tasks of its submitter wait already. ``known``: from where its rover
+        will drive it, as far as that can be told.
         """
         self.require(SUBMITTER, "submit tasks")
-        self.check_priority(draft.terms.priority)
-        kinds = () if self.limits.tasks == NO_LIMIT.tasks else _kinds_of(draft.goal)
+        self.check_terms(draft.terms)
+        limits, goal, steps = self.limits, draft.goal, steps_of(draft.goal)
+        kinds = () if limits.tasks == NO_LIMIT.tasks else _kinds_of(goal)
         for kind in kinds:
-            if kind not in self.limits.tasks:
-                raise self.refusal(f"may not submit a {kind}, only {', '.join(self.limits.tasks)}")
-        if RANKS[self.role] < RANKS[OPERATOR] and _performs(draft.goal):
-            raise self.refusal("may not send a plan that contains rover commands")
-        if draft.terms.is_preemptive:
-            self.check_preemptive()
-        if waiting >= self.limits.quota:
-            raise self.refusal(f"may have at most {self.limits.quota} waiting tasks", R.QUOTA)
-        top = self.limits.max_speed
-        if top >= NO_LIMIT.max_speed:
-            return draft
-        fastest = _fastest(draft.goal)
+            if kind not in limits.tasks:
+                raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
+        if any(isinstance(step, Perform) for step in steps):
+            self.require(OPERATOR, "send a plan that contains rover commands", moves=True)
+        if waiting >= limits.quota:
+            raise self.refusal(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
+        top, most = limits.max_speed, limits.max_distance
+        fastest = 0.0 if top == NO_LIMIT.max_speed else max(map(speed_named_by, steps), default=0.0)
         if fastest > top * SAME:
             raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
-        return replace(draft, terms=self.bounded(draft.terms))
-
-    def bounded(self, terms: Terms) -> Terms:
-        """Return the terms with the role's top speed, which limits any speed set later."""
-        if self.limits.max_speed >= NO_LIMIT.max_speed:
-            return terms
-        return replace(terms, top_speed=self.limits.max_speed)
+        is_far = most == NO_LIMIT.max_distance
+        metres = 0.0 if is_far else time_left(goal, Progress(), known()).metres
+        if not metres <= most * SAME:  # also if it is not known
+            way = UNKNOWN_WAY if isnan(metres) else f"{metres:.2f} m"
+            raise self.refusal(f"may drive {most:g} m at most in a task, not {way}")
+        if is_far and top == NO_LIMIT.max_speed:
+            return draft
+        terms = replace(draft.terms, top_speed=top, max_distance=None if is_far else most)
+        return replace(draft, terms=terms)
 
 
 #: rights of a client that has sent nothing yet
@@ -107,7 +118,7 @@ NOTHING = Rights(OBSERVER, NO_LIMIT)
 
 
 class RightsBook:
-    """The rights of all roles, by key and address."""
+    """The rights of all clients, by key and address; a key may have limits of its own."""
 
     def __init__(self, roles: Roles) -> None:
         self._roles = roles
@@ -119,7 +130,12 @@ class RightsBook:
     def of(self, key: Key, submitter: Submitter) -> Rights:
         """Return the rights of a submitter whose packet was signed with this key."""
         if key is not UNSIGNED:
-            return self._by_role[key.role]
+            of_role, own = self._by_role[key.role], key.limits
+            if not isinstance(own, Limits):
+                return of_role
+            is_bound = own.max_speed < NO_LIMIT.max_speed
+            is_bound |= own.max_distance < NO_LIMIT.max_distance
+            return Rights(key.role, of_role.limits.within(own), f"key {key.name}", is_bound)
         addresses = self._roles.addresses
         if not addresses:
             return self._by_role[self._roles.unsigned]
@@ -132,20 +148,6 @@ def _kinds_of(goal: Goal) -> list[str]:
     if not isinstance(goal, Plan):
         return [kind_of(goal)]
     kinds = [kind_of(step) for step in goal.steps if isinstance(step, SingleGoal)]
-    if len(kinds) == 1 and not _has_home(goal):
+    if len(kinds) == 1 and not goal.has_home:
         return kinds
     return ["plan", *sorted(set(kinds))]
-
-
-def _has_home(plan: Plan) -> bool:
-    return plan.steps[:1] == (Nothing(),)
-
-
-def _performs(goal: Goal) -> bool:
-    return isinstance(goal, Plan) and any(isinstance(step, Perform) for step in goal.steps)
-
-
-def _fastest(goal: Goal) -> float:
-    """Return the highest speed that a goal names, m/s."""
-    steps = goal.steps if isinstance(goal, Plan) else (goal,)
-    return max((speed_named_by(step) for step in steps), default=0.0)

@@ -19,14 +19,14 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.choice import DISABLED, Candidate, Choice, choose, is_low
-from mav_tasks.tasks.driving.estimate import UNKNOWN, Estimate
+from mav_tasks.tasks.driving.estimate import Estimate
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
 from mav_tasks.tasks.events import Event, TaskSubmitted
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.frames import local_place
-from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Plan, SingleGoal, Step
+from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace, Plan, SingleGoal, steps_of
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
@@ -39,8 +39,6 @@ LOOK = 1.0  # s between two looks at the vehicles of waiting tasks
 #: s for which a vehicle must have failed: longer than a radio takes to come back
 GRACE = 5.0
 MOST_AT_ONCE = 10  # tasks assigned again in one look; the others a second later: it takes time
-#: ready tasks of a vehicle up to which their end is computed for a choice, which holds up setpoints
-FORESEEN = 20
 
 
 class Assignments:
@@ -184,8 +182,6 @@ class Assignments:
 
     def _when_empty(self, tasks: VehicleTasks, *, now: float) -> Estimate:
         """Return when and where a vehicle's tasks are over; computed once for each batch."""
-        if len(tasks.queue) > FORESEEN:
-            return UNKNOWN
         as_of = now, self._registry.last_event_of(tasks.vehicle)
         known = self._foreseen.get(tasks.vehicle)
         if known is None or known[0] != as_of:
@@ -196,7 +192,7 @@ class Assignments:
 
 def check_any(goal: Goal) -> None:
     """Raise Rejection for a place that is another one for each vehicle."""
-    for step in _steps_of(goal):
+    for step in steps_of(goal):
         if isinstance(step, GoTo) and isinstance(step.place, LocalPlace):
             words = "metres from a local origin are another place for each rover: name the rover"
             raise Rejection(R.BAD_FRAME, f"{words}, or give latitude and longitude")
@@ -207,7 +203,7 @@ def check_any(goal: Goal) -> None:
 def driven_by(vehicle: Vehicle, goal: Goal) -> Goal:
     """Return a goal as a vehicle drives it. Raise Rejection if it cannot, or must not go there."""
     ability = Ability.of(vehicle.persona, rover="it")
-    steps = [each for each in _steps_of(goal) if isinstance(each, GoTo)]
+    steps = [each for each in steps_of(goal) if isinstance(each, GoTo)]
     for step in steps:
         check_reach(vehicle, step)
     if not isinstance(goal, Plan):
@@ -230,13 +226,9 @@ def _driven_alike(vehicle: Vehicle, goal: Goal) -> Goal:
     return goal
 
 
-def _steps_of(goal: Goal) -> tuple[Step, ...]:
-    return goal.steps if isinstance(goal, Plan) else (goal,)
-
-
 def _way_to(goal: Goal, pose: Pose | None, view: VehicleView) -> float:
     """Return the metres from a pose to where a task begins; 0 if it begins there; NaN: unknown."""
-    first = next((step for step in _steps_of(goal) if isinstance(step, SingleGoal)), None)
+    first = next((step for step in steps_of(goal) if isinstance(step, SingleGoal)), None)
     if not isinstance(first, GoTo):
         return 0.0
     place = local_place(first.place, view.origin)

@@ -93,8 +93,11 @@ class Forwarder:
         self, client: GcsClient, row: Row, message: m.Message | None, *, now: float
     ) -> Rejection | None:
         """Return why a packet may go to no rover, or None if it may."""
-        if not client.rights.reach(row.role):
-            return client.rights.refusal(f"may not send this message to a rover; {row.role} may")
+        try:
+            what, moves = "send this message to a rover", not row.passes_under_stop
+            client.rights.require(row.role, what, moves=moves)
+        except Rejection as refusal:
+            return refusal
         if isinstance(message, m.FileTransferProtocol):
             is_safety = client.rights.reach(SAFETY)
             if not is_safety and self._writers.ends_anothers(message, client.key, now=now):

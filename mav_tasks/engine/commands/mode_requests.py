@@ -76,7 +76,8 @@ class ModeRequests:
             self._show(vehicle, mode, now=now)
             return True
         if not self._is_mission(vehicle, mode):
-            asked.rights.require(row_of_command(MavCmd.DO_SET_MODE).role, "change the mode")
+            role = row_of_command(MavCmd.DO_SET_MODE).role
+            asked.rights.require(role, "change the mode", moves=True)
             vehicle.joint.client_asks_mode(mode, client.key, now=now)
             return False
         self._plans.check_start(asked.rights, vehicle, asked.submitter)

@@ -34,7 +34,8 @@ def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
     """Raise Rejection if a command may not go to its vehicle now, else note its effect."""
     vehicle, command = asked.vehicle, asked.command
     number, params = command.command, command.params
-    asked.rights.require(row.role, f"send command {number} to a rover")
+    what, moves = f"send command {number} to a rover", not row.passes_under_stop
+    asked.rights.require(row.role, what, moves=moves)
     if vehicle.tasks.is_stopped and not row.passes_under_stop:
         raise Rejection(R.STOPPED, CONTINUE_FIRST)
     is_reposition = number == MavCmd.DO_REPOSITION

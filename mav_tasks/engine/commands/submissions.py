@@ -26,6 +26,7 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
+from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
@@ -192,7 +193,9 @@ class Submissions:
         self.check_open()
         if runs_now:
             rights.require(OPERATOR, "run a task immediately")
-        draft = rights.checked(draft, waiting=vehicle.tasks.count_of(draft.submitter))
+        waiting = vehicle.tasks.count_of(draft.submitter)
+        foreseen = Forecast(vehicle.tasks, self._registry, now=now)
+        draft = rights.checked(draft, waiting=waiting, known=foreseen.known_when_empty)
         if ends_driving_of is not None:
             vehicle.joint.end_driving_of(ends_driving_of, now=now)
         if why_not:

@@ -146,10 +146,7 @@ class TaskControl:
             terms = self._with_piece(task, asked.command, times, now=now)
         else:
             terms = _modified(task, asked.command, times, now=now)
-        if terms.priority > task.terms.priority:
-            asked.rights.check_priority(terms.priority)
-        if terms.is_preemptive and not task.terms.is_preemptive:
-            asked.rights.check_preemptive()
+        asked.rights.check_terms(terms, before=task.terms)
         asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
         return task.id
 

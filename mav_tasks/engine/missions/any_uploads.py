@@ -7,7 +7,6 @@ plan is whole, of each rover. One upload is under way at a time, as at every add
 
 from dataclasses import replace
 from functools import partial
-from hashlib import blake2b
 from math import inf
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from mav_tasks.engine.commands.submissions import Submissions, chosen_words
 from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
-from mav_tasks.engine.missions.mission_uploads import refusal_of
+from mav_tasks.engine.missions.mission_uploads import draft_of, refusal_of
 from mav_tasks.engine.missions.plan_items import MissionParseOptions, result_of
 from mav_tasks.engine.policy import row_of
 from mav_tasks.engine.timers import Timers, Turn
@@ -36,7 +35,7 @@ from mav_tasks.tasks.deduplicator import reused
 from mav_tasks.tasks.goal import GoTo, describe
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import ANY, Draft, Marks, Task, TaskId
+from mav_tasks.tasks.task import ANY, Task, TaskId
 
 R = TaskReason
 
@@ -182,10 +181,7 @@ class AnyUploads:
         assert client is not None, "it has just spoken"
         self._submissions.check_open()
         wanted = self._check.plan_of(upload.items, now=now)
-        what = f"{sender.addressed} {wanted.plan.source}".encode()
-        marks = Marks(wanted.nonce, blake2b(what, digest_size=9).hexdigest())
-        submitter = client.submitter(sender.address)
-        draft = Draft(ANY, MavCmd.MISSION_START, wanted.plan, submitter, wanted.terms, marks)
+        draft = draft_of(ANY, wanted, client, sender)
         known = self._submissions.known_plan(draft, begun_at=upload.begun_at, now=now)
         if known is not None:
             self._finish(known, now=now)

@@ -17,7 +17,7 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.fence_items import fence_for_vehicle, fence_of
 from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
-from mav_tasks.engine.missions.plan_items import result_of
+from mav_tasks.engine.missions.plan_items import ParsedMission, result_of
 from mav_tasks.engine.missions.plans import MISSION, Plans, Stored
 from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -33,10 +33,10 @@ from mav_tasks.services.mission_receiver import (
     Sender,
     Upload,
 )
-from mav_tasks.tasks.goal import Plan, describe
+from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId
 
 R = TaskReason
 
@@ -52,6 +52,14 @@ def refusal_of(result: int, words: str) -> Rejection:
     """Return why the receiver itself ended an upload with this MAV_MISSION_RESULT."""
     reason = ENDED.get(MavMissionResult(result), R.BAD_PARAMETER)
     return Rejection(reason, f"upload: {words or 'an item cannot be read'}")
+
+
+def draft_of(vehicle: int, wanted: ParsedMission, client: GcsClient, sender: Sender) -> Draft:
+    """Return the submission of a whole upload; two of one content differ by their nonces."""
+    what = f"{sender.addressed} {wanted.plan.source}".encode()
+    marks = Marks(wanted.nonce, blake2b(what, digest_size=9).hexdigest())
+    submitter = client.submitter(sender.address)
+    return Draft(vehicle, MavCmd.MISSION_START, wanted.plan, submitter, wanted.terms, marks)
 
 
 class UploadSession:
@@ -168,8 +176,9 @@ class MissionUploads:
         is_staged = sender.addressed.component_id == AUTOPILOT
         wanted = desk.check.plan_of(upload.items, now=now)
         terms = replace(wanted.terms, is_staged=is_staged, is_cruising=is_staged)
-        nonce = 0 if is_staged else wanted.nonce
-        draft = self._draft(vehicle, wanted.plan, terms, sender, nonce=nonce)
+        wanted = wanted._replace(terms=terms, nonce=0 if is_staged else wanted.nonce)
+        client = self._client(sender)
+        draft = draft_of(vehicle.system_id, wanted, client, sender)
         # ``begun_at``: a long plan may come again later than submissions are remembered
         known = None
         if not is_staged:
@@ -188,7 +197,6 @@ class MissionUploads:
         if not is_staged and upload.begun_at < halts.at:
             raise Rejection(R.STALE, f"{halts.words} came during the upload: upload it again")
         before = self._plans.stored(vehicle.system_id, MISSION)
-        client = self._client(sender)
         if is_staged:
             self._check_replaced(client, vehicle, draft.submitter)
         task = self._submissions.submit_plan(client.rights, vehicle, draft, now=now)
@@ -277,14 +285,3 @@ class MissionUploads:
         client = self._answers.client(sender)
         assert client is not None, "it has just spoken"
         return client
-
-    def _draft(
-        self, vehicle: Vehicle, plan: Plan, terms: Terms, sender: Sender, *, nonce: int = 0
-    ) -> Draft:
-        client = self._client(sender)
-        what = f"{sender.addressed} {plan.source}".encode()
-        marks = Marks(nonce, blake2b(what, digest_size=9).hexdigest(), "")
-        submitter = client.submitter(sender.address)
-        return Draft(
-            vehicle.system_id, MavCmd.MISSION_START, plan, submitter, terms=terms, marks=marks
-        )

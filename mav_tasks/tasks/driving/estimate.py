@@ -1,7 +1,7 @@
-"""Rough durations of tasks, for people who wait; no decision depends on them.
+"""Rough durations of tasks, for people who wait; and their ways, which limits of clients bound.
 
 A goal is followed leg by leg from where the vehicle is. The estimate ignores other traffic,
-corrections near the end, pauses, and a car's bends.
+corrections near the end, pauses, and a car's bends, but for those of the run that it drives.
 """
 
 from math import cos, nan, sin, sqrt
@@ -26,6 +26,7 @@ from mav_tasks.tasks.goal import (
     Rotate,
     SetSpeed,
     SingleGoal,
+    Wait,
 )
 from mav_tasks.tasks.task import Pose, Progress
 
@@ -44,13 +45,14 @@ class Known(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Seconds that a goal takes (NaN: not known), and where the vehicle is then."""
+    """Seconds that a goal takes, where the vehicle is then, and its way there; NaN: not known."""
 
     seconds: float
     pose: Pose | None
+    metres: float = 0.0
 
 
-UNKNOWN = Estimate(nan, None)
+UNKNOWN = Estimate(nan, None, nan)
 
 
 def time_left(goal: Goal, progress: Progress, known: Known) -> Estimate:
@@ -63,17 +65,18 @@ def time_left(goal: Goal, progress: Progress, known: Known) -> Estimate:
 def _time_of_plan(plan: Plan, progress: Progress, known: Known) -> Estimate:
     progress = progress if progress.step >= 0 else started(plan, progress)
     speed = progress.speed or known.driving.speed
-    seconds, pose = 0.0, known.pose
+    seconds, pose, metres = 0.0, known.pose, 0.0
     for _ in range(MOST_STEPS):
         for step in progress.pending:
             present = plan.steps[step]
             if isinstance(present, SetSpeed):
                 speed = present.speed or known.driving.speed
         if is_over(plan, progress):
-            return Estimate(seconds, pose)
+            return Estimate(seconds, pose, metres)
         goal = present_goal(plan, progress)
-        took, pose = _time_of_goal(goal, progress, known._replace(pose=pose), speed)
+        took, pose, way = _time_of_goal(goal, progress, known._replace(pose=pose), speed)
         seconds += took
+        metres += way
         after = following(plan, progress)
         if after is None or took != took:  # from an unknown place the rest is unknown, too
             break
@@ -90,7 +93,7 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
         return UNKNOWN
     if pose is None and progress.anchor is None and isinstance(goal, GoTo | Face):
         return UNKNOWN
-    at, seconds = pose or SOMEWHERE, SETTLING
+    at, seconds, metres = pose or SOMEWHERE, SETTLING, 0.0
     for number in range(progress.leg, leg_count(goal)):
         is_present = number == progress.leg and progress.anchor is not None
         if is_present:
@@ -99,9 +102,11 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
         else:
             anchor, done = anchor_of(goal, number, at, target), 0.0
             leg = leg_of(goal, Progress(anchor=anchor, leg=number, target=target))
-        seconds += _seconds(leg, max(0.0, length_of(leg) - done), known.driving, speed)
+        left = max(0.0, length_of(leg) - done)
+        seconds += _seconds(leg, left, known.driving, speed)
+        metres += _way(leg, left)
         at = _end_of(leg, anchor, target if number == WAY else None)
-    return Estimate(seconds, None if pose is None and progress.anchor is None else at)
+    return Estimate(seconds, None if pose is None and progress.anchor is None else at, metres)
 
 
 def _end_of(leg: Leg, anchor: Pose, place: LocalPlace | None) -> Pose:
@@ -126,6 +131,17 @@ def _end_of(leg: Leg, anchor: Pose, place: LocalPlace | None) -> Pose:
             return Pose(north + chord * cos(middle), east + chord * sin(middle), wrap(end))
         case _:
             return anchor
+
+
+def _way(leg: Leg, left: float) -> float:
+    """Return the metres of what is left of a leg."""
+    match leg:
+        case Move() | Follow():
+            return left
+        case Drive(forward=forward) | Head(forward=forward):
+            return abs(forward) * left
+        case Rotate() | Wait():
+            return 0.0
 
 
 def _seconds(leg: Leg, left: float, driving: Driving, speed: float) -> float:

@@ -20,6 +20,7 @@ from mav_tasks.tasks.goal import (
     SetSpeed,
     SingleGoal,
     Wait,
+    steps_of,
 )
 from mav_tasks.tasks.task import Progress, Task
 
@@ -30,8 +31,8 @@ END = Wait(0.0)  # past the last step: pending steps are still done
 
 def has_local_place(goal: Goal) -> bool:
     """Return whether a goal has a place in local coordinates, which no other frame shares."""
-    steps = goal.steps if isinstance(goal, Plan) else (goal,)
-    return any(isinstance(step, GoTo) and isinstance(step.place, LocalPlace) for step in steps)
+    places = (step.place for step in steps_of(goal) if isinstance(step, GoTo))
+    return any(isinstance(place, LocalPlace) for place in places)
 
 
 def present_goal(goal: Goal, progress: Progress) -> SingleGoal:

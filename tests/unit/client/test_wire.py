@@ -44,7 +44,10 @@ speeds = st.none() | st.floats(0.02, 1.9)
 rates = st.none() | st.floats(0.01, 1.5)
 moves = st.builds(Move, distances, speeds)
 rotations = st.builds(Rotate, st.floats(0.01, 60.0) | st.floats(-60.0, -0.01), rates)
-drives = st.builds(Drive, st.floats(0.1, 1.9), st.floats(-1.5, 1.5), st.floats(0.1, 3_000.0))
+turns = st.just(0.0) | st.floats(0.001, 1.5) | st.floats(-1.5, -0.001)
+drives = st.builds(Drive, st.floats(0.1, 1.9), turns, st.floats(0.1, 3_000.0))
+#: 0, or so long that a float32 is not 0
+seconds = st.just(0.0) | st.floats(0.001, 1e4)
 places = st.builds(LocalPlace, st.floats(-5e3, 5e3), st.floats(-5e3, 5e3)) | st.builds(
     GlobalPlace,
     st.integers(1, 900_000_000) | st.integers(-900_000_000, -1),
@@ -77,7 +80,7 @@ def close(one: Goal, other: object) -> bool:
 
 
 @FEW
-@given(moves | rotations | drives, st.integers(0, 10), st.integers(0, 2**24 - 1), st.floats(0, 1e6))
+@given(moves | rotations | drives, st.integers(0, 10), st.integers(0, 2**24 - 1), seconds)
 def test_a_goal_of_our_own_arrives_with_its_terms(
     goal: Move | Rotate | Drive, priority: int, after: int, delay: float
 ) -> None:
@@ -108,7 +111,7 @@ def test_a_goal_arrives_as_a_step_of_a_plan(goal: Goal) -> None:
 
 
 @FEW
-@given(places, st.none() | st.floats(0.02, 900.0), st.none() | headings, st.floats(0.0, 1e4))
+@given(places, st.none() | st.floats(0.02, 900.0), st.none() | headings, seconds)
 def test_a_place_is_driven_to_and_stopped_at(
     place: LocalPlace, radius: float | None, yaw: float | None, wait: float
 ) -> None:
@@ -174,6 +177,10 @@ def test_a_jump_goes_one_further_behind_a_home() -> None:
         (lambda: TaskOptions(deadline=nan), "deadline nan"),
         (lambda: wire.items_of_goals([Move(nan)]), "distance"),
         (lambda: wire.items_of_goals([Move("2")]), "distance is not a number"),  # type: ignore[arg-type]
+        (lambda: wire.items_of_goals([Move(2.0, 1e-46)]), "speed 1e-46 is too small to send"),
+        (lambda: wire.items_of_goals([GoTo(None, 1e-300)]), "speed 1e-300 is too small to send"),
+        (lambda: wire.items_of_goals([Wait(1e39)]), "duration 1e.39 is too large to send"),
+        (lambda: TaskOptions(deadline=1e-46), "deadline 1e-46 is too small to send"),
         (lambda: wire.items_of_goals(["move"]), "'move': expected a goal"),  # type: ignore[list-item]
         (lambda: wire.items_of_goals([Drive(1.0, inf, 1.0)]), "yaw_rate"),
         (lambda: wire.items_of_goals([Wait(inf)]), "duration"),

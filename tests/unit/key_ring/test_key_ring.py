@@ -16,6 +16,7 @@ from mav_tasks.key_ring.ring import MOST_KEYS, Entry, KeyRing, key_of
 from mav_tasks.key_ring.ring_file import change, load, path_of_ring
 from mav_tasks.key_ring.toml_form import ring_of, text_of
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.settings import Limits
 
 AT = datetime(2026, 11, 21, 14, 30, tzinfo=UTC)
 SECRET = bytes(range(32))
@@ -87,6 +88,35 @@ def test_a_ring_is_read_as_it_was_written() -> None:
         ("rover-1", "", True),  # no client has rights by it
         ("old", "safety", False),
     ]
+
+
+def test_limits_of_a_key_are_kept_and_told_to_the_engine() -> None:
+    limits = Limits(("move", "wait"), max_priority=3, max_speed=0.5, max_distance=20.0, quota=2)
+    limited = Entry("agent", "submitter", key_of("agent", "submitter", SECRET), limits=limits)
+    ring = KeyRing().with_added(limited)
+    assert 'tasks = ["move", "wait"]\nmax_priority = 3\nmax_speed = 0.5\n' in text_of(ring)
+    again = ring_of(text_of(ring), name="k")
+    assert (again, again.keys[0].limits) == (ring, limits)
+    assert ring_of(text_of(again.with_revoked("agent", at=AT)), name="k").keys[0].limits == limits
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("max_speed = 0", "key anna: max_speed: not in 0.05..100 m/s"),
+        ('tasks = ["fly"]', "key anna: tasks: 'fly': expected a list of move, rotate, drive"),
+        ("quota = 1.5", "key anna: quota: not a whole number"),
+        ("max_sped = 1", "key anna: only role, secret"),
+    ],
+)
+def test_a_wrong_limit_is_refused_by_its_name(line: str, fault: str) -> None:
+    (words,) = faults_of(f"{ENTRY}{line}\n")
+    assert fault in words
+
+
+def test_the_key_of_a_rover_has_no_limits() -> None:
+    (words,) = faults_of(ENTRY.replace("operator", "vehicle") + "quota = 1\n")
+    assert words.endswith("key anna: the key of a rover has no limits")
 
 
 def test_the_secret_of_a_revoked_key_is_good_for_replays_alone() -> None:

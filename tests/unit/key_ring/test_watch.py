@@ -12,6 +12,7 @@ from mav_tasks.key_ring.ring import Entry, key_of
 from mav_tasks.key_ring.ring_file import change, load
 from mav_tasks.key_ring.watch import RingWatch, changes
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.settings import Limits
 
 AT = datetime(2026, 11, 21, 14, 30, tzinfo=UTC)
 WITHIN = 5.0  # s; it takes a tenth
@@ -153,12 +154,12 @@ def test_changes_are_told_by_the_names_of_keys() -> None:
     new = (
         Key("a", b"a" * 32, role="observer"),
         Key("b", b"B" * 32),
-        Key("d", b"d" * 32, role="operator"),
+        Key("d", b"d" * 32, role="operator", limits=Limits(max_speed=0.5, quota=2)),
     )
     assert list(changes(old, new)) == [
         "key a has role observer now",
         "key b has a new secret, role vehicle",
         "key c was removed",
-        "key d was added, role operator",
+        "key d was added, role operator (max_speed 0.5 m/s, quota 2)",
     ]
     assert list(changes(old, old)) == []

@@ -11,11 +11,13 @@ from mav_tasks.tasks.goal import (
     Drive,
     Face,
     GlobalPlace,
+    Goal,
     GoTo,
     Head,
     Jump,
     LocalPlace,
     Move,
+    MoveTurned,
     Plan,
     Rotate,
     SetSpeed,
@@ -55,7 +57,7 @@ class TestTimeLeft:
         assert isnan(time_left(goal, Progress(), NOWHERE).seconds)
 
     def test_a_way_is_the_turn_and_the_distance_and_ends_there(self) -> None:
-        seconds, pose = time_left(GoTo(EAST_3, wait=4.0), Progress(), HERE)
+        seconds, pose, _ = time_left(GoTo(EAST_3, wait=4.0), Progress(), HERE)
         assert seconds == pytest.approx(SETTLING + QUARTER + THREE_METRES + 4.0)
         assert pose == pytest.approx(Pose(0.0, 3.0, pi / 2))
 
@@ -91,9 +93,39 @@ class TestTimeLeft:
         assert end is not None
         assert (end.north, end.east, end.yaw) == pytest.approx((pose.north, pose.east, pose.yaw))
 
+    @pytest.mark.parametrize(
+        ("goal", "metres"),
+        [
+            (Move(-3.0), 3.0),
+            (MoveTurned(2.0), 2.0),
+            (Drive(-0.5, 0.1, 4.0), 2.0),
+            (Head(1.0, 0.5, 4.0), 2.0),
+            (GoTo(LocalPlace(3.0, 4.0), yaw=1.0, wait=2.0), 5.0),
+            (Plan((Rotate(1.0), Wait(5.0), Face(1.0))), 0.0),
+            (Plan((GoTo(EAST_3), Move(1.0), GoTo(LocalPlace(0.0, 0.0)))), 8.0),
+            (Plan((Move(1.0), Jump(0, 2))), 3.0),
+            (Plan((Jump(2, -1), Move(100.0), Move(1.0), Jump(4, 1)), first=2), 1.0),
+        ],
+    )
+    def test_the_way_is_that_of_the_whole_task(self, goal: Goal, metres: float) -> None:
+        assert time_left(goal, Progress(), HERE).metres == pytest.approx(metres)
+
+    @pytest.mark.parametrize(
+        ("goal", "known"),
+        [
+            (GoTo(None), HERE),
+            (GoTo(EAST_3), NOWHERE),
+            (GoTo(GlobalPlace(1, 1)), HERE),
+            (Plan((Move(1.0), GoTo(EAST_3))), NOWHERE),
+            (Plan((Move(0.1), Jump(0, -1))), HERE),
+        ],
+    )
+    def test_a_way_that_nobody_can_know_is_unknown(self, goal: Goal, known: Known) -> None:
+        assert isnan(time_left(goal, Progress(), known).metres)
+
     def test_a_plan_is_its_steps_at_the_speeds_that_it_sets(self) -> None:
         steps = (Wait(5.0), SetSpeed(0.5), Move(5.0), GoTo(LocalPlace(5.0, 0.0)))
-        seconds, pose = time_left(Plan(steps), Progress(), HERE)
+        seconds, pose, _ = time_left(Plan(steps), Progress(), HERE)
         assert seconds == pytest.approx(3 * SETTLING + 5.0 + 11.0)  # already there in the end
         assert pose == pytest.approx(Pose(5.0, 0.0, 0.0))
 

@@ -1,0 +1,460 @@
+"""What the holder of a key may do, within its own limits: decided by the server, by the content."""
+
+from collections.abc import Callable
+from math import hypot
+from pathlib import Path
+
+import pytest
+
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
+from mav_tasks.in_memory import CLIENT_LINK
+from mav_tasks.mavlink.signing import Key
+from mav_tasks.recording.reading import read
+from mav_tasks.recording.replay import Replay
+from mav_tasks.settings import Limits
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from rover_sim.geo import DEFAULT_ORIGIN
+from tests.kit.client import (
+    ACCEPTED,
+    DENIED,
+    DRIVE,
+    GUIDED,
+    MANUAL,
+    RTL,
+    FakeClient,
+    Sent,
+    setpoint,
+    sticks,
+)
+from tests.kit.mission import Item, Upload
+from tests.kit.store import PromptSqliteStore
+from tests.kit.world import World, at
+from tests.scenarios.conftest import MakeWorld
+
+UTC = 1.8e9  # s, when the worlds begin
+WAYPOINT, JUMP, OPTIONS, MOVE, SPEED, RETURN = 16, 177, 54014, 54000, 178, 20
+REPOSITION, MISSION_START, SET_CURRENT, RELAY, MODIFY, CANCEL = 192, 300, 224, 181, 54012, 54010
+SERVO = 183
+LOCAL_POSITION = 32
+PRIORITY = 1  # TASK_MODIFY, param2
+BOSS = Key("boss", bytes(range(32)), "operator")
+SECRET = bytes(range(1, 33))
+NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
+QUEUED = (S.QUEUED, R.NONE)
+MISSION_ACCEPTED, MISSION_DENIED = 0, 14
+ANY = (250, 191)
+
+
+def agents(limits: Limits | None = None, *, role: str = "submitter", secret: bytes = SECRET) -> Key:
+    return Key("agent", secret, role, limits=limits)
+
+
+def put(world: World, *keys: Key) -> None:
+    """Give a server its keys, as the watch of the key ring does."""
+    world.server.pump.handle(KeysChanged(keys), now=world.now)
+    world.server.pump.turn(now=world.now)
+
+
+def opened(world: World, *keys: Key) -> World:
+    server, now = world.server, world.now
+    server.pump.handle(WallClock(UTC), now=now)
+    for up in (False, True):
+        change = LinkChanged(CLIENT_LINK, LinkSide.CLIENTS, up=up, takes_unsigned=True)
+        server.pump.handle(change, now=now)
+    put(world, *keys)
+    return world
+
+
+def signing(world: World, key: Key, *, name: str = "agent", system_id: int = 77) -> FakeClient:
+    client = world.add_client(name, system_id=system_id)
+    client.sign(key.secret, utc=UTC + world.now)
+    world.run(1.2)
+    return client
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Where a store is."""
+    return tmp_path / "tasks.db"
+
+
+@pytest.fixture
+def limited(world: World) -> Callable[..., FakeClient]:
+    """Return a factory of a client whose key has these limits; BOSS is an operator's key."""
+
+    def make(role: str = "submitter", **limits: object) -> FakeClient:
+        key = agents(Limits(**limits), role=role)  # type: ignore[arg-type]
+        return signing(opened(world, BOSS, key), key)
+
+    return make
+
+
+def answer(world: World, sent: Sent) -> tuple[int, int] | None:
+    world.run(0.3)
+    return sent.answer
+
+
+def uploaded(
+    world: World, client: FakeClient, *items: Item, target: tuple[int, int] = (1, 191)
+) -> Upload:
+    upload = Upload(client, items, target=target)
+    world.until(lambda: upload.result is not None, within=5)
+    return upload
+
+
+def places(*norths: float) -> list[Item]:
+    found = (DEFAULT_ORIGIN.to_global(north, 0.0) for north in norths)
+    return [Item(WAYPOINT, x, y, param1=0.01, param4=0.0) for x, y in found]
+
+
+def of_ours(command: int, *params: float) -> Item:
+    p1, p2, p3, p4 = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return Item(command, 0, 0, p1, p2, p3, p4, frame=2)
+
+
+def way(world: World, tasks: int) -> tuple[float, float]:
+    """Run until the tasks are over; return the true way of the rover, and its top speed."""
+    metres, fastest, before = 0.0, 0.0, world.pose()
+    end = world.now + 120.0
+    while not world.is_idle(tasks=tasks) and world.now < end:
+        world.run(0.1)
+        here = world.pose()
+        step = hypot(here[0] - before[0], here[1] - before[1])
+        metres, fastest, before = metres + step, max(fastest, step / 0.1), here
+    return metres, fastest
+
+
+# speed
+
+
+@pytest.mark.parametrize("named", [0.0, 0.1, float("nan")])
+def test_a_default_speed_is_bounded_and_driven(
+    world: World, limited: Callable[..., FakeClient], named: float
+) -> None:
+    agent = limited(max_speed=0.1)
+    assert answer(world, agent.move(0.6, speed=named)) == (ACCEPTED, 1)
+    metres, fastest = way(world, 1)
+    assert world.state(1)[0] is S.COMPLETED
+    assert metres == pytest.approx(0.6, abs=0.05)
+    assert fastest < 0.13
+
+
+@pytest.mark.parametrize(
+    "send",
+    [
+        lambda agent: agent.move(1.0, speed=0.2),
+        lambda agent: agent.command(DRIVE, -0.2, 0, 1),
+        lambda agent: agent.command_int(REPOSITION, 0.2, 0, target=(1, 1), frame=6, **at(1, 0)),
+    ],
+)
+def test_a_higher_speed_is_refused_in_words(
+    world: World, limited: Callable[..., FakeClient], send: Callable[[FakeClient], Sent]
+) -> None:
+    agent = limited(max_speed=0.1)
+    assert answer(world, send(agent)) == NOT_ALLOWED
+    assert "key agent may drive 0.1 m/s at most, not 0.2" in agent.texts()
+    assert uploaded(world, agent, of_ours(SPEED, 1, 0.2), *places(1.0)).result == MISSION_DENIED
+    assert world.tasks() == ()
+
+
+def test_the_tighter_limit_counts_and_an_operators_key_has_limits_too(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited("operator", max_speed=0.1, max_priority=6)
+    assert answer(world, agent.move(1.0, speed=0.2)) == NOT_ALLOWED
+    assert answer(world, agent.command(SPEED, 1, 0.2)) == (DENIED, R.BAD_PARAMETER)
+    assert answer(world, agent.move(1.0, priority=7)) == NOT_ALLOWED
+    assert answer(world, agent.move(5.0, priority=6)) == (ACCEPTED, 1)
+    assert answer(world, agent.command(MODIFY, 1, PRIORITY, 7)) == NOT_ALLOWED
+
+
+# distance
+
+
+def goes(north: float) -> Callable[[World, FakeClient], object]:
+    return lambda _world, agent: agent.command_int(
+        REPOSITION, -1, 0, target=(1, 1), frame=6, **at(north, 0)
+    )
+
+
+def plan(*items: Item, target: tuple[int, int] = (1, 191)) -> Callable[[World, FakeClient], object]:
+    return lambda world, agent: uploaded(world, agent, *items, target=target)
+
+
+#: from 0, 0, heading north; within 3 m, and beyond
+WITHIN: dict[str, Callable[[World, FakeClient], object]] = {
+    "move": lambda _world, agent: agent.move(3.0),
+    "backwards": lambda _world, agent: agent.move(-3.0),
+    "drive": lambda _world, agent: agent.command(DRIVE, 0.5, 0, 6),
+    "go to": goes(3.0),
+    "plan": plan(*places(1.49, 0.0)),
+    "moves": plan(of_ours(MOVE, 1.0), of_ours(MOVE, -2.0)),
+    "jumps": plan(of_ours(MOVE, 1.0), of_ours(JUMP, 0, 2)),
+    "any rover": plan(*places(1.49, 0.0), target=ANY),
+}
+BEYOND: dict[str, Callable[[World, FakeClient], object]] = {
+    "move": lambda _world, agent: agent.move(3.1),
+    "backwards": lambda _world, agent: agent.move(-3.1),
+    "drive": lambda _world, agent: agent.command(DRIVE, -0.5, 0, 6.5),
+    "go to": goes(3.1),
+    "plan": plan(*places(1.6, 0.0)),
+    "moves": plan(of_ours(MOVE, 1.0), of_ours(MOVE, -2.1)),
+    "jumps": plan(of_ours(MOVE, 1.0), of_ours(JUMP, 0, 3)),
+    "for ever": plan(of_ours(MOVE, 0.01), of_ours(JUMP, 0, -1)),
+    "staged": plan(*places(0.0, 1.6, 0.0), target=(1, 1)),
+    "any rover": plan(*places(1.6, 0.0), target=ANY),
+    "any rover's move": lambda _world, agent: agent.move(3.1, target=ANY),
+}
+
+
+@pytest.mark.parametrize("what", WITHIN)
+def test_a_way_within_the_limit_is_driven(
+    world: World, limited: Callable[..., FakeClient], what: str
+) -> None:
+    agent = limited(max_distance=3.0)
+    WITHIN[what](world, agent)
+    world.run(0.3)
+    metres, _ = way(world, 1)
+    assert world.state(1)[0] is S.COMPLETED
+    assert metres == pytest.approx(3.0, abs=0.2)
+
+
+@pytest.mark.parametrize("what", BEYOND)
+def test_a_longer_way_is_refused_in_words(
+    world: World, limited: Callable[..., FakeClient], what: str
+) -> None:
+    agent = limited(max_distance=3.0)
+    sent = BEYOND[what](world, agent)
+    world.run(0.3)
+    if isinstance(sent, Sent):
+        assert sent.answer == NOT_ALLOWED
+    assert any("key agent may drive 3 m at most in a task" in text for text in agent.texts())
+    world.run(5.0)
+    assert world.tasks() == ()
+    assert world.pose() == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
+
+
+def test_a_return_is_as_long_as_the_way_home(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
+    boss.move(4.0)
+    world.run(0.3)
+    way(world, 1)
+    assert answer(world, agent.mode(RTL)) == NOT_ALLOWED
+    assert answer(world, agent.command(RETURN, target=(1, 1))) == NOT_ALLOWED
+    boss.move(-2.0)
+    world.run(0.3)
+    way(world, 2)
+    assert answer(world, agent.command(RETURN, target=(1, 1))) == (ACCEPTED, 3)
+
+
+def test_a_way_begins_where_the_tasks_before_it_end(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
+    assert answer(world, boss.move(6.0)) == (ACCEPTED, 1)
+    goes(1.0)(world, agent)
+    world.run(0.3)
+    assert len(world.tasks()) == 1  # 5 m back, by its turn
+    goes(8.0)(world, agent)
+    world.run(0.3)
+    way(world, 2)
+    assert world.state(2)[0] is S.COMPLETED
+    assert world.pose()[0] == pytest.approx(8.0, abs=0.1)
+
+
+def test_a_task_that_would_begin_too_far_away_fails_where_the_rover_stands(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
+    upload = uploaded(world, agent, *places(2.0), of_ours(OPTIONS, 5, 20))
+    assert (upload.result, world.state(1)[0]) == (MISSION_ACCEPTED, S.SCHEDULED)
+    boss.move(-4.0)
+    world.run(15.0)
+    assert world.stands()
+    world.until_state(1, S.FAILED, within=20)
+    assert world.state(1) == (S.FAILED, R.NOT_ALLOWED)
+    assert any("task 1 may drive 3 m: its way is 6.0 m" in t for t in agent.texts())
+    assert world.pose()[0] == pytest.approx(-4.0, abs=0.1)
+
+
+def test_a_plan_that_is_begun_again_and_again_ends_at_the_limit(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited(max_distance=4.0)
+    assert uploaded(world, agent, *places(0.0, 1.0, 2.0), target=(1, 1)).result == MISSION_ACCEPTED
+    assert answer(world, agent.command(MISSION_START, target=(1, 1))) == (ACCEPTED, 1)
+    metres, before = 0.0, world.pose()
+    for tick in range(600):
+        world.run(0.1)
+        metres, before = metres + abs(world.pose()[0] - before[0]), world.pose()
+        if tick % 40 == 39 and world.state(1)[0] is S.EXECUTING:
+            agent.command(SET_CURRENT, 1 if before[0] > 1.2 else 2, target=(1, 1))
+    assert world.state(1) == (S.FAILED, R.NOT_ALLOWED)
+    assert metres <= 1.05 * 4.0 + 0.4
+
+
+def kept(path: Path) -> PromptSqliteStore:
+    return PromptSqliteStore(path, wall_offset=UTC)
+
+
+def restarted(world: World, path: Path, *keys: Key) -> None:
+    """Kill the server, and start another one on its store."""
+    world.end_server()
+    PromptSqliteStore.opened[-1].close()
+    later = kept(path)
+    world.start_server(later, later.load())
+    opened(world, *keys)
+
+
+def test_what_nobody_can_tell_is_refused(make_world: MakeWorld, path: Path) -> None:
+    world, key = make_world(store=kept(path)), agents(Limits(max_distance=3.0))
+    world.fault(Faults(withheld=frozenset({LOCAL_POSITION})))
+    world.run(1)
+    restarted(world, path, BOSS, key)
+    agent = signing(world, key)
+    sent = agent.command_int(REPOSITION, -1, 0, target=(1, 1), frame=6, **at(1.0, 0))
+    assert answer(world, sent) == NOT_ALLOWED
+    assert any("not unknown (position" in t for t in agent.texts())
+
+
+@pytest.mark.parametrize(
+    "send",
+    [
+        lambda agent: agent.arm(),
+        lambda agent: agent.mode(GUIDED),
+        lambda agent: agent.mode(MANUAL),
+        lambda agent: agent.command(SERVO, 1, 1500, target=(1, 1)),
+        lambda agent: agent.command(SPEED, 1, 2.0, target=(1, 100)),
+    ],
+)
+@pytest.mark.parametrize("limits", [{"max_speed": 0.5}, {"max_distance": 3.0}])
+def test_a_bounded_key_drives_by_tasks_alone(
+    world: World,
+    limited: Callable[..., FakeClient],
+    send: Callable[[FakeClient], Sent],
+    limits: dict[str, float],
+) -> None:
+    agent = limited("safety", **limits)
+    assert answer(world, send(agent)) == NOT_ALLOWED
+    assert any("its limits of speed or way allow only tasks" in t for t in agent.texts())
+    assert uploaded(world, agent, *places(1.0), of_ours(RELAY, 0, 1)).result == MISSION_DENIED
+    agent.stream(setpoint(1.0), rate=20)
+    agent.stream(sticks(x=900), rate=20)
+    boss = signing(world, BOSS, name="boss")
+    boss.mode(GUIDED)
+    boss.arm()
+    world.run(5.0)
+    assert world.pose() == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
+    assert answer(world, agent.stop()) == (ACCEPTED, 0)
+    assert answer(world, agent.proceed()) == (ACCEPTED, 0)
+
+
+def test_a_key_that_is_bounded_otherwise_drives_itself(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited("operator", quota=2)
+    assert answer(world, agent.mode(GUIDED)) == (ACCEPTED, 0)
+
+
+# number, kind, commands to the rover
+
+
+def test_number_and_kinds_are_the_keys_own(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited(quota=2, tasks=("move", "plan"))
+    boss = signing(world, BOSS, name="boss")
+    assert answer(world, boss.move(20.0)) == (ACCEPTED, 1)
+    assert answer(world, agent.rotate(90.0)) == NOT_ALLOWED
+    assert "key agent may not submit a rotate, only move, plan" in agent.texts()
+    assert uploaded(world, agent, *places(1.0, 2.0)).result == MISSION_DENIED  # places to go to
+    for _ in range(2):
+        assert answer(world, agent.move(1.0, nonce=len(world.tasks()))) is not None
+    other = signing(world, agents(), name="another socket")
+    sent = other.move(1.0, nonce=77)
+    assert answer(world, sent) is not None
+    assert sent.answer[1] == R.QUOTA  # type: ignore[index]
+    assert len(world.tasks()) == 3
+
+
+def test_commands_to_the_rover_are_an_operators(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited()
+    relay = of_ours(RELAY, 0, 1)
+    assert uploaded(world, agent, *places(1.0), relay).result == MISSION_DENIED
+    assert world.tasks() == ()
+
+
+# changes, owners, nonces
+
+
+def test_a_change_of_limits_is_in_force_at_once(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited(max_speed=0.2)
+    assert answer(world, agent.move(1.0, speed=0.5)) == NOT_ALLOWED
+    put(world, BOSS, agents(Limits(max_speed=0.6)))
+    world.run(1.2)
+    assert answer(world, agent.move(1.0, speed=0.5)) == (ACCEPTED, 1)
+    put(world, BOSS, agents(Limits(quota=0)))
+    world.run(1.2)
+    sent = agent.move(1.0)
+    assert answer(world, sent) is not None
+    assert sent.answer[1] == R.QUOTA  # type: ignore[index]
+
+
+def test_a_name_that_is_given_again_does_not_own_the_tasks_of_the_old_key(
+    make_world: MakeWorld, path: Path
+) -> None:
+    world, key, again = make_world(store=kept(path)), agents(), agents(secret=bytes(range(2, 34)))
+    old, boss = signing(opened(world, BOSS, key), key), signing(world, BOSS, name="boss")
+    assert answer(world, boss.move(20.0)) == (ACCEPTED, 1)
+    assert answer(world, old.move(1.0)) == (ACCEPTED, 2)
+    assert answer(world, old.move(1.0, nonce=7)) == (ACCEPTED, 3)
+    put(world, BOSS, again)
+    new = signing(world, again, name="new")
+    assert answer(world, new.command(CANCEL, 2)) == NOT_ALLOWED
+    assert any("task 2 belongs to" in text for text in new.texts())
+    assert answer(world, new.move(1.0, nonce=7)) == (ACCEPTED, 4)
+    restarted(world, path, BOSS, again, Key("first", SECRET, "submitter"))
+    new, first = signing(world, again, name="newer"), signing(world, key, name="first")
+    assert answer(world, new.command(CANCEL, 2)) == NOT_ALLOWED
+    assert answer(world, first.move(1.0, nonce=7)) == (ACCEPTED, 3)
+    assert answer(world, first.command(CANCEL, 2)) == (ACCEPTED, 2)
+
+
+def test_a_record_keeps_the_limits_of_keys(make_world: MakeWorld, tmp_path: Path) -> None:
+    world, key = make_world(records=tmp_path), agents(Limits(("move",), max_speed=0.1, quota=1))
+    agent = signing(opened(world, BOSS, key), key)
+    assert answer(world, agent.move(0.3)) == (ACCEPTED, 1)
+    assert answer(world, agent.move(0.3, speed=0.5)) == NOT_ALLOWED
+    way(world, 1)
+    (record,) = map(read, world.end_records())
+    replay = Replay(record, secrets={each.fingerprint: each.secret for each in (BOSS, key)})
+    assert len(list(replay.events())) > 5
+    assert replay.difference is None
+
+
+def test_a_key_owns_its_tasks_from_any_endpoint(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited()
+    boss = signing(world, BOSS, name="boss")
+    assert answer(world, boss.move(20.0)) == (ACCEPTED, 1)
+    assert answer(world, agent.move(1.0)) == (ACCEPTED, 2)
+    elsewhere = signing(world, agents(), name="elsewhere", system_id=99)
+    assert answer(world, elsewhere.command(CANCEL, 2)) == (ACCEPTED, 2)
+
+
+def test_a_nonce_belongs_to_its_key(world: World, limited: Callable[..., FakeClient]) -> None:
+    agent = limited(max_speed=0.1, max_distance=1.0)
+    boss = signing(world, BOSS, name="boss", system_id=77)  # the same address
+    assert answer(world, boss.move(12.0, speed=1.6, nonce=4711)) == (ACCEPTED, 1)
+    assert answer(world, agent.move(12.0, speed=1.6, nonce=4711)) == NOT_ALLOWED
+    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)
+    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)
