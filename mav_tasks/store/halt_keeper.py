@@ -1,7 +1,8 @@
 """The thread that writes halts to the halt record, independently of the database.
 
-If the record fails, the database may still store the halt. A halt that neither has stored within
-GRACE seconds is reported, again every REPORT seconds, and retried until it is stored.
+``HaltsKept`` tells what the record has: then a halt may be acknowledged. If the record fails, the
+database may still store the halt. A halt that neither has stored within GRACE seconds is reported,
+again every REPORT seconds, and retried until it is stored.
 """
 
 import time
@@ -10,7 +11,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 
 from mav_tasks.mailbox import Mailbox
-from mav_tasks.store.base import HaltNotKept, Outcome
+from mav_tasks.store.base import HaltNotKept, HaltsKept, Outcome
 from mav_tasks.store.failures import words_for
 from mav_tasks.store.halt_record import HaltRecord, Word
 from mav_tasks.tasks.events import QueuePaused
@@ -36,6 +37,7 @@ class HaltKeeper:
         self._mail = mail
         self._name = name
         self._kept_through = kept_through
+        self._base = kept_through()  # reported numbers are relative to this
         self._waiting: SimpleQueue[Sequence[Word] | None] = SimpleQueue()
         self._unkept: dict[int, Word] = {}  # by register
         self._report_at: dict[int, float] = {}  # by register
@@ -69,8 +71,8 @@ class HaltKeeper:
         try:
             while not self._is_closing:
                 self._collect()
-                for word in tuple(self._unkept.values()):
-                    self._keep(word)
+                if self._unkept:
+                    self._keep(tuple(self._unkept.values()))
         except Exception as mistake:  # noqa: BLE001 - a bug of ours: raised in the loop
             self._mail.put_mistake(mistake)
 
@@ -85,15 +87,20 @@ class HaltKeeper:
         except Empty:
             pass
 
-    def _keep(self, word: Word) -> None:
+    def _keep(self, words: Sequence[Word]) -> None:
+        """Write words in one go; those that the database has kept meanwhile need no record."""
+        left: list[Word] = []
         try:
-            self._record.write(word)
+            self._record.write(*words)
         except OSError as error:
-            if word.number > self._kept_through():
+            through = self._kept_through()
+            left = [word for word in words if word.number > through]
+            for word in left:
                 self._report(word, words_for(error))
-                return
-        del self._unkept[word.key]
-        self._report_at.pop(word.key, None)
+        else:
+            self._mail.put(HaltsKept(max(word.number for word in words) - self._base))
+        self._unkept = {word.key: word for word in left}
+        self._report_at = {key: at for key, at in self._report_at.items() if key in self._unkept}
 
     def _report(self, word: Word, why: str) -> None:
         now = time.monotonic()

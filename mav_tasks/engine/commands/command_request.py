@@ -7,6 +7,7 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.goals import CHANGE_MODE, marks_of, reposition_flags
 from mav_tasks.engine.commands.words import kind_of, row_said
+from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -92,9 +93,10 @@ class CommandRequest:
         )
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
-        """Send the COMMAND_ACK."""
+        """Send the COMMAND_ACK; that of a halt is sent by ``HaltAnswers`` once the halt is kept."""
         self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
-        self.client.answer(self.pending.answer, self.packet.source)
+        if self.kind is not Kind.HALT:
+            self.client.answer(self.pending.answer, self.packet.source)
 
     def refuse(
         self, refusal: Rejection, *, now: float, result: MavResult | None = None

@@ -20,6 +20,7 @@ from mav_tasks.engine.commands.goals import (
     has_place,
     whole,
 )
+from mav_tasks.engine.commands.halt_answers import HaltAnswers
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
 from mav_tasks.engine.commands.relays import check_relay, relay
@@ -36,7 +37,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Answer, Command
+from mav_tasks.services.command_receiver import Answer, Command, Pending
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
@@ -73,6 +74,7 @@ class Commands:
     _control: TaskControl
     _displays: MessageRequests
     _any: AnyRover
+    _halts: HaltAnswers
 
     def __post_init__(self) -> None:
         self._submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
@@ -95,7 +97,7 @@ class Commands:
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
             if known.answer is not None:
-                client.answer(known.answer, packet.source)
+                self._halts.repeat(client, packet, known.answer)
             return
         asked = CommandRequest(
             client, vehicle, packet, receiver.remember(command, packet.raw, now=now)
@@ -111,6 +113,8 @@ class Commands:
             else:
                 self._submissions.refuse(asked, refusal, now=now)
         note_halt(asked, before=epoch)
+        if asked.kind is Kind.HALT and asked.pending.answer is not None:  # else the rover answers
+            self._halts.hold(client, packet, asked.pending, now=now)
 
     def _of_unheard(
         self, client: GcsClient, packet: Packet, command: Command, *, now: float
@@ -284,7 +288,7 @@ class Commands:
     # STOP, pause, modes
 
     def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
-        """Stop one vehicle or all, whatever the target component; execute and answer every copy.
+        """Stop one vehicle or all, whatever the target component; execute every copy.
 
         DEVIATION: for target_system 0, or the server's own, there is one ack, not one from each
         system: the worst result, from the task server of the lowest system id.
@@ -320,7 +324,9 @@ class Commands:
         if is_to_clear and not clear and client.may_be_refused(now=now):
             words = f"stopped, but role {client.rights.role} may not clear a queue; {OPERATOR} may"
             client.tell(words, MavSeverity.WARNING, source, now=now)
-        client.answer(Answer(command.command, result, param2, source), packet.source)
+        pending = Pending(command, now)
+        pending.answer = Answer(command.command, result, param2, source)
+        self._halts.hold(client, packet, pending, now=now)
 
     def _pause_continue(self, asked: CommandRequest, *, now: float) -> int | None:
         vehicle = asked.vehicle

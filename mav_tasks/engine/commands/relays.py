@@ -6,9 +6,10 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
+from mav_tasks.engine.commands.halt_answers import HaltAnswers
 from mav_tasks.engine.commands.motion_gate import why_not_sent
 from mav_tasks.engine.inputs import Peer
-from mav_tasks.engine.policy import Row
+from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -23,11 +24,15 @@ R = TaskReason
 
 
 class _Asker(NamedTuple):
-    """The sender of a forwarded command: endpoint, address there, and the component addressed."""
+    """The sender of a forwarded command: endpoint, address there, and the component addressed.
+
+    ``halt``: the command, if it halts the rover.
+    """
 
     client: tuple[str, Peer]
     source: Address
     answering: Address
+    halt: CommandRequest | None
 
 
 def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
@@ -54,7 +59,8 @@ def relay(asked: CommandRequest, *, now: float) -> None:
     """Forward a command; ``deliver`` brings its answer to the client."""
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
-    asker = _Asker(asked.client.key, asked.packet.source, answering)
+    halt = asked if asked.kind is Kind.HALT else None
+    asker = _Asker(asked.client.key, asked.packet.source, answering, halt)
     asked.vehicle.relay(
         asked.packet,
         command.message,
@@ -72,7 +78,9 @@ def _disarms(request: Message) -> bool:
     return (request.command, request.param1) == (MavCmd.COMPONENT_ARM_DISARM, 0.0)
 
 
-def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
+def deliver(
+    gcs: GcsSide, halts: HaltAnswers, vehicle: Vehicle, answered: Answered, *, now: float
+) -> None:
     """Answer the client with the vehicle's answer, or with a refusal if there is none."""
     asker = answered.origin
     assert isinstance(asker, _Asker), "only relay gives commands an origin"
@@ -104,4 +112,8 @@ def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -
         answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
         words = f"command {command}: no answer from rover {vehicle.system_id}"
         client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
-    client.answer(answer, asker.source)
+    if asker.halt is None:
+        client.answer(answer, asker.source)
+    else:
+        asker.halt.pending.answer = answer
+        halts.hold(client, asker.halt.packet, asker.halt.pending, now=now)
