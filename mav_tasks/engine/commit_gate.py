@@ -1,11 +1,10 @@
 """Holds values back until all events recorded so far are durable, each with a time limit.
 
-A value of ``hold_halt`` waits for the halts alone, which the store may keep before other events.
+The answer to a command that halts a vehicle may leave earlier: once the store has kept the halts.
 ``knows`` registers, once for each type, how such a value is carried out and how it is given up.
 Values that wait for the same leave in the order in which they came.
 """
 
-from collections import deque
 from math import inf
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -23,26 +22,26 @@ class Step(Protocol[Kind_contra]):
 
 
 class _Held(NamedTuple):
-    """A value, the number of the event that must be kept, and when the value is given up."""
+    """A value, the event that must be durable, until when, and the halt that is enough."""
 
     number: int
     until: float
+    halt: float
     what: Any
-    is_halt: bool
 
 
 class CommitGate:
-    """A queue of values, in the order in which they came."""
+    """The values that wait, in the order in which they came."""
 
     def __init__(self, registry: TaskRegistry, timers: Timers, *, within: float) -> None:
         """``within``: seconds that each value waits at most."""
         self._registry = registry
         self.within = within
-        self._held: deque[_Held] = deque()
+        self._held: list[_Held] = []
         self._halts = 0  # number up to which the halts are kept
         self._accept: dict[type, Step[Any]] = {}
         self._give_up: dict[type, Step[Any]] = {}
-        self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up_late)
+        self._timer = timers.timer(Turn.SUBMISSIONS, self._look)
 
     def __len__(self) -> int:
         return len(self._held)
@@ -51,47 +50,33 @@ class CommitGate:
         """Register how values of a type are carried out, and given up."""
         self._accept[kind], self._give_up[kind] = accept, give_up
 
-    def hold(self, what: object, *, now: float) -> None:
-        """Carry out a value once all events recorded so far are durable, or give it up if late."""
-        self._hold(_Held(self._registry.recorded, now + self.within, what, False), now=now)
+    def hold(self, what: object, *, now: float, halt: float = inf) -> None:
+        """Carry out a value once all events recorded so far are durable, or give it up if late.
 
-    def hold_halt(self, what: object, *, now: float) -> None:
-        """Carry out a value once a restart of the server would know all halts recorded so far."""
-        self._hold(_Held(self._registry.halted, now + self.within, what, True), now=now)
+        ``halt``: number of a halt; that this one is kept is enough.
+        """
+        self._held.append(_Held(self._registry.recorded, now + self.within, halt, what))
+        self._look(now=now)
 
     def committed(self, through: int, *, now: float) -> None:
         """Carry out all values that waited for events up to ``through``."""
-        self._let_out(through, now=now)
+        self._registry.durable = through
+        self._look(now=now)
 
     def halts_kept(self, through: int, *, now: float) -> None:
         """Carry out all values that waited for halts up to ``through``."""
         self._halts = through
-        self._let_out(self._registry.durable, now=now)
+        self._look(now=now)
 
-    def _hold(self, held: _Held, *, now: float) -> None:
-        if self._is_kept(held, self._registry.durable):
-            self._accept[type(held.what)](held.what, now=now)
-            return
-        self._held.append(held)
-        self._plan()
-
-    def _is_kept(self, held: _Held, durable: int) -> bool:
-        return held.number <= (max(durable, self._halts) if held.is_halt else durable)
-
-    def _let_out(self, durable: int, *, now: float) -> None:
-        """Carry out what waits for nothing any more, and what that holds back in turn."""
-        while kept := [held for held in self._held if self._is_kept(held, durable)]:
-            self._held = deque(held for held in self._held if not self._is_kept(held, durable))
-            for held in kept:
-                self._accept[type(held.what)](held.what, now=now)
-        self._plan()
-
-    def _give_up_late(self, *, now: float) -> None:
-        """Give up the values that have waited too long."""
-        while self._held and self._held[0].until <= now:
-            held = self._held.popleft()
-            self._give_up[type(held.what)](held.what, now=now)
-        self._plan()
-
-    def _plan(self) -> None:
-        self._timer.set(self._held[0].until if self._held else inf)
+    def _look(self, *, now: float) -> None:
+        """Carry out what need not wait any more, and give up what has waited too long."""
+        waiting, self._held = self._held, []
+        for held in waiting:
+            number, until, halt, what = held
+            if number <= self._registry.durable or halt <= self._halts:
+                self._accept[type(what)](what, now=now)
+            elif until <= now:
+                self._give_up[type(what)](what, now=now)
+            else:
+                self._held.append(held)
+        self._timer.set(min((held.until for held in self._held), default=inf))

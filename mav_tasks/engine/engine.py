@@ -28,7 +28,6 @@ from mav_tasks.engine.commands.assignments import Assignments
 from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
-from mav_tasks.engine.commands.halt_answers import HaltAnswers
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.relays import deliver
 from mav_tasks.engine.commands.submissions import Submissions
@@ -111,7 +110,6 @@ class Engine:
         self._expected: frozenset[int] = frozenset()
         submissions = Submissions(gcs, registry, deduplicator, questions, timers, settings)
         self._submissions = submissions
-        halts = self._halts = HaltAnswers(submissions.gate)
         self._parameters = ParameterServer(
             gcs, vehicles, registry, submissions, settings=configured, kept=earlier.parameters
         )
@@ -148,7 +146,7 @@ class Engine:
             elsewhere=self._elsewhere,
             broadcasts=Broadcasts(vehicles, packer),
             commands=Commands(
-                vehicles, registry, submissions, plans, modes, control, displays, self._any, halts
+                vehicles, registry, submissions, plans, modes, control, displays, self._any
             ),
             control=control,
             modes=modes,
@@ -188,7 +186,7 @@ class Engine:
                 self._reception.receive((item,), now=now)
             case inputs.Committed(through=through):
                 self._submissions.committed(through, now=now)
-                self._vehicles.commit(through, now=now)
+                self._vehicles.commit(now=now)
             case inputs.HaltsKept(through=through):
                 self._submissions.gate.halts_kept(through, now=now)
             case inputs.AtOnce(packets=several) | inputs.Backlog(packets=several):
@@ -375,7 +373,7 @@ class Engine:
         ):
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
-                deliver(self._gcs, self._halts, vehicle, answered, now=now)
+                deliver(self._gcs, self._submissions, vehicle, answered, now=now)
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)

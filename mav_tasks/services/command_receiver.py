@@ -68,14 +68,18 @@ class Answer(NamedTuple):
 
 
 class Pending:
-    """A command taken in; ``answer`` is None until it has been answered."""
+    """A command taken in; ``answer`` is None until it has been answered.
 
-    __slots__ = ("answer", "at", "command")
+    ``decided`` is the answer to a halt from when it is known on; it may wait until that is kept.
+    """
+
+    __slots__ = ("answer", "at", "command", "decided")
 
     def __init__(self, command: Command, at: float) -> None:
         self.command = command
         self.at = at
         self.answer: Answer | None = None
+        self.decided: Answer | None = None
 
 
 class CommandReceiver:
@@ -92,8 +96,13 @@ class CommandReceiver:
         return None
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
+        """Remember a command; return the one of which it is a copy if the answer to that waits."""
+        is_copy = command.confirmation > 0 or packet in self._packets
+        equals = self._equals(command, within=COPIED, now=now) if is_copy else ()
+        waiting = (each for each in equals if each.decided and not each.answer)
+        pending = next(waiting, None) or Pending(command, now)
         self._packets.pop(packet, None)
-        pending = self._packets[packet] = Pending(command, now)
+        self._packets[packet] = pending
         if len(self._packets) > REMEMBERED:
             self._packets.popitem(last=False)
         return pending

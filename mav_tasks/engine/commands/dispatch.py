@@ -20,14 +20,13 @@ from mav_tasks.engine.commands.goals import (
     has_place,
     whole,
 )
-from mav_tasks.engine.commands.halt_answers import HaltAnswers
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
 from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl, sets_repetition
 from mav_tasks.engine.commands.translate import message_id_of, result_of
-from mav_tasks.engine.commands.words import halts_again
+from mav_tasks.engine.commands.words import OF_ONE_TASK, halts_again
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -37,7 +36,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Answer, Command, Pending
+from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
@@ -74,7 +73,6 @@ class Commands:
     _control: TaskControl
     _displays: MessageRequests
     _any: AnyRover
-    _halts: HaltAnswers
 
     def __post_init__(self) -> None:
         self._submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
@@ -97,11 +95,13 @@ class Commands:
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
             if known.answer is not None:
-                self._halts.repeat(client, packet, known.answer)
+                client.answer(known.answer, packet.source)
             return
         asked = CommandRequest(
             client, vehicle, packet, receiver.remember(command, packet.raw, now=now)
         )
+        if asked.pending.decided is not None and command.command in OF_ONE_TASK:
+            return  # a copy, which must not end another task
         epoch = vehicle.tasks.halts.epoch
         try:
             if asked.kind is Kind.GO:
@@ -113,8 +113,10 @@ class Commands:
             else:
                 self._submissions.refuse(asked, refusal, now=now)
         note_halt(asked, before=epoch)
-        if asked.kind is Kind.HALT and asked.pending.answer is not None:  # else the rover answers
-            self._halts.hold(client, packet, asked.pending, now=now)
+        if asked.decided is not None:
+            self._submissions.answer_halt(
+                client, asked.pending, asked.decided, packet.source, now=now
+            )
 
     def _of_unheard(
         self, client: GcsClient, packet: Packet, command: Command, *, now: float
@@ -324,9 +326,9 @@ class Commands:
         if is_to_clear and not clear and client.may_be_refused(now=now):
             words = f"stopped, but role {client.rights.role} may not clear a queue; {OPERATOR} may"
             client.tell(words, MavSeverity.WARNING, source, now=now)
-        pending = Pending(command, now)
-        pending.answer = Answer(command.command, result, param2, source)
-        self._halts.hold(client, packet, pending, now=now)
+        answer = Answer(command.command, result, param2, source)
+        pending = sender.commands.remember(command, packet.raw, now=now)
+        self._submissions.answer_halt(client, pending, answer, packet.source, now=now)
 
     def _pause_continue(self, asked: CommandRequest, *, now: float) -> int | None:
         vehicle = asked.vehicle

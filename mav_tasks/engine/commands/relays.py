@@ -6,8 +6,8 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
-from mav_tasks.engine.commands.halt_answers import HaltAnswers
 from mav_tasks.engine.commands.motion_gate import why_not_sent
+from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -15,7 +15,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
-from mav_tasks.services.command_receiver import Answer
+from mav_tasks.services.command_receiver import Answer, Pending
 from mav_tasks.services.command_sender import Answered, Standing
 from mav_tasks.settings import ROLES
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
@@ -32,7 +32,7 @@ class _Asker(NamedTuple):
     client: tuple[str, Peer]
     source: Address
     answering: Address
-    halt: CommandRequest | None
+    halt: Pending | None
 
 
 def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
@@ -59,7 +59,7 @@ def relay(asked: CommandRequest, *, now: float) -> None:
     """Forward a command; ``deliver`` brings its answer to the client."""
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
-    halt = asked if asked.kind is Kind.HALT else None
+    halt = asked.pending if asked.kind is Kind.HALT else None
     asker = _Asker(asked.client.key, asked.packet.source, answering, halt)
     asked.vehicle.relay(
         asked.packet,
@@ -79,7 +79,7 @@ def _disarms(request: Message) -> bool:
 
 
 def deliver(
-    gcs: GcsSide, halts: HaltAnswers, vehicle: Vehicle, answered: Answered, *, now: float
+    gcs: GcsSide, submissions: Submissions, vehicle: Vehicle, answered: Answered, *, now: float
 ) -> None:
     """Answer the client with the vehicle's answer, or with a refusal if there is none."""
     asker = answered.origin
@@ -115,5 +115,4 @@ def deliver(
     if asker.halt is None:
         client.answer(answer, asker.source)
     else:
-        asker.halt.pending.answer = answer
-        halts.hold(client, asker.halt.packet, asker.halt.pending, now=now)
+        submissions.answer_halt(client, asker.halt, answer, asker.source, now=now)

@@ -2,8 +2,10 @@
 
 from collections.abc import Hashable
 from functools import partial
+from math import inf
 from typing import NamedTuple
 
+from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
 from mav_tasks.engine.commands.ability import driven
@@ -17,13 +19,15 @@ from mav_tasks.engine.commands.ordering import (
 )
 from mav_tasks.engine.commands.reach import check_reach
 from mav_tasks.engine.commands.translate import result_of
+from mav_tasks.engine.commands.words import OF_ONE_TASK
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.address import AUTOPILOT
-from mav_tasks.mavlink.enums import MavResult, MavSeverity
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from mav_tasks.services.command_receiver import Answer, Pending
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
@@ -41,6 +45,8 @@ PAUSED = {
     R.FAILSAFE: "failsafe",
     R.RESTARTED: "after a restart",
 }
+#: results of a halt that is in force; FAILED: the rover is silent
+IN_FORCE = (MavResult.ACCEPTED, MavResult.FAILED)
 GIVEN_UP = 3.5  # s, after which a client has stopped waiting for an answer
 NONCE = 3  # its index among the parameters
 
@@ -50,6 +56,15 @@ class Submitted(NamedTuple):
 
     asked: CommandRequest
     task: Task
+
+
+class _Halted(NamedTuple):
+    """The answer to a command that has halted a vehicle; it is sent once that is kept."""
+
+    client: GcsClient
+    pending: Pending
+    answer: Answer
+    to: Address
 
 
 class Submissions:
@@ -72,6 +87,7 @@ class Submissions:
         #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         self.gate.knows(Submitted, self._accept, self._withdraw)
+        self.gate.knows(_Halted, _answer, _answer_unkept)
         #: by task that is not durable yet: requests to answer, one for each client and command
         self._undecided: dict[TaskId, list[CommandRequest]] = {}
         self._store_is_away = False
@@ -307,6 +323,21 @@ class Submissions:
         """Return the task that a submission repeats, or None: see ``SubmissionDeduplicator``."""
         return self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
 
+    def answer_halt(
+        self, client: GcsClient, pending: Pending, answer: Answer, to: Address, *, now: float
+    ) -> None:
+        """Answer a command that has halted a vehicle, once a restart would know the halt.
+
+        The record of halts knows no tasks: one that was cancelled would come back and drive.
+        """
+        if pending.decided is not None:  # a copy
+            return
+        pending.decided = answer
+        number, first = pending.command.command, pending.command.params[0]
+        ends_tasks = number in OF_ONE_TASK or (number == MavCmd.TASK_STOP and first == 1.0)
+        halt = inf if ends_tasks else self._registry.halted
+        self.gate.hold(_Halted(client, pending, answer, to), now=now, halt=halt)
+
     def answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
         """Give a repeated submission the answer of the first, once that has one."""
         if known.task_id in self._undecided:
@@ -323,6 +354,20 @@ class Submissions:
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"repeated {what}, no new task: see task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
+
+
+def _answer(halted: _Halted, *, now: float) -> None:  # noqa: ARG001
+    halted.pending.answer = halted.answer
+    halted.client.answer(halted.answer, halted.to)
+
+
+def _answer_unkept(halted: _Halted, *, now: float) -> None:
+    answer = halted.answer
+    if answer.result in IN_FORCE:
+        answer = answer._replace(result=MavResult.FAILED, result_param2=int(R.STORE_UNAVAILABLE))
+        words = "in force, but not kept: a restart of the server undoes it"
+        halted.client.tell(words, MavSeverity.ERROR, answer.source, now=now)
+    _answer(halted._replace(answer=answer), now=now)
 
 
 def _priority_of(submitter: Submitter, settings: Settings) -> int:
