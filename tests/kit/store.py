@@ -60,6 +60,7 @@ class LateStore(MemoryStore):
         self._under_way: deque[tuple[float, int]] = deque()
         self._halts: deque[tuple[float, int]] = deque()
         self._failure: str | None = None
+        self._kept = self._kept_halts = 0  # numbers
 
     def __repr__(self) -> str:
         return f"LateStore({len(self.events)} events, {len(self._under_way)} under way)"
@@ -80,7 +81,18 @@ class LateStore(MemoryStore):
             outcomes.append(NotKept(self._failure))
             self._failure = None
         while self._halts and self._halts[0][0] + self.halts_delay <= self.clock():
-            outcomes.append(HaltsKept(self._halts.popleft()[1]))
+            self._kept_halts = self._halts.popleft()[1]
+            outcomes.append(HaltsKept(self._kept_halts))
         while self._under_way and self._under_way[0][0] + self.delay <= self.clock():
-            outcomes.append(Kept(self._under_way.popleft()[1]))
+            self._kept = self._under_way.popleft()[1]
+            outcomes.append(Kept(self._kept))
         return outcomes
+
+    def left_by_a_crash(self) -> list[Event]:
+        """Return what the next life of a real store would find."""
+        words = {}
+        for event in self.events[self._kept : self._kept_halts]:
+            word = word_of(event, 0, offset=0.0)
+            if word is not None:
+                words[word.key] = event
+        return [*self.events[: self._kept], *words.values()]
