@@ -22,11 +22,11 @@ class Step(Protocol[Kind_contra]):
 
 
 class _Held(NamedTuple):
-    """A value, the event that must be durable, until when, and the halt that is enough."""
+    """A value, the event that must be kept, until when, and whether only the halts must be."""
 
     number: int
     until: float
-    halt: float
+    is_halt: bool
     what: Any
 
 
@@ -50,12 +50,12 @@ class CommitGate:
         """Register how values of a type are carried out, and given up."""
         self._accept[kind], self._give_up[kind] = accept, give_up
 
-    def hold(self, what: object, *, now: float, halt: float = inf) -> None:
+    def hold(self, what: object, *, now: float, is_halt: bool = False) -> None:
         """Carry out a value once all events recorded so far are durable, or give it up if late.
 
-        ``halt``: number of a halt; that this one is kept is enough.
+        ``is_halt``: it is enough that the halts among them are kept.
         """
-        self._held.append(_Held(self._registry.recorded, now + self.within, halt, what))
+        self._held.append(_Held(self._registry.recorded, now + self.within, is_halt, what))
         self._look(now=now)
 
     def committed(self, through: int, *, now: float) -> None:
@@ -72,8 +72,8 @@ class CommitGate:
         """Carry out what need not wait any more, and give up what has waited too long."""
         waiting, self._held = self._held, []
         for held in waiting:
-            number, until, halt, what = held
-            if number <= self._registry.durable or halt <= self._halts:
+            number, until, is_halt, what = held
+            if number <= self._registry.durable or (is_halt and number <= self._halts):
                 self._accept[type(what)](what, now=now)
             elif until <= now:
                 self._give_up[type(what)](what, now=now)

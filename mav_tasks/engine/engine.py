@@ -214,8 +214,8 @@ class Engine:
                 self._gcs.note_congestion(item, now=now)
             case inputs.StoreFailed():
                 self._submissions.store_failed()
-            case inputs.HaltNotStored(vehicle=vehicle):
-                self._publisher.warn_of_loss(vehicle, now=now)
+            case inputs.HaltNotStored():
+                pass  # for the metrics; the answer to the halt has said so
             case inputs.LeaseChanged():
                 self._vehicles.lease.change(item, now=now)
             case inputs.VehiclesTaken(vehicles=vehicles, restored=restored):

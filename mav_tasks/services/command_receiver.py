@@ -70,16 +70,16 @@ class Answer(NamedTuple):
 class Pending:
     """A command taken in; ``answer`` is None until it has been answered.
 
-    ``decided`` is the answer to a halt from when it is known on; it may wait until that is kept.
+    ``is_held``: the answer is known, and waits until the halt is kept.
     """
 
-    __slots__ = ("answer", "at", "command", "decided")
+    __slots__ = ("answer", "at", "command", "is_held")
 
     def __init__(self, command: Command, at: float) -> None:
         self.command = command
         self.at = at
         self.answer: Answer | None = None
-        self.decided: Answer | None = None
+        self.is_held = False
 
 
 class CommandReceiver:
@@ -96,12 +96,9 @@ class CommandReceiver:
         return None
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
-        """Remember a command; return the one of which it is a copy if the answer to that waits."""
-        is_copy = command.confirmation > 0 or packet in self._packets
-        equals = self._equals(command, within=COPIED, now=now) if is_copy else ()
-        waiting = (each for each in equals if each.decided and not each.answer)
-        pending = next(waiting, None) or Pending(command, now)
-        self._packets.pop(packet, None)
+        """Remember a command; return the same packet's before if its answer is held still."""
+        known = self._packets.pop(packet, None)
+        pending = known if known is not None and known.is_held else Pending(command, now)
         self._packets[packet] = pending
         if len(self._packets) > REMEMBERED:
             self._packets.popitem(last=False)

@@ -21,7 +21,7 @@ class Kept:
 
 @dataclass(frozen=True, slots=True)
 class HaltsKept:
-    """Every halt up to this number outlives a crash, also if the database does not have it yet."""
+    """A crash now would lose no halt up to this number, though perhaps other events."""
 
     through: int
 

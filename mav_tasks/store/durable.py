@@ -103,7 +103,7 @@ class DurableStore:
         ]
         halts = [word for word in words if word is not None]
         if halts:
-            self._keeper.append(halts)
+            self._keeper.append(halts, through=self._number)
         self._writer.append(tuple(events))
 
     def take_outcomes(self) -> list[Outcome]:

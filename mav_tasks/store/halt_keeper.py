@@ -37,8 +37,8 @@ class HaltKeeper:
         self._mail = mail
         self._name = name
         self._kept_through = kept_through
-        self._base = kept_through()  # reported numbers are relative to this
-        self._waiting: SimpleQueue[Sequence[Word] | None] = SimpleQueue()
+        self._base = self._through = kept_through()  # reported numbers are relative to the first
+        self._waiting: SimpleQueue[tuple[Sequence[Word], int] | None] = SimpleQueue()
         self._unkept: dict[int, Word] = {}  # by register
         self._report_at: dict[int, float] = {}  # by register
         self._is_closing = False
@@ -50,9 +50,9 @@ class HaltKeeper:
     def start(self) -> None:
         self._thread.start()
 
-    def append(self, words: Sequence[Word]) -> None:
-        """Queue words; never blocks the loop's thread, which calls it."""
-        self._waiting.put(words)
+    def append(self, words: Sequence[Word], *, through: int) -> None:
+        """Queue the words of events up to ``through``, from the loop; never block it."""
+        self._waiting.put((words, through))
 
     def close(self, *, within: float) -> None:
         """Try the remaining words once more and end the thread; wait at most ``within`` s."""
@@ -79,10 +79,11 @@ class HaltKeeper:
     def _collect(self) -> None:
         """Wait for words, or until the next attempt is due."""
         try:
-            words = self._waiting.get(timeout=RETRY if self._unkept else None)
-            while words is not None:
+            item = self._waiting.get(timeout=RETRY if self._unkept else None)
+            while item is not None:
+                words, self._through = item
                 self._unkept.update((word.key, word) for word in words)
-                words = self._waiting.get_nowait()
+                item = self._waiting.get_nowait()
             self._is_closing = True
         except Empty:
             pass
@@ -98,7 +99,7 @@ class HaltKeeper:
             for word in left:
                 self._report(word, words_for(error))
         else:
-            self._mail.put(HaltsKept(max(word.number for word in words) - self._base))
+            self._mail.put(HaltsKept(self._through - self._base))
         self._unkept = {word.key: word for word in left}
         self._report_at = {key: at for key, at in self._report_at.items() if key in self._unkept}
 

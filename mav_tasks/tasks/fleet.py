@@ -67,9 +67,9 @@ class Fleet:
         tasks = self.get(vehicle)
         if tasks is None:
             return True
-        halts, active = tasks.halts, tasks.active
-        if halts.is_by_word and halts.at > halted_before:
+        if tasks.halts.by_somebody.at > halted_before:
             return False
+        active = tasks.active
         return active is None or active.state not in RUNNING
 
     def forget(self, vehicle: int, *, now: float) -> set[TaskId]:

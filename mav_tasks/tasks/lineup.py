@@ -178,7 +178,7 @@ class Lineup:
             self.immediate = None
         if self.halts.raise_epoch(reason, actor=actor, now=now):
             epoch = self.halts.epoch
-            self.registry.record_halt(VehicleHalted(self.vehicle, epoch, reason, actor, now))
+            self.registry.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
 
     def pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
         """Pause the queue; this undoes neither a STOP nor a takeover."""
@@ -187,7 +187,7 @@ class Lineup:
         if self.paused in TAKEN and reason is R.OPERATOR:
             return  # a pause does not say that the vehicle is ours again
         self.paused = reason
-        self.registry.record_halt(QueuePaused(self.vehicle, reason, actor, now))
+        self.registry.record(QueuePaused(self.vehicle, reason, actor, now))
 
     def set_aside(self, task_id: TaskId) -> None:
         """Suspend the active task, so that another one can have the vehicle."""

@@ -60,7 +60,6 @@ class TaskRegistry:
         self._events: list[Event] = []
         self.recorded = 0  # number of the last event recorded
         self.durable = 0  # number of the last event known to be durable
-        self.halted = 0  # number of the last event of ``record_halt``
 
     def __repr__(self) -> str:
         return (
@@ -282,11 +281,6 @@ class TaskRegistry:
         if vehicle := getattr(event, "vehicle", 0):
             self._last_of[vehicle] = self.recorded
         self._events.append(event)
-
-    def record_halt(self, event: Event) -> None:
-        """Append an event by which a vehicle stands after a restart; stores keep it first."""
-        self.record(event)
-        self.halted = self.recorded
 
     def is_durable(self, task_id: TaskId) -> bool:
         """Return whether the task's last submission, state change or modification is durable."""

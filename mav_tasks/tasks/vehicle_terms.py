@@ -85,7 +85,7 @@ class VehicleTerms:
         """Set whether the vehicle may be armed; a person who disarms it forbids that. Store it."""
         if may_be_armed != self.may_be_armed:
             self.may_be_armed = may_be_armed
-            self._registry.record_halt(VehicleArmingSet(self._vehicle, may_be_armed, now))
+            self._registry.record(VehicleArmingSet(self._vehicle, may_be_armed, now))
 
     def is_another(self, uid: str, *, now: float) -> bool:
         """Note the reported unique id. Return whether it is another vehicle than the tasks' own.

@@ -90,7 +90,7 @@ def test_what_was_acknowledged_holds_after_a_crash(
     if moment == "never kept" or (moment == "after the record" and kind in IN_DATABASE):
         world.run(0.2)
         assert sent.answer == NOT_KEPT
-        assert any("not kept" in text for text in world.client.texts())
+        assert any("not stored" in text for text in world.client.texts())
     else:
         assert sent.result == (ACCEPTED if is_kept(kind, moment) else None)
     assert len(world.client.acks) == 1 + (sent.ack is not None)

@@ -45,8 +45,6 @@ class CommandRequest:
         #: its row in the policy table
         self.row = row_said(command)
         self.kind = kind_of(command, self.row, vehicle.parts.persona)
-        #: the answer to a halt, which ``Submissions.answer_halt`` sends
-        self.decided: Answer | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.command}, by {self.submitter})"
@@ -95,13 +93,10 @@ class CommandRequest:
         )
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
-        """Send the COMMAND_ACK; that of a halt waits until the halt is kept."""
-        answer = Answer(self.command.command, result, result_param2, self.answering)
-        if self.kind is Kind.HALT:
-            self.decided = answer
-        else:
-            self.pending.answer = answer
-            self.client.answer(answer, self.packet.source)
+        """Send the COMMAND_ACK; ``Submissions.answer_halt`` sends that of a halt."""
+        self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
+        if self.kind is not Kind.HALT:
+            self.client.answer(self.pending.answer, self.packet.source)
 
     def refuse(
         self, refusal: Rejection, *, now: float, result: MavResult | None = None

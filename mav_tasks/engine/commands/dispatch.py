@@ -26,7 +26,7 @@ from mav_tasks.engine.commands.relays import check_relay, relay
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl, sets_repetition
 from mav_tasks.engine.commands.translate import message_id_of, result_of
-from mav_tasks.engine.commands.words import OF_ONE_TASK, halts_again
+from mav_tasks.engine.commands.words import halts_again
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -94,14 +94,12 @@ class Commands:
         receiver = client.sender(packet.source).commands
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
-            if known.answer is not None:
+            if known.answer is not None and not known.is_held:
                 client.answer(known.answer, packet.source)
             return
         asked = CommandRequest(
             client, vehicle, packet, receiver.remember(command, packet.raw, now=now)
         )
-        if asked.pending.decided is not None and command.command in OF_ONE_TASK:
-            return  # a copy, which must not end another task
         epoch = vehicle.tasks.halts.epoch
         try:
             if asked.kind is Kind.GO:
@@ -113,10 +111,8 @@ class Commands:
             else:
                 self._submissions.refuse(asked, refusal, now=now)
         note_halt(asked, before=epoch)
-        if asked.decided is not None:
-            self._submissions.answer_halt(
-                client, asked.pending, asked.decided, packet.source, now=now
-            )
+        if asked.kind is Kind.HALT and asked.pending.answer is not None:  # else the rover answers
+            self._submissions.answer_halt(client, asked.pending, packet.source, now=now)
 
     def _of_unheard(
         self, client: GcsClient, packet: Packet, command: Command, *, now: float
@@ -326,9 +322,9 @@ class Commands:
         if is_to_clear and not clear and client.may_be_refused(now=now):
             words = f"stopped, but role {client.rights.role} may not clear a queue; {OPERATOR} may"
             client.tell(words, MavSeverity.WARNING, source, now=now)
-        answer = Answer(command.command, result, param2, source)
         pending = sender.commands.remember(command, packet.raw, now=now)
-        self._submissions.answer_halt(client, pending, answer, packet.source, now=now)
+        pending.answer = Answer(command.command, result, param2, source)
+        self._submissions.answer_halt(client, pending, packet.source, now=now)
 
     def _pause_continue(self, asked: CommandRequest, *, now: float) -> int | None:
         vehicle = asked.vehicle

@@ -115,4 +115,5 @@ def deliver(
     if asker.halt is None:
         client.answer(answer, asker.source)
     else:
-        submissions.answer_halt(client, asker.halt, answer, asker.source, now=now)
+        asker.halt.answer = answer
+        submissions.answer_halt(client, asker.halt, asker.source, now=now)

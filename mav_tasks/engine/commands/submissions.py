@@ -2,7 +2,6 @@
 
 from collections.abc import Hashable
 from functools import partial
-from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -27,7 +26,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
-from mav_tasks.services.command_receiver import Answer, Pending
+from mav_tasks.services.command_receiver import Pending
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
@@ -45,8 +44,6 @@ PAUSED = {
     R.FAILSAFE: "failsafe",
     R.RESTARTED: "after a restart",
 }
-#: results of a halt that is in force; FAILED: the rover is silent
-IN_FORCE = (MavResult.ACCEPTED, MavResult.FAILED)
 GIVEN_UP = 3.5  # s, after which a client has stopped waiting for an answer
 NONCE = 3  # its index among the parameters
 
@@ -59,11 +56,10 @@ class Submitted(NamedTuple):
 
 
 class _Halted(NamedTuple):
-    """The answer to a command that has halted a vehicle; it is sent once that is kept."""
+    """A command that has halted a vehicle; its answer is sent once that is kept."""
 
     client: GcsClient
     pending: Pending
-    answer: Answer
     to: Address
 
 
@@ -87,7 +83,7 @@ class Submissions:
         #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         self.gate.knows(Submitted, self._accept, self._withdraw)
-        self.gate.knows(_Halted, _answer, _answer_unkept)
+        self.gate.knows(_Halted, _answer, self._answer_unkept)
         #: by task that is not durable yet: requests to answer, one for each client and command
         self._undecided: dict[TaskId, list[CommandRequest]] = {}
         self._store_is_away = False
@@ -323,20 +319,27 @@ class Submissions:
         """Return the task that a submission repeats, or None: see ``SubmissionDeduplicator``."""
         return self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
 
-    def answer_halt(
-        self, client: GcsClient, pending: Pending, answer: Answer, to: Address, *, now: float
-    ) -> None:
-        """Answer a command that has halted a vehicle, once a restart would know the halt.
+    def answer_halt(self, client: GcsClient, pending: Pending, to: Address, *, now: float) -> None:
+        """Send the answer to a command that has halted a vehicle once a restart would know that.
 
         The record of halts knows no tasks: one that was cancelled would come back and drive.
         """
-        if pending.decided is not None:  # a copy
-            return
-        pending.decided = answer
-        number, first = pending.command.command, pending.command.params[0]
-        ends_tasks = number in OF_ONE_TASK or (number == MavCmd.TASK_STOP and first == 1.0)
-        halt = inf if ends_tasks else self._registry.halted
-        self.gate.hold(_Halted(client, pending, answer, to), now=now, halt=halt)
+        if not pending.is_held:  # else this was a copy
+            pending.is_held = True
+            number, first = pending.command.command, pending.command.params[0]
+            ends_tasks = number in OF_ONE_TASK or (number, first) == (MavCmd.TASK_STOP, 1.0)
+            self.gate.hold(_Halted(client, pending, to), now=now, is_halt=not ends_tasks)
+
+    def _answer_unkept(self, halted: _Halted, *, now: float) -> None:
+        answer = halted.pending.answer
+        assert answer is not None, "what is held has one"
+        if answer.result in (MavResult.ACCEPTED, MavResult.FAILED):  # the latter from silent ones
+            reason = int(R.STORE_UNAVAILABLE)
+            halted.pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
+            what = "STOP" if answer.command == MavCmd.TASK_STOP else f"Command {answer.command}"
+            words = f"{what} in force but not stored: a server restart loses it. See its log"
+            self._gcs.tell(words, MavSeverity.ERROR, answer.source, now=now)
+        _answer(halted, now=now)
 
     def answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
         """Give a repeated submission the answer of the first, once that has one."""
@@ -357,17 +360,10 @@ class Submissions:
 
 
 def _answer(halted: _Halted, *, now: float) -> None:  # noqa: ARG001
-    halted.pending.answer = halted.answer
-    halted.client.answer(halted.answer, halted.to)
-
-
-def _answer_unkept(halted: _Halted, *, now: float) -> None:
-    answer = halted.answer
-    if answer.result in IN_FORCE:
-        answer = answer._replace(result=MavResult.FAILED, result_param2=int(R.STORE_UNAVAILABLE))
-        words = "in force, but not kept: a restart of the server undoes it"
-        halted.client.tell(words, MavSeverity.ERROR, answer.source, now=now)
-    _answer(halted._replace(answer=answer), now=now)
+    client, pending, to = halted
+    assert pending.answer is not None, "what is held has one"
+    pending.is_held = False
+    client.answer(pending.answer, to)
 
 
 def _priority_of(submitter: Submitter, settings: Settings) -> int:
