@@ -331,15 +331,18 @@ class Submissions:
             self.gate.hold(_Halted(client, pending, to), now=now, is_halt=not ends_tasks)
 
     def _answer_unkept(self, halted: _Halted, *, now: float) -> None:
-        answer = halted.pending.answer
+        client, pending, to = halted
+        answer, pending.is_held = pending.answer, False
         assert answer is not None, "what is held has one"
-        if answer.result in (MavResult.ACCEPTED, MavResult.FAILED):  # the latter from silent ones
-            reason = int(R.STORE_UNAVAILABLE)
-            halted.pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
-            what = "STOP" if answer.command == MavCmd.TASK_STOP else f"Command {answer.command}"
-            words = f"{what} in force but not stored: a server restart loses it. See its log"
-            self._gcs.tell(words, MavSeverity.ERROR, answer.source, now=now)
-        _answer(halted, now=now)
+        if answer.result not in (MavResult.ACCEPTED, MavResult.FAILED):  # refused
+            client.answer(answer, to)
+            return
+        reason = int(R.STORE_UNAVAILABLE)
+        pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
+        client.answer(pending.answer, to)
+        what = "STOP" if answer.command == MavCmd.TASK_STOP else f"Command {answer.command}"
+        words = f"{what} in force but not stored: a server restart loses it. See its log"
+        self._gcs.tell(words, MavSeverity.ERROR, answer.source, now=now)
 
     def answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
         """Give a repeated submission the answer of the first, once that has one."""
