@@ -54,6 +54,7 @@ def test_what_can_come_into_the_engine() -> None:
         "PeerChanged",
         "Congestion",
         "Committed",
+        "HaltsKept",
         "StoreFailed",
         "HaltNotStored",
         "LeaseChanged",
