@@ -16,6 +16,7 @@ from mav_tasks.observer import EngineObserver, EngineObservers
 from mav_tasks.store import (
     Evicted,
     HaltNotKept,
+    HaltsKept,
     IdsGranted,
     Kept,
     NonceTaken,
@@ -109,6 +110,8 @@ class Pump:
                 return inputs.VehiclesTaken(vehicles, restored)
             case TaskStates(states=states):
                 return inputs.TasksElsewhere(states)
+            case HaltsKept(through=through):
+                return inputs.HaltsKept(through)
             case HaltNotKept(vehicle=vehicle, text=text):
                 log.error("%s", text)
                 return HaltNotStored(vehicle)

@@ -1,12 +1,12 @@
 """Holds values back until all events recorded so far are durable, each with a time limit.
 
+The answer to a command that halts a vehicle may leave earlier: once the store has kept the halts.
 ``knows`` registers, once for each type, how such a value is carried out and how it is given up.
-Values leave in the order in which they came.
+Values that wait for the same leave in the order in which they came.
 """
 
-from collections import deque
 from math import inf
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.tasks.registry import TaskRegistry
@@ -21,18 +21,27 @@ class Step(Protocol[Kind_contra]):
     def __call__(self, held: Kind_contra, /, *, now: float) -> None: ...
 
 
+class _Held(NamedTuple):
+    """A value, the event that must be kept, until when, and whether only the halts must be."""
+
+    number: int
+    until: float
+    is_halt: bool
+    what: Any
+
+
 class CommitGate:
-    """A queue of values, in the order of the events that they wait for."""
+    """The values that wait, in the order in which they came."""
 
     def __init__(self, registry: TaskRegistry, timers: Timers, *, within: float) -> None:
         """``within``: seconds that each value waits at most."""
         self._registry = registry
         self.within = within
-        #: (number of the event that must be durable, when to give up, value)
-        self._held: deque[tuple[int, float, Any]] = deque()
+        self._held: list[_Held] = []
+        self._halts = 0  # number up to which the halts are kept
         self._accept: dict[type, Step[Any]] = {}
         self._give_up: dict[type, Step[Any]] = {}
-        self._timer = timers.timer(Turn.SUBMISSIONS, self._give_up_late)
+        self._timer = timers.timer(Turn.SUBMISSIONS, self._look)
 
     def __len__(self) -> int:
         return len(self._held)
@@ -41,28 +50,33 @@ class CommitGate:
         """Register how values of a type are carried out, and given up."""
         self._accept[kind], self._give_up[kind] = accept, give_up
 
-    def hold(self, what: object, *, now: float) -> None:
-        """Carry out a value once all events recorded so far are durable, or give it up if late."""
-        if self._registry.recorded <= self._registry.durable:
-            self._accept[type(what)](what, now=now)
-            return
-        if not self._held:
-            self._timer.set(now + self.within)
-        self._held.append((self._registry.recorded, now + self.within, what))
+    def hold(self, what: object, *, now: float, is_halt: bool = False) -> None:
+        """Carry out a value once all events recorded so far are durable, or give it up if late.
+
+        ``is_halt``: it is enough that the halts among them are kept.
+        """
+        self._held.append(_Held(self._registry.recorded, now + self.within, is_halt, what))
+        self._look(now=now)
 
     def committed(self, through: int, *, now: float) -> None:
         """Carry out all values that waited for events up to ``through``."""
-        while self._held and self._held[0][0] <= through:
-            _, _, what = self._held.popleft()
-            self._accept[type(what)](what, now=now)
-        self._plan()
+        self._registry.durable = through
+        self._look(now=now)
 
-    def _give_up_late(self, *, now: float) -> None:
-        """Give up the values that have waited too long."""
-        while self._held and self._held[0][1] <= now:
-            _, _, what = self._held.popleft()
-            self._give_up[type(what)](what, now=now)
-        self._plan()
+    def halts_kept(self, through: int, *, now: float) -> None:
+        """Carry out all values that waited for halts up to ``through``."""
+        self._halts = through
+        self._look(now=now)
 
-    def _plan(self) -> None:
-        self._timer.set(self._held[0][1] if self._held else inf)
+    def _look(self, *, now: float) -> None:
+        """Carry out what need not wait any more, and give up what has waited too long."""
+        waiting, self._held = self._held, []
+        for held in waiting:
+            number, until, is_halt, what = held
+            if number <= self._registry.durable or (is_halt and number <= self._halts):
+                self._accept[type(what)](what, now=now)
+            elif until <= now:
+                self._give_up[type(what)](what, now=now)
+            else:
+                self._held.append(held)
+        self._timer.set(min((held.until for held in self._held), default=inf))

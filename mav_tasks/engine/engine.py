@@ -186,7 +186,9 @@ class Engine:
                 self._reception.receive((item,), now=now)
             case inputs.Committed(through=through):
                 self._submissions.committed(through, now=now)
-                self._vehicles.commit(through, now=now)
+                self._vehicles.commit(now=now)
+            case inputs.HaltsKept(through=through):
+                self._submissions.gate.halts_kept(through, now=now)
             case inputs.AtOnce(packets=several):
                 self._reception.receive(several, now=now)
             case inputs.LinkChanged(side=side):
@@ -212,8 +214,8 @@ class Engine:
             case inputs.StoreFailed():
                 if self._submissions.store_failed():
                     self._publisher.warn_of_store(now=now)
-            case inputs.HaltNotStored(vehicle=vehicle):
-                self._publisher.warn_of_loss(vehicle, now=now)
+            case inputs.HaltNotStored():
+                pass  # for the metrics; the answer to the halt has said so
             case inputs.LeaseChanged():
                 self._vehicles.lease.change(item, now=now)
             case inputs.VehiclesTaken(vehicles=vehicles, restored=restored):
@@ -378,7 +380,7 @@ class Engine:
         ):
             self._modes.look_for_arming(vehicle, now=now)
             for answered in vehicle.requests.take_answers():
-                deliver(self._gcs, vehicle, answered, now=now)
+                deliver(self._gcs, self._submissions, vehicle, answered, now=now)
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)

@@ -100,6 +100,13 @@ class Committed:
 
 
 @dataclass(frozen=True, slots=True)
+class HaltsKept:
+    """All halts up to and including this event outlive a crash, whatever became of the rest."""
+
+    through: int
+
+
+@dataclass(frozen=True, slots=True)
 class StoreFailed:
     """The store could not make events durable; it keeps trying."""
 
@@ -209,6 +216,7 @@ Input = (
     | PeerChanged
     | Congestion
     | Committed
+    | HaltsKept
     | StoreFailed
     | HaltNotStored
     | LeaseChanged

@@ -153,6 +153,7 @@ def described(row: Sequence[Any]) -> str:
 
 _SIMPLE: Mapping[str, Callable[..., Input]] = {
     "committed": inputs.Committed,
+    "halts kept": inputs.HaltsKept,
     "store failed": inputs.StoreFailed,
     "halt not stored": inputs.HaltNotStored,
     "lease": inputs.LeaseChanged,
@@ -186,6 +187,8 @@ def _input_to_json(item: Input | None, now: float) -> list[Any]:
             return ["settings", now, asdict(settings)]
         case inputs.Committed(through=through):
             return ["committed", now, through]
+        case inputs.HaltsKept(through=through):
+            return ["halts kept", now, through]
         case inputs.StoreFailed(text=text):
             return ["store failed", now, text]
         case inputs.HaltNotStored(vehicle=vehicle):

@@ -68,9 +68,12 @@ class Answer(NamedTuple):
 
 
 class Pending:
-    """A command taken in; ``answer`` is None until it has been answered."""
+    """A command taken in; ``answer`` is None until it has been answered.
 
-    __slots__ = ("answer", "at", "command", "receiver")
+    ``is_held``: the answer is known, and waits until the halt is kept.
+    """
+
+    __slots__ = ("answer", "at", "command", "is_held", "receiver")
 
     def __init__(
         self, command: Command, at: float, receiver: "CommandReceiver | None" = None
@@ -79,6 +82,7 @@ class Pending:
         self.at = at
         self.receiver = receiver
         self.answer: Answer | None = None
+        self.is_held = False
 
 
 class CommandReceiver:
@@ -99,8 +103,10 @@ class CommandReceiver:
         return None
 
     def remember(self, command: Command, packet: bytes, *, now: float) -> Pending:
-        self._packets.pop(packet, None)
-        pending = self._packets[packet] = Pending(command, now, self)
+        """Remember a command; return the same packet's before if its answer is held still."""
+        known = self._packets.pop(packet, None)
+        pending = known if known is not None and known.is_held else Pending(command, now, self)
+        self._packets[packet] = pending
         if len(self._packets) > self._most:
             self._packets.popitem(last=False)
         return pending

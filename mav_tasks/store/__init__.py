@@ -3,6 +3,7 @@
 from mav_tasks.store.base import (
     Evicted,
     HaltNotKept,
+    HaltsKept,
     IdsGranted,
     Kept,
     NonceTaken,
@@ -18,6 +19,7 @@ from mav_tasks.store.memory import MemoryStore
 __all__ = [
     "Evicted",
     "HaltNotKept",
+    "HaltsKept",
     "IdsGranted",
     "Kept",
     "MemoryStore",

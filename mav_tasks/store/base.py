@@ -20,6 +20,13 @@ class Kept:
 
 
 @dataclass(frozen=True, slots=True)
+class HaltsKept:
+    """A crash now would lose no halt up to this number, though perhaps other events."""
+
+    through: int
+
+
+@dataclass(frozen=True, slots=True)
 class NotKept:
     """Events could not be made durable; the store keeps trying. ``text`` tells the reason."""
 
@@ -77,7 +84,15 @@ class Evicted:
 
 
 Outcome = (
-    Kept | NotKept | HaltNotKept | IdsGranted | NonceTaken | VehiclesLoaded | TaskStates | Evicted
+    Kept
+    | HaltsKept
+    | NotKept
+    | HaltNotKept
+    | IdsGranted
+    | NonceTaken
+    | VehiclesLoaded
+    | TaskStates
+    | Evicted
 )
 
 

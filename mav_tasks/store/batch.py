@@ -22,7 +22,7 @@ from mav_tasks.tasks.events import (
     VehicleIdentified,
     VehicleSpeedSet,
 )
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.halts import BY_SOMEBODY
 from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
 from mav_tasks.tasks.task import Task, following
 
@@ -126,9 +126,11 @@ class Batch:
                 self.vehicles["paused", event.vehicle] = event.reason
             case QueueContinued():
                 self.vehicles["paused", event.vehicle] = None
+                self.vehicles["halt_reason", event.vehicle] = None
+                self.vehicles["halted_utc", event.vehicle] = None
             case VehicleHalted():
                 self.vehicles["halt_epoch", event.vehicle] = event.epoch
-                if event.reason is not TaskReason.RESTARTED:  # a restart is no request
+                if event.reason in BY_SOMEBODY:
                     self.vehicles["halt_reason", event.vehicle] = event.reason
                     self.vehicles["halted_utc", event.vehicle] = utc
             case VehicleIdentified():

@@ -8,7 +8,7 @@ from mav_tasks.errors import StoreError
 from mav_tasks.mailbox import Mailbox
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
-from mav_tasks.store.base import Kept, Outcome, Which
+from mav_tasks.store.base import HaltsKept, Kept, Outcome, Which
 from mav_tasks.store.batch import Batch
 from mav_tasks.store.codec import Encoder
 from mav_tasks.store.event_database import EventDatabase
@@ -25,8 +25,8 @@ CLOSE_LIMIT = 3.0  # s at shutdown for writing the remaining events
 TRIM_AT_OPEN = 0.5  # s of deleting expired rows at start; the rest is done while serving
 
 
-def _both_kept(earlier: Outcome, later: Outcome) -> bool:
-    return isinstance(earlier, Kept) and isinstance(later, Kept)
+def _is_included(earlier: Outcome, later: Outcome) -> bool:
+    return type(earlier) is type(later) and isinstance(earlier, Kept | HaltsKept)
 
 
 class DurableStore:
@@ -57,7 +57,7 @@ class DurableStore:
         utc = boot_time() + wall_offset()
         self._ended_well = database.ended_well and was_complete
         self._idle = 0.0 if database.last_write is None else max(0.0, utc - database.last_write)
-        self._mail: Mailbox[Outcome] = Mailbox(replaces=_both_kept)
+        self._mail: Mailbox[Outcome] = Mailbox(replaces=_is_included)
         trimmer = Trimmer(retention or Retention())
         self._writer = Writer(
             database,
@@ -103,7 +103,7 @@ class DurableStore:
         ]
         halts = [word for word in words if word is not None]
         if halts:
-            self._keeper.append(halts)
+            self._keeper.append(halts, through=self._number)
         self._writer.append(tuple(events))
 
     def take_outcomes(self) -> list[Outcome]:

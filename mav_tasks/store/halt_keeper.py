@@ -1,7 +1,8 @@
 """The thread that writes halts to the halt record, independently of the database.
 
-If the record fails, the database may still store the halt. A halt that neither has stored within
-GRACE seconds is reported, again every REPORT seconds, and retried until it is stored.
+``HaltsKept`` tells what the record has: then a halt may be acknowledged. If the record fails, the
+database may still store the halt. A halt that neither has stored within GRACE seconds is reported,
+again every REPORT seconds, and retried until it is stored.
 """
 
 import time
@@ -10,7 +11,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 
 from mav_tasks.mailbox import Mailbox
-from mav_tasks.store.base import HaltNotKept, Outcome
+from mav_tasks.store.base import HaltNotKept, HaltsKept, Outcome
 from mav_tasks.store.failures import words_for
 from mav_tasks.store.halt_record import HaltRecord, Word
 from mav_tasks.tasks.events import QueuePaused
@@ -36,7 +37,8 @@ class HaltKeeper:
         self._mail = mail
         self._name = name
         self._kept_through = kept_through
-        self._waiting: SimpleQueue[Sequence[Word] | None] = SimpleQueue()
+        self._base = self._through = kept_through()  # reported numbers are relative to the first
+        self._waiting: SimpleQueue[tuple[Sequence[Word], int] | None] = SimpleQueue()
         self._unkept: dict[int, Word] = {}  # by register
         self._report_at: dict[int, float] = {}  # by register
         self._is_closing = False
@@ -48,9 +50,9 @@ class HaltKeeper:
     def start(self) -> None:
         self._thread.start()
 
-    def append(self, words: Sequence[Word]) -> None:
-        """Queue words; never blocks the loop's thread, which calls it."""
-        self._waiting.put(words)
+    def append(self, words: Sequence[Word], *, through: int) -> None:
+        """Queue the words of events up to ``through``, from the loop; never block it."""
+        self._waiting.put((words, through))
 
     def close(self, *, within: float) -> None:
         """Try the remaining words once more and end the thread; wait at most ``within`` s."""
@@ -69,31 +71,37 @@ class HaltKeeper:
         try:
             while not self._is_closing:
                 self._collect()
-                for word in tuple(self._unkept.values()):
-                    self._keep(word)
+                if self._unkept:
+                    self._keep(tuple(self._unkept.values()))
         except Exception as mistake:  # noqa: BLE001 - a bug of ours: raised in the loop
             self._mail.put_mistake(mistake)
 
     def _collect(self) -> None:
         """Wait for words, or until the next attempt is due."""
         try:
-            words = self._waiting.get(timeout=RETRY if self._unkept else None)
-            while words is not None:
+            item = self._waiting.get(timeout=RETRY if self._unkept else None)
+            while item is not None:
+                words, self._through = item
                 self._unkept.update((word.key, word) for word in words)
-                words = self._waiting.get_nowait()
+                item = self._waiting.get_nowait()
             self._is_closing = True
         except Empty:
             pass
 
-    def _keep(self, word: Word) -> None:
+    def _keep(self, words: Sequence[Word]) -> None:
+        """Write words in one go; those that the database has kept meanwhile need no record."""
+        left: list[Word] = []
         try:
-            self._record.write(word)
+            self._record.write(*words)
         except OSError as error:
-            if word.number > self._kept_through():
+            through = self._kept_through()
+            left = [word for word in words if word.number > through]
+            for word in left:
                 self._report(word, words_for(error))
-                return
-        del self._unkept[word.key]
-        self._report_at.pop(word.key, None)
+        else:
+            self._mail.put(HaltsKept(self._through - self._base))
+        self._unkept = {word.key: word for word in left}
+        self._report_at = {key: at for key, at in self._report_at.items() if key in self._unkept}
 
     def _report(self, word: Word, why: str) -> None:
         now = time.monotonic()

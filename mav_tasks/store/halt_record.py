@@ -192,9 +192,10 @@ class HaltRecord:
         words = [word for _, word in self._newest.values() if word.vehicle != IDS]
         return sorted((w for w in words if w.number > number), key=lambda word: word.number)
 
-    def write(self, word: Word) -> None:
-        """Make a word durable; raise OSError if that fails, or if the file was replaced."""
-        self._put(word)
+    def write(self, *words: Word) -> None:
+        """Make words durable; raise OSError if that fails, or if the file was replaced."""
+        for word in words:
+            self._put(word)
         os.fdatasync(self._file.fd)
         self._file.check()
         if os.pread(self._file.fd, len(HEADER), 0) != self._header:

@@ -20,19 +20,6 @@ AT_ONCE = 1.0  # s; a rover that is free so soon is called free
 HERE = 0.5  # m; a start so near is not worth a word
 MOST_NAMED = 8  # other rovers named in one text
 
-#: a queue that is paused by one of these has stopped by itself, not at a person's word: its rover
-#: cannot do what it is given. The end of a task that had moved the rover pauses a queue, too
-DISABLED = frozenset(
-    {
-        R.FAILSAFE,
-        R.STUCK,
-        R.ARM_REFUSED,
-        R.MODE_REFUSED,
-        R.START_TIMEOUT,
-        R.LINK_TIMEOUT,
-    }
-)
-
 
 class Candidate(NamedTuple):
     """One rover as it stands, and what the task would cost it. SI units.

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SERVER, QueuePaused
-from mav_tasks.tasks.halts import WORDS, LastHalt
+from mav_tasks.tasks.halts import BY_SOMEBODY, NOBODY, WORDS, LastHalt
 from mav_tasks.tasks.lifecycle import ACTIVE, LOSSES, RUNNING, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
@@ -31,7 +31,6 @@ class Fleet:
         self.get = self._of.get
         self.room = PendingTasks(registry, settings)
         self._was_driven: set[int] = set()
-        self._halted: dict[int, LastHalt] = {}  # by command, before this run
         self._comes_up_paused = False
         self.began_at = 0.0  # start of this run, by the clock of ``now``
 
@@ -56,9 +55,9 @@ class Fleet:
         return was_driven
 
     def last_halt(self, vehicle: int, *, now: float) -> LastHalt | None:
-        """Return a vehicle's last halt if it is younger than UNSEEN; each is returned once."""
-        halt = self._halted.pop(vehicle, None)
-        return halt if halt is not None and now - halt.at <= UNSEEN else None
+        """Return a vehicle's last halt if it was a command, and is younger than UNSEEN."""
+        halt = self.of(vehicle).halts.by_somebody
+        return halt if halt.reason in WORDS and now - halt.at <= UNSEEN else None
 
     def may_forget(self, vehicle: int, *, halted_before: float) -> bool:
         """Return whether no task of a vehicle runs, and no command has halted it just now.
@@ -68,16 +67,15 @@ class Fleet:
         tasks = self.get(vehicle)
         if tasks is None:
             return True
-        halts, active = tasks.halts, tasks.active
-        if halts.is_by_word and halts.at > halted_before:
+        if tasks.halts.by_somebody.at > halted_before:
             return False
+        active = tasks.active
         return active is None or active.state not in RUNNING
 
     def forget(self, vehicle: int, *, now: float) -> set[TaskId]:
         """Forget a vehicle and its tasks, which are stored; return the ids of these."""
         self._of.pop(vehicle, None)
         self._was_driven.discard(vehicle)
-        self._halted.pop(vehicle, None)
         self.room.forget(vehicle)
         tasks = self._registry.forget(vehicle)
         self.room.forgotten(now=now)
@@ -142,9 +140,6 @@ class Fleet:
             elif task.state in WAITING:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
-        # after a clean end, too: the end does not wait for a silent vehicle
-        halted = restored.halted.items()
-        self._halted.update({each: LastHalt(*halt) for each, halt in halted if halt[0] in WORDS})
         pauses = self._settings.on_restart == "pause"
         of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
         of_note |= restored.halt_epochs.keys() | restored.disarmed
@@ -158,20 +153,21 @@ class Fleet:
             if not paused and (has_paused or is_unclean or (is_late and pauses)):
                 paused = R.RESTARTED
                 self._registry.record(QueuePaused(vehicle, paused, SERVER, now))
+            halt = LastHalt(*restored.halted.get(vehicle, NOBODY))
             self.of(vehicle).restore(
                 active.get(vehicle, ()),
                 paused=paused,
                 speed=restored.speeds.get(vehicle),
                 uid=restored.uids.get(vehicle, ""),
                 halt_epoch=restored.halt_epochs.get(vehicle, 1),
+                halt=halt if halt.reason in BY_SOMEBODY else NOBODY,
                 may_be_armed=vehicle not in restored.disarmed,
                 resuming=goes_on,
                 now=now,
             )
             self.of(vehicle).bounds.home = restored.homes.get(vehicle)
-            reason, halted_at = restored.halted.get(vehicle, (R.NONE, 0.0))
-            if paused is R.STOPPED and reason is R.STOPPED:
-                self.of(vehicle).was_stopped(at=halted_at, now=now)
+            if paused is R.STOPPED and halt.reason is R.STOPPED:
+                self.of(vehicle).was_stopped(at=halt.at, now=now)
 
     def _interrupted(self, task: Task, state: TaskState, *, now: float) -> Task:
         if task.state is state:

@@ -38,18 +38,38 @@ WORDS = frozenset(
 )
 
 
+#: halts by somebody: a command, or what a person or another controller does to the vehicle
+BY_SOMEBODY = WORDS | {TaskReason.TAKEOVER, TaskReason.OTHER_CONTROLLER}
+#: why a vehicle pauses its queue by itself: it cannot do what it is given
+DISABLED = frozenset(
+    {
+        TaskReason.FAILSAFE,
+        TaskReason.STUCK,
+        TaskReason.ARM_REFUSED,
+        TaskReason.MODE_REFUSED,
+        TaskReason.START_TIMEOUT,
+        TaskReason.LINK_TIMEOUT,
+    }
+)
+
+
 class LastHalt(NamedTuple):
-    """The last halt of an earlier run."""
+    """The last halt of a vehicle by somebody."""
 
     reason: TaskReason
     at: float  # s, of this run's clock
 
 
+NOBODY = LastHalt(TaskReason.NONE, -inf)
+
+
 class Halts:
     """Counter of one vehicle's halts, with the last one."""
 
-    def __init__(self, *, epoch: int = 1) -> None:
+    def __init__(self, *, epoch: int = 1, by_somebody: LastHalt = NOBODY) -> None:
         self.epoch = epoch
+        #: the last one by somebody, until somebody lets the vehicle go on
+        self.by_somebody = by_somebody
         self.at = -inf  #: s, when the last one came
         self.by: Hashable = None  #: sender of the command; None: no command
         self.number = -1  #: of that command, in its sender's sequence
@@ -79,6 +99,9 @@ class Halts:
 
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it repeats the last one and does not count."""
+        if reason in BY_SOMEBODY:
+            is_word = self.by_somebody.reason in WORDS and reason not in WORDS
+            self.by_somebody = LastHalt(self.by_somebody.reason if is_word else reason, now)
         is_same = (reason, actor) == (self._reason, self._actor)
         if self._reason is TaskReason.DISARMED and reason in TAKEN and now <= self._shown_at:
             self.at = now  # the vehicle shows the commanded disarming
@@ -101,6 +124,7 @@ class Halts:
     def lets_go(self) -> None:
         """Note that the queue was resumed; that does not undo a disarming."""
         self.is_undone = self._reason is not TaskReason.DISARMED
+        self.by_somebody = NOBODY
 
     def was_said_by(self, sender: Hashable, number: int, *, command: int = 0) -> None:
         """Note the sender of the last halt, its command, and the number of that command.

@@ -5,6 +5,7 @@ the vehicle. Others may have started and be suspended: pre-empted, or held.
 """
 
 from dataclasses import dataclass
+from math import inf
 
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import SET_FAILSAFE, Settings
@@ -13,7 +14,7 @@ from mav_tasks.tasks.driving.displacement import LedAway
 from mav_tasks.tasks.events import QueuePaused, VehicleHalted
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import SingleGoal
-from mav_tasks.tasks.halts import Halts
+from mav_tasks.tasks.halts import DISABLED, Halts
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.queue import TaskQueue
@@ -192,6 +193,16 @@ class Lineup:
         """Suspend the active task, so that another one can have the vehicle."""
         self.executor.give_up()
         self.suspended_ids[task_id] = None
+
+    def keeps(self, task: Task) -> bool:
+        """Return whether a waiting task stays with this vehicle because somebody has halted it.
+
+        A takeover that a text of the vehicle has explained was its own failsafe's.
+        """
+        reason, at = self.halts.by_somebody
+        if reason is R.TAKEOVER and self.paused is R.FAILSAFE:
+            at = -inf
+        return at >= task.submitted_at or (bool(self.paused) and self.paused not in DISABLED)
 
     def blocker(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> TaskReason:
         """Return why no task with this goal can take control of the vehicle now, or NONE."""

@@ -15,7 +15,7 @@ from mav_tasks.tasks.driving.mission_sequencer import goal_of, present_goal, ski
 from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.halts import Halts
+from mav_tasks.tasks.halts import NOBODY, Halts, LastHalt
 from mav_tasks.tasks.lifecycle import (
     CONTINUE_FIRST,
     TAKEN,
@@ -65,11 +65,12 @@ class VehicleTasks(Lineup):
         uid: str,
         now: float,
         halt_epoch: int = 1,
+        halt: LastHalt = NOBODY,
         may_be_armed: bool = True,
         resuming: Container[TaskId] = (),
     ) -> None:
         """Load the active and suspended tasks of an earlier run; those ``resuming`` go on alone."""
-        self.halts = Halts(epoch=halt_epoch)
+        self.halts = Halts(epoch=halt_epoch, by_somebody=halt)
         self.halts.restored_at = now
         self.halt(R.RESTARTED, actor=SERVER, now=now)
         self.paused = paused
@@ -247,7 +248,7 @@ class VehicleTasks(Lineup):
         if resumes:
             assert active is not None
             self.check_start(seen, goal_of(active), now=now)
-        if self.paused:
+        if self.paused or self.halts.by_somebody is not NOBODY:
             self.paused = R.NONE
             self.halts.lets_go()
             self.registry.record(QueueContinued(self.vehicle, actor, now))
@@ -359,6 +360,8 @@ class VehicleTasks(Lineup):
             return demand
         self.turns.begin_next(seen, now=now)
         if self.active is not None:  # the refusal was for the task before
+            if not self.paused:  # whoever halted the vehicle has not kept it from going on
+                self.halts.by_somebody = NOBODY
             return self.executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD
 

@@ -1,4 +1,4 @@
-"""Attack D8: STOP with a full disk, then the server is killed or ended and starts again.
+"""Attack D8: a halt on a full disk or a busy machine, then the server ends and starts again.
 
 Processes are real. The disk is full for every file but the record of halts, whose blocks have been
 its own since it was made: what that is like on a file system is in unit/store/test_halt_record.py.
@@ -8,7 +8,7 @@ import resource
 import signal
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,12 @@ from tests.kit.processes import (
 )
 
 MOVE, STOP, CONTINUE, ARM, CHANGE_SPEED = 54000, 54003, 193, 400, 178
-AUTOPILOT = (1, 1)
+AUTOPILOT, SERVER = (1, 1), (1, 191)
+FAILED = 4  # MAV_RESULT
+Halt = tuple[int, tuple[float, ...], tuple[int, int]]
+#: command, parameters and target of what was acknowledged before it was kept
+HALTS: dict[str, Halt] = {"STOP": (STOP, (), SERVER), "disarming": (ARM, (0,), AUTOPILOT)}
+BUSY = 4  # processes
 DELAY = 6.0  # s, until the task that waits would drive
 GOES_ON = ("--set", "rules.on_restart=continue")
 NO_FILE_AT_ALL = 1  # byte
@@ -69,19 +74,38 @@ def restarted(running: Stand, folder: Path, *options: str) -> Iterator[Process]:
         yield server
 
 
-@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
-def test_a_stop_outlives_a_full_disk_and_the_end_of_the_server(
-    tmp_path: Path, end: signal.Signals
+def busy(folder: Path) -> ExitStack:
+    """Return processes that leave the server little time."""
+    load = ExitStack()
+    for number in range(BUSY):
+        load.enter_context(process("-c", "while True: pass", folder=folder, name=f"busy{number}"))
+    return load
+
+
+@pytest.mark.parametrize(
+    ("halt", "is_full", "end"),
+    [
+        (HALTS["STOP"], True, signal.SIGKILL),
+        (HALTS["STOP"], True, signal.SIGTERM),
+        (HALTS["STOP"], False, signal.SIGKILL),
+        (HALTS["disarming"], True, signal.SIGKILL),
+        (HALTS["disarming"], False, signal.SIGKILL),
+    ],
+)
+def test_a_halt_outlives_the_end_of_the_server_just_after_its_acknowledgement(
+    tmp_path: Path, halt: Halt, is_full: bool, end: signal.Signals
 ) -> None:
     path = tmp_path / "tasks.sqlite3"
     with stand(tmp_path, *GOES_ON, serve_store=str(path)) as running:
         link = running.connect()
         use_log(link)
         submit(link, MOVE, 5.0, 0, 0, 11, 0, DELAY)
-        limit_files(running, SIZE)
-        assert command_long(link, STOP).result == 0
-        wait_until(lambda: "the disk" in running.server.text, within=5, what="the full disk")
-        running.server.end(end)
+        if is_full:
+            limit_files(running, SIZE)
+        with busy(tmp_path):
+            command, params, target = halt
+            assert command_long(link, command, *params, target=target).result == 0
+            running.server.end(end)
         with restarted(running, tmp_path, *GOES_ON):
             began = running.truth()[-1]
             wait_until(
@@ -90,8 +114,9 @@ def test_a_stop_outlives_a_full_disk_and_the_end_of_the_server(
                 what="the time at which it would have driven",
             )
             assert running.truth()[-1]["north"] == pytest.approx(began["north"], abs=0.01)
-            refused = command_long(running.connect(), ARM, 1, target=AUTOPILOT)
-            assert (refused.result, refused.result_param2) == (1, TaskReason.STOPPED)
+            if command == STOP:
+                refused = command_long(running.connect(), ARM, 1, target=AUTOPILOT)
+                assert (refused.result, refused.result_param2) == (1, TaskReason.STOPPED)
             assert command_long(running.connect(), CONTINUE, 1).result == 0  # the way out
             wait_until(lambda: running.speed() > 0.2, within=15, what="the rover to drive")
 
@@ -117,7 +142,8 @@ def test_a_stop_that_nothing_keeps_is_said_to_everybody(tmp_path: Path) -> None:
     with stand(tmp_path, serve_store=str(path)) as running:
         link, other = running.connect(), running.connect(source_system=254)
         limit_files(running, NO_FILE_AT_ALL)
-        assert command_long(link, STOP).result == 0
+        ack = command_long(link, STOP)
+        assert (ack.result, ack.result_param2) == (FAILED, TaskReason.STORE_UNAVAILABLE)
         for each in (link, other):
             wait_for(each, "STATUSTEXT", "'STOP in force but not stored' in STATUSTEXT.text")
         running.server.end(signal.SIGTERM)

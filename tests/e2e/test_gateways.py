@@ -120,6 +120,26 @@ def test_a_gateway_takes_over_from_one_that_was_killed(fleet: Fleet) -> None:
     assert (fleet.state(ran.id), fleet.state(waits.id)) == (S.COMPLETED, S.COMPLETED)
 
 
+@pytest.mark.parametrize("asked", ["a", "b"])
+def test_a_pause_outlives_its_gateway_which_is_killed_just_after_it(
+    fleet: Fleet, asked: str
+) -> None:
+    fleet.start("a")
+    assert fleet.holder() == "a"
+    fleet.start("b")
+    fleet.client("a").submit(Move(5.0), delay=4.0)
+    client = fleet.client(asked)
+    client.pause()
+    fleet.processes["a"].end(signal.SIGKILL)
+    fleet.processes["b"].wait_for("rover 1: found")
+    until = (
+        latest(fleet.truth)["time"] + 8.0
+    )  # the task's time comes, and the gateway listens first
+    wait_until(lambda: latest(fleet.truth)["time"] > until, within=30, what="time to drive")
+    assert latest(fleet.truth)["north"] == 0.0
+    assert fleet.client("b").queue().paused is TaskReason.OPERATOR
+
+
 def release(client: SyncClient, task_id: int) -> None:
     """Release a held task; words from before do not count just after a takeover."""
 
@@ -273,6 +293,10 @@ def connected_to(port: int) -> Any:
 
 def speed(truth: Path) -> float:
     """Return the rover's latest true speed, m/s."""
+    return abs(latest(truth)["forward_speed"])
+
+
+def latest(truth: Path) -> dict[str, float]:
+    """Return the rover's latest true state."""
     header, *_, last, _ = truth.read_text(encoding="ascii").split("\n")
-    values = dict(zip(header.split(","), last.split(","), strict=True))
-    return abs(float(values["forward_speed"]))
+    return dict(zip(header.split(","), map(float, last.split(",")), strict=True))

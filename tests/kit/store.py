@@ -6,7 +6,8 @@ from pathlib import Path
 from select import POLLIN, poll
 from typing import ClassVar
 
-from mav_tasks.store import Kept, MemoryStore, NotKept, Outcome
+from mav_tasks.store import HaltsKept, Kept, MemoryStore, NotKept, Outcome
+from mav_tasks.store.halt_record import word_of
 from mav_tasks.store.sqlite import SqliteStore
 from mav_tasks.tasks.events import Event
 
@@ -32,8 +33,9 @@ class PromptSqliteStore(SqliteStore):
         outcomes = super().take_outcomes()
         while self._kept < len(self.events):
             for outcome in outcomes:
-                assert isinstance(outcome, Kept), outcome
-                self._kept = outcome.through
+                assert isinstance(outcome, Kept | HaltsKept), outcome
+                if isinstance(outcome, Kept):
+                    self._kept = outcome.through
             if self._kept < len(self.events):
                 mail = self.fileno()
                 assert mail is not None, "closed"
@@ -45,14 +47,20 @@ class PromptSqliteStore(SqliteStore):
 
 
 class LateStore(MemoryStore):
-    """Commits ``delay`` seconds after the append; ``inf``: never."""
+    """Commits ``delay`` seconds after the append; ``inf``: never.
 
-    def __init__(self, *, delay: float = 0.0) -> None:
+    ``halts_delay``: the same of its record of halts.
+    """
+
+    def __init__(self, *, delay: float = 0.0, halts_delay: float = 0.0) -> None:
         super().__init__()
         self.delay = delay
+        self.halts_delay = halts_delay
         self.clock: Callable[[], float] = lambda: 0.0  # the world sets its own clock
         self._under_way: deque[tuple[float, int]] = deque()
+        self._halts: deque[tuple[float, int]] = deque()
         self._failure: str | None = None
+        self._kept = self._kept_halts = 0  # numbers
 
     def __repr__(self) -> str:
         return f"LateStore({len(self.events)} events, {len(self._under_way)} under way)"
@@ -64,12 +72,27 @@ class LateStore(MemoryStore):
     def append(self, events: Sequence[Event]) -> None:
         super().append(events)
         self._under_way.append((self.clock(), self._count))
+        if any(word_of(event, 0, offset=0.0) for event in events):
+            self._halts.append((self.clock(), self._count))
 
     def take_outcomes(self) -> list[Outcome]:
         outcomes: list[Outcome] = []
         if self._failure is not None:
             outcomes.append(NotKept(self._failure))
             self._failure = None
+        while self._halts and self._halts[0][0] + self.halts_delay <= self.clock():
+            self._kept_halts = self._halts.popleft()[1]
+            outcomes.append(HaltsKept(self._kept_halts))
         while self._under_way and self._under_way[0][0] + self.delay <= self.clock():
-            outcomes.append(Kept(self._under_way.popleft()[1]))
+            self._kept = self._under_way.popleft()[1]
+            outcomes.append(Kept(self._kept))
         return outcomes
+
+    def left_by_a_crash(self) -> list[Event]:
+        """Return what the next life of a real store would find."""
+        words = {}
+        for event in self.events[self._kept : self._kept_halts]:
+            word = word_of(event, 0, offset=0.0)
+            if word is not None:
+                words[word.key] = event
+        return [*self.events[: self._kept], *words.values()]

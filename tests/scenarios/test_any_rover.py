@@ -12,6 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
+from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, ACK, DENIED, FAILED, MOVE, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
 from tests.kit.store import PromptSqliteStore
@@ -294,6 +295,98 @@ def test_what_a_person_halts_keeps_its_tasks(make_world: MakeWorld, halt: str) -
     world.run(1.0)
     world.rovers[1].autopilot.set_faults(Faults(silent=True, battery=5))
     world.run(30.0)
+    assert rover_of(world, task) == 2
+    assert world.state(task)[0] is S.QUEUED
+
+
+def halt_by_a_person(world: World, halt: str) -> None:
+    """Halt rover 1, which is idle."""
+    match halt:
+        case "stop":
+            world.client.stop(target=(1, 191))
+        case "pause":
+            world.client.pause(target=(1, 191))
+        case "hold":
+            world.client.mode(4, target=(1, 1))
+        case "disarm":
+            world.client.arm(False, target=(1, 1))
+        case "manual":
+            world.operator_mode(Mode.MANUAL)
+    world.run(2.0)
+
+
+def submit_later(world: World, delay: float) -> int:
+    """Submit a move for any rover that starts after so many seconds; return its id."""
+    sent = world.client.command(MOVE, 0.5, 0, 0, 9, 0, delay, 5, target=ANY)
+    world.run(0.1)
+    return sent.task_id
+
+
+def server_again(world: World, store: PromptSqliteStore) -> None:
+    """End the server in an orderly way, and start another one on its store."""
+    world.server.shut_down(now=world.now)
+    world.until(lambda: world.server.pump.is_over, within=10)
+    world.end_server()
+    world.start_server(store, store.load())
+
+
+@pytest.mark.parametrize("restarts", [False, True], ids=["", "restarted"])
+@pytest.mark.parametrize("halt", ["stop", "pause", "hold", "disarm", "manual"])
+def test_the_task_of_an_idle_rover_that_a_person_halts_stays(
+    make_world: MakeWorld, tmp_path: Any, halt: str, restarts: bool
+) -> None:
+    store = PromptSqliteStore(tmp_path / "tasks.sqlite3", wall_offset=0.0)
+    world = make_world(rovers=2, store=store, settings=Settings(on_restart="continue"))
+    world.client.mode(4, target=(1, 1))
+    world.run(1.0)
+    world.client.arm(True, target=(1, 1))
+    world.run(2.0)
+    task = submit_later(world, 15.0)
+    assert rover_of(world, task) == 1
+    halt_by_a_person(world, halt)
+    world.rovers[0].autopilot.set_faults(Faults(silent=True))
+    if restarts:
+        server_again(world, store)
+    world.run(30.0)
+    assert rover_of(world, task) == 1
+    assert world.rovers[1].truth.north == 0.0
+
+
+def test_a_continue_lets_the_tasks_of_a_halted_rover_move_again(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    task = submit_later(world, 60.0)
+    halt_by_a_person(world, "disarm")
+    world.client.proceed(target=(1, 191))
+    world.run(1.0)
+    world.rovers[0].autopilot.set_faults(Faults(silent=True))
+    world.until(lambda: rover_of(world, task) == 2, within=15)
+
+
+def test_a_task_that_came_after_the_halt_of_an_idle_rover_may_move(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    halt_by_a_person(world, "hold")
+    task = submit_later(world, 60.0)
+    assert rover_of(world, task) == 1
+    world.rovers[0].autopilot.set_faults(Faults(silent=True))
+    world.until(lambda: rover_of(world, task) == 2, within=15)
+
+
+@pytest.mark.parametrize("restarts", [False, True], ids=["", "restarted"])
+def test_a_pause_by_a_person_stands_beside_a_failsafe_of_the_rover(
+    make_world: MakeWorld, tmp_path: Any, restarts: bool
+) -> None:
+    store = PromptSqliteStore(tmp_path / "tasks.sqlite3", wall_offset=0.0)
+    world = make_world(rovers=2, store=store, settings=Settings(on_restart="continue"))
+    task = failsafe_of_rover_2(world)
+    world.client.pause(target=(2, 191))
+    world.run(3.0)
+    if restarts:
+        server_again(world, store)
+        world.run(6.0)
+        world.client.proceed(target=(1, 191))
+        world.run(0.1)
+        assert world.paused() is R.NONE
+    world.run(20.0)
     assert rover_of(world, task) == 2
     assert world.state(task)[0] is S.QUEUED
 

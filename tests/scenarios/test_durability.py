@@ -7,7 +7,7 @@ import pytest
 from mav_tasks.tasks.events import TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.client import ACCEPTED, TEMPORARILY_REJECTED
+from tests.kit.client import ACCEPTED, FAILED, TEMPORARILY_REJECTED
 from tests.kit.store import LateStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -144,13 +144,15 @@ def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(
     at = world.now
     sent = world.client.command(54010, 1, 1) if by == "kill" else world.client.stop()
     world.run(0.05)
-    assert sent.answer == (ACCEPTED, 1)
+    assert sent.answer == ((ACCEPTED, 1) if by == "STOP" else None)  # which has a record of its own
     assert {"zero", "HOLD"} <= set(world.observer.sent_since(at))
     world.run(told_after - 0.06)
     assert world.state(1)[0] is S.KILLED
     assert {status.state for status in world.client.statuses(1)} == {S.STARTING, S.EXECUTING}
     world.run(0.05)
     assert world.client.statuses(1)[-1].state == S.KILLED
+    not_kept = by == "kill" and delay == inf
+    assert sent.answer == ((FAILED, R.STORE_UNAVAILABLE) if not_kept else (ACCEPTED, 1))
 
 
 def test_an_end_is_not_told_by_news_of_the_same_step(world: World, store: LateStore) -> None:

@@ -53,6 +53,7 @@ def test_what_can_come_into_the_engine() -> None:
         "PeerChanged",
         "Congestion",
         "Committed",
+        "HaltsKept",
         "StoreFailed",
         "HaltNotStored",
         "LeaseChanged",

@@ -23,9 +23,10 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder
-from mav_tasks.mavlink.enums import MavCmd
+from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet, split_datagram
 from mav_tasks.services.command_receiver import is_stop
+from mav_tasks.tasks.lifecycle import TaskReason
 
 EVERYBODY = 0  # target_system
 MOST = 4096  # clients whose number is remembered
@@ -44,6 +45,8 @@ TOWARDS, BACK = "to", "from"
 #: before each packet towards a gateway: when it arrived here, s, by which it counts as old there
 ARRIVED = Struct(">d")
 LENGTH = 3
+#: result and reason of a STOP that the other gateway could not store
+NOT_KEPT = (MavResult.FAILED, TaskReason.STORE_UNAVAILABLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +194,8 @@ class Elsewhere:
                 continue
             ack = self._decoder.decode(packet)
             if isinstance(ack, m.CommandAck) and ack.command == MavCmd.TASK_STOP:
+                if (ack.result, ack.result_param2) == NOT_KEPT:
+                    continue  # its next gateway would not know it
                 theirs = {each for each, gateway in self._holders.items() if gateway == by}
                 for each in self._stops:
                     if each.received.client.key == client:

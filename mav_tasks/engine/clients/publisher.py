@@ -103,14 +103,6 @@ class Publisher:
             ):
                 self.note_change(event.task_id)
 
-    def warn_of_loss(self, system_id: int, *, now: float) -> None:
-        """Tell all clients that a STOP or pause in force is not stored: a restart loses it."""
-        vehicle = self._vehicles.get(system_id)
-        if vehicle is not None and vehicle.tasks.paused:
-            what = "STOP" if vehicle.tasks.is_stopped else "Pause"
-            text = f"{what} in force but not stored: a server restart loses it. See its log"
-            self._gcs.tell(text, MavSeverity.ERROR, vehicle.server_address, now=now)
-
     def warn_of_store(self, *, now: float) -> None:
         """Tell all clients that the store has failed."""
         text = "Store failed: new tasks are refused. See the server's log"

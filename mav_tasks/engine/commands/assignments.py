@@ -2,7 +2,7 @@
 
 A task moves to another vehicle if its own fails before it has begun the task: if it is silent, has
 stopped by its own failsafe or after a task that failed, or is low on battery, for GRACE seconds.
-What a person halts stays where it is: after a STOP, a pause or a takeover the operator decides.
+What a person halts stays where it is (``Lineup.keeps``): then the operator decides.
 Nothing moves while this gateway's lease is not trusted. A task that has begun never moves.
 ``tasks/choice.py`` has the rule of the choice.
 """
@@ -18,7 +18,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.choice import DISABLED, Candidate, Choice, choose, is_low
+from mav_tasks.tasks.choice import Candidate, Choice, choose, is_low
 from mav_tasks.tasks.driving.estimate import Estimate
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
@@ -115,10 +115,10 @@ class Assignments:
             self._assign_again(task, whys[task.vehicle], now=now)
 
     def _is_movable(self, task: Task) -> bool:
-        """Return whether a task may move now: it is stored, and nobody has called for it."""
-        tasks = self._fleet.get(task.vehicle)
-        is_called_for = tasks is not None and tasks.immediate == task.id
-        return self._registry.is_durable(task.id) and not is_called_for
+        """Return whether a task may move now: it is stored, and nobody wants it to stay."""
+        tasks = self._fleet.of(task.vehicle)
+        is_wanted_there = tasks.immediate == task.id or tasks.keeps(task)
+        return self._registry.is_durable(task.id) and not is_wanted_there
 
     def _assign_again(self, task: Task, why: str, *, now: float) -> None:
         """Give a task to another vehicle; it stays if no other one can drive it."""
@@ -135,11 +135,9 @@ class Assignments:
         self._fleet.room.assign(task, choice.vehicle, choice=words, now=now)
 
     def _why_failed(self, system_id: int, *, now: float) -> str:
-        """Return why a vehicle cannot begin its tasks, or "" if it can, or if a person waits."""
+        """Return why a vehicle cannot begin its tasks, or "" if it can, or if a task is held."""
         tasks, vehicle = self._fleet.get(system_id), self._vehicles.look_at(system_id)
         if tasks is None or tasks.is_held_ahead:
-            return ""
-        if tasks.paused and (tasks.paused not in DISABLED or tasks.halts.is_by_word):
             return ""
         if vehicle is None:  # not heard in this run; another gateway may have begun its task
             is_lost = self._vehicles.has_listened(now=now) and not self._vehicles.lease.is_shared

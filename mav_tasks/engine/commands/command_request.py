@@ -7,6 +7,7 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.goals import CHANGE_MODE, marks_of, reposition_flags
 from mav_tasks.engine.commands.words import kind_of, row_said
+from mav_tasks.engine.policy import Kind
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -94,9 +95,10 @@ class CommandRequest:
         )
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
-        """Send the COMMAND_ACK."""
+        """Send the COMMAND_ACK; ``Submissions.answer_halt`` sends that of a halt."""
         self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
-        self.client.answer(self.pending.answer, self.packet.source)
+        if self.kind is not Kind.HALT:
+            self.client.answer(self.pending.answer, self.packet.source)
 
     def refuse(
         self, refusal: Rejection, *, now: float, result: MavResult | None = None

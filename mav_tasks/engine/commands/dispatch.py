@@ -94,7 +94,7 @@ class Commands:
         receiver = client.sender(packet.source).commands
         known = receiver.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
-            if known.answer is not None:
+            if known.answer is not None and not known.is_held:
                 client.answer(known.answer, packet.source)
             return
         asked = CommandRequest(
@@ -111,6 +111,8 @@ class Commands:
             else:
                 self._submissions.refuse(asked, refusal, now=now)
         note_halt(asked, before=epoch)
+        if asked.kind is Kind.HALT and asked.pending.answer is not None:  # else the rover answers
+            self._submissions.answer_halt(client, asked.pending, packet.source, now=now)
 
     def _of_unheard(
         self, client: GcsClient, packet: Packet, command: Command, *, now: float
@@ -287,7 +289,7 @@ class Commands:
     # STOP, pause, modes
 
     def _stop(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
-        """Stop one vehicle or all, whatever the target component; execute and answer every copy.
+        """Stop one vehicle or all, whatever the target component; execute every copy.
 
         DEVIATION: for target_system 0, or the server's own, there is one ack, not one from each
         system: the worst result, from the task server of the lowest system id.
@@ -323,7 +325,9 @@ class Commands:
         if is_to_clear and not clear and client.may_be_refused(now=now):
             words = f"stopped, but role {client.rights.role} may not clear a queue; {OPERATOR} may"
             client.tell(words, MavSeverity.WARNING, source, now=now)
-        client.answer(Answer(command.command, result, param2, source), packet.source)
+        pending = sender.commands.remember(command, packet.raw, now=now)
+        pending.answer = Answer(command.command, result, param2, source)
+        self._submissions.answer_halt(client, pending, packet.source, now=now)
 
     def _pause_continue(self, asked: CommandRequest, *, now: float) -> int | None:
         vehicle = asked.vehicle

@@ -7,14 +7,15 @@ from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.commands.motion_gate import why_not_sent
+from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.inputs import Peer
-from mav_tasks.engine.policy import Row
+from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
-from mav_tasks.services.command_receiver import Answer
+from mav_tasks.services.command_receiver import Answer, Pending
 from mav_tasks.services.command_sender import Answered, Standing
 from mav_tasks.settings import ROLES
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
@@ -23,11 +24,15 @@ R = TaskReason
 
 
 class _Asker(NamedTuple):
-    """The sender of a forwarded command: endpoint, address there, and the component addressed."""
+    """The sender of a forwarded command: endpoint, address there, and the component addressed.
+
+    ``halt``: the command, if it halts the rover.
+    """
 
     client: tuple[str, Peer]
     source: Address
     answering: Address
+    halt: Pending | None
 
 
 def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
@@ -55,7 +60,8 @@ def relay(asked: CommandRequest, *, now: float) -> None:
     """Forward a command; ``deliver`` brings its answer to the client."""
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
-    asker = _Asker(asked.client.key, asked.packet.source, answering)
+    halt = asked.pending if asked.kind is Kind.HALT else None
+    asker = _Asker(asked.client.key, asked.packet.source, answering, halt)
     asked.vehicle.relay(
         asked.packet,
         command.message,
@@ -73,7 +79,9 @@ def _disarms(request: Message) -> bool:
     return (request.command, request.param1) == (MavCmd.COMPONENT_ARM_DISARM, 0.0)
 
 
-def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -> None:
+def deliver(
+    gcs: GcsSide, submissions: Submissions, vehicle: Vehicle, answered: Answered, *, now: float
+) -> None:
     """Answer the client with the vehicle's answer, or with a refusal if there is none."""
     asker = answered.origin
     assert isinstance(asker, _Asker), "only relay gives commands an origin"
@@ -105,4 +113,8 @@ def deliver(gcs: GcsSide, vehicle: Vehicle, answered: Answered, *, now: float) -
         answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
         words = f"command {command}: no answer from rover {vehicle.system_id}"
         client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
-    client.answer(answer, asker.source)
+    if asker.halt is None:
+        client.answer(answer, asker.source)
+    else:
+        asker.halt.answer = answer
+        submissions.answer_halt(client, asker.halt, asker.source, now=now)

@@ -4,6 +4,7 @@ from collections.abc import Hashable
 from functools import partial
 from typing import NamedTuple
 
+from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
 from mav_tasks.engine.commands.ability import driven
@@ -17,13 +18,15 @@ from mav_tasks.engine.commands.ordering import (
 )
 from mav_tasks.engine.commands.reach import check_reach
 from mav_tasks.engine.commands.translate import result_of
+from mav_tasks.engine.commands.words import OF_ONE_TASK
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import TASK_COMMANDS
 from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.address import AUTOPILOT
-from mav_tasks.mavlink.enums import MavResult, MavSeverity
+from mav_tasks.mavlink.address import AUTOPILOT, Address
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
+from mav_tasks.services.command_receiver import Pending
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.forecast import Forecast
@@ -53,6 +56,14 @@ class Submitted(NamedTuple):
     task: Task
 
 
+class _Halted(NamedTuple):
+    """A command that has halted a vehicle; its answer is sent once that is kept."""
+
+    client: GcsClient
+    pending: Pending
+    to: Address
+
+
 class Submissions:
     """The entry of all new tasks, which are acknowledged once durable."""
 
@@ -73,6 +84,7 @@ class Submissions:
         #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
         self.gate.knows(Submitted, self._accept, self._withdraw)
+        self.gate.knows(_Halted, _answer, self._answer_unkept)
         #: by task that is not durable yet: requests to answer, one for each client and command
         self._undecided: dict[TaskId, list[CommandRequest]] = {}
         self._store_is_away = False
@@ -311,6 +323,31 @@ class Submissions:
         """Return the task that a submission repeats, or None: see ``SubmissionDeduplicator``."""
         return self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
 
+    def answer_halt(self, client: GcsClient, pending: Pending, to: Address, *, now: float) -> None:
+        """Send the answer to a command that has halted a vehicle once a restart would know that.
+
+        The record of halts knows no tasks: one that was cancelled would come back and drive.
+        """
+        if not pending.is_held:  # else this was a copy
+            pending.is_held = True
+            number, first = pending.command.command, pending.command.params[0]
+            ends_tasks = number in OF_ONE_TASK or (number, first) == (MavCmd.TASK_STOP, 1.0)
+            self.gate.hold(_Halted(client, pending, to), now=now, is_halt=not ends_tasks)
+
+    def _answer_unkept(self, halted: _Halted, *, now: float) -> None:
+        client, pending, to = halted
+        answer, pending.is_held = pending.answer, False
+        assert answer is not None, "what is held has one"
+        if answer.result not in (MavResult.ACCEPTED, MavResult.FAILED):  # refused
+            client.answer(answer, to)
+            return
+        reason = int(R.STORE_UNAVAILABLE)
+        pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
+        client.answer(pending.answer, to)
+        what = "STOP" if answer.command == MavCmd.TASK_STOP else f"Command {answer.command}"
+        words = f"{what} in force but not stored: a server restart loses it. See its log"
+        self._gcs.tell(words, MavSeverity.ERROR, answer.source, now=now)
+
     def answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
         """Give a repeated submission the answer of the first, once that has one."""
         if known.task_id in self._undecided:
@@ -327,6 +364,13 @@ class Submissions:
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"repeated {what}, no new task: see task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
+
+
+def _answer(halted: _Halted, *, now: float) -> None:  # noqa: ARG001
+    client, pending, to = halted
+    assert pending.answer is not None, "what is held has one"
+    pending.is_held = False
+    client.answer(pending.answer, to)
 
 
 def _priority_of(submitter: Submitter, settings: Settings) -> int:

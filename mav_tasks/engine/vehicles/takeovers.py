@@ -171,7 +171,10 @@ class Takeovers:
             parts.registry.record(VehicleSeen(parts.system_id, words, now))
         if news.cause and parts.tasks.paused is R.TAKEOVER:
             words = f"was taken over by its failsafe: {news.cause}"
-            self._joint.on(Event.EXPLAINED, Word(R.FAILSAFE, parts.actor, words), now=now)
+            if parts.tasks.halts.by_somebody.reason is R.TAKEOVER:
+                self._joint.on(Event.EXPLAINED, Word(R.FAILSAFE, parts.actor, words), now=now)
+            else:  # a command to halt stands beside it
+                parts.note(words, now=now)
 
     def _taken(
         self, event: Event, what: str, *, now: float, reason: TaskReason = R.TAKEOVER

@@ -273,11 +273,9 @@ class VehicleSide:
             else:
                 vehicle.joint.shut_down(now=now)
 
-    def commit(self, durable: int, *, now: float) -> None:
-        """Mark events up to ``durable`` as durable; start the tasks that waited only for that."""
-        waiting = self.deadline_heap.awaiting_commit()
-        self._registry.durable = durable
-        for vehicle in waiting:
+    def commit(self, *, now: float) -> None:
+        """Start the tasks that waited only for events that are durable now."""
+        for vehicle in self.deadline_heap.awaiting_commit():
             self.deadline_heap.mark_dirty(vehicle)
             vehicle.joint.step(now)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
-from mav_tasks.store.base import Evicted, IdsGranted, NotKept, Outcome
+from mav_tasks.store.base import Evicted, HaltsKept, IdsGranted, NotKept, Outcome
 from mav_tasks.store.durable import CLOSE_LIMIT, DurableStore
 from mav_tasks.store.halt_record import HaltRecord, Word
 from mav_tasks.store.postgres.address import Address
@@ -95,6 +95,8 @@ class FleetStore(DurableStore):
         """Return the outcomes since the last call; raise an exception of the store's threads."""
         outcomes: list[Outcome] = []
         for outcome in super().take_outcomes():
+            if isinstance(outcome, HaltsKept):
+                continue  # on this machine, where the gateway that gets the vehicle cannot read it
             if isinstance(outcome, NotKept) and self._fleet.is_replaced:
                 outcome = Evicted(outcome.text)
             if isinstance(outcome, IdsGranted):
