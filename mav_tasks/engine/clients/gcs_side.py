@@ -27,6 +27,7 @@ from mav_tasks.settings import Settings
 MAX_LINK_NUMBER = 255  # limit of its field in TASK_STATUS
 NEWCOMERS = 2.0  # new unsigned clients a second, on average; the burst is ``max_clients``
 CROWDED = 2  # beyond ``max_clients`` / CROWDED, clients heard only once are forgotten after SILENT
+GONE = 60.0  # s of silence, after which a client of any standing may replace this one
 SILENT = 3.0  # s, after which a new client may replace this one; heartbeats come each second
 
 
@@ -292,7 +293,8 @@ class GcsSide:
     def _has_room(self, standing: tuple[int, bool], *, now: float) -> bool:
         """Whether there is room for a client of this standing; perhaps forget one in its place.
 
-        That one has a lower standing, or the same and is silent.
+        That one has a lower standing, or the same and is silent, or has been silent for long.
+        Silent ones go first: commands that have ended leave clients of any standing behind.
         """
         if len(self._clients) < self._settings.clients.max_clients:
             return True
@@ -300,10 +302,17 @@ class GcsSide:
             client
             for client in self.clients
             if not client.is_configured
-            and (client.standing, now - client.heard_at < SILENT) < (standing, True)
+            and (
+                (client.standing, now - client.heard_at < SILENT) < (standing, True)
+                or now - client.heard_at >= GONE
+            )
         ]
-        silent = min(others, key=lambda client: (client.standing, client.heard_at), default=None)
-        if silent is None:
+        last = min(
+            others,
+            key=lambda each: (now - each.heard_at < SILENT, each.standing, each.heard_at),
+            default=None,
+        )
+        if last is None:
             return False
-        self._drop(silent.key, silent)
+        self._drop(last.key, last)
         return True

@@ -87,6 +87,23 @@ class Rights(NamedTuple):
         ``waiting``: how many tasks of its submitter wait already. ``known``: from where its rover
         will drive it, as far as that can be told.
         """
+        self.check_content(draft)
+        limits = self.limits
+        if waiting >= limits.quota:
+            raise self.refusal(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
+        top, most = limits.max_speed, limits.max_distance
+        is_far = most == NO_LIMIT.max_distance
+        metres = 0.0 if is_far else time_left(draft.goal, Progress(), known()).metres
+        if not metres <= most * SAME:  # also if it is not known
+            way = UNKNOWN_WAY if isnan(metres) else f"{metres:.2f} m"
+            raise self.refusal(f"may drive {most:g} m at most in a task, not {way}")
+        if is_far and top == NO_LIMIT.max_speed:
+            return draft
+        terms = replace(draft.terms, top_speed=top, max_distance=None if is_far else most)
+        return replace(draft, terms=terms)
+
+    def check_content(self, draft: Draft) -> None:
+        """Raise Rejection if a task is not allowed, whichever rover drives it."""
         self.require(SUBMITTER, "submit tasks")
         self.check_terms(draft.terms)
         limits, goal, steps = self.limits, draft.goal, steps_of(draft.goal)
@@ -96,21 +113,10 @@ class Rights(NamedTuple):
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
         if any(isinstance(step, Perform) for step in steps):
             self.require(OPERATOR, "send a plan that contains rover commands", moves=True)
-        if waiting >= limits.quota:
-            raise self.refusal(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
-        top, most = limits.max_speed, limits.max_distance
+        top = limits.max_speed
         fastest = 0.0 if top == NO_LIMIT.max_speed else max(map(speed_named_by, steps), default=0.0)
         if fastest > top * SAME:
             raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
-        is_far = most == NO_LIMIT.max_distance
-        metres = 0.0 if is_far else time_left(goal, Progress(), known()).metres
-        if not metres <= most * SAME:  # also if it is not known
-            way = UNKNOWN_WAY if isnan(metres) else f"{metres:.2f} m"
-            raise self.refusal(f"may drive {most:g} m at most in a task, not {way}")
-        if is_far and top == NO_LIMIT.max_speed:
-            return draft
-        terms = replace(draft.terms, top_speed=top, max_distance=None if is_far else most)
-        return replace(draft, terms=terms)
 
 
 #: rights of a client that has sent nothing yet

@@ -159,6 +159,7 @@ class AnyRover:
         client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
         check_any(wish.goal)
         draft = Draft(ANY, command.command, wish.goal, client.who, wish.terms, wish.marks)
+        client.rights.check_content(draft)
         confirmation = command.confirmation
         known = self._submissions.known(draft, confirmation=confirmation, origin=None, now=now)
         if known is not None:

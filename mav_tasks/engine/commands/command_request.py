@@ -95,9 +95,9 @@ class CommandRequest:
         )
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
-        """Send the COMMAND_ACK; ``Submissions.answer_halt`` sends that of a halt."""
+        """Send the COMMAND_ACK; ``Submissions.answer_halt`` sends that of a halt in force."""
         self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
-        if self.kind is not Kind.HALT:
+        if self.kind is not Kind.HALT or result not in translate.IN_FORCE:
             self.client.answer(self.pending.answer, self.packet.source)
 
     def refuse(

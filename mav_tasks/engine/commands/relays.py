@@ -8,6 +8,7 @@ from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.commands.motion_gate import why_not_sent
 from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.commands.translate import IN_FORCE
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -113,8 +114,9 @@ def deliver(
         answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
         words = f"command {command}: no answer from rover {vehicle.system_id}"
         client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
-    if asker.halt is None:
+    if asker.halt is not None:
+        asker.halt.answer = answer
+    if asker.halt is None or answer.result not in IN_FORCE:
         client.answer(answer, asker.source)
     else:
-        asker.halt.answer = answer
         submissions.answer_halt(client, asker.halt, asker.source, now=now)

@@ -17,7 +17,7 @@ from mav_tasks.engine.commands.ordering import (
     why_older,
 )
 from mav_tasks.engine.commands.reach import check_reach
-from mav_tasks.engine.commands.translate import result_of
+from mav_tasks.engine.commands.translate import IN_FORCE, result_of
 from mav_tasks.engine.commands.words import OF_ONE_TASK
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import TASK_COMMANDS
@@ -328,7 +328,8 @@ class Submissions:
 
         The record of halts knows no tasks: one that was cancelled would come back and drive.
         """
-        if not pending.is_held:  # else this was a copy
+        assert pending.answer is not None, "it was decided"
+        if pending.answer.result in IN_FORCE and not pending.is_held:  # else this was a copy
             pending.is_held = True
             number, first = pending.command.command, pending.command.params[0]
             ends_tasks = number in OF_ONE_TASK or (number, first) == (MavCmd.TASK_STOP, 1.0)
@@ -338,9 +339,6 @@ class Submissions:
         client, pending, to = halted
         answer, pending.is_held = pending.answer, False
         assert answer is not None, "what is held has one"
-        if answer.result not in (MavResult.ACCEPTED, MavResult.FAILED):  # refused
-            client.answer(answer, to)
-            return
         reason = int(R.STORE_UNAVAILABLE)
         pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
         client.answer(pending.answer, to)

@@ -38,6 +38,8 @@ R = TaskReason
 
 NEVER = 0xFFFFFFFF  # TASK_QUEUE_STATUS.heartbeat_age: no heartbeat came
 
+#: results of a command that has halted a vehicle; FAILED: it is silent, or the halt is not kept
+IN_FORCE = (MavResult.ACCEPTED, MavResult.FAILED)
 #: MAV_RESULT of each refusal reason; DENIED for all others
 RESULT_OF: dict[int, MavResult] = {
     R.QUEUE_FULL: MavResult.TEMPORARILY_REJECTED,

@@ -139,7 +139,7 @@ class AnyUploads:
     ) -> None:
         kind, row = message.mission_type, row_of(packet.message_id, message)
         try:
-            client.rights.require(row.role, f"change {row.about}")
+            client.rights.require(row.role, f"do this ({row.about})")
             if kind != MavMissionType.MISSION:
                 words = f"upload: mission type {kind} belongs to one rover: name it"
                 raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
@@ -182,6 +182,7 @@ class AnyUploads:
         self._submissions.check_open()
         wanted = self._check.plan_of(upload.items, now=now)
         draft = draft_of(ANY, wanted, client, sender)
+        client.rights.check_content(draft)
         known = self._submissions.known_plan(draft, begun_at=upload.begun_at, now=now)
         if known is not None:
             self._finish(known, now=now)

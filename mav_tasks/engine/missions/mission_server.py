@@ -173,7 +173,7 @@ class MissionServers:
         kind = getattr(message, "mission_type", MISSION)
         row = row_of(packet.message_id, message)
         try:
-            client.rights.require(row.role, f"change {row.about}")
+            client.rights.require(row.role, f"do this ({row.about})")
         except Rejection as refusal:
             if isinstance(message, m.MissionCount | m.MissionClearAll):
                 self._answers.ack(sender, kind, MavMissionResult.DENIED, refusal.reason)
