@@ -8,11 +8,8 @@ from mav_tasks.agents.forms import DONE, TASK, task_form
 from mav_tasks.agents.reading import TASK_ID, VEHICLE_ID
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
-from mav_tasks.client.descriptions import SILENT_BUT_STOPPED
 from mav_tasks.client.goal_form import goal_schema
 from mav_tasks.client.idempotency import LONGEST
-from mav_tasks.errors import Refused
-from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import MAX_PRIORITY
 
 MOST_GOALS = 100
@@ -120,12 +117,7 @@ async def _release(rovers: Rovers, values: Values, _report: Report) -> dict[str,
 
 async def _stop(rovers: Rovers, values: Values, _report: Report) -> dict[str, Any]:
     vehicle = values["vehicle"]  # any: STOP is never too much
-    try:
-        await rovers.unfound.stop(vehicle=vehicle)
-    except Refused as error:
-        if error.reason != TaskReason.VEHICLE_SILENT:
-            raise
-        raise Refused(SILENT_BUT_STOPPED, result=error.result, reason=error.reason) from error
+    await rovers.unfound.stop(vehicle=vehicle)
     which = "every rover" if vehicle is None else f"rover {vehicle}"
     return {"done": f"STOP is in force for {which}: no task runs until an operator resumes"}
 

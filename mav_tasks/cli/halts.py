@@ -13,9 +13,8 @@ from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import is_alone, opened, unfound
 from mav_tasks.cli.words import line_of, resume_command
 from mav_tasks.client.aio import Client
-from mav_tasks.client.descriptions import SILENT_BUT_STOPPED
 from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.lifecycle import TaskState
 
 Everywhere = Annotated[bool, typer.Option("--all", help="Apply to every rover of the server.")]
 
@@ -34,14 +33,7 @@ async def stop(
     """
     _require_one_choice(common, everywhere=everywhere)
     async with unfound(common) as client:  # do not wait for discovery
-        try:
-            await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
-        except Refused as error:
-            if error.reason == TaskReason.VEHICLE_SILENT:
-                raise Refused(
-                    SILENT_BUT_STOPPED, result=error.result, reason=error.reason
-                ) from error
-            raise
+        await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
     which, way_on = "every rover", "mav-tasks resume --all"
     if common.vehicle is not None:
         which, way_on = f"rover {common.vehicle}", f"mav-tasks resume --vehicle {common.vehicle}"

@@ -13,6 +13,7 @@ from mav_tasks import plan_files
 from mav_tasks.client import wire
 from mav_tasks.client.asker import Asker
 from mav_tasks.client.connection import Connection
+from mav_tasks.client.descriptions import STOP_IN_FORCE
 from mav_tasks.client.handle import Release, Task
 from mav_tasks.client.plan_sources import Plan, file_of, items_of
 from mav_tasks.client.session import TELEMETRY_RATE, Session
@@ -381,7 +382,8 @@ class Client:
         This ignores the client's default rover, and needs no ``found``. ``clear`` also cancels the
         waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds,
         and then to each rover that is known, until each has answered.
-        After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard.
+        After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard;
+        after Refused (STORE_UNAVAILABLE) it is in force until the server restarts.
         """
         await self._stop(vehicle, clear=clear, within=within)
         rovers = self._open.session.fleet.served() if vehicle is None else []
@@ -393,7 +395,11 @@ class Client:
 
     async def _stop(self, vehicle: int | None, *, clear: bool, within: float) -> None:
         command = self._stop_command(vehicle, clear=clear)
-        await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
+        try:
+            await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
+        except Refused as error:
+            words = STOP_IN_FORCE.get(error.reason, str(error))
+            raise Refused(words, result=error.result, reason=error.reason) from error
 
     def stop_again(self, *, clear: bool = False, vehicle: int | None = None) -> None:
         """Send one STOP and wait for no answer: an equal ``stop`` that is not sent yet gets it."""

@@ -16,10 +16,16 @@ UNTIL_RESUMED = (
     TaskReason.RESTARTED,
 )
 
-SILENT_BUT_STOPPED = (
-    "STOP is in force, but a rover is silent and may still move;"
-    " the server stops it when it is heard again"
-)
+#: what a STOP that is in force has not reached, by the reason of its answer
+STOP_IN_FORCE: dict[int, str] = {
+    TaskReason.VEHICLE_SILENT: (
+        "STOP is in force, but a rover is silent and may still move;"
+        " the server stops it when it is heard again"
+    ),
+    TaskReason.STORE_UNAVAILABLE: (
+        "STOP is in force, but not stored: a restart of the server loses it"
+    ),
+}
 
 
 def state_of(status: TaskStatus) -> str:

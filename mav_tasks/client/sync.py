@@ -314,7 +314,8 @@ class SyncClient(BlockingClient):
         This ignores the client's default rover, and needs no ``found``. ``clear`` also cancels the
         waiting tasks. STOP is sent ten times a second until it is answered, for ``within`` seconds,
         and then to each rover that is known, until each has answered.
-        After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard.
+        After Refused (VEHICLE_SILENT) it stays in force, and stops the rover once that is heard;
+        after Refused (STORE_UNAVAILABLE) it is in force until the server restarts.
         """
         self._call(self._aio.stop(clear=clear, vehicle=vehicle, within=within))
 

@@ -70,10 +70,10 @@ class Answer(NamedTuple):
 class Pending:
     """A command taken in; ``answer`` is None until it has been answered.
 
-    ``is_held``: the answer is known, and waits until the halt is kept.
+    ``is_held``: the answer is known, and waits until the halt is kept; ``words`` follow it.
     """
 
-    __slots__ = ("answer", "at", "command", "is_held", "receiver")
+    __slots__ = ("answer", "at", "command", "is_held", "receiver", "words")
 
     def __init__(
         self, command: Command, at: float, receiver: "CommandReceiver | None" = None
@@ -83,6 +83,7 @@ class Pending:
         self.receiver = receiver
         self.answer: Answer | None = None
         self.is_held = False
+        self.words: tuple[str, Address] | None = None
 
 
 class CommandReceiver:

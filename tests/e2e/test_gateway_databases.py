@@ -100,7 +100,8 @@ def test_with_a_full_disk_the_task_goes_on_and_a_stop_at_the_other_gateway_works
             with pytest.raises(Refused):
                 client.submit(Move(1.0))
             asked = time.monotonic()
-            client.stop()
+            with pytest.raises(Refused, match="STOP is in force, but not stored"):
+                client.stop()
             assert fleet.zero_after(asked) < AT_ONCE
             assert fleet.motions_since(asked + AT_ONCE) == 0
         fleet.until(S.KILLED)

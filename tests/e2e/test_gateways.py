@@ -195,7 +195,8 @@ def test_without_the_database_the_rover_stops_and_the_task_goes_on_with_it(
         fleet.processes["a"].wait_for("cannot renew its lease: its rovers are stopped")
         wait_until(lambda: speed(fleet.truth) < 0.01, within=5)
         client = fleet.client("a")
-        client.stop()  # is obeyed without the database
+        with pytest.raises(Refused, match="STOP is in force, but not stored"):
+            client.stop()  # is obeyed without the database
     fleet.processes["a"].wait_for("has renewed its lease")
     fleet.until_state(task.id, S.KILLED)
 

@@ -94,10 +94,14 @@ class CommandRequest:
             and bool(reposition_flags(command) & CHANGE_MODE)
         )
 
+    def is_held(self, result: MavResult) -> bool:
+        """Whether ``Submissions.answer_halt`` sends this answer: it is that of a halt in force."""
+        return self.kind is Kind.HALT and result in translate.IN_FORCE
+
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
-        """Send the COMMAND_ACK; ``Submissions.answer_halt`` sends that of a halt in force."""
+        """Send the COMMAND_ACK, unless the halt must be kept first."""
         self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
-        if self.kind is not Kind.HALT or result not in translate.IN_FORCE:
+        if not self.is_held(result):
             self.client.answer(self.pending.answer, self.packet.source)
 
     def refuse(
@@ -110,7 +114,10 @@ class CommandRequest:
         if result is None:
             result = translate.result_of(refusal.reason)
         self.answer(result, refusal.reason)
-        self.client.tell_refusal(refusal.text, self.refusing, now=now)
+        if self.is_held(result):
+            self.pending.words = refusal.text, self.refusing
+        else:
+            self.client.tell_refusal(refusal.text, self.refusing, now=now)
         reason = TaskReason(refusal.reason)
         return SubmissionRefused(
             self.vehicle.system_id, self.command.command, reason, refusal.text, self.actor, now
@@ -136,6 +143,10 @@ class MessageRequest(CommandRequest):
     def marks(self) -> Marks:
         """Empty keys, equal for all: a ground station repeats SET_MODE and means it once."""
         return Marks()
+
+    def is_held(self, result: MavResult) -> bool:  # noqa: ARG002
+        """Return False: there is no answer."""
+        return False
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Do nothing: heartbeats show the mode."""

@@ -364,11 +364,13 @@ class Submissions:
             asked.tell(words, MavSeverity.INFO, now=now)
 
 
-def _answer(halted: _Halted, *, now: float) -> None:  # noqa: ARG001
+def _answer(halted: _Halted, *, now: float) -> None:
     client, pending, to = halted
     assert pending.answer is not None, "what is held has one"
     pending.is_held = False
     client.answer(pending.answer, to)
+    if pending.words is not None:
+        client.tell_refusal(*pending.words, now=now)
 
 
 def _priority_of(submitter: Submitter, settings: Settings) -> int:

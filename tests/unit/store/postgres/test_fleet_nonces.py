@@ -84,7 +84,8 @@ def test_named_vehicles_other_nonces_and_other_clients_are_not_compared(url: str
         assert isinstance(other[0], TaskSubmitted)
         task = other[0].task
         stranger = TaskSubmitted(
-            replace(task, submitter=replace(task.submitter, key="another")), task.submitted_at
+            replace(task, submitter=replace(task.submitter, fingerprint="another")),
+            task.submitted_at,
         )
         named = TaskSubmitted(replace(task, id=TaskId(1004), choice=""), task.submitted_at)
         b.store.append([*to_any(1001, nonce=78), *to_any(1002, nonce=0), stranger, named])
