@@ -416,7 +416,7 @@ class Limits:
     max_speed: float = setting(10.0, Number(0.05, 100, "m/s"), "speed limit of this role's tasks")
     max_distance: float = setting(
         1e6,
-        Number(0.1, 1e6, "m"),
+        Number(0.1, 1e7, "m"),
         "maximum way of one of this role's tasks; one of unknown length is refused",
     )
     quota: int = setting(

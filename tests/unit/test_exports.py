@@ -25,9 +25,9 @@ def public(thing: object) -> list[str]:
 
 
 @pytest.mark.patches_core
-def test_the_engine_has_five_methods_and_five_views() -> None:
+def test_the_engine_has_five_methods_and_six_views() -> None:
     methods = ["handle", "handle_deadline", "next_deadline", "take_events", "take_packets"]
-    views = ["snapshot", "parameters", "reach", "expected", "stop_until"]
+    views = ["snapshot", "parameters", "reach", "expected", "stop_until", "has_heard"]
     assert public(Engine) == sorted([*methods, *views])
 
 

@@ -1,8 +1,8 @@
 """Every file that the server or a command writes: who may read it, and whose link it follows.
 
-Store, lock, telemetry log, record, keys and profiles are their owner's alone, with the folders made
-for them, whatever the umask. Documents (plans, QGroundControl's actions, a sample of the
-configuration) are as the umask says, like any document, and are there as a whole or not at all.
+Store, record of halts, telemetry log, record, keys and profiles are their owner's alone, with the
+folders made for them, whatever the umask. Documents (plans, QGroundControl's actions, a sample of
+the configuration) are as the umask says, like any document, and there as a whole or not at all.
 """
 
 import os
@@ -63,7 +63,7 @@ def write_store(folder: Path) -> None:
         store.append([submitted(1)])
         wait_for(store, 1)
         names = {path.name for path in (folder / "data" / "own").iterdir()}
-        assert names >= {"tasks.sqlite3", "tasks.sqlite3.lock", "tasks.sqlite3-wal"}
+        assert names >= {"tasks.sqlite3", "tasks.sqlite3.halts", "tasks.sqlite3-wal"}
         assert modes_below(folder) == ({0o600}, {0o700})  # also while it is open
 
 
@@ -141,14 +141,14 @@ def test_a_store_may_be_a_link_of_ones_own(tmp_path: Path) -> None:
     link = tmp_path / "tasks.sqlite3"
     link.symlink_to(tmp_path / "disk" / "tasks.sqlite3")
     with closing(SqliteStore(link, wall_offset=lambda: 0.0)):
-        assert (tmp_path / "disk" / "tasks.sqlite3.lock").exists()
+        assert (tmp_path / "disk" / "tasks.sqlite3.halts").exists()
 
 
-def test_the_lock_is_not_taken_through_a_link(tmp_path: Path) -> None:
+def test_the_record_of_halts_is_not_made_through_a_link(tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     victim.write_text("precious", encoding="utf-8")
-    (tmp_path / "tasks.sqlite3.lock").symlink_to(victim)
-    with pytest.raises(StoreError, match=r"tasks\.sqlite3\.lock is a symbolic link: remove it$"):
+    (tmp_path / "tasks.sqlite3.halts").symlink_to(victim)
+    with pytest.raises(StoreError, match=r"tasks\.sqlite3\.halts"):
         SqliteStore(tmp_path / "tasks.sqlite3", wall_offset=lambda: 0.0)
     assert victim.read_text("utf-8") == "precious"
 

@@ -11,7 +11,7 @@ counted, because the link to the rover may be slow.
 What is stored, or lets a rover go, has a smaller limit besides, for it may fill the disk.
 """
 
-from mav_tasks.engine.clients.gcs_client import CHANGES
+from mav_tasks.engine.clients.gcs_client import changes_of
 from mav_tasks.engine.clients.gcs_side import Received
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import OBSERVER, OPERATOR
@@ -61,7 +61,7 @@ class Door:
         if is_taken and row.is_claimed and row.kind in (Kind.WISH, Kind.GO):
             items = message.count if isinstance(message, m.MissionCount) else 0
             is_taken = client.changes.take(tokens=min(1 + items // ITEMS, rate), now=now)
-            what, rate = "changes", rate * CHANGES
+            what, rate = "changes", changes_of(rate)
         if is_taken:
             return True
         self.left_out += 1

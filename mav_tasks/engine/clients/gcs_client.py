@@ -22,6 +22,7 @@ from mav_tasks.tasks.task import Submitter, Task
 
 AT_ONCE = 5.0  # s, whose requests may come in one burst: a script queues a day's work
 CHANGES = 1 / 20  # of the rate of requests: what is stored, or lets a rover go
+LEAST_CHANGES = 1.0  # /s, if the requests may be so many
 REFUSALS, REFUSALS_AT_ONCE = 2.0, 20.0  # told and recorded: a second, and in one burst
 #: s for which a refusal is not repeated: QGroundControl asks three times for a mode, 1.3 s apart,
 #: and sends one "go to" in two messages
@@ -34,6 +35,11 @@ MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 ELSEWHERE = 0.5  # s between messages of one type to a client at another gateway
 MAX_SENDERS = 32  # addresses at one endpoint whose commands are remembered: there may be a router
 NO_STANDING = (0, False)  # of a client that has said nothing yet
+
+
+def changes_of(rate: float) -> float:
+    """Return how many changes a second go with a rate of requests."""
+    return max(rate * CHANGES, min(rate, LEAST_CHANGES))
 
 
 class GcsClient:
@@ -143,7 +149,7 @@ class GcsClient:
         if limits is None or limits[0].rate != rate:
             limits = self._limits_of[place] = [
                 TokenBucket(rate=each, burst=rate * AT_ONCE, now=now)
-                for each in (rate, rate * CHANGES)
+                for each in (rate, changes_of(rate))
             ]
         self.requests, self.changes = limits
 

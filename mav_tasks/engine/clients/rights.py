@@ -92,12 +92,12 @@ class Rights(NamedTuple):
         if waiting >= limits.quota:
             raise self.refusal(f"may have at most {limits.quota} waiting tasks", R.QUOTA)
         top, most = limits.max_speed, limits.max_distance
-        is_far = most == NO_LIMIT.max_distance
+        is_far = most >= NO_LIMIT.max_distance
         metres = 0.0 if is_far else time_left(draft.goal, Progress(), known()).metres
         if not metres <= most * SAME:  # also if it is not known
             way = UNKNOWN_WAY if isnan(metres) else f"{metres:.2f} m"
             raise self.refusal(f"may drive {most:g} m at most in a task, not {way}")
-        if is_far and top == NO_LIMIT.max_speed:
+        if is_far and top >= NO_LIMIT.max_speed:
             return draft
         terms = replace(draft.terms, top_speed=top, max_distance=None if is_far else most)
         return replace(draft, terms=terms)
@@ -114,7 +114,7 @@ class Rights(NamedTuple):
         if any(isinstance(step, Perform) for step in steps):
             self.require(OPERATOR, "send a plan that contains rover commands", moves=True)
         top = limits.max_speed
-        fastest = 0.0 if top == NO_LIMIT.max_speed else max(map(speed_named_by, steps), default=0.0)
+        fastest = 0.0 if top >= NO_LIMIT.max_speed else max(map(speed_named_by, steps), default=0.0)
         if fastest > top * SAME:
             raise self.refusal(f"may drive {top:g} m/s at most, not {fastest:g}")
 

@@ -5,7 +5,7 @@ from functools import partial
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
 from typing import Any
 
-from mav_tasks.engine.clients.sender import Sender
+from mav_tasks.engine.clients.sender import Memory, Sender
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.tasks.task import Task
@@ -13,7 +13,7 @@ from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 #: what must be remembered although a vehicle is gone: the times of signatures, against replayed
 #: packets, and what clients have said, so that a late copy of it counts as a copy
-KEPT = (Signatures, Sender)
+KEPT = (Signatures, Sender, Memory)
 PLAIN = (str, bytes, bytearray, float, bool, type, ModuleType, BuiltinFunctionType)
 
 

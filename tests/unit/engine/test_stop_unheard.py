@@ -3,7 +3,7 @@
 import pytest
 
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets
+from mav_tasks.engine.inputs import HaltsKept, LinkChanged, LinkSide, Packets
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Packer
@@ -32,6 +32,7 @@ def test_is_latched_answered_and_sent_first_when_it_is_heard(
     stop = m.CommandLong(*target, 54003, 0, 0, 0, 0, 0, 0, 0, 0)
     data = packer.pack(stop, Address(255, 190), seq=0)
     engine.handle(Packets("c", [(CLIENT, data)]), now=1.0)
+    engine.handle(HaltsKept(len(engine.take_events()) + 1), now=1.0)
     acks = [o.data for o in engine.take_packets() if o.peer == CLIENT and o.data[7] == 77]
     assert len(acks) == 1
     ack = decoder.decode(split_datagram(acks[0])[0])
