@@ -315,7 +315,7 @@ class Lives(RuleBasedStateMachine):
             case QueuePaused(vehicle=vehicle, reason=reason):
                 self.paused[vehicle] = reason
             case QueueContinued(vehicle=vehicle):
-                del self.paused[vehicle]
+                self.paused.pop(vehicle, None)  # a halt of an idle rover ends with it, too
 
     def due(self, task: Task) -> float:
         utc = task.terms.start_utc
