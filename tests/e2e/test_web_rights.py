@@ -1,9 +1,9 @@
-"""Who uses the page is a client of the server: a request gets the same answer as by MAVLink."""
+"""Who uses the page is a client of the server, with a key; test_rights.py compares the answers."""
 
 import json
 import signal
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
-from mav_tasks import Key, Move, Refused, SyncClient, Wait
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks import Key, Refused, SyncClient, Wait
 from tests.kit.commands import called
 from tests.kit.processes import Stand, free_udp_ports, process, stand, wait_until
 from tests.kit.web import Web, add_key, has_rover, ring_of, web
@@ -23,27 +22,6 @@ pytestmark = pytest.mark.slow
 ROLES = {"ola": "observer", "sam": "submitter", "otto": "operator", "sue": "safety"}
 LIMITS = {"max_priority": 7, "max_speed": 1.0, "quota": 3}
 LATER = 1000  # s: no task of these tests begins
-SERVO = """QGC WPL 110
-0\t1\t3\t16\t0\t0\t0\t0\t-35.363262\t149.165237\t0\t1
-1\t0\t3\t183\t5\t1900\t0\t0\t0\t0\t0\t1
-"""
-CIRCLE = {
-    "circle": {"center": [-35.363262, 149.165237], "radius": 90},
-    "inclusion": True,
-    "version": 1,
-}
-FENCE = json.dumps(
-    {
-        "fileType": "Plan",
-        "groundStation": "QGroundControl",
-        "version": 1,
-        "mission": {"items": [], "version": 2},
-        "geoFence": {"version": 2, "circles": [CIRCLE], "polygons": []},
-        "rallyPoints": {"points": [], "version": 2},
-    }
-)
-FILES = {"servo.waypoints": SERVO, "yard.plan": FENCE}
-WITH_REASON = {403: {"not_allowed"}, 409: {"quota", "wrong_state"}}
 
 
 @dataclass
@@ -69,27 +47,12 @@ class Rig:
         """Return a user's key."""
         return Key(name, bytes.fromhex(self.tokens[name]))
 
-    def of(self, name: str) -> int:
-        """Return a new waiting task of a user."""
-        return self.clients[name].submit(Wait(5), delay=LATER).id
-
-    def epoch(self) -> int:
-        """Return the rover's halt epoch."""
-        return self.clients["otto"].queue().halt_epoch
-
-    def paused(self) -> int:
-        """Pause the rover; return its halt epoch."""
-        self.clients["otto"].pause()
-        return self.epoch()
-
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """One of each for all of them."""
     folder = tmp_path_factory.mktemp("rights")
     tokens = {name: add_key(folder, name, role) for name, role in ROLES.items()}
-    for name, text in FILES.items():
-        (folder / name).write_text(text, encoding="utf-8")
     limits = [f"roles.submitter.{name}={value}" for name, value in LIMITS.items()]
     options = [word for each in limits for word in ("--set", each)]
     store = str(folder / "tasks.sqlite3")
@@ -106,137 +69,6 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
             for name, token in tokens.items()
         }
         yield Rig(folder, it, page, tokens, clients)
-
-
-@dataclass
-class Case:
-    """A request by HTTP, and by MAVLink. Both are about the number that ``prepare`` returns."""
-
-    by_http: Callable[[Rig, str, int], httpx.Response]
-    by_mavlink: Callable[[Rig, SyncClient, int], Any]
-    prepare: Callable[[Rig, str], int] = lambda _rig, _name: 0
-
-
-def _file(name: str) -> dict[str, Any]:
-    return {"name": name, "text": FILES[name]}
-
-
-CASES = {
-    "submit": Case(
-        lambda rig, who, _: rig.submit(who),
-        lambda _rig, client, _: client.submit_mission([Wait(5)], delay=LATER),
-    ),
-    "plan with a servo": Case(
-        lambda rig, who, _: rig.http(
-            who, "POST", "/vehicles/1/missions", _file("servo.waypoints") | {"delay": LATER}
-        ),
-        lambda rig, client, _: client.submit_mission(rig.folder / "servo.waypoints", delay=LATER),
-    ),
-    "priority": Case(
-        lambda rig, who, _: rig.submit(who, priority=8),
-        lambda _rig, client, _: client.submit_mission([Wait(5)], delay=LATER, priority=8),
-    ),
-    "speed": Case(
-        lambda rig, who, _: rig.submit(who, goals=[{"kind": "move", "distance": 1, "speed": 2}]),
-        lambda _rig, client, _: client.submit_mission([Move(1, speed=2)], delay=LATER),
-    ),
-    "pre-emptive": Case(
-        lambda rig, who, task: rig.http(who, "PATCH", f"/tasks/{task}", {"preemptive": True}),
-        lambda _rig, client, task: client.modify(task, preemptive=True),
-        lambda rig, who: rig.of("otto" if who == "ola" else who),
-    ),
-    "cancel": Case(
-        lambda rig, who, task: rig.http(who, "POST", f"/tasks/{task}/cancel", {}),
-        lambda _rig, client, task: client.cancel(task),
-        lambda rig, _: rig.of("otto"),
-    ),
-    "change": Case(
-        lambda rig, who, task: rig.http(who, "PATCH", f"/tasks/{task}", {"priority": 2}),
-        lambda _rig, client, task: client.modify(task, priority=2),
-        lambda rig, _: rig.of("otto"),
-    ),
-    "release": Case(
-        lambda rig, who, task: rig.http(
-            *(who, "POST", f"/tasks/{task}/release"), {"how": "skip", "epoch": rig.epoch()}
-        ),
-        lambda rig, client, task: client.release(task, "skip", epoch=rig.epoch()),
-        lambda rig, _: rig.of("otto"),
-    ),
-    "resume": Case(
-        lambda rig, who, epoch: rig.http(who, "POST", "/vehicles/1/resume", {"epoch": epoch}),
-        lambda _rig, client, epoch: client.resume(epoch=epoch),
-        lambda rig, _: rig.paused(),
-    ),
-    "clear": Case(
-        lambda rig, who, _: rig.http(who, "POST", "/vehicles/1/clear", {}),
-        lambda _rig, client, _: client.clear(),
-    ),
-    "fence": Case(
-        lambda rig, who, _: rig.http(who, "PUT", "/vehicles/1/fence", _file("yard.plan")),
-        lambda rig, client, _: client.set_fence(rig.folder / "yard.plan"),
-    ),
-    "STOP": Case(
-        lambda rig, who, _: rig.http(who, "POST", "/stop", {}),
-        lambda _rig, client, _: client.stop(),
-    ),
-    "pause": Case(
-        lambda rig, who, _: rig.http(who, "POST", "/vehicles/1/pause", {}),
-        lambda _rig, client, _: client.pause(),
-    ),
-}
-#: the lowest role that may, and what a role below it is told
-ALLOWED = {
-    "submit": ("submitter", "submit"),
-    "plan with a servo": ("operator", "may not send a plan that contains rover commands"),
-    "priority": ("operator", "role submitter may use priority 7 at most, not 8"),
-    "speed": ("operator", "role submitter may drive 1 m/s at most, not 2"),
-    "pre-emptive": ("operator", "may not make a task pre-emptive; operator may"),
-    "cancel": ("operator", "belongs to 244/190@"),
-    "change": ("operator", "belongs to 244/190@"),
-    "release": ("operator", "belongs to 244/190@"),
-    "resume": ("operator", "operator may"),
-    "clear": ("operator", "operator may"),
-    "fence": ("safety", "safety may"),
-    "STOP": ("observer", ""),
-    "pause": ("observer", ""),
-}
-
-
-@pytest.mark.parametrize("what", CASES)
-def test_each_role_gets_the_answer_that_it_gets_by_mavlink(what: str, rig: Rig) -> None:
-    case, (lowest, words) = CASES[what], ALLOWED[what]
-    ranks = list(ROLES.values())
-    for who, role in ROLES.items():
-        answer = case.by_http(rig, who, case.prepare(rig, who))
-        told = None
-        if not answer.is_success:
-            told = answer.json()
-            assert told["reason"] in WITH_REASON[answer.status_code], told
-        heard: tuple[str, str] | None = None
-        try:
-            case.by_mavlink(rig, rig.clients[who], case.prepare(rig, who))
-        except Refused as refused:
-            heard = TaskReason(refused.reason).name.lower(), str(refused)
-        if told is None:
-            assert heard is None or heard[0] == "wrong_state", (who, heard)
-        else:
-            assert heard is not None, (who, told)
-            assert _alike(told["detail"]) == _alike(heard[1])
-            assert told["reason"] == heard[0]
-        may = ranks.index(role) >= ranks.index(lowest)
-        if not may:
-            assert told is not None, who
-            assert told["reason"] == "not_allowed"
-            if role != "observer":
-                assert words in told["detail"]
-        elif told is not None:
-            assert told["reason"] == "wrong_state"  # it was not held
-    rig.http("sue", "POST", "/stop", {"clear": True})
-
-
-def _alike(words: str) -> str:
-    """Return words without the ids of tasks, which differ between two requests."""
-    return " ".join("N" if word.strip(":,").isdigit() else word for word in words.split())
 
 
 def test_the_quota_of_a_role_holds_for_the_page_and_mavlink_together(rig: Rig) -> None:
