@@ -90,14 +90,14 @@ def test_the_server_knows_who_submitted_and_who_stopped(rig: Rig) -> None:
     assert rig.http("sam", "POST", f"/tasks/{task}/cancel", {}).status_code == 204
     entries = rig.http("ola", "GET", f"/tasks/{task}/journal").json()["entries"]
     assert sum("signed sam" in json.dumps(entry) for entry in entries) >= 2
-    rig.http("ola", "GET", "/session")  # what the page does first: it opens her connection
-
-    def is_known() -> bool:
-        stop = rig.http("ola", "POST", "/stop", {})
-        assert (stop.status_code, stop.json()["by"]) == (200, "ola")
-        return "signed ola" in rig.stand.server.text
-
-    wait_until(is_known, within=5, what=lambda: rig.stand.server.text[-1000:])
+    assert rig.submit("ola").status_code == 403  # over her own connection, which is open now
+    stop = rig.http("ola", "POST", "/stop", {})
+    assert (stop.status_code, stop.json()["by"]) == (200, "ola")
+    wait_until(
+        lambda: "signed ola" in rig.stand.server.text,
+        within=5,
+        what=lambda: rig.stand.server.text[-1000:],
+    )
 
 
 def test_a_token_of_another_ring_does_nothing_but_stop(rig: Rig, tmp_path: Path) -> None:
