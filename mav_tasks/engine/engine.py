@@ -347,8 +347,7 @@ class Engine:
 
     def _let_go(self, vehicles: Sequence[int], *, now: float) -> None:
         """Forget vehicles that another gateway hears, unless something came between."""
-        strays = self.reach(now=now).strays
-        for vehicle in sorted(strays.intersection(vehicles)):
+        for vehicle in sorted(self.reach(now=now).strays.intersection(vehicles)):
             self._vehicles.forget(vehicle)
             tasks = self._fleet.forget(vehicle, now=now)
             self._deduplicator.forget_vehicle(vehicle, tasks)

@@ -85,8 +85,7 @@ class Reception:
                 self._receive_from_vehicles(item, now=now)
 
     def _received(self, item: Packets, *, now: float) -> list[Received]:
-        let_in = self.gates.let_in(item, now=now)
-        taken = self.intake.packets(let_in, self.gcs.counts, now=now)
+        taken = self.intake.packets(self.gates.let_in(item, now=now), self.gcs.counts, now=now)
         received: list[Received] = []
         for peer, packet, arrived in taken:
             each = self.gcs.receive(item.link, peer, packet, arrived=arrived, now=now)
@@ -103,8 +102,7 @@ class Reception:
                 if self.restarts.begins_anew(packet, now=now):
                     self.gcs.continue_numbers(packet)
                 is_ours = self.vehicles.is_answer_to_us(packet)
-                is_withheld = is_ours or packet.message_id == m.CommandAck.id
-                if is_withheld or self.reports.replaces(packet):
+                if is_ours or packet.message_id == m.CommandAck.id or self.reports.replaces(packet):
                     self.publisher.withhold(packet)
                 else:
                     self.gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
@@ -164,8 +162,7 @@ class Reception:
             if vehicle is None:
                 return
             if isinstance(message, m.CommandCancel):
-                number = message.command
-                self.control.cancel_latest(client, vehicle, packet.source, number, now=now)
+                self.control.cancel_latest(client, vehicle, packet.source, message.command, now=now)
             else:
                 asked = MessageRequest.of(client, vehicle, packet, int(message.custom_mode))
                 self.modes.heard(asked, now=now)

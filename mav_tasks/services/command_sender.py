@@ -131,8 +131,7 @@ class CommandSender:
         interval = REPEAT if repeats else give_up_after
         retry = Retry.starting(now=now, interval=interval, give_up_after=give_up_after)
         lane = (message.target_component, message.command)
-        request = _Request(None, lane, message, None, retry, is_urgent=immediate)
-        self._enqueue(request, now=now)
+        self._enqueue(_Request(None, lane, message, None, retry, is_urgent=immediate), now=now)
 
     def repeat(self, message: CommandLong | CommandInt, *, now: float) -> bool:
         """Send one copy more of a command of our own, which is given up as much later.
@@ -163,8 +162,7 @@ class CommandSender:
         """Forward a client's command once; its answer, or its lack of one, comes from ``take``."""
         retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
         lane = (component, command)
-        request = _Request(origin, lane, message, packet, retry, standing, immediate)
-        self._enqueue(request, now=now)
+        self._enqueue(_Request(origin, lane, message, packet, retry, standing, immediate), now=now)
 
     def withdraw(self, component: int, command: int) -> None:
         """Send no further copy of our own commands of this id, and none that wait."""
@@ -323,8 +321,7 @@ class CommandSender:
     def _answer(self, request: _Request, ack: CommandAck | None) -> None:
         was_sent = request.retry.sent > 0
         for each in (*request.joined, request):
-            answered = Answered(each.origin, *each.lane, ack, each.message, was_sent)
-            self._answers.append(answered)
+            self._answers.append(Answered(each.origin, *each.lane, ack, each.message, was_sent))
 
 
 def _is_same_wish(one: _Request, other: _Request) -> bool:

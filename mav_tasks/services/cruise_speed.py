@@ -42,8 +42,7 @@ class CruiseSpeed:
     def receive(self, message: ParamValue) -> None:
         """Take in a parameter of the vehicle, whoever has asked for it, or changed it."""
         name = message.param_id
-        is_speed = name in self._names and message.param_type == REAL32
-        if is_speed and isfinite(message.param_value):
+        if name in self._names and message.param_type == REAL32 and isfinite(message.param_value):
             self._values[name] = message.param_value
             self._unheard.discard(name)
 

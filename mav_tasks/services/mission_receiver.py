@@ -279,8 +279,7 @@ class MissionReceiver:
     def _request(self, session: _Session, seq: int) -> None:
         sender = session.sender
         session.last_form = form = self._next_form(session)
-        request = form(*sender.address, seq, session.mission_type)
-        self._outgoing.append(ToClient(sender, request))
+        self._outgoing.append(ToClient(sender, form(*sender.address, seq, session.mission_type)))
 
     def _next_form(self, session: _Session) -> RequestForm:
         """Return the form for the next request: that of the autopilot; unanswered, also the other.

@@ -66,8 +66,7 @@ class MissionSender:
         download.at = now
         if seq < len(download.items):
             make = message_of if form is m.MissionRequestInt else float_message_of
-            item = make(download.items[seq], seq, mission_type, to=sender.address)
-            return ToClient(sender, item)
+            return ToClient(sender, make(download.items[seq], seq, mission_type, to=sender.address))
         result = MavMissionResult.INVALID_SEQUENCE
         return ToClient(sender, m.MissionAck(*sender.address, result, mission_type))
 

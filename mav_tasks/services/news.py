@@ -106,8 +106,7 @@ class News:
         """Whether a change to this mode can be our own doing."""
         if mode not in (self._persona.hold_mode, self._persona.control_mode):
             return False
-        is_hold = mode == self._persona.hold_mode
-        asked_at = self.hold_asked_at if is_hold else self.mode_asked_at
+        asked_at = self.hold_asked_at if mode == self._persona.hold_mode else self.mode_asked_at
         is_awaited = self.was_awaited and mode == self._asked_mode
         return now - asked_at <= LATE or (is_awaited and asked_at > -inf)
 

@@ -176,8 +176,7 @@ class OffboardControl:
     def may_have_disarmed(self, *, now: float) -> bool:
         """Whether a disarming just seen can be our own doing."""
         self._note_requests(now)
-        is_stopping = self.phase is Phase.STOPPING
-        return self._news.may_be_our_disarming(is_stopping=is_stopping, now=now)
+        return self._news.may_be_our_disarming(is_stopping=self.phase is Phase.STOPPING, now=now)
 
     def takes_heartbeat(self) -> bool:
         """Whether the vehicle is to be asked for a heartbeat, once."""
@@ -315,8 +314,7 @@ class OffboardControl:
         self._looks_since, self._wants_heartbeat = now, True
 
     def _shows_whose_it_is(self, now: float) -> bool:
-        since = self._looks_since if self.phase is Phase.LOOKING else now
-        return self._news.is_newer_than(since)
+        return self._news.is_newer_than(self._looks_since if self.phase is Phase.LOOKING else now)
 
     def _next_by_way_of_hold(self, *, may_arm: bool, now: float) -> None:
         """The next step of HOLD, arm, zeros, our mode; zeros at each, which do no harm."""
@@ -616,8 +614,7 @@ class OffboardControl:
         self._next_hold_at = now + again_after
         self._request(self._orders.hold(), now=now)
         if self._persona.drives_in_hold and self._news.mode == self._persona.hold_mode:
-            staying = self._orders.staying(changes_mode=True)
-            self._request(staying, now=now)
+            self._request(self._orders.staying(changes_mode=True), now=now)
 
     def _request_disarming(self, *, now: float) -> None:
         self._news.disarming_asked_at = now

@@ -181,8 +181,7 @@ class Executor:
 
     def let_go(self, *, actor: str, now: float) -> None:
         """End a CANCELLING task without standstill: its vehicle was taken over, or has rebooted."""
-        task = self._active(S.CANCELLING)
-        self._finish(S.CANCELLED, task.reason, actor=actor, now=now)
+        self._finish(S.CANCELLED, self._active(S.CANCELLING).reason, actor=actor, now=now)
 
     def kill(self, reason: TaskReason, *, actor: str, now: float) -> TaskId | None:
         """End the active task at once. Return its id, or None."""
@@ -211,8 +210,7 @@ class Executor:
             return view.HOLD
         elapsed = min(now - self._last_tick, 2 * self._settings.watch.setpoint_period)
         self._last_tick = now
-        demand = self._step(task, seen, now, elapsed)
-        return self.drive.limit(demand, elapsed=elapsed, now=now)
+        return self.drive.limit(self._step(task, seen, now, elapsed), elapsed=elapsed, now=now)
 
     def _step(self, task: Task, seen: VehicleView, now: float, elapsed: float) -> Demand:
         match task.state:

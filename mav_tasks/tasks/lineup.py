@@ -177,8 +177,7 @@ class Lineup:
         if self.immediate is not None and (self.active is None or self.active.id != self.immediate):
             self.immediate = None
         if self.halts.raise_epoch(reason, actor=actor, now=now):
-            epoch = self.halts.epoch
-            self.registry.record(VehicleHalted(self.vehicle, epoch, reason, actor, now))
+            self.registry.record(VehicleHalted(self.vehicle, self.halts.epoch, reason, actor, now))
 
     def pause_queue(self, reason: TaskReason, *, actor: str, now: float) -> None:
         """Pause the queue; this undoes neither a STOP nor a takeover."""

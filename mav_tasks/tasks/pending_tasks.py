@@ -115,8 +115,7 @@ class PendingTasks:
         queueing = self._settings.queueing
         if self._of_vehicle.get(draft.vehicle, 0) >= queueing.capacity:
             raise Rejection(R.QUEUE_FULL, f"queue full: {queueing.capacity} tasks wait")
-        owner = draft.submitter.owner
-        if self._of_owner.get(owner, 0) >= queueing.quota:
+        if self._of_owner.get(draft.submitter.owner, 0) >= queueing.quota:
             raise Rejection(R.QUOTA, f"quota: this client has {queueing.quota} waiting tasks")
         if draft.terms.after:
             self._dependencies.check(draft.terms.after)

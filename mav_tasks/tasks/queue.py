@@ -109,8 +109,7 @@ class TaskQueue:
         First by priority, then by rank: neither aging nor an inherited rank lets a lower priority
         interrupt.
         """
-        firsts = (self._preemptive[:1], self._by_priority[:1])
-        return [first[0][2] for first in firsts if first]
+        return [first[0][2] for first in (self._preemptive[:1], self._by_priority[:1]) if first]
 
     def rank(self, task_id: TaskId) -> Rank:
         """Return the rank with which a task waits in the queue."""

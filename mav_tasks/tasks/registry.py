@@ -188,8 +188,7 @@ class TaskRegistry:
         old = self._tasks[task_id]
         task = self._tasks[task_id] = replace(old, terms=terms, version=old.version + 1)
         self._note_run(old, task)
-        modified = TaskModified(task_id, task.vehicle, task.version, terms, actor, now, old.terms)
-        self.record(modified)
+        self.record(TaskModified(task_id, task.vehicle, task.version, terms, actor, now, old.terms))
         self._last_event[task_id] = self.recorded
         return task
 
@@ -229,8 +228,7 @@ class TaskRegistry:
     def keep_progress(self, task_id: TaskId, *, now: float) -> None:
         """Store the live progress, for the next run after a crash. No new version."""
         task = self._tasks[task_id]
-        event = TaskProgressed(task_id, task.vehicle, task.version, task.progress, now)
-        self.record(event)
+        self.record(TaskProgressed(task_id, task.vehicle, task.version, task.progress, now))
 
     def withdraw(self, task_id: TaskId, *, now: float) -> None:
         """Withdraw a submission that did not become durable in time."""
@@ -252,8 +250,7 @@ class TaskRegistry:
 
     def repeat_no_more(self, task_id: TaskId, *, actor: str, now: float) -> None:
         """Let a task no longer repeat; its run may be over, with the next one not planned yet."""
-        terms = replace(self._tasks[task_id].terms, repeat="")
-        self.modify(task_id, terms, actor=actor, now=now)
+        self.modify(task_id, replace(self._tasks[task_id].terms, repeat=""), actor=actor, now=now)
         self.unplanned.pop(task_id, None)
 
     def between_runs(self, series: int) -> TaskId | None:
@@ -322,8 +319,7 @@ class TaskRegistry:
             del self._last_event[oldest]
 
     def _note_live(self, task: Task) -> None:
-        key = task.submitter, task.command, task.vehicle
-        self._live.setdefault(key, {})[task.id] = None
+        self._live.setdefault((task.submitter, task.command, task.vehicle), {})[task.id] = None
         if task.terms.repeat:
             self.runs[task.terms.series] = task.id
 

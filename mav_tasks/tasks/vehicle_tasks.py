@@ -167,8 +167,7 @@ class VehicleTasks(Lineup):
 
     def _is_of_another_driver(self, task: Task) -> bool:
         """Return whether an active task was interrupted because somebody else has the vehicle."""
-        was_taken = self.paused in TAKEN and task.reason is R.FRAME_RESET
-        return task.reason in TAKEN or was_taken
+        return task.reason in TAKEN or (self.paused in TAKEN and task.reason is R.FRAME_RESET)
 
     def modify(self, task: Task, terms: Terms, *, actor: str, now: float) -> None:
         """Change a task's terms. Raise Rejection if its dependency cannot complete."""
@@ -191,8 +190,7 @@ class VehicleTasks(Lineup):
     def skip_to(self, task: Task, step: int, *, now: float) -> None:
         """Continue, or start, an unfinished plan at another of its steps."""
         assert isinstance(task.goal, Plan), "only plans have steps"
-        present = self.registry[task.id].progress
-        progress = skipped_to(task.goal, replace(present, pending=()), step)
+        progress = skipped_to(task.goal, replace(self.registry[task.id].progress, pending=()), step)
         if self.executor.task_id == task.id:
             self.executor.drive.forget()
         self.registry.advance(task.id, progress, now=now)
@@ -342,8 +340,7 @@ class VehicleTasks(Lineup):
     def step(self, seen: VehicleView, *, now: float) -> Demand:
         """Start the tasks that can start. Return what the vehicle must be made to do now."""
         self.seen = seen
-        has_jumped = self._jumps.has_jumped(seen.motion, driving=self.settings.driving)
-        if has_jumped and self.is_driving:
+        if self._jumps.has_jumped(seen.motion, driving=self.settings.driving) and self.is_driving:
             self.hold(R.FRAME_RESET, now=now)
         if self.is_stopped:
             return view.STOP

@@ -31,8 +31,7 @@ class Broadcasts:
         """Return a copy of a client's packet for each rover; only the packet if none answers it."""
         if not _is_to_be_answered(received.message):
             return [received]
-        unheard = (tasks.vehicle for tasks in self._vehicles.unheard)
-        ids = sorted([*self._vehicles.by_id, *unheard])
+        ids = sorted([*self._vehicles.by_id, *(tasks.vehicle for tasks in self._vehicles.unheard)])
         return [self._copy(received, system_id) for system_id in ids] or [received]
 
     def _copy(self, received: Received, system_id: int) -> Received:

@@ -90,8 +90,7 @@ class GcsSide:
                 self._remove(key)
             return
         self.links.add(change.link)
-        number = min(len(self.link_numbers) + 1, MAX_LINK_NUMBER)
-        self.link_numbers.setdefault(change.link, number)
+        self.link_numbers.setdefault(change.link, min(len(self.link_numbers) + 1, MAX_LINK_NUMBER))
         for peer in change.peers:
             self._add(change.link, peer, is_configured=True, now=now)
 
@@ -114,8 +113,7 @@ class GcsSide:
         self._newcomers = None
         for client in self.clients:
             client.apply(settings.clients)
-            rights = self._rights.of(client.signed_by, client.who)
-            client.take_rights(rights, now=client.heard_at)
+            client.take_rights(self._rights.of(client.signed_by, client.who), now=client.heard_at)
 
     def forget_unknown(self) -> list[tuple[str, Peer]]:
         """Forget clients whose key is no longer valid; configured ones become unheard.

@@ -94,8 +94,7 @@ class ParameterServer:
         One that is set here, and not durable yet, keeps its value until then.
         """
         ours = {name: self._kept[name] for name in self._pending if name in self._kept}
-        theirs = {name: value for name, value in values.items() if name not in self._pending}
-        kept = theirs | ours
+        kept = {name: value for name, value in values.items() if name not in self._pending} | ours
         if kept == self._kept:
             return
         self._kept = kept

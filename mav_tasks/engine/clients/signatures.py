@@ -279,8 +279,7 @@ class Signatures:
             return
         self._told[key.fingerprint] = self.now
         actor = f"{packet.source}@{peer} signed {key.name}"
-        seconds = (self._clock() - timestamp) / UNITS
-        self.refused.append(SignatureRefused(actor, seconds, self.now))
+        self.refused.append(SignatureRefused(actor, (self._clock() - timestamp) / UNITS, self.now))
 
     def take_refused(self) -> list[SignatureRefused]:
         """Return the wrong clocks found since the last call, for the journal and the log."""

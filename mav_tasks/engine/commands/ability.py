@@ -25,8 +25,7 @@ class Ability(NamedTuple):
     @property
     def turns_on_spot(self) -> bool:
         """Whether the vehicle turns while it stands."""
-        by_rate = self.honours_yaw_rate and self.turning is Turning.ON_SPOT
-        return by_rate or self.turns_by_course
+        return (self.honours_yaw_rate and self.turning is Turning.ON_SPOT) or self.turns_by_course
 
     @property
     def why_no_turn(self) -> str:

@@ -71,8 +71,7 @@ class AnyRequest(CommandRequest):
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Send the COMMAND_ACK; an accepting one names the rover in result_param1."""
         rover = self.vehicle.system_id if result is MavResult.ACCEPTED else 0
-        number = self.command.command
-        self.pending.answer = Answer(number, result, result_param2, self._ours, rover)
+        self.pending.answer = Answer(self.command.command, result, result_param2, self._ours, rover)
         self.client.answer(self.pending.answer, self.packet.source)
 
 
@@ -155,8 +154,7 @@ class AnyRover:
         if client.waited > GIVEN_UP:
             raise Rejection(R.STALE, "delayed by the server: send it again")
         wish = parse_command(command, packet.raw, self._driving, now=now)
-        is_ours = is_task_command(command.command)
-        client.uses_dialect |= is_ours and command.params[NONCE] != 0.0
+        client.uses_dialect |= is_task_command(command.command) and command.params[NONCE] != 0.0
         check_any(wish.goal)
         draft = Draft(ANY, command.command, wish.goal, client.who, wish.terms, wish.marks)
         client.rights.check_content(draft)
@@ -248,8 +246,7 @@ class AnyRover:
         rover: int,
     ) -> None:
         ours = _addressed(pending.command, self._vehicles.our_address)
-        number = pending.command.command
-        pending.answer = Answer(number, result, result_param2, ours, rover)
+        pending.answer = Answer(pending.command.command, result, result_param2, ours, rover)
         client.answer(pending.answer, packet.source)
 
 

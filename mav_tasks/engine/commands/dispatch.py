@@ -246,8 +246,7 @@ class Commands:
 
     def _refuse_repeats(self, repeats: _Repeats, *, now: float) -> None:
         words = f"task {repeats.task_id}: not stored in time that it repeats: send it again"
-        refusal = Rejection(R.STORE_UNAVAILABLE, words)
-        self._registry.record(repeats.asked.refuse(refusal, now=now))
+        self._registry.record(repeats.asked.refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now))
 
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
         """Raise Rejection if an observer's question is too much for the rover's link."""
@@ -283,8 +282,7 @@ class Commands:
     def _undo_hold_before(self, asked: CommandRequest, *, now: float) -> None:
         number = asked.vehicle.hold_before.undoing(asked.sender, now=now)
         if number is not None and asked.rights.reach(OPERATOR):
-            undoes = _UndoesHold(asked.vehicle, number, asked.actor)
-            self._submissions.gate.hold(undoes, now=now)
+            self._submissions.gate.hold(_UndoesHold(asked.vehicle, number, asked.actor), now=now)
 
     # STOP, pause, modes
 

@@ -233,8 +233,7 @@ def _yaw(command: Command, index: int, *, turn: float) -> float | None:
 
     0 counts as none: many clients leave a 0 there without meaning north.
     """
-    value = number(command, index, "yaw", low=-turn, high=turn, default=0.0)
-    return value or None
+    return number(command, index, "yaw", low=-turn, high=turn, default=0.0) or None
 
 
 def _speed_or_default(command: Command, index: int, driving: Driving) -> float | None:

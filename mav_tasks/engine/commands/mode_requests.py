@@ -186,8 +186,7 @@ class ModeRequests:
         active = vehicle.tasks.active
         has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).items)
         has_plan = has_plan or (active is not None and isinstance(active.goal, Plan))
-        is_mission = mode == vehicle.persona.mission_mode and has_plan
-        return is_mission and vehicle.parts.settings.claim
+        return mode == vehicle.persona.mission_mode and has_plan and vehicle.parts.settings.claim
 
 
 def _return_home(asked: CommandRequest) -> Draft:

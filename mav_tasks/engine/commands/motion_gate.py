@@ -47,8 +47,7 @@ def why_no_motion(parts: Parts, *, takes_over: bool = False) -> str:
     """
     if parts.tasks.is_stopped:
         return STOP_IN_FORCE
-    is_handed_over = takes_over and parts.control.phase is Phase.RELEASING
-    if parts.control.is_engaged and not is_handed_over:
+    if parts.control.is_engaged and not (takes_over and parts.control.phase is Phase.RELEASING):
         return "not during a task"
     if parts.control.awaits_mode:
         return "the server is setting HOLD"

@@ -108,8 +108,7 @@ def has_left_before_halt(asked: CommandRequest, *, anybodys: bool = False) -> bo
 def note_halt(asked: CommandRequest, *, before: int) -> None:
     """Note this command as the last halt if the epoch is not ``before``, or if it repeats it."""
     halts = asked.vehicle.tasks.halts
-    is_repeated = halts.by is asked.sender and asked.kind is Kind.HALT
-    if halts.epoch != before or is_repeated:
+    if halts.epoch != before or (halts.by is asked.sender and asked.kind is Kind.HALT):
         number = asked.sender.line.number_of(asked.packet.seq)
         halts.was_said_by(asked.sender, number, command=asked.command.command)
 

@@ -44,8 +44,7 @@ def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
     asked.rights.require(row.role, what, moves=moves)
     if vehicle.tasks.is_stopped and not row.passes_under_stop:
         raise Rejection(R.STOPPED, CONTINUE_FIRST)
-    is_reposition = number == MavCmd.DO_REPOSITION
-    takes_over = is_reposition and bool(reposition_flags(command) & CHANGE_MODE)
+    takes_over = number == MavCmd.DO_REPOSITION and bool(reposition_flags(command) & CHANGE_MODE)
     why_not = why_not_sent(row, vehicle, asked.client.key, takes_over=takes_over)
     if why_not:
         raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")

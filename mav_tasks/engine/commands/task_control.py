@@ -166,8 +166,7 @@ class TaskControl:
         wish = asked.command.params[1]
         if wish == NO_CHANGE:
             return 0
-        driving = asked.vehicle.parts.settings.driving
-        top = min(driving.max_speed, asked.rights.limits.max_speed)
+        top = min(asked.vehicle.parts.settings.driving.max_speed, asked.rights.limits.max_speed)
         speed = None if wish == DEFAULT else number(asked.command, 2, "speed", low=0.01, high=top)
         return asked.vehicle.tasks.set_speed(speed, actor=asked.actor, now=now) or 0
 
@@ -184,8 +183,7 @@ class TaskControl:
 
 def sets_repetition(command: Command) -> bool:
     """Whether a command lets a task repeat, or sends a piece of that."""
-    is_modify = command.command == MavCmd.TASK_MODIFY
-    return is_modify and command.params[1] in (P.EVERY, P.REPEAT)
+    return command.command == MavCmd.TASK_MODIFY and command.params[1] in (P.EVERY, P.REPEAT)
 
 
 def _words(task: Task) -> str:
@@ -223,8 +221,7 @@ def _modified(task: Task, command: Command, times: Times, *, now: float) -> Term
         case P.PREEMPTIVE:
             return replace(terms, is_preemptive=flag(command, 3, "pre-emptive", default=None))
         case P.LABEL:
-            label = _with_piece(terms.label, command, "label", most=MAX_LABEL)
-            return replace(terms, label=label)
+            return replace(terms, label=_with_piece(terms.label, command, "label", most=MAX_LABEL))
         case _:
             return replace(terms, start_at=None, start_utc=_utc(command))
 

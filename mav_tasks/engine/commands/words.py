@@ -39,8 +39,7 @@ def kind_of(command: Command, row: Row, persona: Persona) -> Kind:
     """Return the kind of a command with this row; HOLD is a HALT, any other mode a GO."""
     if command.command != SET_MODE:
         return row.kind
-    is_hold = persona.mode_in(*command.params[1:3]) == persona.hold_mode
-    return Kind.HALT if is_hold else Kind.GO
+    return Kind.HALT if persona.mode_in(*command.params[1:3]) == persona.hold_mode else Kind.GO
 
 
 def kind_of_message(message: Message | None, persona: Persona) -> Kind:

@@ -223,8 +223,7 @@ class AnyUploads:
             return
         self._vehicles.mark_dirty(vehicle)
         self._submissions.take_back(vehicle, task, now=now)
-        words = "not stored in time: not accepted"
-        self._refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now)
+        self._refuse(Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted"), now=now)
 
     def _finish(self, task_id: TaskId, *, now: float) -> None:
         self._receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task_id, now=now)

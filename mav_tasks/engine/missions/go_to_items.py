@@ -92,5 +92,4 @@ def _command_of(message: m.MissionItem | m.MissionItemInt) -> Command:
     x, y = (inf, inf) if item is None else (float(item.x), float(item.y))
     first = (message.param1, message.param2, message.param3, message.param4)
     target = Address(message.target_system, message.target_component or AUTOPILOT)
-    params = (*first, x, y, message.z)
-    return Command(target, message.command, params, 0, message.frame, NO_MESSAGE)
+    return Command(target, message.command, (*first, x, y, message.z), 0, message.frame, NO_MESSAGE)

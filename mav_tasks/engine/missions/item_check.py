@@ -62,8 +62,7 @@ class PlanCheck:
 
     def plan_of(self, items: tuple[Item, ...], *, now: float) -> ParsedMission:
         """Return the plan of a whole upload. Raise Rejection if it makes none."""
-        count = len(items)
-        steps = tuple(self._step(item, seq, count=count) for seq, item in enumerate(items))
+        steps = tuple(self._step(item, seq, count=len(items)) for seq, item in enumerate(items))
         return plan_of(items, steps, has_home=self._manner.has_home, now=now)
 
     @property

@@ -125,5 +125,4 @@ class MissionClearing:
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ERROR)
 
     def _refused(self, sender: Sender, vehicle: Vehicle, why: Rejection, *, now: float) -> None:
-        message_id = m.MissionClearAll.id
-        self._answers.refused(sender, vehicle, why, message_id=message_id, now=now)
+        self._answers.refused(sender, vehicle, why, message_id=m.MissionClearAll.id, now=now)

@@ -114,8 +114,7 @@ class MissionServers:
                 unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
                 self._uploads.refused(sender, vehicle, unknown, now=now)
             case m.MissionCount():
-                rank = client.rights.rank
-                desk.uploads.receiver.count(message, sender, rank=rank, now=now)
+                desk.uploads.receiver.count(message, sender, rank=client.rights.rank, now=now)
             case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
                 self._vehicles.mark_dirty(vehicle)  # never a plan item, even during an upload
                 self._go_to.receive(client, vehicle, packet, message, now=now)
@@ -177,8 +176,7 @@ class MissionServers:
         except Rejection as refusal:
             if isinstance(message, m.MissionCount | m.MissionClearAll):
                 self._answers.ack(sender, kind, MavMissionResult.DENIED, refusal.reason)
-                is_upload = isinstance(message, m.MissionCount)
-                message_id = 0 if is_upload else type(message).id
+                message_id = 0 if isinstance(message, m.MissionCount) else type(message).id
                 self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
             return True
         return False

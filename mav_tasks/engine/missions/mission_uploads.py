@@ -153,8 +153,7 @@ class MissionUploads:
     ) -> None:
         """Decide about an upload that was held back."""
         if self._answers.client(upload.sender) is None:
-            gone = Rejection(R.WRONG_STATE, "the client has gone")
-            self._refuse(desk, vehicle, gone, now=now)
+            self._refuse(desk, vehicle, Rejection(R.WRONG_STATE, "the client has gone"), now=now)
         else:
             self._decide(desk, vehicle, upload, now=now)
 
@@ -241,8 +240,7 @@ class MissionUploads:
             fence_of(items)  # if it raises, the fence before stays in force
             items = fence_for_vehicle(items)
         store = partial(self._store, desk, vehicle, upload)
-        refuse = partial(self._refuse, desk, vehicle)
-        write_through(vehicle, kind, items, store, refuse, now=now)
+        write_through(vehicle, kind, items, store, partial(self._refuse, desk, vehicle), now=now)
 
     def _store(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
         sender, kind = upload.sender, upload.mission_type

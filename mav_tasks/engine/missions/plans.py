@@ -212,8 +212,7 @@ class Plans:
                 vehicle.joint.go_on(actor=actor, now=now)
             return
         if task.terms.is_staged:
-            terms = replace(task.terms, is_staged=False)
-            vehicle.tasks.modify(task, terms, actor=actor, now=now)
+            vehicle.tasks.modify(task, replace(task.terms, is_staged=False), actor=actor, now=now)
         if vehicle.tasks.paused:
             vehicle.tasks.give_way_to(task, actor=actor, now=now)
         vehicle.joint.wake(now=now)

@@ -44,8 +44,7 @@ def is_task_command(number: int) -> bool:
 
 def row_of_command(number: int) -> Row:
     """Return the row of a command by its number: the most dangerous that it can be."""
-    row = COMMANDS.get(number)
-    return row or (_NOT_THERE_YET if is_task_command(number) else UNKNOWN)
+    return COMMANDS.get(number) or (_NOT_THERE_YET if is_task_command(number) else UNKNOWN)
 
 
 def row_of_message(message_id: int) -> Row:

@@ -84,5 +84,4 @@ class Armings:
             self._may_show_until = min(asked_at + RESENT, now) + SHOWN_LATE
 
     def _may_be_older(self, ours: float, now: float) -> bool:
-        is_outdated = self._was_disarmed and ours <= self._outdated_at
-        return is_outdated and now <= self._may_show_until
+        return self._was_disarmed and ours <= self._outdated_at and now <= self._may_show_until

@@ -38,8 +38,7 @@ class GoWords:
         said = self._said.get(packet)
         if said is None or said.sender is sender:
             return None
-        is_there = now - said.sender.line.heard_at <= PRESENT
-        within = DOUBLED if is_there else COPIED
+        within = DOUBLED if now - said.sender.line.heard_at <= PRESENT else COPIED
         return said.epoch if now - said.at <= within else None
 
     def says(self, packet: bytes, sender: Sender, *, epoch: int, now: float) -> None:

@@ -98,8 +98,7 @@ class JointControl:
 
     def disarm(self, *, actor: str, now: float) -> None:
         """Handle a client's disarming: only a newer request arms the vehicle again."""
-        word = Word(R.DISARMED, actor, "disarmed by a client")
-        self.on(Event.DISARM, word, now=now)
+        self.on(Event.DISARM, Word(R.DISARMED, actor, "disarmed by a client"), now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:
         """Send HOLD once and let go: setpoints, or our own address, come from elsewhere."""

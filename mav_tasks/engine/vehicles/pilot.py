@@ -146,8 +146,7 @@ class Pilot:
 
         HOLD stops every vehicle, but some roll on in it.
         """
-        throttle = self._parts.sticks.throttle(now=now)
-        is_known = bool(throttle) and self.guard.is_fresh(now=now)
+        is_known = bool(self._parts.sticks.throttle(now=now)) and self.guard.is_fresh(now=now)
         return self._parts.persona.brakes_by_setpoints and is_known
 
     def _send_at_once(self, *, now: float) -> None:
@@ -170,8 +169,7 @@ class Pilot:
         rolls = persona.brakes_by_speed_loop and self.guard.brakes(
             rolls_out=persona.rolls_out, now=now
         )
-        stick = parts.sticks.throttle(now=now)
-        parts.control.posture = Posture(yaw, rolls=rolls, stick=stick)
+        parts.control.posture = Posture(yaw, rolls=rolls, stick=parts.sticks.throttle(now=now))
 
     def _obey(self, demand: Demand, seen: VehicleView, *, now: float) -> None:
         parts = self._parts

@@ -106,8 +106,7 @@ class Takeovers:
         if was_armed and not armed:
             self._disarmed(before, now=now)
         parts.armings.shows(armed=armed)
-        ours = parts.control.arming_asked_at
-        if armed and parts.armings.are_older(ours=ours, now=now):
+        if armed and parts.armings.are_older(ours=parts.control.arming_asked_at, now=now):
             words = (
                 "was armed by a delayed command: disarmed again."
                 " Wait 5 s, then arm it if you mean it"

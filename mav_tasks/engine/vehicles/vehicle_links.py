@@ -100,8 +100,7 @@ class VehicleLinks:
         outlets = {peer: self._outlet(change.link, peer) for peer in (*change.peers, *known)}
         beat = partial(self._beat, outlets)
         heartbeat = self._timers.rhythm(Turn.LINKS, beat, period=INTERVAL, now=now)
-        link = Link(change.is_local, change.capacity, heartbeat, outlets)
-        self._links[change.link] = link
+        self._links[change.link] = Link(change.is_local, change.capacity, heartbeat, outlets)
 
     def change_peer(self, change: PeerChanged) -> None:
         """Send to a peer that connected; one that is gone may come back at another place."""

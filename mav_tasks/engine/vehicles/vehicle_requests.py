@@ -113,8 +113,7 @@ class VehicleRequests:
         """Ask for a heartbeat now: somebody waits to see its mode or arming."""
         if not self._shows:
             return
-        request = self._message_request(m.Heartbeat.id)
-        self._sender.request(request, now=now, give_up_after=SHOW)
+        self._sender.request(self._message_request(m.Heartbeat.id), now=now, give_up_after=SHOW)
         self.flush(now=now)
 
     def relay(

@@ -406,11 +406,13 @@ class VehicleSide:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
         link_name, peer, packet, heartbeat, _ = beat
         persona, tasks = self._persona_of(beat), self._fleet.get(packet.system_id)
-        if tasks and heartbeat.autopilot != NO_AUTOPILOT:
-            which = kind_of(heartbeat), tasks.terms.uid
-            if not self._strangers.is_alone(beat, which):
-                self._note_once(packet.system_id, SHARED, now=now)
-                return None
+        if (
+            tasks
+            and heartbeat.autopilot != NO_AUTOPILOT
+            and not self._strangers.is_alone(beat, (kind_of(heartbeat), tasks.terms.uid))
+        ):
+            self._note_once(packet.system_id, SHARED, now=now)
+            return None
         if persona is None:
             return None
         way = self.links.meets(link_name, peer)
@@ -457,8 +459,7 @@ class VehicleSide:
             words = f"has vehicle type {heartbeat.type}, not that of a rover: not driven"
             self._note_once(packet.system_id, words, now=now)
             return None
-        honours = self._settings.yaw_rate == "honoured"
-        persona = persona_of(heartbeat, honours_yaw_rate=honours)
+        persona = persona_of(heartbeat, honours_yaw_rate=self._settings.yaw_rate == "honoured")
         if persona is None:
             self._note_once(
                 packet.system_id,

@@ -170,8 +170,7 @@ class Arrival:
             if course.remaining < 0.0:
                 self._creeping(course).overshot()
         most = 0 if course.has_one_try else CORRECTIONS
-        tried = self._gives_up or self._corrections > most
-        return tried and course.is_settled(driving=driving)
+        return (self._gives_up or self._corrections > most) and course.is_settled(driving=driving)
 
     def _watch(self, course: PathFollower, *, driving: Driving, now: float) -> None:
         """Note whether the rover still makes progress."""

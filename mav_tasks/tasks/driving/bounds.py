@@ -77,8 +77,7 @@ class Bounds:
         start = LocalPlace(pose.north, pose.east)
         if progress.path and progress.anchor is not None:
             left = rest_of(progress.path, progress.done)
-            on_path = pose_on(progress.anchor, progress.path, progress.done)
-            return is_allowed(on_path, left, fence)
+            return is_allowed(pose_on(progress.anchor, progress.path, progress.done), left, fence)
         return fence.allows_way(start, end) or fence.escapes(start, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:

@@ -95,8 +95,7 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
         return UNKNOWN
     at, seconds, metres = pose or SOMEWHERE, SETTLING, 0.0
     for number in range(progress.leg, leg_count(goal)):
-        is_present = number == progress.leg and progress.anchor is not None
-        if is_present:
+        if number == progress.leg and progress.anchor is not None:
             leg, done = leg_of(goal, progress), progress.done
             anchor = progress.anchor or at
         else:

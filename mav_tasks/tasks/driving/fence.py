@@ -194,8 +194,7 @@ class _LocalPolygon:
         self._corners = [(corner.north, corner.east) for corner in corners]
         self._ends = list(pairwise((*self._corners, self._corners[0])))
         self._box = _box(corners)
-        sides = pairwise((*corners, corners[0]))
-        self._edges = [(*_box(ends), _Way(*ends)) for ends in sides]
+        self._edges = [(*_box(ends), _Way(*ends)) for ends in pairwise((*corners, corners[0]))]
 
     def side(self, north: float, east: float) -> _Side:
         low_north, high_north, low_east, high_east = self._box

@@ -56,8 +56,7 @@ def steer_along(
     """
     # a vehicle that is steered by course is less exact, and may not move at all at low speed: PX4's
     # simulated one does not at 0.5 m/s (1.17, factory gains)
-    settles = passing == 0.0 and not by_course
-    bends = _speed_in_bends(leg, along, driving, settles=settles)
+    bends = _speed_in_bends(leg, along, driving, settles=passing == 0.0 and not by_course)
     top = min(leg.speed or driving.speed, bends)
     speed = approach(
         remaining,
@@ -68,8 +67,7 @@ def steer_along(
         at_end=passing,
     )
     if by_course:
-        ahead = max(LOOKAHEAD, LOOKAHEAD_TIME * motion.speed)
-        there = pose_on(anchor, leg.path, along + ahead)
+        there = pose_on(anchor, leg.path, along + max(LOOKAHEAD, LOOKAHEAD_TIME * motion.speed))
         here = motion.pose
         return Velocity(speed, 0.0, atan2(there.east - here.east, there.north - here.north))
     forward = copysign(speed, -remaining if leg.is_reverse else remaining)
@@ -126,5 +124,4 @@ def _curvature(leg: Follow, anchor: Pose, motion: Motion, along: float, forward:
 def _rolling(forward: float, motion: Motion) -> float:
     """Return the speed that turns a curvature into a turn rate: the measured one, bounded."""
     asked = abs(forward)
-    measured = abs(motion.forward)
-    return copysign(min(max(measured, min(asked, SLOWEST)), 2 * asked), forward)
+    return copysign(min(max(abs(motion.forward), min(asked, SLOWEST)), 2 * asked), forward)

@@ -28,7 +28,6 @@ class JumpWatch:
         north = motion.pose.north - last.pose.north
         east = motion.pose.east - last.pose.east
         reach = JUMP + 2 * driving.max_speed * elapsed
-        turned = abs(wrap(motion.pose.yaw - last.pose.yaw))
-        if turned > TURN + 2 * driving.max_turn_rate * elapsed:
+        if abs(wrap(motion.pose.yaw - last.pose.yaw)) > TURN + 2 * driving.max_turn_rate * elapsed:
             return True
         return north * north + east * east > reach * reach

@@ -183,8 +183,7 @@ def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pos
     """Yield the corners of a way along a path, moved ``outside`` m outwards in its bends."""
     start = anchor
     for bend in path:
-        turn = abs(bend.curvature * bend.length)
-        parts = 1 + int(turn / CHORD)
+        parts = 1 + int(abs(bend.curvature * bend.length) / CHORD)
         out = 0.0 if abs(bend.curvature) < STRAIGHT else -outside if bend.curvature > 0 else outside
         for part in range(parts + 1):
             pose = moved(start, bend.curvature, bend.length * part / parts)

@@ -98,10 +98,8 @@ def resumed(
 
 def _is_on_path(leg: Follow, anchor: Pose, pose: Pose, *, done: float) -> bool:
     """Return whether steering can return to a path by itself, near where it was left."""
-    along = nearest(anchor, leg.path, pose, around=done)
-    there = pose_on(anchor, leg.path, along)
-    is_aligned = abs(wrap(there.yaw - pose.yaw)) <= TURNED
-    return distance(pose, there) <= BESIDE_PATH and is_aligned
+    there = pose_on(anchor, leg.path, nearest(anchor, leg.path, pose, around=done))
+    return distance(pose, there) <= BESIDE_PATH and abs(wrap(there.yaw - pose.yaw)) <= TURNED
 
 
 def recovery_path(
