@@ -220,13 +220,11 @@ class PendingTasks:
 
     def handle_deadline(self, *, now: float) -> None:
         """Expire tasks whose deadline has passed, and settle those whose start time has come."""
-        for task_id in self.times.take_over(now=now):
-            task = self._waiting(task_id)
-            if task is not None:
+        for task_id in self.times.deadlines.take(now=now):
+            if task := self._waiting(task_id):
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
-        for task_id in self.times.take_starts(now=now):
-            task = self._waiting(task_id)
-            if task is not None:
+        for task_id in self.times.starts.take(now=now):
+            if task := self._waiting(task_id):
                 self._settle(task, now=now)
 
     def set_wall_offset(self, offset: float, *, now: float) -> None:

@@ -9,7 +9,7 @@ from mav_tasks.tasks.task import Task, TaskId, Terms
 SPARE = 64  # outdated entries of a heap that do not matter
 
 
-class _Schedule:
+class Schedule:
     """One time for each task. Its memory follows the number of tasks, and not that of changes."""
 
     def __init__(self) -> None:
@@ -49,25 +49,24 @@ class Times:
     """The start times and deadlines of all waiting tasks."""
 
     def __init__(self) -> None:
-        self._starts, self._deadlines = _Schedule(), _Schedule()
-        self._wall_offset = 0.0
-        #: when the first entry is due; inf without one
-        self.next_at = inf
+        self.starts, self.deadlines = Schedule(), Schedule()
+        #: UTC minus monotonic time, s
+        self.wall_offset = 0.0
 
     def __repr__(self) -> str:
-        return f"Times({self._starts} starts, {self._deadlines} deadlines)"
+        return f"Times({self.starts} starts, {self.deadlines} deadlines)"
+
+    @property
+    def next_at(self) -> float:
+        """When the first entry is due; inf without one."""
+        return min(self.starts.first(), self.deadlines.first())
 
     def start(self, terms: Terms) -> float:
         """Return the monotonic time before which a task does not start; -inf without one."""
         if terms.start_utc is None and terms.start_at is None:  # nearly always
             return -inf
-        from_utc = -inf if terms.start_utc is None else terms.start_utc - self._wall_offset
+        from_utc = -inf if terms.start_utc is None else terms.start_utc - self.wall_offset
         return max(from_utc, -inf if terms.start_at is None else terms.start_at)
-
-    @property
-    def wall_offset(self) -> float:
-        """UTC minus monotonic time, s."""
-        return self._wall_offset
 
     def deadline(self, terms: Terms) -> float | None:
         """Return the monotonic time until which a task must have started; None without one."""
@@ -83,34 +82,16 @@ class Times:
     def note(self, *tasks: Task) -> None:
         """Take the start times and deadlines of waiting tasks, in place of their earlier ones."""
         for task in tasks:
-            self._starts.put(task.id, self.start(task.terms))
-            self._deadlines.put(task.id, self.deadline(task.terms))
-        self._look()
+            self.starts.put(task.id, self.start(task.terms))
+            self.deadlines.put(task.id, self.deadline(task.terms))
 
     def forget(self, tasks: Iterable[TaskId]) -> None:
         """Forget the times of these tasks, which do not wait any more."""
         for task_id in tasks:
-            self._starts.put(task_id, None)
-            self._deadlines.put(task_id, None)
-        self._look()
-
-    def _look(self) -> None:
-        self.next_at = min(self._starts.first(), self._deadlines.first())
-
-    def take_over(self, *, now: float) -> list[TaskId]:
-        """Return the tasks whose deadline has passed, each once."""
-        return self._take(self._deadlines, now)
-
-    def take_starts(self, *, now: float) -> list[TaskId]:
-        """Return the tasks whose start time has come, each once."""
-        return self._take(self._starts, now)
-
-    def _take(self, schedule: _Schedule, now: float) -> list[TaskId]:
-        due = schedule.take(now=now)
-        self._look()
-        return due
+            self.starts.put(task_id, None)
+            self.deadlines.put(task_id, None)
 
     def set_wall_offset(self, offset: float, tasks: Iterable[Task]) -> None:
         """Set UTC minus monotonic time, s, which moves the times of all waiting tasks."""
-        self._wall_offset = offset
+        self.wall_offset = offset
         self.note(*tasks)

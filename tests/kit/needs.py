@@ -60,8 +60,7 @@ def needs_of(engine: Engine) -> Iterator[tuple[Timer, float, object]]:
         due = desk.uploads.receiver.next_deadline()
         yield desk._timer, inf if due is None else due, desk.uploads.receiver
     times = e._fleet.room.times
-    firsts = [each.first() for each in (times._starts, times._deadlines)]
-    yield e._starting, min(firsts, default=inf), times
+    yield e._starting, times.next_at, times
     limit = e._settings.watch.operator_lost
     yield e._operator._timer, e._operator._heard_at + limit, e._operator
     yield e._keeping, e.signatures.keep_at, e.signatures
