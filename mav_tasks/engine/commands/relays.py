@@ -96,23 +96,22 @@ def deliver(
         return
     ack, command = answered.ack, answered.command
     if ack is not None:
-        # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK
-        result = ack.result if ack.result <= MavResult.CANCELLED else MavResult.UNSUPPORTED
-        if command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED:
-            result = MavResult.UNSUPPORTED  # some autopilots answer so for an unknown message
-        answer = Answer(command, result, ack.result_param2, asker.answering)
-    elif not answered.was_sent:
-        reason = int(R.RATE_LIMITED)
-        answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
-        words = f"command {command}: rover {vehicle.system_id} is busy, try again"
-        client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
-    elif command == MavCmd.REQUEST_MESSAGE:
-        answer = Answer(command, MavResult.UNSUPPORTED, 0, asker.answering)
+        result, param2 = ack.result, ack.result_param2
+        # beyond CANCELLED (COMMAND_INT_ONLY and the like) a result crashes MAVSDK; some autopilots
+        # answer FAILED for an unknown message
+        is_unknown = command == MavCmd.REQUEST_MESSAGE and result == MavResult.FAILED
+        if is_unknown or result > MavResult.CANCELLED:
+            result = MavResult.UNSUPPORTED
+    elif answered.was_sent and command == MavCmd.REQUEST_MESSAGE:
+        result, param2 = MavResult.UNSUPPORTED, 0
     else:
-        reason = int(R.VEHICLE_SILENT)
-        answer = Answer(command, MavResult.TEMPORARILY_REJECTED, reason, asker.answering)
-        words = f"command {command}: no answer from rover {vehicle.system_id}"
-        client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+        result, param2 = MavResult.TEMPORARILY_REJECTED, int(R.RATE_LIMITED)
+        words, severity = f"rover {vehicle.system_id} is busy, try again", MavSeverity.INFO
+        if answered.was_sent:
+            words, severity = f"no answer from rover {vehicle.system_id}", MavSeverity.WARNING
+            param2 = int(R.VEHICLE_SILENT)
+        client.tell(f"command {command}: {words}", severity, vehicle.server_address, now=now)
+    answer = Answer(command, result, param2, asker.answering)
     if asker.halt is not None:
         asker.halt.answer = answer
     if asker.halt is None or answer.result not in IN_FORCE:
