@@ -8,6 +8,9 @@ from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
 
+#: stored plans by system id and kind: (id, source) as in PlanStored
+StoredPlans = Mapping[tuple[int, int], tuple[int, str]]
+
 
 @dataclass(frozen=True, slots=True)
 class Restored:
@@ -35,7 +38,7 @@ class Restored:
     halt_epochs: Mapping[int, int] = field(default_factory=dict)
     halted: Mapping[int, tuple[TaskReason, float]] = field(default_factory=dict)
     disarmed: frozenset[int] = frozenset()
-    plans: Mapping[tuple[int, int], tuple[int, str]] = field(default_factory=dict)
+    plans: StoredPlans = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     signatures: tuple[SignatureTime, ...] = ()
     signed_until: int = 0

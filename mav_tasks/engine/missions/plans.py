@@ -4,7 +4,6 @@ A mission at the autopilot's address is staged: a task that waits until it is st
 started again after its end, it becomes a new task.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -29,6 +28,7 @@ from mav_tasks.tasks.lifecycle import (
     words_of,
 )
 from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.restored import StoredPlans
 from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId
 
 R, S = TaskReason, TaskState
@@ -60,13 +60,7 @@ class _Started(NamedTuple):
 class Plans:
     """The store of all vehicles' plans, and the start of missions."""
 
-    def __init__(
-        self,
-        registry: TaskRegistry,
-        fleet: Fleet,
-        *,
-        restored: Mapping[tuple[int, int], tuple[int, str]],
-    ) -> None:
+    def __init__(self, registry: TaskRegistry, fleet: Fleet, *, restored: StoredPlans) -> None:
         self._registry = registry
         self._fleet = fleet
         self._stored: dict[tuple[int, int], Stored] = {}
@@ -74,7 +68,7 @@ class Plans:
         self._started: dict[int, _Started] = {}  # the last start of each vehicle
         self.restore(restored)
 
-    def restore(self, plans: Mapping[tuple[int, int], tuple[int, str]]) -> None:
+    def restore(self, plans: StoredPlans) -> None:
         """Load stored plans, (id, source) by system id and kind."""
         for (system_id, kind), (plan_id, source) in plans.items():
             stored = self._stored[system_id, kind] = Stored(plan_id, unpacked(source))
