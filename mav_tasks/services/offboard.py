@@ -584,7 +584,7 @@ class OffboardControl:
     def _ask_mode(self, *, now: float) -> None:
         self._news.mode_asked_at = now
         self._news.unsettle(now, mode=self._persona.control_mode)
-        self._ask(self._orders.our_mode(), now=now)
+        self._ask(self._orders.mode(self._persona.control_mode), now=now)
 
     def _ask_hold(self, *, now: float) -> None:
         self._news.hold_asked_at = now

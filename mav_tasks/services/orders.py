@@ -121,10 +121,6 @@ class Orders:
         enabled, mode, _ = self._persona.mode_params(self._persona.hold_mode)
         return self._command(MavCmd.DO_SET_MODE, enabled, mode, HOLD_OF_PX4)
 
-    def our_mode(self) -> CommandLong:
-        """Return the command that asks for the mode in which setpoints are followed."""
-        return self.mode(self._persona.control_mode)
-
     def arming(self, *, arm: bool) -> CommandLong:
         return self._command(MavCmd.COMPONENT_ARM_DISARM, float(arm))
 

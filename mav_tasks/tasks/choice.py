@@ -68,7 +68,11 @@ def choose(candidates: Sequence[Candidate], *, least_battery: float) -> Choice:
     if not able:
         raise _refusal([each for each in against.values() if each is not None])
     best = min(able, key=_order)
-    others = [_beaten(each) for each in sorted(able, key=_order) if each is not best]
+    others = [
+        f"rover {each.vehicle}: begins in {_seconds(each.begins_in)}"
+        for each in sorted(able, key=_order)
+        if each is not best
+    ]
     others += [each.text for each in against.values() if each is not None]
     named = others[:MOST_NAMED] + (["and others"] if len(others) > MOST_NAMED else [])
     words = _praise(best)
@@ -130,10 +134,6 @@ def _praise(it: Candidate) -> str:
     if it.distance > HERE:
         words += f", {it.distance:.0f} m away"
     return words if it.battery is None else f"{words}, battery {it.battery:.0%}"
-
-
-def _beaten(it: Candidate) -> str:
-    return f"rover {it.vehicle}: begins in {_seconds(it.begins_in)}"
 
 
 def _seconds(seconds: float) -> str:

@@ -202,7 +202,8 @@ class Drive:
                 self._course = None
                 return Demand(DemandKind.DRIVE, self._last_velocity)
         self._note_progress(task, executed, now=now)
-        stands = seen.still and self._has_asked_to_stand(now)
+        # zeros were commanded for long enough to call slowness a standstill
+        stands = seen.still and now - self._moved_at >= self._settings.watch.still_time
         if self._arrival.stands_here(
             course,
             motion,
@@ -324,10 +325,6 @@ class Drive:
             return here
         self._registry.advance(task.id, here, now=now)
         return None
-
-    def _has_asked_to_stand(self, now: float) -> bool:
-        """Return whether zeros were commanded for long enough to call slowness a standstill."""
-        return now - self._moved_at >= self._settings.watch.still_time
 
     def _note_progress(self, task: Task, executed: float, *, now: float) -> None:
         assert self._course is not None

@@ -102,11 +102,10 @@ class Halts:
         if reason in BY_SOMEBODY:
             is_word = self.by_somebody.reason in WORDS and reason not in WORDS
             self.by_somebody = LastHalt(self.by_somebody.reason if is_word else reason, now)
-        is_same = (reason, actor) == (self._reason, self._actor)
-        if self._reason is TaskReason.DISARMED and reason in TAKEN and now <= self._shown_at:
-            self.at = now  # the vehicle shows the commanded disarming
-            return False
         self.at = now  # a repeated halt, too, makes older commands stale
+        if self._reason is TaskReason.DISARMED and reason in TAKEN and now <= self._shown_at:
+            return False  # the vehicle shows the commanded disarming
+        is_same = (reason, actor) == (self._reason, self._actor)
         if is_same and now - self._counted_at < SAME and not self._was_asked:
             return False
         self.epoch += 1

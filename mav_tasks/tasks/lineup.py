@@ -159,11 +159,10 @@ class Lineup:
     @property
     def is_held_ahead(self) -> bool:
         """Whether a held task keeps all others from starting."""
-        task_id = self.executor.task_id
-        active = None if task_id is None else self.registry.get(task_id)
+        active = self.active
         if active is not None and active.state is S.HELD:
             return True
-        return bool(self.suspended_ids) and any(task.state is S.HELD for task in self.suspended)
+        return any(task.state is S.HELD for task in self.suspended)
 
     # shared by several parts
 

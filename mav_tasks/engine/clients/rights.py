@@ -106,8 +106,8 @@ class Rights(NamedTuple):
         """Raise Rejection if a task is not allowed, whichever rover drives it."""
         self.require(SUBMITTER, "submit tasks")
         self.check_terms(draft.terms)
-        limits, goal, steps = self.limits, draft.goal, steps_of(draft.goal)
-        kinds = () if limits.tasks == NO_LIMIT.tasks else _kinds_of(goal)
+        limits, steps = self.limits, steps_of(draft.goal)
+        kinds = () if limits.tasks == NO_LIMIT.tasks else _kinds_of(draft.goal)
         for kind in kinds:
             if kind not in limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")

@@ -105,10 +105,6 @@ class AnyRover:
     def apply(self, settings: Settings) -> None:
         self._driving = settings.driving
 
-    def is_addressed(self, system_id: int) -> bool:
-        """Return whether a target_system is the server itself, and no rover."""
-        return system_id == self._vehicles.our_address.system_id
-
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """Execute or refuse a command to the server; others than these get no answer."""
         is_shown = command.command == MavCmd.REQUEST_MESSAGE and task_id_of(command) > 0

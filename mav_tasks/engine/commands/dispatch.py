@@ -84,7 +84,7 @@ class Commands:
             self._stop(client, packet, command, now=now)
             return
         system_id = command.target.system_id
-        if self._any.is_addressed(system_id):
+        if system_id == self._vehicles.our_address.system_id:  # and no rover
             self._any.receive(client, packet, command, now=now)
             return
         vehicle = self._vehicles.get(system_id or min(self._vehicles.by_id, default=0))
@@ -125,7 +125,7 @@ class Commands:
         answer: clients send to everyone.
         """
         system_id, component = command.target
-        tasks = self._vehicles.tasks_of_unheard(system_id)
+        tasks = next((each for each in self._vehicles.unheard if each.vehicle == system_id), None)
         address = Address(system_id, MavComponent.ONBOARD_COMPUTER)
         result, reason, words = MavResult.ACCEPTED, int(R.NONE), ""
         if tasks is None:

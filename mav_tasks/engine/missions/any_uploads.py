@@ -167,10 +167,7 @@ class AnyUploads:
             else:
                 self._answers.send(told)
         for upload in uploads:
-            try:
-                self._take_in(upload, now=now)
-            except Rejection as why:
-                self._refuse(why, now=now)
+            self._decide(upload, now=now)
         due = self._receiver.next_deadline()
         self._timer.set(inf if due is None else due)
 
@@ -187,7 +184,7 @@ class AnyUploads:
         if known is not None:
             self._finish(known, now=now)
             return
-        again = partial(self._take_in_late, upload)
+        again = partial(self._decide, upload)
         if self._submissions.questions.hold(draft.terms.after, again, self._refuse, now=now):
             return
         choice = self._assignments.choose(wanted.plan, now=now)
@@ -201,8 +198,8 @@ class AnyUploads:
         task = self._submissions.submit_plan(client.rights, vehicle, draft, now=now)
         self._submissions.gate.hold(_Plan(sender, vehicle, task), now=now)
 
-    def _take_in_late(self, upload: Upload, *, now: float) -> None:
-        """Submit what was held back, to the rover that is the best one now."""
+    def _decide(self, upload: Upload, *, now: float) -> None:
+        """Submit a whole plan, perhaps held back before, to the best rover now, or refuse it."""
         try:
             self._take_in(upload, now=now)
         except Rejection as why:

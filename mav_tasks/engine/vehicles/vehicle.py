@@ -188,10 +188,6 @@ class Vehicle:
         self.requests.move_to(outlet)
         self.parts.authority.moved(may_arm=may_arm)
 
-    def recall(self, message: Stamped, *, at: float) -> None:
-        """Process a message that came at ``at``, just before the first heartbeat."""
-        self.where.receive(message, now=at, not_after=at)
-
     def come_back(self, *, was_driven: bool, halt: LastHalt | None, now: float) -> None:
         """Handle the first heartbeat of a vehicle of an earlier run: see ``Takeovers``."""
         self._takeovers.come_back(was_driven=was_driven, halt=halt, now=now)

@@ -176,10 +176,6 @@ class VehicleSide:
         """The tasks of each vehicle of an earlier run that was not heard in this one."""
         return [tasks for tasks in self._fleet if tasks.vehicle not in self._vehicles]
 
-    def tasks_of_unheard(self, system_id: int) -> VehicleTasks | None:
-        """Return the tasks of a vehicle that was not heard in this run, None if it has none."""
-        return next((tasks for tasks in self.unheard if tasks.vehicle == system_id), None)
-
     def has_listened(self, *, now: float) -> bool:
         """Return whether this run is old enough to have heard every vehicle that is there."""
         return now - self._fleet.began_at > self._settings.watch.heartbeat_lost
@@ -235,8 +231,6 @@ class VehicleSide:
         del self._ours[system_id]
         self._drop(system_id)
         self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
-        if self._answer is not None and self._answer.system_id == system_id:
-            self._answer = None
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle that has a task of a revoked key, even if another key's task drives.
@@ -316,7 +310,8 @@ class VehicleSide:
             if beat is None:
                 return None
             if self._ours is not None and packet.system_id not in self._ours:
-                self._note_other(beat)
+                if self._persona_of(beat) is not None:
+                    self._strangers.note_beat(beat)  # another gateway's, which this one may get
                 return None
             vehicle = self._meet(beat, now=now)
         elif beat and beat.message.autopilot == NO_AUTOPILOT:
@@ -371,11 +366,6 @@ class VehicleSide:
             else:
                 vehicle.joint.on(Event.LEASE_ENDS, Word(), now=now)
 
-    def _note_other(self, beat: Beat) -> None:
-        """Note a vehicle that this gateway hears, but does not have: it may get it."""
-        if self._persona_of(beat) is not None:
-            self._strangers.note_beat(beat)
-
     def _beat(self, outlets: Mapping[Peer, PacketSender], *, now: float) -> None:
         """Send a heartbeat and a TIMESYNC request to each endpoint of a link, each second."""
         self._question.ts1 = round(now * NANO)
@@ -405,13 +395,14 @@ class VehicleSide:
     def _meet(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Add a new vehicle if a first heartbeat is from an autopilot that we can drive."""
         link_name, peer, packet, heartbeat, _ = beat
-        persona, tasks = self._persona_of(beat), self._fleet.get(packet.system_id)
+        number = packet.system_id
+        persona, tasks = self._persona_of(beat), self._fleet.get(number)
         if (
             tasks
             and heartbeat.autopilot != NO_AUTOPILOT
             and not self._strangers.is_alone(beat, (kind_of(heartbeat), tasks.terms.uid))
         ):
-            self._note_once(packet.system_id, SHARED, now=now)
+            self._note_once(number, SHARED, now=now)
             return None
         if persona is None:
             return None
@@ -422,12 +413,12 @@ class VehicleSide:
         if is_new:
             outlet.send_unfenced(gcs_heartbeat(), self.our_address, is_ours=True)
         vehicle = Vehicle(
-            packet.system_id,
+            number,
             heartbeat=heartbeat,
             persona=persona,
             outlet=outlet,
             registry=self._registry,
-            tasks=self._fleet.of(packet.system_id),
+            tasks=self._fleet.of(number),
             settings=self._settings,
             lease=self.lease,
             may_arm=self.links.may_arm(link_name),
@@ -435,13 +426,12 @@ class VehicleSide:
         )
         if self._ours is not None:
             vehicle.parts.listens_until = now + LISTENS
-        self._vehicles[packet.system_id] = vehicle
-        self.links.learn(packet.system_id, (link_name, peer))
+        self._vehicles[number] = vehicle
+        self.links.learn(number, (link_name, peer))
         self.deadline_heap.mark_dirty(vehicle)
-        self._registry.record(VehicleSeen(packet.system_id, f"found ({persona.name})", now))
-        number = packet.system_id
+        self._registry.record(VehicleSeen(number, f"found ({persona.name})", now))
         for moved in self._strangers.take_motion(number, link_name, peer, now=now):
-            vehicle.recall(moved.message, at=moved.at)
+            vehicle.where.receive(moved.message, now=moved.at, not_after=moved.at)
         was_driven = self._fleet.was_driven(number)
         halt = self._fleet.last_halt(number, now=now)
         vehicle.come_back(was_driven=was_driven, halt=halt, now=now)
@@ -466,7 +456,6 @@ class VehicleSide:
                 f"has autopilot type {heartbeat.autopilot}, which is not supported: not driven",
                 now=now,
             )
-            return None
         return persona
 
     def _note_intruder(
