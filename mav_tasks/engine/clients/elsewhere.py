@@ -25,6 +25,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet, split_datagram
+from mav_tasks.mavlink.router import Place
 from mav_tasks.services.command_receiver import is_stop
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -79,8 +80,8 @@ class Elsewhere:
         self._had: set[int] = set()  # vehicles that other gateways have, or had
         self._stops: list[_Stop] = []  # the latest
         self._decoder = Decoder()
-        self._clients: dict[int, tuple[str, Peer]] = {}  # by number
-        self._numbers: dict[tuple[str, Peer], int] = {}
+        self._clients: dict[int, Place] = {}  # by number
+        self._numbers: dict[Place, int] = {}
         self._last = 0  # number
 
     def __repr__(self) -> str:
@@ -132,8 +133,7 @@ class Elsewhere:
             return False
         if target is None or self._vehicles.look_at(target) is not None:
             return False
-        gateway = self._holders.get(target, "")
-        if gateway:
+        if gateway := self._holders.get(target, ""):
             self._pass_on(gateway, received)
         return bool(gateway)
 
@@ -176,8 +176,11 @@ class Elsewhere:
         client, target = received.client, self._target_of(received)
         owed: set[int] = set()
         if client.key[0] != FLEET_LINK:  # its own gateway passes it on
-            theirs = (each for each in self._had if self._vehicles.look_at(each) is None)
-            owed = {each for each in theirs if target in (EVERYBODY, each)}
+            owed = {
+                each
+                for each in self._had
+                if target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
+            }
         said = client.key, target
         kept = [each for each in self._stops if (each.received.client.key, each.target) != said]
         if len(kept) >= MOST_STOPS:  # those that nobody has to hear any more go first
@@ -187,7 +190,7 @@ class Elsewhere:
         if owed and not self._vehicles.lease.is_trusted:
             client.answer_in_words(NOT_PASSED_ON, Address(min(owed), component), now=now)
 
-    def _note_answer(self, client: tuple[str, Peer], data: bytes, *, by: str) -> None:
+    def _note_answer(self, client: Place, data: bytes, *, by: str) -> None:
         """Forget a client's STOPs that another gateway has answered: one answer stands for all."""
         for packet in split_datagram(data) if self._stops else ():
             if packet.message_id != m.CommandAck.id:
@@ -207,7 +210,7 @@ class Elsewhere:
         self._send_on(gateway, key, raw, arrived=received.arrived, is_first=is_first)
 
     def _send_on(
-        self, gateway: str, key: tuple[str, Peer], raw: bytes, *, arrived: float, is_first: bool
+        self, gateway: str, key: Place, raw: bytes, *, arrived: float, is_first: bool
     ) -> None:
         number = self._numbers.get(key)
         if number is None:

@@ -19,6 +19,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.router import Place
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.services.command_receiver import is_stop
 from mav_tasks.services.token_bucket import TokenBucket
@@ -68,7 +69,7 @@ class GcsSide:
         self._newcomers: TokenBucket | None = None
         #: number of each client link of this run, from 1
         self.link_numbers: dict[str, int] = {}
-        self._clients: dict[tuple[str, Peer], GcsClient] = {}
+        self._clients: dict[Place, GcsClient] = {}
         #: all clients
         self.clients = self._clients.values()
         #: return a client by its key, None if it is gone
@@ -92,19 +93,18 @@ class GcsSide:
         self.links.add(change.link)
         self.link_numbers.setdefault(change.link, min(len(self.link_numbers) + 1, MAX_LINK_NUMBER))
         for peer in change.peers:
-            self._add(change.link, peer, is_configured=True, now=now)
+            self._add(change.link, peer, now=now)
 
     def change_peer(self, change: PeerChanged, *, now: float) -> None:
         """Add a connection of a stream link, or remove it when it is closed."""
         self._remove((change.link, change.peer))
         self._signatures.forget(change.link, change.peer)
         if change.up and change.link in self.links:
-            self._add(change.link, change.peer, is_configured=True, is_connected=True, now=now)
+            self._add(change.link, change.peer, is_connected=True, now=now)
 
     def note_congestion(self, change: Congestion, *, now: float) -> None:
         """Hold back telemetry to an endpoint that is congested."""
-        client = self._clients.get((change.link, change.peer))
-        if client is not None:
+        if client := self._clients.get((change.link, change.peer)):
             client.thinner.backoff.note(change.is_congested, now=now)
 
     def apply(self, settings: Settings) -> None:
@@ -115,7 +115,7 @@ class GcsSide:
             client.apply(settings.clients)
             client.take_rights(self._rights.of(client.signed_by, client.who), now=client.heard_at)
 
-    def forget_unknown(self) -> list[tuple[str, Peer]]:
+    def forget_unknown(self) -> list[Place]:
         """Forget clients whose key is no longer valid; configured ones become unheard.
 
         Return their links and endpoints.
@@ -227,29 +227,24 @@ class GcsSide:
             if silence > (SILENT if passes else limits.forget_after) and not awaits(client):
                 self._drop(key, client)
 
-    def _drop(self, key: tuple[str, Peer], client: GcsClient) -> None:
+    def _drop(self, key: Place, client: GcsClient) -> None:
         if client.is_configured:
             client.is_heard = False
         else:
             self._remove(key)
             self._signatures.forget(*key)
 
-    def _remove(self, key: tuple[str, Peer]) -> None:
+    def _remove(self, key: Place) -> None:
         client = self._clients.pop(key, None)
         if client is not None and client.statuses.next_deadline() < inf:
             self.plan_statuses()
 
-    def _add(
-        self, link: str, peer: Peer, *, is_configured: bool, now: float, is_connected: bool = False
-    ) -> GcsClient:
-        self._has_room(
-            NO_STANDING, now=now
-        )  # a configured or connected client is added even if there is none
-        client = self._new(
-            link, peer, is_configured=is_configured, is_connected=is_connected, now=now
+    def _add(self, link: str, peer: Peer, *, now: float, is_connected: bool = False) -> None:
+        """Add a configured or connected client, even if there is no room for it."""
+        self._has_room(NO_STANDING, now=now)
+        self._clients[link, peer] = self._new(
+            link, peer, is_configured=True, is_connected=is_connected, now=now
         )
-        self._clients[link, peer] = client
-        return client
 
     def _new(
         self, link: str, peer: Peer, *, is_configured: bool, is_connected: bool, now: float

@@ -12,6 +12,7 @@ from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Outgoing
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import MAGIC_V2, Packet
+from mav_tasks.mavlink.router import Place
 from mav_tasks.mavlink.signing import (
     FROM_RADIOS,
     HIGHEST_TIMESTAMP,
@@ -97,11 +98,11 @@ class Signatures:
         self._links: dict[str, _Link] = {}
         self._numbers: dict[str, int] = {}
         self._times: dict[str, StreamTimes] = {}  # by fingerprint
-        self._signers: dict[tuple[str, Peer], Signer] = {}
-        self._fenced: dict[tuple[str, Peer], Signer] = {}  # to vehicles of a fleet that are ours
+        self._signers: dict[Place, Signer] = {}
+        self._fenced: dict[Place, Signer] = {}  # to vehicles of a fleet that are ours
         self._lead = (0.0, 0.0)  # s ahead of our clock, and when it was that
         #: the lead with which each way began to be signed as a vehicle of ours
-        self._began: dict[tuple[str, Peer], tuple[float, float]] = {}
+        self._began: dict[Place, tuple[float, float]] = {}
         #: whether there is a key or an endpoint to sign for
         self.may_sign = False
         self._offset: float | None = None  # UTC less ``now``

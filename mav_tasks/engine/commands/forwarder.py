@@ -16,6 +16,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.router import Place
 from mav_tasks.services import file_transfer
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -48,7 +49,7 @@ class Forwarder:
                 self._refusals.stream(client, target.system_id, packet, why_not, now=now)
             return
         is_observers = not client.rights.reach(SUBMITTER)
-        behind: dict[tuple[str, Peer], list[Vehicle]] = {}  # a radio may have several
+        behind: dict[Place, list[Vehicle]] = {}  # a radio may have several
         for vehicle in self._vehicles.addressed_by(target.system_id):
             if target != vehicle.server_address:
                 behind.setdefault(vehicle.requests.place, []).append(vehicle)

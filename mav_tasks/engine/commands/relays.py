@@ -9,13 +9,13 @@ from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.commands.motion_gate import why_not_sent
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.translate import IN_FORCE
-from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
+from mav_tasks.mavlink.router import Place
 from mav_tasks.services.command_receiver import Answer, Pending
 from mav_tasks.services.command_sender import Answered, Standing
 from mav_tasks.settings import ROLES
@@ -30,7 +30,7 @@ class _Asker(NamedTuple):
     ``halt``: the command, if it halts the rover.
     """
 
-    client: tuple[str, Peer]
+    client: Place
     source: Address
     answering: Address
     halt: Pending | None
@@ -45,8 +45,7 @@ def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
     if vehicle.tasks.is_stopped and not row.passes_under_stop:
         raise Rejection(R.STOPPED, CONTINUE_FIRST)
     takes_over = number == MavCmd.DO_REPOSITION and bool(reposition_flags(command) & CHANGE_MODE)
-    why_not = why_not_sent(row, vehicle, asked.client.key, takes_over=takes_over)
-    if why_not:
+    if why_not := why_not_sent(row, vehicle, asked.client.key, takes_over=takes_over):
         raise Rejection(R.NOT_ALLOWED, f"command {number}: {why_not}")
     if number in (MavCmd.DO_CHANGE_SPEED, MavCmd.NAV_SET_YAW_SPEED) and not isfinite(params[1]):
         raise Rejection(R.BAD_PARAMETER, "param2 speed is not given")  # makes an autopilot abort

@@ -6,7 +6,7 @@ It decides nothing but the order in which packets leave.
 from collections.abc import Hashable
 from math import inf
 
-from mav_tasks.engine.inputs import Outgoing, Peer
+from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
@@ -14,6 +14,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.router import Place
 from mav_tasks.services.command_sender import Answered, CommandSender, Standing
 from mav_tasks.services.cruise_speed import CruiseSpeed
 from mav_tasks.services.interval_requester import IntervalRequester
@@ -76,7 +77,7 @@ class VehicleRequests:
         self._last_words = self._prepare_last_words()
 
     @property
-    def place(self) -> tuple[str, Peer]:
+    def place(self) -> Place:
         """The link and endpoint at which the vehicle is reached."""
         return self._outlet.link, self._outlet.peer
 
@@ -182,8 +183,7 @@ class VehicleRequests:
 
     def ask_for_rates(self, *, now: float) -> None:
         """Ask for the next message interval that is due, if any."""
-        request = self.intervals.next_request(now=now)
-        if request is not None:
+        if request := self.intervals.next_request(now=now):
             request.target_system, request.target_component = self._target
             self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
             self.flush(now=now)
