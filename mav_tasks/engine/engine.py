@@ -310,8 +310,7 @@ class Engine:
 
     def has_heard(self, link: str, peer: Peer) -> bool:
         """Return whether a client or a rover at an endpoint has sent a valid packet."""
-        client = self._gcs.client((link, peer))
-        if client is not None:
+        if client := self._gcs.client((link, peer)):
             return client.is_heard
         return self._vehicles.links.has_vehicle_at(link, peer)
 
@@ -371,8 +370,7 @@ class Engine:
         if self._parameters.is_changed:
             self._apply(self._parameters.take_change())
         for system_id in room.take_woken() if room.woken else ():
-            woken = self._vehicles.get(system_id)
-            if woken is not None:
+            if woken := self._vehicles.get(system_id):
                 woken.joint.wake(now=now)
         for vehicle in (
             self._vehicles.deadline_heap.settle() if self._vehicles.deadline_heap.touched else ()

@@ -88,8 +88,7 @@ class Reception:
         taken = self.intake.packets(self.gates.let_in(item, now=now), self.gcs.counts, now=now)
         received: list[Received] = []
         for peer, packet, arrived in taken:
-            each = self.gcs.receive(item.link, peer, packet, arrived=arrived, now=now)
-            if each is not None:
+            if each := self.gcs.receive(item.link, peer, packet, arrived=arrived, now=now):
                 received.append(each)
         return received
 

@@ -126,8 +126,7 @@ class LossFailsafe:
         if not after <= LONGEST:
             return AFTER, f"{AFTER} is {after:g} s, more than {LONGEST:g}"
         station = OF_ABSENCE.get(int(self._values.get(NO_STATION, 0.0)), Deed.HOLD)
-        is_excepted = int(self._values.get(EXCEPT, 0.0)) & OFFBOARD_BIT
-        if station in STANDS or is_excepted:
+        if station in STANDS or int(self._values.get(EXCEPT, 0.0)) & OFFBOARD_BIT:
             return "", ""
         return NO_STATION, f"{NO_STATION} is {self._values[NO_STATION]:g}: {station.value}"
 

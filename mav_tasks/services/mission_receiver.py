@@ -333,8 +333,7 @@ class MissionReceiver:
         session = self._session
         assert session is not None, "an upload is under way"
         self._session = None
-        refused = None if session.is_whole else last
-        self._note_in_vain(session, refused, now=now)
+        self._note_in_vain(session, None if session.is_whole else last, now=now)
         sender, kind = session.sender, session.mission_type
         if result == MavMissionResult.ACCEPTED:
             del self._in_vain[sender, kind]

@@ -92,11 +92,6 @@ class Persona:
         return self.turning is Turning.STEERED and self.heeds_throttle_stick
 
     @property
-    def brakes_by_speed_loop(self) -> bool:
-        """Whether another set-point brakes it than the one on which it stands."""
-        return self.rolls_out or self.stands_by_course
-
-    @property
     def stands_by_course(self) -> bool:
         """Whether it takes zero velocity for "to the north", and turns there.
 

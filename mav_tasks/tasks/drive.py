@@ -184,8 +184,7 @@ class Drive:
                 task.goal, task.progress, seen, motion, steering=steering
             ):
                 return view.STAND
-            stopped = self._go_on(task, task.progress, seen, motion, now=now)
-            if stopped is not None:
+            if stopped := self._go_on(task, task.progress, seen, motion, now=now):
                 return stopped
         course = self._way_back or self._course
         assert course is not None, "EXECUTING begins by setting the course"

@@ -208,8 +208,7 @@ class Lineup:
 
     def check_start(self, seen: VehicleView, goal: SingleGoal, *, now: float) -> None:
         """Raise Rejection, with a remedy, if a task with this goal could not start now."""
-        blocker = self.blocker(seen, goal, now=now)
-        if blocker:
+        if blocker := self.blocker(seen, goal, now=now):
             raise Rejection(blocker, f"cannot start: {WAYS_OUT.get(blocker, words_of(blocker))}")
 
     def is_of_another_frame(self, task: Task, seen: VehicleView) -> bool:

@@ -98,8 +98,7 @@ class PendingTasks:
 
     def rank(self, task: Task) -> Rank:
         """Return a task's rank among the ready ones; for an active task, the rank it would have."""
-        waiter = self._waiters.get(task.id)
-        if waiter is not None:
+        if waiter := self._waiters.get(task.id):
             return waiter.rank
         return self._most_urgent(task.id, _own_rank(self._settings, task, task.submitted_at))
 
@@ -309,8 +308,7 @@ class PendingTasks:
         So it went while the server was off, or the clock was set: a run starts late only as long as
         no other is due.
         """
-        due = self.times.start(task.terms)
-        if not task.terms.repeat or task.state is S.BLOCKED or due > now:
+        if not task.terms.repeat or task.state is S.BLOCKED or self.times.start(task.terms) > now:
             return task
         run = next_run(task.terms, now=now, wall_offset=self.times.wall_offset)
         if run is None or not run.left_out:
@@ -398,8 +396,7 @@ class PendingTasks:
 
     def ended(self, task_id: TaskId, *, now: float) -> None:
         """Settle the dependents of a task that completed, or fail those of a task that did not."""
-        ended = self._registry.get(task_id)
-        if ended is not None:
+        if ended := self._registry.get(task_id):
             self._part_all(task_id, completed=ended.state is S.COMPLETED, now=now)
 
     def _part_all(self, task_id: TaskId, *, completed: bool, now: float) -> None:

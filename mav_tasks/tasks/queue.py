@@ -91,8 +91,7 @@ class TaskQueue:
 
     def discard(self, task_id: TaskId) -> None:
         """Remove a task if it is in the queue."""
-        entry = self._entries.pop(task_id, None)
-        if entry is not None:
+        if entry := self._entries.pop(task_id, None):
             by_priority = (-entry.priority, entry.rank, task_id)
             _remove(self._order, (entry.rank, task_id))
             _remove(self._by_priority, by_priority)

@@ -208,8 +208,7 @@ class MessageRequests:
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
         client.follow(task_id)
-        owner = self._vehicles.look_at(task.vehicle)
-        if owner is not None:
+        if owner := self._vehicles.look_at(task.vehicle):
             tasks, address = owner.tasks, owner.server_address
             self._show_statuses(client, [task.id], tasks, address, reader=packet.source, now=now)
 

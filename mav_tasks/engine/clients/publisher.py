@@ -95,8 +95,7 @@ class Publisher:
             spoken = translate.text_of(event)
             if spoken is not None:
                 system_id, severity, text = spoken
-                vehicle = self._vehicles.get(system_id)
-                if vehicle is not None:
+                if vehicle := self._vehicles.get(system_id):
                     self._gcs.tell(text, severity, vehicle.server_address, now=now)
             if isinstance(
                 event, TaskChanged | TaskModified | TaskAssigned | TaskAdvanced | TaskWaits

@@ -114,8 +114,7 @@ class AnyRover:
         if command.target.component_id not in (0, self._vehicles.our_address.component_id):
             return
         receiver = client.sender(packet.source).commands
-        known = receiver.same_packet(packet.raw, now=now)
-        if known is not None:
+        if known := receiver.same_packet(packet.raw, now=now):
             if known.answer is not None:
                 client.answer(known.answer, packet.source)
             return

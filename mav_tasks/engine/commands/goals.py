@@ -238,17 +238,21 @@ def _yaw(command: Command, index: int, *, turn: float) -> float | None:
 
 def _speed_or_default(command: Command, index: int, driving: Driving) -> float | None:
     """Return a speed in m/s, None for the default: 0 or NaN."""
-    if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
+    if _is_unset(command.params[index - 1]):
         return None
     return number(command, index, "speed", low=MIN_SPEED, high=driving.max_speed)
 
 
 def _rate_or_default(command: Command, index: int, driving: Driving) -> float | None:
     """Return a turn rate in rad/s, None for the default: 0 or NaN."""
-    if command.params[index - 1] == 0.0 or isnan(command.params[index - 1]):
+    if _is_unset(command.params[index - 1]):
         return None
     fastest = degrees(driving.max_turn_rate)
     return radians(number(command, index, "rate", low=MIN_RATE, high=fastest))
+
+
+def _is_unset(value: float) -> bool:
+    return value == 0.0 or isnan(value)
 
 
 # goals
@@ -295,7 +299,7 @@ def refuse_infinite(command: Command) -> None:
 
 def _refuse_reserved(command: Command, index: int) -> None:
     """Raise Rejection if a reserved parameter is set: it must not be ignored silently."""
-    if not (isnan(command.params[index - 1]) or command.params[index - 1] == 0.0):
+    if not _is_unset(command.params[index - 1]):
         raise bad(f"param{index} (unused): must be 0 in this version", param=index)
 
 

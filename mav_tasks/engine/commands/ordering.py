@@ -31,8 +31,7 @@ AGAIN = "wait 4 s and repeat it if you mean it"
 
 def require_newer(asked: CommandRequest, *, now: float) -> None:
     """Raise Rejection (STALE) for a command that is older than the rover's last halt."""
-    words = why_older(asked, now=now)
-    if words:
+    if words := why_older(asked, now=now):
         raise Rejection(TaskReason.STALE, words)
 
 

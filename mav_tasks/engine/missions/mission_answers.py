@@ -28,8 +28,7 @@ class MissionAnswers:
 
     def send(self, told: ToClient) -> None:
         """Send a message in the name of the address that the client addressed."""
-        client = self.client(told.sender)
-        if client is not None:
+        if client := self.client(told.sender):
             client.outlet.send(told.message, told.sender.addressed)
 
     def ack(self, sender: Sender, kind: int, result: MavMissionResult, reason: int = 0) -> None:
@@ -38,8 +37,7 @@ class MissionAnswers:
 
     def tell(self, sender: Sender, vehicle: Vehicle, words: str, *, now: float) -> None:
         """Send a warning text to the sender's client."""
-        client = self.client(sender)
-        if client is not None:
+        if client := self.client(sender):
             client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
 
     def refused(

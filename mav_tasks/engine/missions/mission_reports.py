@@ -108,8 +108,7 @@ class MissionReports:
                     if task is not None and isinstance(task.goal, Plan):
                         changed.add(event.vehicle)
         for system_id in changed:
-            vehicle = self._vehicles.get(system_id)
-            if vehicle is not None:
+            if vehicle := self._vehicles.get(system_id):
                 self._tell(vehicle, self._plans.current(vehicle))
 
     def _report(self, *, now: float) -> None:

@@ -81,8 +81,7 @@ class FrameMonitor:
         # between two instants a position may have been corrected, which does not change the origin
         if abs(later) > (APART if self.origin is None else 0.0):
             return
-        place = _place(where)
-        if place is not None:
+        if place := _place(where):
             there = LocalPlace(local.x + later * local.vx, local.y + later * local.vy)
             self._set_origin(origin_of(place, there), is_said=False)
 

@@ -134,8 +134,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.TELL_STICK:
             parts.note("has a stick off centre: HOLD is set. Centre it", now=now)
         case Effect.TELL_HELD:
-            held = tasks.held
-            if held is not None:
+            if held := tasks.held:
                 parts.note(f"waits for held task {held.id}: press {BUTTONS}", now=now)
         case _:
             assert_never(effect)

@@ -166,9 +166,8 @@ class Pilot:
         is_known = motion is not None and now - motion.at <= parts.settings.watch.position_lost
         yaw = motion.pose.yaw if motion is not None and is_known else None
         persona = parts.persona
-        rolls = persona.brakes_by_speed_loop and self.guard.brakes(
-            rolls_out=persona.rolls_out, now=now
-        )
+        by_speed_loop = persona.rolls_out or persona.stands_by_course
+        rolls = by_speed_loop and self.guard.brakes(rolls_out=persona.rolls_out, now=now)
         parts.control.posture = Posture(yaw, rolls=rolls, stick=parts.sticks.throttle(now=now))
 
     def _obey(self, demand: Demand, seen: VehicleView, *, now: float) -> None:

@@ -131,8 +131,7 @@ class VehicleLinks:
         link = self._links.get(link_name)
         if link is None:
             return None
-        outlet = link.outlets.get(peer)
-        if outlet is not None:
+        if outlet := link.outlets.get(peer):
             return outlet, False
         if len(link.outlets) >= MAX_PEERS:
             return None

@@ -188,8 +188,7 @@ class VehicleSide:
         assert self._ours is not None, "a server without a fleet has all vehicles"
         for vehicle in vehicles:
             self._ours[vehicle] = now
-            beat = self._strangers.take_beat(vehicle, now=now)
-            if beat is not None:
+            if beat := self._strangers.take_beat(vehicle, now=now):
                 self._meet(beat, now=now)
 
     def reach(self, *, now: float) -> Reach:

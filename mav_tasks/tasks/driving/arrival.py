@@ -72,8 +72,7 @@ class Creeping:
         """Learn from the distance ``way`` that it rolled on after zero was commanded at a speed."""
         if speed > 0:
             seen = max(0.0, min(LONGEST_LAG, way / speed))
-            weight = 0.5 * min(1.0, speed / self._telling)
-            self.lag += weight * (seen - self.lag)
+            self.lag += (0.5 * min(1.0, speed / self._telling)) * (seen - self.lag)
 
     def had_no_effect(self, speed: float) -> None:
         """Raise the least speed, since the rover stands at this speed."""

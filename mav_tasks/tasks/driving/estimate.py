@@ -96,8 +96,7 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
     at, seconds, metres = pose or SOMEWHERE, SETTLING, 0.0
     for number in range(progress.leg, leg_count(goal)):
         if number == progress.leg and progress.anchor is not None:
-            leg, done = leg_of(goal, progress), progress.done
-            anchor = progress.anchor or at
+            anchor, done, leg = progress.anchor, progress.done, leg_of(goal, progress)
         else:
             anchor, done = anchor_of(goal, number, at, target), 0.0
             leg = leg_of(goal, Progress(anchor=anchor, leg=number, target=target))

@@ -93,8 +93,7 @@ def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Stee
     """
     if distance(pose, place) <= THERE:
         return replace(progress, leg=WAY, anchor=pose, path=(Bend(0.0, HERE),), done=0.0)
-    way = way_to(pose, place, steering) or boldest_way_to(pose, place, steering)
-    first, *others = runs_of(way)
+    first, *others = runs_of(way_to(pose, place, steering) or boldest_way_to(pose, place, steering))
     return replace(progress, leg=FACE if others else WAY, anchor=pose, path=first, done=0.0)
 
 
