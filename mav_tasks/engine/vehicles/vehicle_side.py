@@ -230,6 +230,8 @@ class VehicleSide:
         del self._ours[system_id]
         self._drop(system_id)
         self._noted = {each for each in self._noted if not each.startswith(f"{system_id} ")}
+        if self._answer is not None and self._answer.system_id == system_id:
+            self._answer = None
 
     def pause_tasks_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Pause each vehicle that has a task of a revoked key, even if another key's task drives.
