@@ -159,7 +159,7 @@ def _of_server() -> Iterator[Row]:
 def _of_page() -> Iterator[Row]:
     with _stand() as (folder, udp):
         command = ["web", "--store", "", "--listen", f"{HOST}:0"]
-        command += ["--tokens", str(folder / "tokens.json"), "--server", f"udpout:{HOST}:{udp}"]
+        command += ["--server", f"udpout:{HOST}:{udp}"]
         with _started(folder, "web", *command, ready=r"web page: http://[^:]+:(\d+)") as (it, at):
             port = int(at)
             stop = _stop_by_http(port)
