@@ -55,8 +55,13 @@ class CommitGate:
 
         ``is_halt``: it is enough that the halts among them are kept.
         """
-        self._held.append(_Held(self._registry.recorded, now + self.within, is_halt, what))
-        self._look(now=now)
+        held = _Held(self._registry.recorded, now + self.within, is_halt, what)
+        if self._is_kept(held):
+            self._accept[type(what)](what, now=now)
+            return
+        if not self._held:
+            self._timer.set(held.until)
+        self._held.append(held)
 
     def committed(self, through: int, *, now: float) -> None:
         """Carry out all values that waited for events up to ``through``."""
@@ -68,15 +73,18 @@ class CommitGate:
         self._halts = through
         self._look(now=now)
 
+    def _is_kept(self, held: _Held) -> bool:
+        durable = self._registry.durable
+        return held.number <= durable or (held.is_halt and held.number <= self._halts)
+
     def _look(self, *, now: float) -> None:
         """Carry out what need not wait any more, and give up what has waited too long."""
         waiting, self._held = self._held, []
         for held in waiting:
-            number, until, is_halt, what = held
-            if number <= self._registry.durable or (is_halt and number <= self._halts):
-                self._accept[type(what)](what, now=now)
-            elif until <= now:
-                self._give_up[type(what)](what, now=now)
+            if self._is_kept(held):
+                self._accept[type(held.what)](held.what, now=now)
+            elif held.until <= now:
+                self._give_up[type(held.what)](held.what, now=now)
             else:
                 self._held.append(held)
         self._timer.set(min((held.until for held in self._held), default=inf))
