@@ -357,7 +357,7 @@ class VehicleTasks(Lineup):
             return demand
         self.turns.begin_next(seen, now=now)
         if self.active is not None:  # the refusal was for the task before
-            if not self.paused:  # whoever halted the vehicle has not kept it from going on
+            if not self.paused:  # the person who halted it has not paused its queue
                 self.halts.by_somebody = NOBODY
             return self.executor.step(replace(seen, refusal=R.NONE), now=now)
         return view.HAND_BACK if self.is_idle else view.HOLD

@@ -39,7 +39,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     """Return why a command is older than the last halt, "" if it is newer; remember it.
 
     Call this for each copy, even one recognised in another way: the next copy is recognised by it.
-    A command of an observer is not remembered: whoever executes it refuses it, however new.
+    A command of an observer is not remembered: it is refused by its role, however new it is.
     """
     if not asked.rights.reach(SUBMITTER):
         return ""
