@@ -1,4 +1,4 @@
-"""Of the product of several parameters, those in which every two or three values meet.
+"""Of the product of several parameters, those combinations in which every two values meet.
 
 ``WHOLE_PRODUCTS=1`` adds the rest of each product.
 """
@@ -14,21 +14,17 @@ Chosen = tuple[int, ...]  # the index of a value for each parameter
 
 
 def every_pair(**values: Sequence[Any] | Mapping[str, Any]) -> pytest.MarkDecorator:
-    """Parametrize so that every two values meet; as a volume, so that every three do.
+    """Parametrize so that every two values meet.
 
     The values of a parameter may be given by their names.
     """
     axes = [list(named(each)) for each in values.values()]
     sizes = [len(axis) for axis in axes]
-    pairs = covering(sizes, together=2)
-    volume = covering(sizes, together=3) if len(sizes) > 2 else set()
+    everything = product(*map(range, sizes))
     cases = []
-    for chosen in product(*map(range, sizes)):
-        if chosen not in pairs | volume and "WHOLE_PRODUCTS" not in os.environ:
-            continue
+    for chosen in everything if "WHOLE_PRODUCTS" in os.environ else sorted(covering(sizes)):
         names, picked = zip(*(axis[i] for axis, i in zip(axes, chosen, strict=True)), strict=True)
-        marks = () if chosen in pairs else (pytest.mark.volume,)
-        cases.append(pytest.param(*picked, id="-".join(names), marks=marks))
+        cases.append(pytest.param(*picked, id="-".join(names)))
     return pytest.mark.parametrize(tuple(values), cases)
 
 
@@ -37,11 +33,11 @@ def named(values: Sequence[Any] | Mapping[str, Any]) -> Iterable[tuple[str, Any]
     return values.items() if isinstance(values, Mapping) else ((str(each), each) for each in values)
 
 
-def covering(sizes: Sequence[int], *, together: int) -> set[Chosen]:
-    """Return combinations in which every so many values meet, the same each time."""
+def covering(sizes: Sequence[int]) -> set[Chosen]:
+    """Return combinations in which every two values meet, the same each time."""
 
     def met(chosen: Chosen) -> set[Any]:
-        return set(combinations(enumerate(chosen), together))
+        return set(combinations(enumerate(chosen), 2))
 
     everything = list(product(*map(range, sizes)))
     missing = {each for chosen in everything for each in met(chosen)}

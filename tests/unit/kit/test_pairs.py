@@ -13,19 +13,10 @@ SIZES = [(2, 2), (4, 2, 3, 5), (4, 2, 3, 4), (2, 2, 5, 3)]
 
 @pytest.mark.parametrize(("sizes", "most"), [*zip(SIZES, [4, 24, 20, 18], strict=True)])
 def test_every_two_values_meet(sizes: tuple[int, ...], most: int) -> None:
-    found = covering(sizes, together=2)
+    found = covering(sizes)
     for (i, many), (j, others) in combinations(enumerate(sizes), 2):
         met = {(chosen[i], chosen[j]) for chosen in found}
         assert met == set(product(range(many), range(others)))
-    assert len(found) <= most
-
-
-@pytest.mark.parametrize(("sizes", "most"), [*zip(SIZES[1:], [70, 60, 40], strict=True)])
-def test_every_three_values_meet(sizes: tuple[int, ...], most: int) -> None:
-    found = covering(sizes, together=3)
-    for which in combinations(range(len(sizes)), 3):
-        met = {tuple(chosen[i] for i in which) for chosen in found}
-        assert met == set(product(*(range(sizes[i]) for i in which)))
     assert len(found) <= most
 
 
@@ -35,7 +26,7 @@ def test_the_rest_of_the_product_is_there_on_request(monkeypatch: pytest.MonkeyP
 
     few = cases()
     assert few[0].id == "a-one-False-False"
-    assert 4 <= sum(not case.marks for case in few) < len(few) < 16
+    assert 4 <= len(few) < 16
     monkeypatch.setenv("WHOLE_PRODUCTS", "1")
     every = {case.values for case in cases()}
     assert every == set(product("ab", (1, 2), BOTH, BOTH))
