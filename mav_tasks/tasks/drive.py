@@ -29,10 +29,21 @@ from mav_tasks.tasks.driving.stage import (
 )
 from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
 from mav_tasks.tasks.events import VehicleNoted
-from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
+from mav_tasks.tasks.goal import (
+    Face,
+    Gate,
+    GlobalPlace,
+    Move,
+    MoveTurned,
+    Near,
+    Plan,
+    Rotate,
+    Wait,
+)
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Progress, Task
+from mav_tasks.tasks.times import Times, waited
 from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 
 S, R = TaskState, TaskReason
@@ -54,8 +65,11 @@ class Becomes(NamedTuple):
 class Drive:
     """Driver of one vehicle's active task; ``begin`` precedes each EXECUTING."""
 
-    def __init__(self, registry: TaskRegistry, settings: Settings, bounds: Bounds) -> None:
+    def __init__(
+        self, registry: TaskRegistry, settings: Settings, bounds: Bounds, times: Times
+    ) -> None:
         self._registry = registry
+        self._times = times
         self._bounds = bounds
         self._settings = settings
         #: m/s, speed of tasks that are ``is_cruising``; None: the settings' speed
@@ -137,6 +151,10 @@ class Drive:
         here = set_out(task.goal, progress, seen, motion, steering=steering)
         if here is None:
             return Becomes(S.PAUSED, R.POSITION_LOST)
+        single = present_goal(task.goal, here)
+        if isinstance(single, Wait):
+            utc = now + self._times.wall_offset
+            here = replace(here, done=waited(single, here.done, utc=utc))
         longest = self._settings.driving.max_distance
         if here.target is not None and distance(motion.pose, here.target) > longest:
             return Becomes(S.FAILED, R.BAD_PARAMETER)
@@ -144,9 +162,7 @@ class Drive:
             known = Known(self._settings.driving, motion.pose, seen.home, seen.origin)
             if end := self._end_of_way(task, time_left(task.goal, here, known).metres, now=now):
                 return end
-        if not self._bounds.allows_stage(
-            present_goal(task.goal, here), here, motion.pose, seen.origin
-        ):
+        if not self._bounds.allows_stage(single, here, motion.pose, seen.origin):
             return _refused(task)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         driving = self._settings.driving
@@ -192,7 +208,10 @@ class Drive:
         elapsed = 0.0 if is_held_back else elapsed
         course.look(motion, elapsed=elapsed)
         if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
-            self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
+            origin = seen.origin
+            self._look_on_the_way(
+                task, task.goal, course, motion, origin=origin, elapsed=elapsed, now=now
+            )
             if course.has_passed(motion):
                 after = self._leave_step(task, task.goal, now=now)
                 if isinstance(after, Becomes):
@@ -290,14 +309,13 @@ class Drive:
         course: PathFollower,
         motion: Motion,
         *,
+        origin: GlobalPlace | None,
         elapsed: float,
         now: float,
     ) -> None:
         if not course.progress.pending:
             return
-        target = course.progress.target
-        to_place = None if target is None else distance(motion.pose, target)
-        looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
+        looked = look_on_the_way(plan, course.progress, motion.pose, origin=origin, elapsed=elapsed)
         course.progress = looked.progress
         for step in looked.done:
             self._registry.reached(task.id, step, performs=step in looked.performed, now=now)
@@ -310,8 +328,8 @@ class Drive:
         progress = self._course.progress
         if not is_over(plan, progress):
             self._registry.reached(task.id, progress.step, performs=False, now=now)
-        left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
-        after = following(plan, replace(progress, pending=left))  # unmet Near conditions lapse
+        left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near | Gate))
+        after = following(plan, replace(progress, pending=left))  # unmet conditions lapse
         return Becomes(S.COMPLETED) if after is None else after
 
     def _go_on(

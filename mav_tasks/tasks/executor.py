@@ -18,6 +18,7 @@ from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TERMINAL, TaskReason, TaskS
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.scheduler import start_blocker
 from mav_tasks.tasks.task import Pose, Progress, Task, TaskId
+from mav_tasks.tasks.times import Times
 from mav_tasks.tasks.timing import INTERVALS, Timing, TimingMeter
 from mav_tasks.tasks.view import Demand, ModeKind, VehicleView
 
@@ -37,11 +38,13 @@ def has_moved(task: Task) -> bool:
 class Executor:
     """State machine of one vehicle's active task, if there is one."""
 
-    def __init__(self, registry: TaskRegistry, settings: Settings, bounds: Bounds) -> None:
+    def __init__(
+        self, registry: TaskRegistry, settings: Settings, bounds: Bounds, times: Times
+    ) -> None:
         self._registry = registry
         self._settings = settings
         #: drives the task while it is EXECUTING
-        self.drive = Drive(registry, settings, bounds)
+        self.drive = Drive(registry, settings, bounds, times)
         self.task_id: TaskId | None = None  #: of the active task
         self._since = 0.0  # when the current state was entered
         self._executed_before = 0.0  # s of EXECUTING before the current state

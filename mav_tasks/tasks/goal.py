@@ -72,7 +72,9 @@ class GoTo:
     ``place`` None is the vehicle's home. ``speed`` in m/s, None = default. ``radius`` is the
     acceptance radius in metres, None = the tolerance of a move. ``yaw`` is the heading in radians
     to turn to on arrival, None = any. ``wait`` is the seconds to stand there. ``passes``: in a
-    plan, the vehicle does not stop at the place if another one follows.
+    plan, the vehicle does not stop at the place if another one follows. With ``turns`` it drives
+    that many turns round the place instead, ``around`` metres from it, negative =
+    counter-clockwise. ``backwards``: it drives there backwards.
     """
 
     place: Place | None
@@ -81,6 +83,9 @@ class GoTo:
     yaw: float | None = None
     wait: float = 0.0
     passes: bool = False
+    turns: float = 0.0
+    around: float = 0.0
+    backwards: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +116,14 @@ class Head:
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Stand for ``duration`` seconds."""
+    """Stand for ``duration`` seconds.
+
+    With ``until`` it stands until that time of day (UTC), and ``duration`` is when it comes again:
+    hour, minute and second, of which the first ones may be -1 = any.
+    """
 
     duration: float
+    until: tuple[int, ...] = ()
 
 
 #: a goal that drives on its own: a task's goal, or a step of a plan
@@ -141,8 +151,20 @@ class Jump:
 
 
 @dataclass(frozen=True, slots=True)
+class SetReverse:
+    """Drive to the places from here on backwards, or forwards again."""
+
+    backwards: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Perform:
-    """A command to the vehicle itself; only the plan's ``source`` says which one."""
+    """A command to the vehicle itself; only the plan's ``source`` says which one.
+
+    ``role``: the least that may send it.
+    """
+
+    role: str = "operator"
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +181,19 @@ class Near:
     distance: float
 
 
-Step = SingleGoal | Nothing | SetSpeed | Jump | Perform | Delay | Near
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """CONDITION_GATE: the steps up to the next place wait until the vehicle has passed this one.
+
+    It has passed it when it is on that side of it on which the next place is.
+    """
+
+    place: Place
+
+
+#: what is done on the way to the next place
+OnTheWay = SetSpeed | Perform | Delay | Near | Gate
+Step = SingleGoal | Nothing | SetReverse | Jump | OnTheWay
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,8 +254,14 @@ def describe(goal: Goal) -> str:
             return f"face {degrees(yaw) % 360:.6g} deg"
         case Head(forward=forward, duration=duration):
             return f"drive {forward:g} m/s on a heading for {duration:g} s"
+        case Wait(until=until) if until:
+            return f"wait until {_clock(until)} UTC"
         case Wait(duration=duration):
             return f"wait {duration:g} s"
+
+
+def _clock(until: tuple[int, ...]) -> str:
+    return ":".join("--" if part < 0 else f"{part:02}" for part in until)
 
 
 def kind_of(goal: SingleGoal) -> str:
@@ -267,7 +307,8 @@ def ends_at_home(goal: Goal) -> bool:
 
 def _describe_plan(plan: Plan) -> str:
     if len(plan.steps) <= FEW_STEPS and not plan.has_home:  # with home it is a mission
-        driven = [step for step in plan.steps if not isinstance(step, Nothing | SetSpeed)]
+        unseen = Nothing | SetSpeed | SetReverse
+        driven = [step for step in plan.steps if not isinstance(step, unseen)]
         if len(driven) == 1 and isinstance(driven[0], SingleGoal):
             return describe(driven[0])  # the other steps are its speed and options
     count = plan.item_count

@@ -61,7 +61,7 @@ class Lineup:
         self.queue: TaskQueue = room.queue(vehicle)
         #: its fence, rally points and home
         self.bounds = Bounds()
-        self.executor = Executor(registry, settings, self.bounds)
+        self.executor = Executor(registry, settings, self.bounds, room.times)
         #: values of the vehicle that hold for all its tasks
         self.terms = VehicleTerms(vehicle, registry, self.executor, self.bounds, settings)
         #: how many tasks of a submitter's owner wait, on any vehicle

@@ -200,8 +200,8 @@ class Progress:
     In a plan, ``step`` is the step being driven (-1: not started), and legs are legs of that step.
     ``jumps`` are pairs of a jump's step and how often it was taken. ``pending`` are the steps on
     the way that are still to be done; the first of them has waited for ``pending_for`` seconds.
-    ``speed`` is the last one set by the plan or a client, m/s. ``driven`` is the metres that were
-    commanded so far, over all legs.
+    ``speed`` is the last one set by the plan or a client, m/s; ``backwards`` says whether the plan
+    drives backwards. ``driven`` is the metres that were commanded so far, over all legs.
     """
 
     anchor: Pose | None = None
@@ -217,6 +217,7 @@ class Progress:
     speed: float | None = None
     path: tuple[Bend, ...] = ()
     driven: float = 0.0
+    backwards: bool = False
 
 
 @dataclass(frozen=True, slots=True)

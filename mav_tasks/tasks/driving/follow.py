@@ -47,16 +47,19 @@ def steer_along(
     radius: float,
     passing: float = 0.0,
     by_course: bool = False,
+    settles: bool = True,
     slowest: Slowest = USUAL,
 ) -> Velocity:
     """Return the velocity that drives the vehicle along its path, and back to it.
 
     ``along`` is its place on the path, ``remaining`` the rest, negative beyond the end. ``passing``
     is its speed at the end, m/s, if it goes on there. ``radius`` is its minimum turning radius, m.
+    ``settles``: it shall be exact at the end, and not only on the way.
     """
     # a vehicle that is steered by course is less exact, and may not move at all at low speed: PX4's
     # simulated one does not at 0.5 m/s (1.17, factory gains)
-    bends = _speed_in_bends(leg, along, driving, settles=passing == 0.0 and not by_course)
+    settles = settles and passing == 0.0 and not by_course
+    bends = _speed_in_bends(leg, along, driving, settles=settles)
     top = min(leg.speed or driving.speed, bends)
     speed = approach(
         remaining,

@@ -9,7 +9,7 @@ from dataclasses import replace
 from math import atan2, copysign, cos, hypot, pi, sin, tau
 
 from mav_tasks.tasks.driving.guidance import Leg, wrap
-from mav_tasks.tasks.driving.path import Follow, path_length
+from mav_tasks.tasks.driving.path import Follow, Path, circle_from, path_length
 from mav_tasks.tasks.goal import (
     Drive,
     Face,
@@ -24,8 +24,8 @@ from mav_tasks.tasks.goal import (
 )
 from mav_tasks.tasks.task import Pose, Progress
 
-#: the legs of a GoTo: face the place (as a car: drive to where the last run to it begins), drive
-#: there, then turn to ``yaw`` and wait, if asked for
+#: the legs of a GoTo: face the way to the place (as a car: drive to where the last run to it
+#: begins), drive it, then turn to ``yaw`` and wait, if asked for
 FACE, WAY = range(2)
 
 
@@ -40,8 +40,33 @@ def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None)
     """Return the anchor of a leg that begins at ``pose``."""
     if isinstance(goal, GoTo) and leg == WAY:
         assert target is not None, "the place was found before the task began"
-        return replace(pose, yaw=bearing(pose, target))
+        return replace(pose, yaw=heading_to(goal, pose, target))
     return pose
+
+
+def heading_to(goal: GoTo, pose: Pose, target: LocalPlace) -> float:
+    """Return the heading of the vehicle at which the way to a place begins."""
+    if goal.turns:
+        return circle_from(pose, target, goal.around, length=0.0)[0]
+    yaw = bearing(pose, target)
+    return yaw + pi if goal.backwards else yaw
+
+
+def circling(goal: GoTo, progress: Progress) -> float:
+    """Return the radians of a circle that are still to be driven, after the way onto it."""
+    if not progress.path:
+        return tau * goal.turns
+    done = progress.done if progress.leg == WAY else 0.0
+    arc, left = progress.path[-1], path_length(progress.path) - done
+    return abs(arc.curvature) * max(0.0, min(arc.length, left))
+
+
+def circle_of(goal: GoTo, progress: Progress, pose: Pose, target: LocalPlace) -> Path:
+    """Return the way of what turns on the spot onto and round a circle; () for a mere place."""
+    if not goal.turns:
+        return ()
+    length = circling(goal, progress) * abs(goal.around)
+    return circle_from(pose, target, goal.around, length=length)[1]
 
 
 def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
@@ -117,11 +142,14 @@ def distance(pose: Pose, place: LocalPlace | Pose) -> float:
 def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
     if progress.leg <= WAY:
         assert progress.target is not None, "the place was found before the task began"
-        if progress.path:
-            return Follow(progress.path, goal.speed)
+        is_path = bool(progress.path) or goal.turns > 0
+        if is_path and not (goal.turns and progress.leg == FACE):
+            path = progress.path or circle_of(goal, progress, anchor, progress.target)
+            return Follow(path, goal.speed)
         if progress.leg == FACE:
-            return Rotate(wrap(bearing(anchor, progress.target) - anchor.yaw))
-        return Move(distance(anchor, progress.target), goal.speed)
+            return Rotate(wrap(heading_to(goal, anchor, progress.target) - anchor.yaw))
+        way = distance(anchor, progress.target)
+        return Move(-way if goal.backwards else way, goal.speed)
     if progress.leg == WAY + 1 and goal.yaw is not None:
         return Rotate(_turn(anchor.yaw, goal.yaw, 0))
     return Wait(goal.wait)

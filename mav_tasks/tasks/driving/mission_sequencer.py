@@ -8,23 +8,19 @@ while it is driven.
 from dataclasses import replace
 
 from mav_tasks.tasks.goal import (
-    Delay,
     Goal,
     GoTo,
     Jump,
     LocalPlace,
-    Near,
-    Nothing,
-    Perform,
+    OnTheWay,
     Plan,
-    SetSpeed,
+    SetReverse,
     SingleGoal,
     Wait,
     steps_of,
 )
 from mav_tasks.tasks.task import Progress, Task
 
-ON_THE_WAY = (SetSpeed, Perform, Delay, Near)
 SHORT = 1.0  # s; a loop of shorter waits would only keep the server busy
 END = Wait(0.0)  # past the last step: pending steps are still done
 
@@ -39,8 +35,11 @@ def present_goal(goal: Goal, progress: Progress) -> SingleGoal:
     """Return the goal that is being driven, or that will be first."""
     if not isinstance(goal, Plan):
         return goal
-    step = progress.step if progress.step >= 0 else started(goal, progress).step
-    return _driven(goal, step) or END
+    progress = progress if progress.step >= 0 else started(goal, progress)
+    driven = _driven(goal, progress.step) or END
+    if progress.backwards and isinstance(driven, GoTo) and driven.place and not driven.turns:
+        return replace(driven, backwards=True)  # a return and a circle are driven forwards
+    return driven
 
 
 def goal_of(task: Task) -> SingleGoal:
@@ -50,7 +49,7 @@ def goal_of(task: Task) -> SingleGoal:
 
 def started(plan: Plan, progress: Progress) -> Progress:
     """Return the progress with which a plan starts."""
-    return _at(plan, replace(progress, jumps=(), speed=None), plan.first)
+    return _at(plan, replace(progress, jumps=(), speed=None, backwards=False), plan.first)
 
 
 def following(plan: Plan, progress: Progress) -> Progress | None:
@@ -69,10 +68,13 @@ def is_over(plan: Plan, progress: Progress) -> bool:
 
 
 def goes_on_to_a_place(plan: Plan, progress: Progress) -> GoTo | None:
-    """Return the next step that drives, if it is a GoTo, or None."""
+    """Return the next step that drives, if it goes to a place in the same direction, or None."""
     after = following(plan, progress)
-    goal = None if after is None else _driven(plan, after.step)
-    return goal if isinstance(goal, GoTo) else None
+    goal = None if after is None or is_over(plan, after) else present_goal(plan, after)
+    before = present_goal(plan, progress)
+    if not isinstance(goal, GoTo) or not isinstance(before, GoTo) or goal.turns:
+        return None
+    return goal if goal.backwards == before.backwards else None
 
 
 def loops_in_vain(plan: Plan) -> int | None:
@@ -111,15 +113,14 @@ def _ways_on(plan: Plan, step: int) -> list[int]:
 
 def _driven(plan: Plan, step: int) -> SingleGoal | None:
     goal = plan.steps[step] if 0 <= step < len(plan.steps) else None
-    if goal is None or isinstance(goal, Nothing | SetSpeed | Jump | Perform | Delay | Near):
-        return None
-    return goal
+    return goal if isinstance(goal, SingleGoal) else None
 
 
 def _at(plan: Plan, progress: Progress, step: int) -> Progress:
     """Return the progress at the next step that drives, or past the end."""
     made = dict(zip(progress.jumps[::2], progress.jumps[1::2], strict=True))
     pending = dict.fromkeys(progress.pending)  # each once, or a loop would add ever more
+    backwards = progress.backwards
     while 0 <= step < len(plan.steps):  # it ends: no plan loops in vain
         present = plan.steps[step]
         if isinstance(present, Jump):
@@ -128,9 +129,11 @@ def _at(plan: Plan, progress: Progress, step: int) -> Progress:
                 made[step] = count + 1
                 step = present.to
                 continue
-        elif isinstance(present, ON_THE_WAY):
+        elif isinstance(present, OnTheWay):
             pending[step] = None
-        elif not isinstance(present, Nothing):
+        elif isinstance(present, SetReverse):
+            backwards = present.backwards
+        elif isinstance(present, SingleGoal):
             break
         step += 1
     jumps = tuple(number for pair in made.items() for number in pair)
@@ -144,4 +147,6 @@ def _at(plan: Plan, progress: Progress, step: int) -> Progress:
         anchor=None,
         target=None,
         done=0.0,
+        path=(),
+        backwards=backwards,
     )

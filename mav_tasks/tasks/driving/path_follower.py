@@ -11,12 +11,13 @@ from mav_tasks.tasks.driving.legs import (
     FACE,
     WAY,
     anchor_of,
+    circle_of,
     distance,
     leg_count,
     leg_of,
     length_of,
 )
-from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.path import Follow, Path
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
 from mav_tasks.tasks.task import Progress
@@ -26,6 +27,7 @@ BESIDE = 0.15  # m from a place, at the end of the way there; farther off has mi
 BESIDE_OF_LOOP = 0.4
 TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: close enough
 ONE_TRY = 3.0  # factor on the settling distance of a car that is steered by course
+TIGHTEST = 0.25  # m, radius to which what turns on the spot may steer to be back on a circle
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is commanded nearer to the end than required
 
 
@@ -63,6 +65,11 @@ class PathFollower:
     def has_one_try(self) -> bool:
         """Whether an error at the end cannot be corrected: a car that is steered by course."""
         return self.by_course and self.steering is not None
+
+    @property
+    def is_circle(self) -> bool:
+        """Whether it drives round a place, and not to it."""
+        return isinstance(self.goal, GoTo) and self.goal.turns > 0
 
     @property
     def is_passing(self) -> bool:
@@ -144,14 +151,17 @@ class PathFollower:
             self.misses += 1
         if following >= leg_count(self.goal):
             return False
-        anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)
-        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=())
+        anchor = anchor_of(self.goal, following, motion.pose, target)
+        path: Path = ()
+        if isinstance(self.goal, GoTo) and target is not None and following <= WAY:
+            path = circle_of(self.goal, self.progress, anchor, target)
+        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=path)
         return True
 
     def _has_missed(self, motion: Motion) -> bool:
         """Return whether the vehicle stands beside the place that it drove to."""
         target = self.progress.target
-        if target is None or self.progress.leg != WAY:
+        if target is None or self.progress.leg != WAY or self.is_circle:
             return False
         return distance(motion.pose, target) > self._near_enough
 
@@ -160,7 +170,8 @@ class PathFollower:
         before = self.progress.leg
         if before == WAY and not self._has_missed(motion):
             return False
-        self.progress = set_out_to(self.progress, motion.pose, target, steering)
+        assert isinstance(self.goal, GoTo), "only that has a place"
+        self.progress = set_out_to(self.goal, self.progress, motion.pose, target, steering)
         if self.progress.leg <= before:  # this run should have been the last one
             self.misses += 1
         return True
@@ -187,7 +198,6 @@ class PathFollower:
         if self.is_passing and remaining > 0:
             remaining = max(remaining - self.within, 0.0)
         if isinstance(leg, Follow):
-            assert self.steering is not None, "a path is driven by what steers as a car"
             return steer_along(
                 leg,
                 anchor,
@@ -195,9 +205,10 @@ class PathFollower:
                 along=self.progress.done,
                 remaining=remaining,
                 driving=driving,
-                radius=self.steering.radius,
+                radius=TIGHTEST if self.steering is None else self.steering.radius,
                 passing=self.passing if self.is_passing else 0.0,
                 by_course=self.by_course,
+                settles=not self.is_circle,
                 slowest=slowest,
             )
         return guidance.steer(

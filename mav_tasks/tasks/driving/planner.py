@@ -10,10 +10,10 @@ from cmath import phase, rect
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
-from math import atan2, pi, remainder, sqrt, tau
+from math import atan2, copysign, cos, pi, remainder, sin, sqrt, tau
 
 from mav_tasks.tasks.driving.fence import LocalFence
-from mav_tasks.tasks.driving.legs import FACE, WAY, distance
+from mav_tasks.tasks.driving.legs import FACE, WAY, circling, distance
 from mav_tasks.tasks.driving.path import (
     STRAIGHT,
     Path,
@@ -24,7 +24,7 @@ from mav_tasks.tasks.driving.path import (
     runs_of,
     turn_of,
 )
-from mav_tasks.tasks.goal import LocalPlace
+from mav_tasks.tasks.goal import GoTo, LocalPlace
 from mav_tasks.tasks.task import Bend, Pose, Progress
 
 #: factor on the turning radius: a planned bend leaves room to steer
@@ -40,6 +40,7 @@ BACKWARDS = 1.0  # extra cost of a way driven backwards, as a factor
 PIECES = (0.3, 0.6, 1.0, 1.5, 2.2, 3.0)
 THREE_POINT = (0.5, 0.9, 1.4)  # the same for both pieces of a three-point turn
 THERE = 0.1  # m; nearer is at the place: ArduPilot's simulated car (4.6.3) is no more exact
+ENTRIES = 16  # places of a circle at which a car may come onto it
 HERE = 1e-3  # m and rad from a place or heading; nearer needs no way
 
 
@@ -85,15 +86,44 @@ def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
     return _best(pose, ways, steering.fence)
 
 
-def set_out_to(progress: Progress, pose: Pose, place: LocalPlace, steering: Steering) -> Progress:
+def way_round(
+    goal: GoTo, progress: Progress, pose: Pose, centre: LocalPlace, steering: Steering
+) -> Path:
+    """Return the way onto and round a circle, driven forwards and no tighter than it can.
+
+    It ignores the fence if no way stays within it.
+    """
+    side = copysign(1.0, goal.around)
+    radius = max(abs(goal.around), steering.planned_radius)
+    arc = Bend(side / radius, circling(goal, progress) * radius)
+    anyhow = replace(steering, reverses=False, fence=None)
+    ways: list[Path] = []
+    for number in range(ENTRIES):
+        angle = tau * number / ENTRIES
+        north, east = centre.north + radius * cos(angle), centre.east + radius * sin(angle)
+        way = way_to_pose(pose, Pose(north, east, angle + side * pi / 2), anyhow)
+        ways += [] if way is None else [(*way, arc)]
+    way = _best(pose, ways, steering.fence) or _best(pose, ways, None)
+    assert way is not None, "there is a way to every pose"
+    return way
+
+
+def set_out_to(
+    goal: GoTo, progress: Progress, pose: Pose, place: LocalPlace, steering: Steering
+) -> Progress:
     """Return the progress with which the first run of the way to a place begins.
 
     If no way stays within the fence, it ignores the fence. A car that is as near to the
     place as it can get stays there.
     """
+    if goal.turns:
+        path = way_round(goal, progress, pose, place, steering)
+        return replace(progress, leg=WAY, anchor=pose, path=path, done=0.0)
     if distance(pose, place) <= THERE:
         return replace(progress, leg=WAY, anchor=pose, path=(Bend(0.0, HERE),), done=0.0)
-    first, *others = runs_of(way_to(pose, place, steering) or boldest_way_to(pose, place, steering))
+    start = _turned(pose) if goal.backwards else pose
+    way = way_to(start, place, steering) or boldest_way_to(start, place, steering)
+    first, *others = runs_of(_reversed(way) if goal.backwards else way)
     return replace(progress, leg=FACE if others else WAY, anchor=pose, path=first, done=0.0)
 
 

@@ -1,19 +1,42 @@
 """A stage of a task (a single goal, or a step of a plan): its start, and the steps on the way."""
 
 from dataclasses import dataclass, replace
-from math import inf, radians
+from math import inf, pi, radians
 
 from mav_tasks.settings import Driving, Turning
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.follow import bend_speed
 from mav_tasks.tasks.driving.guidance import Motion, corner_speed, wrap
-from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, bearing, begun_from, distance
+from mav_tasks.tasks.driving.legs import (
+    FACE,
+    WAY,
+    anchor_of,
+    bearing,
+    begun_from,
+    circle_of,
+    distance,
+    heading_to,
+)
 from mav_tasks.tasks.driving.mission_sequencer import goes_on_to_a_place, present_goal, started
 from mav_tasks.tasks.driving.path import path_length, pose_on
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.driving.recovery_path import resumed
-from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, LocalPlace, Near, Perform, Plan, SetSpeed
+from mav_tasks.tasks.frames import local_place
+from mav_tasks.tasks.goal import (
+    Delay,
+    Face,
+    Gate,
+    GlobalPlace,
+    Goal,
+    GoTo,
+    LocalPlace,
+    Near,
+    Perform,
+    Place,
+    Plan,
+    SetSpeed,
+)
 from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress
 from mav_tasks.tasks.view import VehicleView
@@ -24,7 +47,7 @@ ROLLING = 0.05  # m/s; a vehicle that is faster goes on to its next place withou
 
 
 @dataclass(frozen=True, slots=True)
-class OnTheWay:
+class LookedAt:
     """The steps on the way that one look has done."""
 
     progress: Progress
@@ -67,12 +90,12 @@ def set_out(
         return None
     if steering is not None:
         placed = replace(progress, frame=seen.frame, target=target)
-        return set_out_to(placed, motion.pose, target, steering)
-    is_rolling = motion.speed > ROLLING and _bends_gently(motion, target)
+        return set_out_to(single, placed, motion.pose, target, steering)
+    is_rolling = motion.speed > ROLLING and _bends_gently(single, motion, target)
     leg = WAY if is_rolling or not turns_first else FACE
     anchor = anchor_of(single, leg, motion.pose, target)
     begun_here = replace(progress, anchor=anchor, frame=seen.frame, leg=leg, done=0.0)
-    return replace(begun_here, target=target, path=())
+    return replace(begun_here, target=target, path=circle_of(single, progress, anchor, target))
 
 
 def may_go_on_rolling(
@@ -87,12 +110,13 @@ def may_go_on_rolling(
     single = present_goal(goal, progress)
     target = place_of(single, seen) if isinstance(single, GoTo) else None
     if steering is not None and target is not None:
-        return set_out_to(progress, motion.pose, target, steering).leg == WAY
-    return target is not None and _bends_gently(motion, target)
+        assert isinstance(single, GoTo), "only that has a place"
+        return set_out_to(single, progress, motion.pose, target, steering).leg == WAY
+    return isinstance(single, GoTo) and target is not None and _bends_gently(single, motion, target)
 
 
-def _bends_gently(motion: Motion, target: LocalPlace) -> bool:
-    return corner_speed(_off(motion.pose, bearing(motion.pose, target)), lead=1.0) > 0.0
+def _bends_gently(goal: GoTo, motion: Motion, target: LocalPlace) -> bool:
+    return corner_speed(_off(motion.pose, heading_to(goal, motion.pose, target)), lead=1.0) > 0.0
 
 
 def course_of(
@@ -116,7 +140,8 @@ def course_of(
         return stopping
     here = Pose(target.north, target.east, bearing(anchor, target))
     if progress.path:
-        here = replace(here, yaw=pose_on(anchor, progress.path, path_length(progress.path)).yaw)
+        at_end = pose_on(anchor, progress.path, path_length(progress.path))
+        here = replace(here, yaw=at_end.yaw + pi if single.backwards else at_end.yaw)
     within = min(single.radius or driving.acceptance_radius, distance(here, after) / 2)
     turn = _off(here, bearing(here, after))
     speed = corner_speed(turn, lead=within)
@@ -138,16 +163,13 @@ def _off(pose: Pose, yaw: float) -> float:
 
 
 def look_on_the_way(
-    plan: Plan, progress: Progress, *, to_place: float | None, elapsed: float
-) -> OnTheWay:
-    """Do those pending steps that are due.
-
-    ``to_place`` is the metres to the place that is driven to, None without one; ``elapsed`` the
-    seconds since the last look.
-    """
+    plan: Plan, progress: Progress, pose: Pose, *, origin: GlobalPlace | None, elapsed: float
+) -> LookedAt:
+    """Do those pending steps that are due; ``elapsed``: the seconds since the last look."""
     done: list[int] = []
     performed: list[int] = []
-    left_to_place = -inf if to_place is None else to_place
+    target = progress.target
+    left_to_place = -inf if target is None else distance(pose, target)
     for number in progress.pending:
         step = plan.steps[number]
         match step:
@@ -160,6 +182,8 @@ def look_on_the_way(
                 progress = replace(progress, pending_for=0.0)
             case Near(distance=near) if left_to_place > near:
                 break
+            case Gate(place=place) if target and not _is_past(place, pose, target, origin=origin):
+                break
             case SetSpeed(speed=speed):
                 progress = replace(progress, speed=speed)
             case Perform():
@@ -169,4 +193,13 @@ def look_on_the_way(
             break
     if done:
         progress = replace(progress, pending=progress.pending[len(done) :])
-    return OnTheWay(progress, tuple(done), tuple(performed))
+    return LookedAt(progress, tuple(done), tuple(performed))
+
+
+def _is_past(place: Place, pose: Pose, target: LocalPlace, *, origin: GlobalPlace | None) -> bool:
+    """Return whether a pose is on the target's side of a gate."""
+    gate = local_place(place, origin)
+    if gate is None:
+        return True
+    north, east = target.north - gate.north, target.east - gate.east
+    return (pose.north - gate.north) * north + (pose.east - gate.east) * east >= 0.0
