@@ -29,17 +29,7 @@ from mav_tasks.tasks.driving.stage import (
 )
 from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
 from mav_tasks.tasks.events import VehicleNoted
-from mav_tasks.tasks.goal import (
-    Face,
-    Gate,
-    GlobalPlace,
-    Move,
-    MoveTurned,
-    Near,
-    Plan,
-    Rotate,
-    Wait,
-)
+from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Progress, Task
@@ -135,7 +125,7 @@ class Drive:
                 here,
                 motion,
                 honours_yaw_rate=seen.honours_yaw_rate,
-                steering=steering_of(seen, self._bounds),
+                steering=steering_of(present_goal(task.goal, here), seen, self._bounds),
             )
         return here
 
@@ -143,15 +133,13 @@ class Drive:
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
     ) -> Progress | Becomes:
         """Plan the path of a stage that begins here, if it can begin."""
-        steering = steering_of(seen, self._bounds)
-        if steering is not None and isinstance(
-            present_goal(task.goal, progress), Rotate | Face | MoveTurned
-        ):
+        single = present_goal(task.goal, progress)
+        steering = steering_of(single, seen, self._bounds)
+        if steering is not None and isinstance(single, Rotate | Face | MoveTurned):
             return Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
         here = set_out(task.goal, progress, seen, motion, steering=steering)
         if here is None:
             return Becomes(S.PAUSED, R.POSITION_LOST)
-        single = present_goal(task.goal, here)
         if isinstance(single, Wait):
             utc = now + self._times.wall_offset
             here = replace(here, done=waited(single, here.done, utc=utc))
@@ -195,7 +183,8 @@ class Drive:
         if end := self._end_of_way(task, 0.0, now=now):
             return end
         if self._course is None:  # another step of a plan begins
-            steering = steering_of(seen, self._bounds)
+            single = present_goal(task.goal, task.progress)
+            steering = steering_of(single, seen, self._bounds)
             if not seen.still and not may_go_on_rolling(
                 task.goal, task.progress, seen, motion, steering=steering
             ):
@@ -208,10 +197,7 @@ class Drive:
         elapsed = 0.0 if is_held_back else elapsed
         course.look(motion, elapsed=elapsed)
         if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
-            origin = seen.origin
-            self._look_on_the_way(
-                task, task.goal, course, motion, origin=origin, elapsed=elapsed, now=now
-            )
+            self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
             if course.has_passed(motion):
                 after = self._leave_step(task, task.goal, now=now)
                 if isinstance(after, Becomes):
@@ -309,13 +295,14 @@ class Drive:
         course: PathFollower,
         motion: Motion,
         *,
-        origin: GlobalPlace | None,
         elapsed: float,
         now: float,
     ) -> None:
         if not course.progress.pending:
             return
-        looked = look_on_the_way(plan, course.progress, motion.pose, origin=origin, elapsed=elapsed)
+        target = course.progress.target
+        to_place = None if target is None else distance(motion.pose, target)
+        looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
         course.progress = looked.progress
         for step in looked.done:
             self._registry.reached(task.id, step, performs=step in looked.performed, now=now)
@@ -328,8 +315,8 @@ class Drive:
         progress = self._course.progress
         if not is_over(plan, progress):
             self._registry.reached(task.id, progress.step, performs=False, now=now)
-        left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near | Gate))
-        after = following(plan, replace(progress, pending=left))  # unmet conditions lapse
+        left = tuple(n for n in progress.pending if not isinstance(plan.steps[n], Near))
+        after = following(plan, replace(progress, pending=left))  # unmet Near conditions lapse
         return Becomes(S.COMPLETED) if after is None else after
 
     def _go_on(

@@ -181,18 +181,8 @@ class Near:
     distance: float
 
 
-@dataclass(frozen=True, slots=True)
-class Gate:
-    """CONDITION_GATE: the steps up to the next place wait until the vehicle has passed this one.
-
-    It has passed it when it is on that side of it on which the next place is.
-    """
-
-    place: Place
-
-
 #: what is done on the way to the next place
-OnTheWay = SetSpeed | Perform | Delay | Near | Gate
+OnTheWay = SetSpeed | Perform | Delay | Near
 Step = SingleGoal | Nothing | SetReverse | Jump | OnTheWay
 
 
@@ -255,13 +245,9 @@ def describe(goal: Goal) -> str:
         case Head(forward=forward, duration=duration):
             return f"drive {forward:g} m/s on a heading for {duration:g} s"
         case Wait(until=until) if until:
-            return f"wait until {_clock(until)} UTC"
+            return f"wait until {':'.join(f'{part:02}' for part in until)} UTC"
         case Wait(duration=duration):
             return f"wait {duration:g} s"
-
-
-def _clock(until: tuple[int, ...]) -> str:
-    return ":".join("--" if part < 0 else f"{part:02}" for part in until)
 
 
 def kind_of(goal: SingleGoal) -> str:

@@ -111,8 +111,10 @@ class Rights(NamedTuple):
         for kind in kinds:
             if kind not in limits.tasks:
                 raise self.refusal(f"may not submit a {kind}, only {', '.join(limits.tasks)}")
-        if any(isinstance(step, Perform) for step in steps):
-            self.require(OPERATOR, "send a plan that contains rover commands", moves=True)
+        for role in (OPERATOR, SAFETY):
+            if Perform(role) in steps:
+                what = "" if role == OPERATOR else f" for {role}"
+                self.require(role, f"send a plan that contains rover commands{what}", moves=True)
         top = limits.max_speed
         fastest = 0.0 if top >= NO_LIMIT.max_speed else max(map(speed_named_by, steps), default=0.0)
         if fastest > top * SAME:

@@ -1,12 +1,23 @@
 """Refuses or adapts goals that a vehicle cannot drive, by its setpoints or its steering."""
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from mav_tasks.errors import Rejection
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Turning
-from mav_tasks.tasks.goal import Drive, Face, GoTo, Head, Move, MoveTurned, Rotate, SingleGoal
+from mav_tasks.tasks.goal import (
+    Drive,
+    Face,
+    GoTo,
+    Head,
+    Move,
+    MoveTurned,
+    Rotate,
+    SetReverse,
+    SingleGoal,
+    Step,
+)
 from mav_tasks.tasks.lifecycle import TaskReason
 
 
@@ -47,6 +58,9 @@ class Ability(NamedTuple):
         return f"{self.rover} cannot reverse"
 
 
+G = TypeVar("G", bound=Step)
+
+
 def driven(goal: SingleGoal, persona: Persona, *, system_id: int) -> tuple[SingleGoal, str]:
     """Return a goal as this vehicle drives it, and a text if that differs, or "".
 
@@ -58,8 +72,8 @@ def driven(goal: SingleGoal, persona: Persona, *, system_id: int) -> tuple[Singl
     return as_driven(goal, ability), driven_otherwise(goal, ability)
 
 
-def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
-    """Return a goal as a vehicle of this ability drives it. Raise Rejection if it cannot.
+def as_driven(goal: G, ability: Ability) -> G | SingleGoal:
+    """Return a goal, or step, as a vehicle of this ability drives it. Raise Rejection if it cannot.
 
     The final heading of a "go to" is dropped where the autopilot ignores it, too: clients name one
     without meaning it.
@@ -70,6 +84,8 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     if _turns_round(goal, ability):
         assert isinstance(goal, Move)
         return MoveTurned(-goal.distance, goal.speed)
+    if goal == SetReverse(backwards=True) and not ability.honours_yaw_rate:
+        raise _cannot(f"{ability.why_no_reverse}: leave DO_SET_REVERSE out", param=1)
     if ability.turning is Turning.STEERED:
         _check_rolls(goal, ability)
     if not ability.honours_yaw_rate:
@@ -77,7 +93,7 @@ def as_driven(goal: SingleGoal, ability: Ability) -> SingleGoal:
     return goal
 
 
-def _turns_round(goal: SingleGoal, ability: Ability) -> bool:
+def _turns_round(goal: Step, ability: Ability) -> bool:
     """Whether a backward move is driven forwards, between two turns on the spot."""
     is_backwards = isinstance(goal, Move) and goal.distance < 0
     return is_backwards and not ability.honours_yaw_rate and ability.turns_on_spot
@@ -92,7 +108,7 @@ def driven_otherwise(wish: SingleGoal, ability: Ability) -> str:
     return f"{ability.rover} steers like a car: the final heading is ignored"
 
 
-def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
+def _check_rolls(goal: Step, ability: Ability) -> None:
     """Raise Rejection for a turn in place: a car turns only while it rolls."""
     match goal:
         case Rotate() | Face():
@@ -103,7 +119,7 @@ def _check_rolls(goal: SingleGoal, ability: Ability) -> None:
             raise _cannot(f"param2 speed 0: {ability.why_no_turn}", param=2)
 
 
-def _check_course(goal: SingleGoal, ability: Ability) -> None:
+def _check_course(goal: Step, ability: Ability) -> None:
     """Raise Rejection for a turn rate or reverse: setpoints of speed and course have neither."""
     match goal:
         case Rotate() | Face() if not ability.turns_on_spot:

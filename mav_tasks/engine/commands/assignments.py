@@ -208,9 +208,7 @@ def driven_by(vehicle: Vehicle, goal: Goal) -> Goal:
         return as_driven(goal, ability)
     if vehicle.where.leg_over_fence(goal.steps) is not None:
         raise Rejection(R.OUTSIDE_FENCE, "the path crosses the fence")
-    driven = (
-        as_driven(step, ability) if isinstance(step, SingleGoal) else step for step in goal.steps
-    )
+    driven = (as_driven(step, ability) for step in goal.steps)
     return Plan(tuple(driven), goal.source, goal.first, goal.has_home, goal.has_options)
 
 

@@ -32,6 +32,7 @@ from mav_tasks.tasks.goal import (
 )
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, MAX_TASK_ID, Marks, Terms
+from mav_tasks.tasks.times import DAY, HOUR, MINUTE
 
 R = TaskReason
 
@@ -335,9 +336,21 @@ def _return(_command: Command, _driving: Driving) -> SingleGoal:
 
 
 def _delay(command: Command, _driving: Driving) -> SingleGoal:
-    if command.params[0] == -1.0:
-        raise bad("param1 -1: a time of day is not supported, see START_UTC", param=1)
+    wish = command.params[0]
+    if wish < 0.0 or (wish == 0.0 and any(command.params[1:4])):
+        return _time_of_day(command)
     return Wait(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
+
+
+def _time_of_day(command: Command) -> SingleGoal:
+    highs = ((2, "hour", 23), (3, "minute", 59), (4, "second", 59))
+    until = tuple(whole(command, *each[:2], low=-1, high=each[2], default=-1) for each in highs)
+    for part, again in zip(until, (DAY, HOUR, MINUTE), strict=True):
+        if part >= 0:
+            return Wait(again, until)
+    if command.params[0] == 0.0:
+        return Wait(0.0)
+    raise bad("param1 delay: neither seconds nor a time of day (param2 to param4)", param=1)
 
 
 def _condition_yaw(command: Command, driving: Driving) -> SingleGoal:

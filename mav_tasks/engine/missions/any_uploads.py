@@ -19,7 +19,7 @@ from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.mission_uploads import draft_of, refusal_of
-from mav_tasks.engine.missions.plan_items import MissionParseOptions, result_of
+from mav_tasks.engine.missions.plan_items import MissionParseOptions, result_of, skipped
 from mav_tasks.engine.policy import row_of
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -211,7 +211,9 @@ class AnyUploads:
             return  # retracted, and answered
         self._vehicles.mark_dirty(vehicle)  # its task may start
         self._finish(task.id, now=now)
-        words = f"Task {task.id} queued: {describe(task.goal)}{chosen_words(task)}"
+        words = (
+            f"Task {task.id} queued: {describe(task.goal)}{skipped(task.goal)}{chosen_words(task)}"
+        )
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
     def _withdraw(self, plan: _Plan, *, now: float) -> None:

@@ -17,7 +17,7 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.fence_items import fence_for_vehicle, fence_of
 from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
-from mav_tasks.engine.missions.plan_items import ParsedMission, result_of
+from mav_tasks.engine.missions.plan_items import ParsedMission, result_of, skipped
 from mav_tasks.engine.missions.plans import MISSION, Plans, Stored
 from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -216,7 +216,7 @@ class MissionUploads:
         if task.terms.is_staged:
             self._plans.begin_at(vehicle, 0)
         what = "ready to start" if task.terms.is_staged else "queued"
-        words = f"Task {task.id} {what}: {describe(task.goal)}"
+        words = f"Task {task.id} {what}: {describe(task.goal)}{skipped(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
     def _withdraw(self, mission: _Mission, *, now: float) -> None:

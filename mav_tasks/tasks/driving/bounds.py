@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import cos, sin
 
 from mav_tasks.tasks.driving.fence import Fence, LocalFence
-from mav_tasks.tasks.driving.legs import WAY, anchor_of, distance
+from mav_tasks.tasks.driving.legs import WAY, distance
 from mav_tasks.tasks.driving.path import pose_on, rest_of
 from mav_tasks.tasks.driving.planner import is_allowed
 from mav_tasks.tasks.events import VehicleHomeSet
@@ -75,12 +75,9 @@ class Bounds:
         if fence is None or end is None:
             return True
         start = LocalPlace(pose.north, pose.east)
-        if progress.path and progress.anchor is not None and progress.target is not None:
-            anchor, done = progress.anchor, progress.done
-            if isinstance(goal, GoTo) and goal.turns and progress.leg < WAY:  # it turns to it first
-                anchor, done = anchor_of(goal, WAY, anchor, progress.target), 0.0
-            left = rest_of(progress.path, done)
-            return is_allowed(pose_on(anchor, progress.path, done), left, fence)
+        if progress.path and progress.anchor is not None:
+            left = rest_of(progress.path, progress.done)
+            return is_allowed(pose_on(progress.anchor, progress.path, progress.done), left, fence)
         return fence.allows_way(start, end) or fence.escapes(start, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:

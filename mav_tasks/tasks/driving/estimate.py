@@ -11,7 +11,7 @@ from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import Leg, wrap
 from mav_tasks.tasks.driving.legs import WAY, anchor_of, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal, started
-from mav_tasks.tasks.driving.path import Follow, path_length, pose_on
+from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import (
     Drive,
@@ -110,8 +110,6 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
 def _end_of(leg: Leg, anchor: Pose, place: LocalPlace | None) -> Pose:
     """Return the end of a leg that begins at ``anchor``; ``place`` is the end of a go-to."""
     north, east, yaw = anchor.north, anchor.east, anchor.yaw
-    if isinstance(leg, Follow):
-        return pose_on(anchor, leg.path, path_length(leg.path))
     if place is not None:
         return Pose(place.north, place.east, yaw)
     match leg:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from math import atan2, copysign, cos, hypot, pi, sin, tau
 
 from mav_tasks.tasks.driving.guidance import Leg, wrap
-from mav_tasks.tasks.driving.path import Follow, Path, circle_from, path_length
+from mav_tasks.tasks.driving.path import Follow, Path, path_length
 from mav_tasks.tasks.goal import (
     Drive,
     Face,
@@ -24,8 +24,8 @@ from mav_tasks.tasks.goal import (
 )
 from mav_tasks.tasks.task import Pose, Progress
 
-#: the legs of a GoTo: face the way to the place (as a car: drive to where the last run to it
-#: begins), drive it, then turn to ``yaw`` and wait, if asked for
+#: the legs of a GoTo: face the place (as a car: drive to where the last run to it begins), drive
+#: there, then turn to ``yaw`` and wait, if asked for
 FACE, WAY = range(2)
 
 
@@ -45,28 +45,16 @@ def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None)
 
 
 def heading_to(goal: GoTo, pose: Pose, target: LocalPlace) -> float:
-    """Return the heading of the vehicle at which the way to a place begins."""
-    if goal.turns:
-        return circle_from(pose, target, goal.around, length=0.0)[0]
-    yaw = bearing(pose, target)
-    return yaw + pi if goal.backwards else yaw
+    """Return the heading of the vehicle when it drives straight to a place."""
+    return bearing(pose, target) + pi * goal.backwards
 
 
-def circling(goal: GoTo, progress: Progress) -> float:
+def circling(goal: GoTo, path: Path, *, done: float) -> float:
     """Return the radians of a circle that are still to be driven, after the way onto it."""
-    if not progress.path:
+    if not path:
         return tau * goal.turns
-    done = progress.done if progress.leg == WAY else 0.0
-    arc, left = progress.path[-1], path_length(progress.path) - done
-    return abs(arc.curvature) * max(0.0, min(arc.length, left))
-
-
-def circle_of(goal: GoTo, progress: Progress, pose: Pose, target: LocalPlace) -> Path:
-    """Return the way of what turns on the spot onto and round a circle; () for a mere place."""
-    if not goal.turns:
-        return ()
-    length = circling(goal, progress) * abs(goal.around)
-    return circle_from(pose, target, goal.around, length=length)[1]
+    left = min(path[-1].length, path_length(path) - done)
+    return max(0.0, left * abs(path[-1].curvature))
 
 
 def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
@@ -142,13 +130,13 @@ def distance(pose: Pose, place: LocalPlace | Pose) -> float:
 def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
     if progress.leg <= WAY:
         assert progress.target is not None, "the place was found before the task began"
-        is_path = bool(progress.path) or goal.turns > 0
-        if is_path and not (goal.turns and progress.leg == FACE):
-            path = progress.path or circle_of(goal, progress, anchor, progress.target)
-            return Follow(path, goal.speed)
+        way = distance(anchor, progress.target)
+        if progress.path:
+            return Follow(progress.path, goal.speed)
         if progress.leg == FACE:
             return Rotate(wrap(heading_to(goal, anchor, progress.target) - anchor.yaw))
-        way = distance(anchor, progress.target)
+        if goal.turns:  # only to estimate it: the way onto it is planned when it begins
+            return Move(way + tau * goal.turns * abs(goal.around), goal.speed)
         return Move(-way if goal.backwards else way, goal.speed)
     if progress.leg == WAY + 1 and goal.yaw is not None:
         return Rotate(_turn(anchor.yaw, goal.yaw, 0))

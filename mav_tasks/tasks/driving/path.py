@@ -7,9 +7,8 @@ in one direction, forwards or backwards.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import asin, atan2, copysign, cos, hypot, inf, pi, sin, sqrt, tau
+from math import atan2, copysign, cos, hypot, inf, pi, sin, tau
 
-from mav_tasks.tasks.goal import LocalPlace
 from mav_tasks.tasks.task import Bend, Pose
 
 Path = tuple[Bend, ...]
@@ -99,30 +98,6 @@ def beside(anchor: Pose, path: Path, pose: Pose, along: float) -> float:
     return east * cos(there.yaw) - north * sin(there.yaw)
 
 
-def circle_from(
-    pose: Pose, centre: LocalPlace, around: float, *, length: float
-) -> tuple[float, Path]:
-    """Return the heading at which a way onto a circle begins, and the way with ``length`` m of it.
-
-    From outside the way is a tangent; from inside half a smaller circle, that ends on the other
-    side. ``around`` is the radius, negative = counter-clockwise.
-    """
-    side, radius = copysign(1.0, around), abs(around)
-    north, east = centre.north - pose.north, centre.east - pose.east
-    away = hypot(north, east)
-    arc = Bend(1 / around, length)
-    if away < radius:
-        within = (radius + away) / 2
-        return _heading(pose, north, east) - side * pi / 2, (Bend(side / within, pi * within), arc)
-    straight = sqrt(away * away - radius * radius)
-    yaw = atan2(east, north) - side * asin(radius / away)
-    return yaw, (Bend(0.0, straight), arc)
-
-
-def _heading(pose: Pose, north: float, east: float) -> float:
-    return atan2(east, north) if hypot(north, east) > STRAIGHT else pose.yaw
-
-
 def joined(first: Path, second: Path) -> Path:
     """Return two paths joined: empty pieces removed, equal neighbours merged."""
     pieces: list[Bend] = []
@@ -208,12 +183,10 @@ def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pos
     """Yield the corners of a way along a path, moved ``outside`` m outwards in its bends."""
     start = anchor
     for bend in path:
-        turned = abs(bend.curvature * bend.length)
-        length = bend.length if turned <= tau else bend.length * tau / turned  # once round
-        parts = 1 + int(min(turned, tau) / CHORD)
+        parts = 1 + int(abs(bend.curvature * bend.length) / CHORD)
         out = 0.0 if abs(bend.curvature) < STRAIGHT else -outside if bend.curvature > 0 else outside
         for part in range(parts + 1):
-            pose = moved(start, bend.curvature, length * part / parts)
+            pose = moved(start, bend.curvature, bend.length * part / parts)
             north, east = -out * sin(pose.yaw), out * cos(pose.yaw)
             yield Pose(pose.north + north, pose.east + east, pose.yaw)
         start = moved(start, bend.curvature, bend.length)

@@ -11,13 +11,12 @@ from mav_tasks.tasks.driving.legs import (
     FACE,
     WAY,
     anchor_of,
-    circle_of,
     distance,
     leg_count,
     leg_of,
     length_of,
 )
-from mav_tasks.tasks.driving.path import Follow, Path
+from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
 from mav_tasks.tasks.task import Progress
@@ -27,7 +26,6 @@ BESIDE = 0.15  # m from a place, at the end of the way there; farther off has mi
 BESIDE_OF_LOOP = 0.4
 TURNED_ROUND = 0.1  # m from the end of a run, where a car changes its direction: close enough
 ONE_TRY = 3.0  # factor on the settling distance of a car that is steered by course
-TIGHTEST = 0.25  # m, radius to which what turns on the spot may steer to be back on a circle
 MOVING_TOLERANCE = 0.4  # of the tolerance: zero is commanded nearer to the end than required
 
 
@@ -151,11 +149,8 @@ class PathFollower:
             self.misses += 1
         if following >= leg_count(self.goal):
             return False
-        anchor = anchor_of(self.goal, following, motion.pose, target)
-        path: Path = ()
-        if isinstance(self.goal, GoTo) and target is not None and following <= WAY:
-            path = circle_of(self.goal, self.progress, anchor, target)
-        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=path)
+        anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)
+        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=())
         return True
 
     def _has_missed(self, motion: Motion) -> bool:
@@ -198,6 +193,7 @@ class PathFollower:
         if self.is_passing and remaining > 0:
             remaining = max(remaining - self.within, 0.0)
         if isinstance(leg, Follow):
+            assert self.steering is not None, "a path is driven with a turning circle"
             return steer_along(
                 leg,
                 anchor,
@@ -205,7 +201,7 @@ class PathFollower:
                 along=self.progress.done,
                 remaining=remaining,
                 driving=driving,
-                radius=TIGHTEST if self.steering is None else self.steering.radius,
+                radius=self.steering.radius,
                 passing=self.passing if self.is_passing else 0.0,
                 by_course=self.by_course,
                 settles=not self.is_circle,

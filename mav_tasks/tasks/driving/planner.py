@@ -10,10 +10,10 @@ from cmath import phase, rect
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
-from math import atan2, copysign, cos, pi, remainder, sin, sqrt, tau
+from math import atan2, copysign, pi, remainder, sqrt, tau
 
 from mav_tasks.tasks.driving.fence import LocalFence
-from mav_tasks.tasks.driving.legs import FACE, WAY, circling, distance
+from mav_tasks.tasks.driving.legs import FACE, WAY, bearing, circling, distance
 from mav_tasks.tasks.driving.path import (
     STRAIGHT,
     Path,
@@ -40,7 +40,6 @@ BACKWARDS = 1.0  # extra cost of a way driven backwards, as a factor
 PIECES = (0.3, 0.6, 1.0, 1.5, 2.2, 3.0)
 THREE_POINT = (0.5, 0.9, 1.4)  # the same for both pieces of a three-point turn
 THERE = 0.1  # m; nearer is at the place: ArduPilot's simulated car (4.6.3) is no more exact
-ENTRIES = 16  # places of a circle at which a car may come onto it
 HERE = 1e-3  # m and rad from a place or heading; nearer needs no way
 
 
@@ -89,23 +88,15 @@ def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
 def way_round(
     goal: GoTo, progress: Progress, pose: Pose, centre: LocalPlace, steering: Steering
 ) -> Path:
-    """Return the way onto and round a circle, driven forwards and no tighter than it can.
-
-    It ignores the fence if no way stays within it.
-    """
-    side = copysign(1.0, goal.around)
-    radius = max(abs(goal.around), steering.planned_radius)
-    arc = Bend(side / radius, circling(goal, progress) * radius)
-    anyhow = replace(steering, reverses=False, fence=None)
-    ways: list[Path] = []
-    for number in range(ENTRIES):
-        angle = tau * number / ENTRIES
-        north, east = centre.north + radius * cos(angle), centre.east + radius * sin(angle)
-        way = way_to_pose(pose, Pose(north, east, angle + side * pi / 2), anyhow)
-        ways += [] if way is None else [(*way, arc)]
-    way = _best(pose, ways, steering.fence) or _best(pose, ways, None)
+    """Return the way to the nearest place of a circle and round it, as narrow as can be driven."""
+    side, radius = copysign(1.0, goal.around), max(abs(goal.around), steering.planned_radius)
+    outwards = bearing(pose, centre) + pi
+    nearest = moved(Pose(centre.north, centre.east, outwards), 0.0, radius)
+    entry = replace(nearest, yaw=outwards + side * pi / 2)
+    way = way_to_pose(pose, entry, replace(steering, reverses=False, fence=None))
     assert way is not None, "there is a way to every pose"
-    return way
+    turned = circling(goal, progress.path, done=progress.done)
+    return (*way, Bend(side / radius, turned * radius))
 
 
 def set_out_to(

@@ -8,15 +8,7 @@ from dataclasses import replace
 from math import copysign, cos, inf, radians, sin
 
 from mav_tasks.tasks.driving.guidance import Motion, cross_track, done_so_far, wrap
-from mav_tasks.tasks.driving.legs import (
-    FACE,
-    WAY,
-    anchor_of,
-    circle_of,
-    distance,
-    leg_of,
-    length_of,
-)
+from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, distance, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.driving.path import Follow, forward_of, nearest, pose_on
 from mav_tasks.tasks.driving.path_follower import PathFollower
@@ -88,8 +80,7 @@ def resumed(
         return progress
     leg = leg_of(goal, progress)
     if isinstance(leg, Follow):
-        is_path = steering is not None or goal.turns > 0
-        is_near = is_path and _is_on_path(leg, anchor, pose, done=progress.done)
+        is_near = steering is not None and _is_on_path(leg, anchor, pose, done=progress.done)
     elif progress.leg == WAY:
         along = done_so_far(leg, anchor, pose, before=progress.done)
         is_near = abs(cross_track(anchor, pose)) <= OFF_TRACK and 0 <= along <= length_of(leg)
@@ -102,8 +93,7 @@ def resumed(
         return set_out_to(goal, progress, pose, progress.target, steering)
     leg_again = FACE if turns_first else WAY
     again = anchor_of(goal, leg_again, pose, progress.target)
-    path = circle_of(goal, progress, again, progress.target)
-    return replace(progress, leg=leg_again, anchor=again, done=0.0, path=path)
+    return replace(progress, leg=leg_again, anchor=again, done=0.0, path=())
 
 
 def _is_on_path(leg: Follow, anchor: Pose, pose: Pose, *, done: float) -> bool:

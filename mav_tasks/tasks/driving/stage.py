@@ -13,7 +13,6 @@ from mav_tasks.tasks.driving.legs import (
     anchor_of,
     bearing,
     begun_from,
-    circle_of,
     distance,
     heading_to,
 )
@@ -22,20 +21,17 @@ from mav_tasks.tasks.driving.path import path_length, pose_on
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.driving.recovery_path import resumed
-from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import (
     Delay,
     Face,
-    Gate,
-    GlobalPlace,
     Goal,
     GoTo,
     LocalPlace,
     Near,
     Perform,
-    Place,
     Plan,
     SetSpeed,
+    SingleGoal,
 )
 from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress
@@ -43,11 +39,12 @@ from mav_tasks.tasks.view import VehicleView
 
 #: rad; a car stops before a larger turn: it may be shorter to reverse
 ROLLING_TURN = radians(100)
+ROUND = 0.4  # m, radius of the way of what turns on the spot onto a circle
 ROLLING = 0.05  # m/s; a vehicle that is faster goes on to its next place without stopping
 
 
 @dataclass(frozen=True, slots=True)
-class LookedAt:
+class OnTheWay:
     """The steps on the way that one look has done."""
 
     progress: Progress
@@ -55,11 +52,17 @@ class LookedAt:
     performed: tuple[int, ...] = ()  # of those, commands to the vehicle
 
 
-def steering_of(seen: VehicleView, bounds: Bounds) -> Steering | None:
-    """Return the constraints on a car's ways; None for a vehicle that turns on the spot."""
+def steering_of(goal: SingleGoal, seen: VehicleView, bounds: Bounds) -> Steering | None:
+    """Return the constraints on a car's ways; None for a vehicle that turns on the spot.
+
+    What turns on the spot does not do so on its way onto a circle.
+    """
+    radius = seen.turning_radius
     if seen.turning is not Turning.STEERED:
-        return None
-    return Steering(seen.turning_radius, seen.honours_yaw_rate, bounds.local(seen.origin))
+        if not isinstance(goal, GoTo) or not goal.turns:
+            return None
+        radius = ROUND
+    return Steering(radius, seen.honours_yaw_rate, bounds.local(seen.origin))
 
 
 def set_out(
@@ -95,7 +98,7 @@ def set_out(
     leg = WAY if is_rolling or not turns_first else FACE
     anchor = anchor_of(single, leg, motion.pose, target)
     begun_here = replace(progress, anchor=anchor, frame=seen.frame, leg=leg, done=0.0)
-    return replace(begun_here, target=target, path=circle_of(single, progress, anchor, target))
+    return replace(begun_here, target=target, path=())
 
 
 def may_go_on_rolling(
@@ -109,10 +112,11 @@ def may_go_on_rolling(
     """Return whether a stage can begin without a stop."""
     single = present_goal(goal, progress)
     target = place_of(single, seen) if isinstance(single, GoTo) else None
-    if steering is not None and target is not None:
-        assert isinstance(single, GoTo), "only that has a place"
+    if target is None or not isinstance(single, GoTo):
+        return False
+    if steering is not None:
         return set_out_to(single, progress, motion.pose, target, steering).leg == WAY
-    return isinstance(single, GoTo) and target is not None and _bends_gently(single, motion, target)
+    return _bends_gently(single, motion, target)
 
 
 def _bends_gently(goal: GoTo, motion: Motion, target: LocalPlace) -> bool:
@@ -141,7 +145,7 @@ def course_of(
     here = Pose(target.north, target.east, bearing(anchor, target))
     if progress.path:
         at_end = pose_on(anchor, progress.path, path_length(progress.path))
-        here = replace(here, yaw=at_end.yaw + pi if single.backwards else at_end.yaw)
+        here = replace(here, yaw=at_end.yaw + pi * single.backwards)
     within = min(single.radius or driving.acceptance_radius, distance(here, after) / 2)
     turn = _off(here, bearing(here, after))
     speed = corner_speed(turn, lead=within)
@@ -163,13 +167,16 @@ def _off(pose: Pose, yaw: float) -> float:
 
 
 def look_on_the_way(
-    plan: Plan, progress: Progress, pose: Pose, *, origin: GlobalPlace | None, elapsed: float
-) -> LookedAt:
-    """Do those pending steps that are due; ``elapsed``: the seconds since the last look."""
+    plan: Plan, progress: Progress, *, to_place: float | None, elapsed: float
+) -> OnTheWay:
+    """Do those pending steps that are due.
+
+    ``to_place`` is the metres to the place that is driven to, None without one; ``elapsed`` the
+    seconds since the last look.
+    """
     done: list[int] = []
     performed: list[int] = []
-    target = progress.target
-    left_to_place = -inf if target is None else distance(pose, target)
+    left_to_place = -inf if to_place is None else to_place
     for number in progress.pending:
         step = plan.steps[number]
         match step:
@@ -182,8 +189,6 @@ def look_on_the_way(
                 progress = replace(progress, pending_for=0.0)
             case Near(distance=near) if left_to_place > near:
                 break
-            case Gate(place=place) if target and not _is_past(place, pose, target, origin=origin):
-                break
             case SetSpeed(speed=speed):
                 progress = replace(progress, speed=speed)
             case Perform():
@@ -193,13 +198,4 @@ def look_on_the_way(
             break
     if done:
         progress = replace(progress, pending=progress.pending[len(done) :])
-    return LookedAt(progress, tuple(done), tuple(performed))
-
-
-def _is_past(place: Place, pose: Pose, target: LocalPlace, *, origin: GlobalPlace | None) -> bool:
-    """Return whether a pose is on the target's side of a gate."""
-    gate = local_place(place, origin)
-    if gate is None:
-        return True
-    north, east = target.north - gate.north, target.east - gate.east
-    return (pose.north - gate.north) * north + (pose.east - gate.east) * east >= 0.0
+    return OnTheWay(progress, tuple(done), tuple(performed))

@@ -1,0 +1,357 @@
+"""What becomes of each command in a plan: one row for each of MAVLink's commands.
+
+It is driven, or sent to the vehicle at its place, or skipped, as autopilots do that store what they
+cannot do; or the plan is refused, because it would be unsafe or mean nothing. A command without a
+row of its own is treated by its kind in the policy table. tools/plan_table.py prints all of it to
+dialects/README.md.
+"""
+
+from collections.abc import Callable, Mapping
+from math import copysign, inf, isnan
+from typing import NamedTuple
+
+from mav_tasks.engine.commands.goals import (
+    MAX_DELAY,
+    MAX_WAIT,
+    MIN_SPEED,
+    bad,
+    goal_of,
+    identifier,
+    number,
+    place_in,
+    whole,
+)
+from mav_tasks.engine.policy import row_of_command
+from mav_tasks.errors import Rejection
+from mav_tasks.mavlink.enums import MavFrame
+from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.mission_item import NOT_GIVEN
+from mav_tasks.settings import Driving
+from mav_tasks.tasks.goal import (
+    Delay,
+    GoTo,
+    Jump,
+    Near,
+    Nothing,
+    Perform,
+    Place,
+    SetReverse,
+    SetSpeed,
+    Step,
+    Wait,
+)
+from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, Terms
+
+R = TaskReason
+
+FOR_EVER = 1e9  # s; JSON has no infinity
+MAX_JUMPS = 65_535
+MOST_TURNS = 255  # as ArduPilot stores
+LEAST_CIRCLE = 0.9  # m, radius; ArduPilot's TURN_RADIUS
+NO_CHANGE, DEFAULT = (0.0, -1.0), -2.0  # DO_CHANGE_SPEED, param2
+GROUND_OR_AIR = 1  # the same, highest param1: airspeed counts as ground speed
+SENT, SKIPPED, REFUSED = "sends", "skips", "refuses"  # uses of commands
+HERE = (0, NOT_GIVEN)  # values of x and y that mean no place
+
+
+class Surroundings(NamedTuple):
+    """What the meaning of an item depends on besides the item."""
+
+    items: int  # of the plan
+    driving: Driving
+    is_px4: bool
+
+
+Parser = Callable[[Command, Surroundings], Step]
+
+
+class PlanRow(NamedTuple):
+    """What becomes of a command: ``use`` says how, ``about`` what, or why not."""
+
+    use: str
+    about: str
+    ardupilot: str  # what it does with it in its own missions, for the document
+    px4: str
+
+
+def row_of_item(command: int) -> PlanRow:
+    """Return the row of a command: its own, or that of its kind in the policy table."""
+    policy = row_of_command(command)
+    return ROWS.get(str(command)) or ROWS[policy.kind.name + "-bound" * policy.is_bound]
+
+
+def step_of_command(command: Command, around: Surroundings) -> Step:
+    """Return the step that a command becomes. Raise Rejection for one that is not for a plan."""
+    number = command.command
+    row = row_of_item(number)
+    if row.use == SENT:
+        return Perform(row_of_command(number).role)
+    if row.use == REFUSED:
+        words = f"command {name_of(number)} is not for a plan: {row.about}"
+        raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+    parse = PARSERS.get(number)
+    return Nothing() if parse is None else parse(command, around)
+
+
+def name_of(command: int) -> str:
+    """Return a command's number and name."""
+    return f"{command} {row_of_command(command).name}".strip()
+
+
+def options_of(command: Command, *, now: float) -> Terms:
+    """Return the terms in a TASK_OPTIONS. Raise Rejection that names a bad parameter."""
+    delay = number(command, 2, "start delay", low=0.0, high=MAX_DELAY, default=0.0)
+    deadline = number(command, 3, "deadline", low=0.0, high=MAX_DELAY, default=0.0)
+    return Terms(
+        priority=whole(command, 1, "priority", high=MAX_PRIORITY, default=DEFAULT_PRIORITY),
+        after=identifier(command, 4, "run after"),
+        start_at=now + delay if delay else None,
+        deadline=now + deadline if deadline else None,
+    )
+
+
+# what a command becomes
+
+
+def _as_command(command: Command, around: Surroundings) -> Step:
+    return goal_of(command, around.driving)
+
+
+def _place(command: Command) -> Place | None:
+    """Return the place of an item, None if that is where the vehicle is."""
+    is_here = all(part in HERE for part in command.params[4:6])
+    return None if is_here and command.frame != MavFrame.LOCAL_NED else place_in(command)
+
+
+def _waypoint(command: Command, around: Surroundings) -> Step:
+    if _place(command) is None:
+        return Wait(number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0))
+    goal = goal_of(command, around.driving)
+    assert isinstance(goal, GoTo), "a waypoint is a place"
+    if goal.wait or goal.yaw is not None:
+        return goal
+    return GoTo(goal.place, goal.speed, goal.radius, passes=True)
+
+
+def _loiter(command: Command, _around: Surroundings) -> Step:
+    place = _place(command)
+    return GoTo(place, wait=FOR_EVER) if place else Wait(FOR_EVER)
+
+
+def _circle(command: Command, around: Surroundings) -> Step:
+    turns = number(command, 1, "turns", low=0.0, high=MOST_TURNS)
+    most = around.driving.max_distance
+    radius = number(command, 3, "radius", low=-most, high=most, default=0.0)
+    radius = copysign(max(abs(radius), LEAST_CIRCLE), radius)
+    # without a place it is round the place before, which ``plan_of`` knows
+    return GoTo(_place(command), turns=turns, around=radius) if turns else Nothing()
+
+
+def _land(command: Command, around: Surroundings) -> Step:
+    place = _place(command)
+    return GoTo(place) if place and around.is_px4 else Nothing()
+
+
+def _delay(command: Command, _around: Surroundings) -> Step:
+    return Delay(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
+
+
+def _near(command: Command, around: Surroundings) -> Step:
+    return Near(number(command, 1, "distance", low=0.0, high=around.driving.max_distance))
+
+
+def _gate(command: Command, _around: Surroundings) -> Step:
+    _place(command)  # only to check it
+    return Near(0.0)  # ``plan_of`` knows from where to where
+
+
+def _jump(command: Command, around: Surroundings) -> Step:
+    to = whole(command, 1, "item", high=around.items - 1, default=None)
+    return Jump(to, _times(command))
+
+
+def _times(command: Command) -> int:
+    return whole(command, 2, "repeat", low=-1, high=MAX_JUMPS, default=None)
+
+
+def _jump_to_tag(command: Command, _around: Surroundings) -> Step:
+    return Jump(0, _times(command))  # ``plan_of`` knows where the tag is
+
+
+def _go_on_with(command: Command, around: Surroundings) -> Step:
+    return Jump(whole(command, 1, "item", high=around.items - 1, default=None), -1)
+
+
+def _speed(command: Command, around: Surroundings) -> Step:
+    whole(command, 1, "speed type", high=GROUND_OR_AIR)
+    wish = command.params[1]
+    if wish in NO_CHANGE or isnan(wish):
+        return SetSpeed(None) if around.is_px4 else Nothing()
+    if wish == DEFAULT:
+        return SetSpeed(None)
+    # planners leave speeds of aircraft there: bound them to the limit
+    top = around.driving.max_speed
+    return SetSpeed(min(number(command, 2, "speed", low=MIN_SPEED, high=inf), top))
+
+
+def _reverse(command: Command, _around: Surroundings) -> Step:
+    return SetReverse(command.params[0] == 1.0)
+
+
+def _own(command: Command, around: Surroundings) -> Step:
+    for index, name in ((5, "run after"), (6, "start delay")):
+        if command.params[index - 1] not in HERE:
+            raise bad(f"param{index} {name}: not in a plan item, use TASK_OPTIONS", param=index)
+    return goal_of(command, around.driving)
+
+
+def _options(command: Command, _around: Surroundings) -> Step:
+    options_of(command, now=0.0)  # only to check them
+    return Nothing()
+
+
+#: how a command becomes a step; without one it becomes Nothing
+PARSERS: Mapping[int, Parser] = {
+    16: _waypoint,
+    17: _loiter,
+    18: _circle,
+    **dict.fromkeys((19, 20, 93, 115, 213), _as_command),
+    **dict.fromkeys((21, 22), _land),
+    112: _delay,
+    114: _near,
+    177: _jump,
+    178: _speed,
+    194: _reverse,
+    224: _go_on_with,
+    601: _jump_to_tag,
+    4501: _gate,
+    **dict.fromkeys(range(54000, 54003), _own),
+    54014: _options,
+}
+
+#: numbers, or a kind of the policy table ("-bound" if it is) · what the server does with an item ·
+#: how, or why not and what to write · ArduPilot Rover 4.6.3 · PX4 1.17.0; "*": tried there
+TABLE = """
+16 | drives | drives there. Stops there if it has a hold time (param1) or a yaw (param4), or if the
+path bends by more than 45°; else passes within the acceptance radius (param2; if it is 0,
+`driving.acceptance_radius`, 0.5 m by default). At 0/0: stays here for the hold time |
+the same; 0/0 is here* | drives there; at 0/0 it sets off to that place on earth*
+
+17 | drives | drives there and stays until another item is set | the same | the same
+
+18 | drives | drives to the circle of param3 metres round the place (negative: counter-clockwise;
+at least 0.9 m, and what its turning circle allows), and param1 turns on it. Always forwards; stops
+at the end. At 0/0: round the place before | the same, and drives on at the end* | refuses the plan*
+
+19 | drives | as the command: drives there and stands for param1 seconds | the same | the same
+
+20 | drives | as the command: returns; as the last item it also disarms the rover |
+drives home, stays armed* | begins its Return mode*
+
+21 | skips | PX4: drives there. ArduPilot: nothing | skips it, and goes on* |
+drives there and stays, armed*
+
+22 | skips | PX4: drives there. ArduPilot: nothing | skips it* |
+drives there; without an altitude it refuses to start*
+
+93 | drives | as the command: stands for param1 seconds, or until a time of day (UTC) |
+the same; if all are 0 it stands until midnight* | ignores a time of day*
+
+112 | drives | delays the following items, up to the next place, by param1 seconds | the same |
+stores it
+
+114 | drives | the same, until that place is param1 metres away | the same | stores it
+
+115 | drives | as the command: turns to a heading | skips it* | refuses the plan*
+
+177 | drives | continues with item param1, param2 times in the whole plan (-1: for ever). A loop
+without motion is refused | the same* | the same
+
+178 | drives | from here on drives at param2 m/s, at most the server's limit; airspeed counts as
+ground speed. 0, -1: no change (PX4: back to the default). -2: back to the default |
+no change for 0, -1, -2* | back to its default for 0, -1, -2*
+
+194 | drives | param1 = 1: drives to the following places backwards, else forwards again; not a
+return and a circle. Refused for a rover that cannot reverse | the same* | refuses the plan*
+
+213 | drives | as the command: drives on a heading for 3 s | until the heading is reached |
+refuses the plan
+
+224 | drives | continues with item param1 | refuses the plan | refuses the plan
+
+600 | drives | a place to which DO_JUMP_TAG leads, named by param1 | the same* | refuses the plan
+
+601 | drives | continues with the item after JUMP_TAG param1, param2 times, as DO_JUMP |
+the same; ends the plan if there is no such tag* | refuses the plan
+
+4501 | drives | delays the following items, up to the next place, until the rover has passed it |
+refuses the plan* | the same*
+
+54000 54001 54002 | drives | as the command; param5 and param6 (after, delay) must be 0 | – | –
+
+54014 | drives | options of the whole plan: param1 priority, param2 start delay s, param3 deadline s
+(both from the end of the upload), param4 run after, param5 (`x`) nonce, param6 (`y`) more bits of
+your nonce: a plan that repeats the nonce with another number there is another plan | – | –
+
+82 | skips | a curve; write NAV_WAYPOINT (16) if it shall be driven to | skips it* |
+refuses the plan*
+
+193 | skips | a plan does not pause itself; write NAV_DELAY (93) or NAV_LOITER_UNLIM (17) |
+skips it* | refuses the plan*
+
+215 | skips | a task that resumes goes on exactly where it was interrupted | goes back by param1
+metres when it resumes | refuses the plan
+
+188 189 190 191 | skips | a mark for the autopilot's own return | skips it* | 189: stores it
+
+30 31 83 84 85 94 208 210 212 222 223 3000 42703 | skips | for aircraft, engines, or what others
+drive | skips it | 31, 84, 85, 3000: stores it, else refuses the plan
+
+ACTION | sends | sent to the rover as a command when its turn comes | see below | see below
+
+217 | sends | sent; scripts on the rover read it | does it; refuses it as a command |
+refuses the plan
+
+207 218 | sends | sent; limits or can do anything, so it needs role `safety` | does it* |
+refuses the plan*
+
+92 | refuses | nobody else can drive in the middle of a plan: end the plan there |
+waits for others' set-points* | refuses the plan*
+
+400 | refuses | the server arms the rover; as the last item NAV_RETURN_TO_LAUNCH (20) disarms it |
+refuses the plan* | disarms; the rover rolls on*
+
+42702 | refuses | a script cannot drive in a plan; DO_SEND_SCRIPT_MESSAGE (217) tells it something |
+a script drives | refuses the plan
+
+95 159 240 | refuses | it is no command, but the end of a range of them | refuses | refuses
+
+MOTION | refuses | write NAV_WAYPOINT (16) or NAV_LOITER_TURNS (18) to drive somewhere |
+refuses | refuses
+
+MOTION-bound | refuses | tests, calibrates or restarts the rover: never on the way |
+refuses | refuses
+
+GO GO-bound HALT | refuses | the server starts, stops and arms the rover, and sets its mode: leave
+it out, or send it as a command | refuses | refuses
+
+QUESTION | refuses | it asks, and nobody would hear the answer: send it as a command |
+refuses | refuses
+
+WISH | refuses | it is about tasks or goes to a place at once: send it as a command, or see 16 |
+refuses | refuses
+
+ACTION-bound | refuses | limits or identifies the rover: do that before the plan | refuses | refuses
+"""
+
+
+def _read(table: str) -> Mapping[str, PlanRow]:
+    rows: dict[str, PlanRow] = {}
+    for line in table.strip().split("\n\n"):
+        names, *cells = (" ".join(cell.split()) for cell in line.split("|"))
+        rows |= dict.fromkeys(names.split(), PlanRow(*cells))
+    return rows
+
+
+ROWS = _read(TABLE)

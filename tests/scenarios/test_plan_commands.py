@@ -1,0 +1,249 @@
+"""The commands of a plan: driven, sent at their place, skipped and said once, or refused."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from math import atan2, hypot, nan, pi, remainder, tau
+from typing import NamedTuple
+
+import pytest
+
+from mav_tasks.settings import Settings, VehicleProfile
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Persona
+from tests.kit.car import Car
+from tests.kit.mission import Item, Upload, reached
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.world import PROMPT, World, at, is_at
+from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_profiles import ARDUPILOT_PROFILE, PX4_PROFILE
+
+WAYPOINT, CIRCLE, LAND, TAKEOFF, SPLINE, DELAY, SPEED = 16, 18, 21, 22, 82, 93, 178
+SERVO, REVERSE, FENCE, TAG, JUMP_TO_TAG, GATE, START = 183, 194, 207, 600, 601, 4501, 300
+ARDUPILOT_CAR = replace(ARDUPILOT_PROFILE, turning="steered", turning_radius=1.2)
+NOON = 1_800_014_400.0 + 43_200.0 - (1_800_014_400.0 % 86_400.0)
+
+
+def place(north: float, east: float, **params: float) -> Item:
+    return Item(WAYPOINT, **at(north, east), **params)
+
+
+def circle(north: float, east: float, *, turns: float, radius: float) -> Item:
+    return Item(CIRCLE, **at(north, east), param1=turns, param3=radius, param4=0.0)
+
+
+def do(command: int, *params: float) -> Item:
+    first = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return Item(command, 0, 0, *first, frame=2)
+
+
+class Seen(NamedTuple):
+    """What was truly driven, look after look."""
+
+    north: float
+    east: float
+    speed: float  # forward, m/s
+    at: float
+
+
+def driven(world: World, *items: Item, within: float = 90.0) -> list[Seen]:
+    """Upload a plan, drive it to its end, and return how the rover truly went."""
+    upload = Upload(world.client, items, target=(1, 191))
+    world.until(lambda: upload.result is not None, within=5)
+    assert upload.result == 0, world.client.texts()
+    track: list[Seen] = []
+
+    def is_over() -> bool:
+        truth = world.truth
+        track.append(Seen(truth.north, truth.east, truth.forward_speed, world.now))
+        return world.state(upload.opaque_id)[0] is S.COMPLETED
+
+    world.until(is_over, within=within)
+    return track
+
+
+def refused(world: World, *items: Item) -> str:
+    """Return why a plan was refused."""
+    upload = Upload(world.client, items, target=(1, 191))
+    world.until(lambda: upload.result is not None, within=5)
+    assert upload.result != 0
+    world.run(0.2)
+    return world.client.texts()[-1]
+
+
+def turned_round(track: list[Seen], north: float, east: float, *, within: float) -> float:
+    """Return the radians driven round a place, clockwise positive, while nearer than that."""
+    turned, last = 0.0, None
+    for seen in track:
+        if hypot(seen.north - north, seen.east - east) > within:
+            last = None
+            continue
+        angle = atan2(seen.east - east, seen.north - north)
+        turned += 0.0 if last is None else remainder(angle - last, tau)
+        last = angle
+    return turned
+
+
+MakeRover = Callable[[Persona, VehicleProfile | None], World]
+
+
+@pytest.fixture
+def make_rover(make_world: MakeWorld) -> MakeRover:
+    def make(persona: Persona, profile: VehicleProfile | None) -> World:
+        if profile is None:
+            return make_world(persona=persona)
+        body = partial(Car, radius=1.2)
+        return make_world(persona=persona, settings=Settings(profiles=(profile,)), body=body)
+
+    return make
+
+
+rovers = pytest.mark.parametrize(
+    ("persona", "profile"),
+    [(PROMPT, None), (PROMPT, ARDUPILOT_CAR), (PROMPT_PX4, None)],
+    ids=["ardupilot", "ardupilot car", "px4"],
+)
+
+
+@rovers
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_circle_is_driven_as_a_circle(
+    make_rover: MakeRover, persona: Persona, profile: VehicleProfile | None, side: int
+) -> None:
+    if (side, profile) == (-1, ARDUPILOT_CAR):
+        pytest.skip("one side is enough")
+    world = make_rover(persona, profile)
+    track = driven(world, circle(5, 0, turns=1.5, radius=2.0 * side), place(0, 0))
+    on_it = [seen for seen in track if 1.6 < hypot(seen.north - 5, seen.east) < 2.4]
+    assert turned_round(on_it, 5, 0, within=2.4) * side >= 1.5 * tau - 0.6
+    farthest = max(seen.north for seen in track)
+    assert farthest == pytest.approx(7.0, abs=0.35)
+    assert is_at(world, 0.0, 0.0) or profile is not None
+
+
+@pytest.mark.parametrize("profile", [None, ARDUPILOT_CAR], ids=["skid", "car"])
+def test_what_is_to_be_driven_backwards_is(
+    make_rover: MakeRover, profile: VehicleProfile | None
+) -> None:
+    world = make_rover(PROMPT, profile)
+    back = (do(REVERSE, 1), place(6, 3), place(2, 5), do(REVERSE, 0))
+    track = driven(world, place(6, 0), *back, place(0, 0))
+    there = next(n for n, seen in enumerate(track) if hypot(seen.north - 2, seen.east - 5) < 0.6)
+    first = next(n for n, seen in enumerate(track) if hypot(seen.north - 6, seen.east) < 0.5)
+    way = track[first:there]
+    backwards = sum(seen.speed < -0.05 for seen in way)
+    forwards = sum(seen.speed > 0.15 for seen in way)
+    assert backwards > 4 * forwards
+    assert max(seen.speed for seen in track[there:]) > 0.3
+    assert is_at(world, 0.0, 0.0) or profile is not None
+
+
+def test_what_cannot_reverse_is_told_so(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    assert "item 2: this rover cannot reverse: leave" in refused(world, place(2, 0), do(REVERSE, 1))
+
+
+def test_a_tag_is_gone_on_from(world: World) -> None:
+    items = (do(TAG, 3), place(1, 0), place(1, 1), do(JUMP_TO_TAG, 3, 1), place(0, 0))
+    driven(world, *items)
+    assert reached(world.client)[:5] == [1, 2, 1, 2, 4]
+
+
+@pytest.mark.parametrize(
+    ("params", "seconds"), [((0, 12, 0, 40), 40.0), ((-1, -1, 1, -1), 60.0), ((2,), 2.0)]
+)
+def test_it_stands_until_a_time_of_day(
+    make_world: MakeWorld, params: tuple[float, ...], seconds: float
+) -> None:
+    world = make_world(wall_offset=NOON)
+    began = world.now
+    track = driven(world, do(DELAY, *params), place(1, 0))
+    moved_at = next(seen.at for seen in track if hypot(seen.north, seen.east) > 0.05)
+    clock = moved_at + NOON - NOON // 86_400 * 86_400 - 43_200
+    if seconds > 2:
+        assert seconds < clock < seconds + 2
+    else:
+        assert 2.0 < moved_at - began < 6.0
+
+
+@pytest.mark.parametrize("wish", [0.0, -1.0])
+@pytest.mark.parametrize(("persona", "speed"), [(PROMPT, 0.3), (PROMPT_PX4, 0.5)])
+def test_no_speed_means_what_it_means_to_the_autopilot(
+    make_world: MakeWorld, persona: Persona, wish: float, speed: float
+) -> None:
+    world = make_world(persona=persona)
+    slow, same = do(SPEED, 1, 0.3), do(SPEED, 1, wish, 50)
+    track = driven(world, place(2, 0), slow, place(4, 0), same, place(7, 0))
+    late = [seen.speed for seen in track if 5 < seen.north < 6]
+    assert max(late) == pytest.approx(speed, abs=0.08)
+
+
+def test_a_waypoint_without_a_place_is_here(world: World) -> None:
+    here = Item(WAYPOINT, param1=3.0)
+    track = driven(world, place(2, 0), here, place(3, 0))
+    stood = [seen.at for seen in track if 1.5 < seen.north < 2.5 and abs(seen.speed) < 0.01]
+    assert stood[-1] - stood[0] > 2.5
+
+
+def test_a_gate_holds_back_a_command_until_it_is_passed(world: World) -> None:
+    world.watched.shows_on_request = True
+    sent: list[float] = []
+    items = (place(2, 0), Item(GATE, **at(5, 0)), do(SERVO, 9, 1700), place(8, 0))
+    upload = Upload(world.client, items, target=(1, 191))
+    world.until(lambda: upload.result is not None, within=5)
+
+    def is_over() -> bool:
+        if not sent and str(SERVO) in world.observer.sent_since(0):
+            sent.append(world.truth.north)
+        return world.state(upload.opaque_id)[0] is S.COMPLETED
+
+    world.until(is_over, within=60)
+    assert sent == [pytest.approx(5.0, abs=0.2)]
+
+
+def test_what_is_skipped_is_said_once(world: World) -> None:
+    driven(world, Item(TAKEOFF), place(1, 0), Item(SPLINE, **at(9, 9)), Item(LAND, **at(9, 9)))
+    said = [text for text in world.client.texts() if "skips" in text]
+    assert len(said) == 1
+    assert "it skips item 1 (22 NAV_TAKEOFF), 3 (82 NAV_SPLINE_WAYPOINT), 4 (21 NAV_LAND)" in said[0]
+    assert is_at(world, 1.0, 0.0)
+
+
+def test_a_landing_is_a_place_to_a_px4(make_world: MakeWorld) -> None:
+    world = make_world(persona=PROMPT_PX4)
+    driven(world, Item(LAND, **at(2, 1)))
+    assert hypot(world.truth.north - 2, world.truth.east - 1) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (176, "176 DO_SET_MODE is not for a plan: the server starts, stops and arms the rover"),
+        (192, "see 16"),
+        (246, "never on the way"),
+        (400, "as the last item NAV_RETURN_TO_LAUNCH (20) disarms it"),
+        (511, "nobody would hear the answer"),
+        (34, "write NAV_WAYPOINT (16) or NAV_LOITER_TURNS (18)"),
+        (180, "do that before the plan"),
+        (54003, "out, or send it as a command"),
+        (777, "777 is not for a plan"),
+    ],
+)
+def test_what_is_refused_is_told_with_the_reason(world: World, command: int, words: str) -> None:
+    assert words in refused(world, place(1, 0), do(command, 1))
+
+
+def test_what_limits_a_rover_needs_the_role_for_that(make_world: MakeWorld) -> None:
+    from mav_tasks.settings import Roles
+
+    roles = Roles(unsigned="operator")
+    world = make_world(settings=Settings(roles=roles))
+    assert "safety may" in refused(world, place(1, 0), do(FENCE, 0))
+    driven(world, place(1, 0), do(SERVO, 9, 1500))
+
+
+def test_angles() -> None:
+    """The measure of these tests: twice round a place is twice round it."""
+    track = [Seen(*p, 0.0, 0.0) for p in ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 0), (0, 1))]
+    assert turned_round(track, 0, 0, within=2) == pytest.approx(2.5 * pi)
+    assert nan != nan
