@@ -39,7 +39,10 @@ BY_CONTENT = {
         "makes a task pre-emptive, or runs it immediately": TASK,
         "sends a plan that has commands to the rover": TASK,
         "starts a plan in a paused queue, or of a rover in a manual mode": TASK,
-    }
+    },
+    "safety": {
+        "sends a plan that switches the rover's fence, or auxiliary functions (207, 218)": TASK
+    },
 }
 
 Group = tuple[Row, list[str]]

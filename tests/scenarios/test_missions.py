@@ -25,7 +25,7 @@ from tests.kit.store import LateStore
 from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
-WAYPOINT, DELAY, SPEED, JUMP, SERVO, TAKEOFF, LAND, OPTIONS = 16, 93, 178, 177, 183, 22, 21, 54014
+WAYPOINT, DELAY, SPEED, JUMP, SERVO, TAKEOFF, MODE, OPTIONS = 16, 93, 178, 177, 183, 22, 176, 54014
 START, SET_CURRENT, MOVE, PICTURE = 300, 224, 54000, 2000
 HOME = Item(WAYPOINT, frame=0, current=1)
 NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 2, 3, 4, 5
@@ -135,7 +135,7 @@ def test_it_comes_back_as_it_was(world: World) -> None:
 @pytest.mark.parametrize(
     ("bad", "result"),
     [
-        (Item(LAND, **at(1, 1)), 3),
+        (Item(MODE, frame=2), 3),
         (Item(WAYPOINT, x=910000000, y=5), 10),
         (Item(WAYPOINT, x=470000000, y=1810000000), 11),
         (Item(WAYPOINT, **at(1, 0), param1=-1.0), 6),
@@ -174,7 +174,7 @@ def test_a_jump_may_lead_ahead_of_all_items_that_have_come_by_then(world: World)
 
 def test_a_refused_plan_leaves_the_one_before(world: World) -> None:
     uploaded(world)
-    uploaded(world, HOME, Item(LAND))
+    uploaded(world, HOME, Item(MODE))
     download = Download(world.client)
     world.until(lambda: download.is_done, within=5)
     assert (download.count, download.opaque_id) == (4, 1)

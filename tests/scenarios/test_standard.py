@@ -192,7 +192,7 @@ def test_the_speed_is_changed_of_what_runs_and_of_what_comes(world: World) -> No
         (REPOSITION, (9, 1, 0, nan), {"x": 1, "y": 1, "frame": 0}, "speed"),
         (WAYPOINT, (0, 0, 0, 0), {"x": 1, "y": 1, "frame": 8}, "frame 8"),
         (WAYPOINT, (-1, 0, 0, 0), {"x": 1, "y": 1, "frame": 0}, "hold"),
-        (DELAY, (-1,), {"frame": 0}, "time of day"),
+        (DELAY, (-1, 24), {"frame": 0}, "hour 24 not in"),
         (YAW, (400,), {"frame": 0}, "angle"),
         (SPEED, (1, 9), {"frame": 0}, "speed"),
         (SPEED, (2, 1), {"frame": 0}, "speed type"),

@@ -308,7 +308,11 @@ metres when it resumes | refuses the plan
 30 31 83 84 85 94 208 210 212 222 223 3000 42703 | skips | for aircraft, engines, or what others
 drive | skips it | 31, 84, 85, 3000: stores it, else refuses the plan
 
-ACTION | sends | sent to the rover as a command when its turn comes | see below | see below
+ACTION | sends | sent to the rover as a command when its turn comes | does 179, 181*, 182, 183*,
+184*, 195, 197, 201 to 203, 206, 211*, 216*, 531, 532, 534, 1000, 2000, 2001, 2500, 2501; skips 205
+and 42600; refuses a plan with another one | does 179, 187, 195 to 197, 200, 201, 203 to 206, 211,
+214, 260, 530, 532, 534, 1000, 1001, 2000*, 2001, 2003, 2500, 2501, 42600; refuses a plan with
+another one*
 
 217 | sends | sent; scripts on the rover read it | does it; refuses it as a command |
 refuses the plan
