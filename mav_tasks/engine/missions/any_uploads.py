@@ -19,7 +19,8 @@ from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.mission_uploads import draft_of, refusal_of
-from mav_tasks.engine.missions.plan_items import MissionParseOptions, result_of, skipped
+from mav_tasks.engine.missions.plan_items import result_of, skipped
+from mav_tasks.engine.missions.plan_table import MissionParseOptions
 from mav_tasks.engine.policy import row_of
 from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle

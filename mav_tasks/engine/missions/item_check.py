@@ -6,12 +6,12 @@ An upload is refused at the first bad item, so that its client learns which one 
 from mav_tasks.engine.commands.goals import bad
 from mav_tasks.engine.missions.fence_items import check_fence_item, check_rally_item
 from mav_tasks.engine.missions.plan_items import (
-    MissionParseOptions,
     ParsedMission,
     plan_of,
     result_of,
     step_of,
 )
+from mav_tasks.engine.missions.plan_table import MissionParseOptions
 from mav_tasks.engine.missions.plans import STORED
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection

@@ -8,11 +8,11 @@ from dataclasses import replace
 from math import hypot, isnan
 from typing import NamedTuple
 
-from mav_tasks.engine.commands.ability import Ability, as_driven
+from mav_tasks.engine.commands.ability import as_driven
 from mav_tasks.engine.commands.goals import KNOWN_FRAMES, place_in, refuse_infinite
 from mav_tasks.engine.missions.plan_table import (
     SKIPPED,
-    Surroundings,
+    MissionParseOptions,
     name_of,
     options_of,
     row_of_item,
@@ -21,11 +21,9 @@ from mav_tasks.engine.missions.plan_table import (
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavFrame, MavMissionResult
+from mav_tasks.mavlink.enums import MavCmd, MavFrame, MavMissionResult
 from mav_tasks.services.command_receiver import NO_MESSAGE, Command
 from mav_tasks.services.mission_item import Item, packed, unpacked
-from mav_tasks.services.persona import Persona
-from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.mission_sequencer import loops_in_vain
 from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import (
@@ -58,21 +56,6 @@ RESULT_OF: dict[int, MavMissionResult] = {
 }
 
 
-class MissionParseOptions(NamedTuple):
-    """How items are parsed: the vehicle's conventions, and the server's limits."""
-
-    has_home: bool  # item 0 is home, as with ArduPilot
-    ability: Ability
-    driving: Driving
-    is_px4: bool = False  # an item means what it means to a PX4
-
-    @classmethod
-    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "MissionParseOptions":
-        """Return the options of a vehicle; ``is_staged``: the plan is for the autopilot."""
-        is_px4 = persona.autopilot == MavAutopilot.PX4
-        return cls(persona.has_home_item and is_staged, Ability.of(persona), driving, is_px4)
-
-
 class ParsedMission(NamedTuple):
     """A plan, with the terms and the nonce (or 0) of its options item."""
 
@@ -92,20 +75,15 @@ def step_of(item: Item, seq: int, *, count: int, manner: MissionParseOptions) ->
     """Return the step of an item. Raise Rejection that names the item's number in the file."""
     if manner.has_home and seq == 0:
         return Nothing()
-    name = number_of(seq, has_home=manner.has_home)
-    try:
-        return _step_of(item, count=count, manner=manner)
-    except Rejection as why:
-        raise Rejection(why.reason, f"item {name}: {why.text}", param=why.param) from None
-
-
-def _step_of(item: Item, *, count: int, manner: MissionParseOptions) -> Step:
     command = _command_of(item)
-    if item.frame not in KNOWN_FRAMES:
-        raise Rejection(R.BAD_FRAME, f"frame {item.frame} is unknown")
-    refuse_infinite(command)
-    around = Surroundings(count, manner.driving, manner.is_px4)
-    return as_driven(step_of_command(command, around), manner.ability)
+    try:
+        if item.frame not in KNOWN_FRAMES:
+            raise Rejection(R.BAD_FRAME, f"frame {item.frame} is unknown")
+        refuse_infinite(command)
+        return as_driven(step_of_command(command, count, manner), manner.ability)
+    except Rejection as why:
+        name = number_of(seq, has_home=manner.has_home)
+        raise Rejection(why.reason, f"item {name}: {why.text}", param=why.param) from None
 
 
 def steps_of(items: Sequence[Item], *, manner: MissionParseOptions) -> tuple[Step, ...]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
+from mav_tasks.engine.commands.ability import Ability
 from mav_tasks.engine.commands.goals import (
     MAX_DELAY,
     MAX_WAIT,
@@ -23,9 +24,10 @@ from mav_tasks.engine.commands.goals import (
 )
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.errors import Rejection
-from mav_tasks.mavlink.enums import MavFrame
+from mav_tasks.mavlink.enums import MavAutopilot, MavFrame
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.services.mission_item import NOT_GIVEN
+from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.goal import (
     Delay,
@@ -55,15 +57,23 @@ SENT, SKIPPED, REFUSED = "sends", "skips", "refuses"  # uses of commands
 HERE = (0, NOT_GIVEN)  # values of x and y that mean no place
 
 
-class Surroundings(NamedTuple):
-    """What the meaning of an item depends on besides the item."""
+class MissionParseOptions(NamedTuple):
+    """How items are parsed: the vehicle's conventions, and the server's limits."""
 
-    items: int  # of the plan
+    has_home: bool  # item 0 is home, as with ArduPilot
+    ability: Ability
     driving: Driving
-    is_px4: bool
+    is_px4: bool = False  # an item means what it means to a PX4
+
+    @classmethod
+    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "MissionParseOptions":
+        """Return the options of a vehicle; ``is_staged``: the plan is for the autopilot."""
+        is_px4 = persona.autopilot == MavAutopilot.PX4
+        return cls(persona.has_home_item and is_staged, Ability.of(persona), driving, is_px4)
 
 
-Parser = Callable[[Command, Surroundings], Step]
+#: (command, number of the plan's items, how items are parsed) -> what it becomes
+Parser = Callable[[Command, int, MissionParseOptions], Step]
 
 
 class PlanRow(NamedTuple):
@@ -81,7 +91,7 @@ def row_of_item(command: int) -> PlanRow:
     return ROWS.get(str(command)) or ROWS[policy.kind.name + "-bound" * policy.is_bound]
 
 
-def step_of_command(command: Command, around: Surroundings) -> Step:
+def step_of_command(command: Command, count: int, manner: MissionParseOptions) -> Step:
     """Return the step that a command becomes. Raise Rejection for one that is not for a plan."""
     number = command.command
     row = row_of_item(number)
@@ -91,7 +101,7 @@ def step_of_command(command: Command, around: Surroundings) -> Step:
         words = f"command {name_of(number)} is not for a plan: {row.about}"
         raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
     parse = PARSERS.get(number)
-    return Nothing() if parse is None else parse(command, around)
+    return Nothing() if parse is None else parse(command, count, manner)
 
 
 def name_of(command: int) -> str:
@@ -114,8 +124,8 @@ def options_of(command: Command, *, now: float) -> Terms:
 # what a command becomes
 
 
-def _as_command(command: Command, around: Surroundings) -> Step:
-    return goal_of(command, around.driving)
+def _as_command(command: Command, _count: int, how: MissionParseOptions) -> Step:
+    return goal_of(command, how.driving)
 
 
 def _place(command: Command) -> Place | None:
@@ -124,50 +134,50 @@ def _place(command: Command) -> Place | None:
     return None if is_here and command.frame != MavFrame.LOCAL_NED else place_in(command)
 
 
-def _waypoint(command: Command, around: Surroundings) -> Step:
+def _waypoint(command: Command, _count: int, how: MissionParseOptions) -> Step:
     if _place(command) is None:
         return Wait(number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0))
-    goal = goal_of(command, around.driving)
+    goal = goal_of(command, how.driving)
     assert isinstance(goal, GoTo), "a waypoint is a place"
     if goal.wait or goal.yaw is not None:
         return goal
     return GoTo(goal.place, goal.speed, goal.radius, passes=True)
 
 
-def _loiter(command: Command, _around: Surroundings) -> Step:
+def _loiter(command: Command, _count: int, _how: MissionParseOptions) -> Step:
     place = _place(command)
     return GoTo(place, wait=FOR_EVER) if place else Wait(FOR_EVER)
 
 
-def _circle(command: Command, around: Surroundings) -> Step:
+def _circle(command: Command, _count: int, how: MissionParseOptions) -> Step:
     turns = number(command, 1, "turns", low=0.0, high=MOST_TURNS)
-    most = around.driving.max_distance
+    most = how.driving.max_distance
     radius = number(command, 3, "radius", low=-most, high=most, default=0.0)
     radius = copysign(max(abs(radius), LEAST_CIRCLE), radius)
     # without a place it is round the place before, which ``plan_of`` knows
     return GoTo(_place(command), turns=turns, around=radius) if turns else Nothing()
 
 
-def _land(command: Command, around: Surroundings) -> Step:
+def _land(command: Command, _count: int, how: MissionParseOptions) -> Step:
     place = _place(command)
-    return GoTo(place) if place and around.is_px4 else Nothing()
+    return GoTo(place) if place and how.is_px4 else Nothing()
 
 
-def _delay(command: Command, _around: Surroundings) -> Step:
+def _delay(command: Command, _count: int, _how: MissionParseOptions) -> Step:
     return Delay(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
 
 
-def _near(command: Command, around: Surroundings) -> Step:
-    return Near(number(command, 1, "distance", low=0.0, high=around.driving.max_distance))
+def _near(command: Command, _count: int, how: MissionParseOptions) -> Step:
+    return Near(number(command, 1, "distance", low=0.0, high=how.driving.max_distance))
 
 
-def _gate(command: Command, _around: Surroundings) -> Step:
+def _gate(command: Command, _count: int, _how: MissionParseOptions) -> Step:
     _place(command)  # only to check it
     return Near(0.0)  # ``plan_of`` knows from where to where
 
 
-def _jump(command: Command, around: Surroundings) -> Step:
-    to = whole(command, 1, "item", high=around.items - 1, default=None)
+def _jump(command: Command, count: int, _how: MissionParseOptions) -> Step:
+    to = whole(command, 1, "item", high=count - 1, default=None)
     return Jump(to, _times(command))
 
 
@@ -175,38 +185,38 @@ def _times(command: Command) -> int:
     return whole(command, 2, "repeat", low=-1, high=MAX_JUMPS, default=None)
 
 
-def _jump_to_tag(command: Command, _around: Surroundings) -> Step:
+def _jump_to_tag(command: Command, _count: int, _how: MissionParseOptions) -> Step:
     return Jump(0, _times(command))  # ``plan_of`` knows where the tag is
 
 
-def _go_on_with(command: Command, around: Surroundings) -> Step:
-    return Jump(whole(command, 1, "item", high=around.items - 1, default=None), -1)
+def _go_on_with(command: Command, count: int, _how: MissionParseOptions) -> Step:
+    return Jump(whole(command, 1, "item", high=count - 1, default=None), -1)
 
 
-def _speed(command: Command, around: Surroundings) -> Step:
+def _speed(command: Command, _count: int, how: MissionParseOptions) -> Step:
     whole(command, 1, "speed type", high=GROUND_OR_AIR)
     wish = command.params[1]
     if wish in NO_CHANGE or isnan(wish):
-        return SetSpeed(None) if around.is_px4 else Nothing()
+        return SetSpeed(None) if how.is_px4 else Nothing()
     if wish == DEFAULT:
         return SetSpeed(None)
     # planners leave speeds of aircraft there: bound them to the limit
-    top = around.driving.max_speed
+    top = how.driving.max_speed
     return SetSpeed(min(number(command, 2, "speed", low=MIN_SPEED, high=inf), top))
 
 
-def _reverse(command: Command, _around: Surroundings) -> Step:
+def _reverse(command: Command, _count: int, _how: MissionParseOptions) -> Step:
     return SetReverse(command.params[0] == 1.0)
 
 
-def _own(command: Command, around: Surroundings) -> Step:
+def _own(command: Command, _count: int, how: MissionParseOptions) -> Step:
     for index, name in ((5, "run after"), (6, "start delay")):
         if command.params[index - 1] not in HERE:
             raise bad(f"param{index} {name}: not in a plan item, use TASK_OPTIONS", param=index)
-    return goal_of(command, around.driving)
+    return goal_of(command, how.driving)
 
 
-def _options(command: Command, _around: Surroundings) -> Step:
+def _options(command: Command, _count: int, _how: MissionParseOptions) -> Step:
     options_of(command, now=0.0)  # only to check them
     return Nothing()
 

@@ -177,6 +177,7 @@ def turn_of(yaw: float, to: float, side: float) -> float:
 
 #: rad; arcs up to this are treated as chords, which at a radius of 2 m are off by 1 cm
 CHORD = pi / 15
+ONCE_ROUND = 31  # arcs; what follows on a circle is there already
 
 
 def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pose]:
@@ -185,7 +186,7 @@ def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pos
     for bend in path:
         parts = 1 + int(abs(bend.curvature * bend.length) / CHORD)
         out = 0.0 if abs(bend.curvature) < STRAIGHT else -outside if bend.curvature > 0 else outside
-        for part in range(parts + 1):
+        for part in range(min(parts, ONCE_ROUND) + 1):
             pose = moved(start, bend.curvature, bend.length * part / parts)
             north, east = -out * sin(pose.yaw), out * cos(pose.yaw)
             yield Pose(pose.north + north, pose.east + east, pose.yaw)

@@ -40,6 +40,7 @@ BACKWARDS = 1.0  # extra cost of a way driven backwards, as a factor
 PIECES = (0.3, 0.6, 1.0, 1.5, 2.2, 3.0)
 THREE_POINT = (0.5, 0.9, 1.4)  # the same for both pieces of a three-point turn
 THERE = 0.1  # m; nearer is at the place: ArduPilot's simulated car (4.6.3) is no more exact
+ENTRIES = 12  # places of a circle at which it may be entered
 HERE = 1e-3  # m and rad from a place or heading; nearer needs no way
 
 
@@ -88,15 +89,17 @@ def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
 def way_round(
     goal: GoTo, progress: Progress, pose: Pose, centre: LocalPlace, steering: Steering
 ) -> Path:
-    """Return the way to the nearest place of a circle and round it, as narrow as can be driven."""
+    """Return the way onto a circle and round it, forwards, no narrower than can be driven."""
     side, radius = copysign(1.0, goal.around), max(abs(goal.around), steering.planned_radius)
-    outwards = bearing(pose, centre) + pi
-    nearest = moved(Pose(centre.north, centre.east, outwards), 0.0, radius)
-    entry = replace(nearest, yaw=outwards + side * pi / 2)
-    way = way_to_pose(pose, entry, replace(steering, reverses=False, fence=None))
-    assert way is not None, "there is a way to every pose"
-    turned = circling(goal, progress.path, done=progress.done)
-    return (*way, Bend(side / radius, turned * radius))
+    arc = Bend(side / radius, circling(goal, progress.path, done=progress.done) * radius)
+    anyhow = replace(steering, reverses=False, fence=None)
+    outwards, ways = bearing(pose, centre) + pi, list[Path]()
+    for number in range(ENTRIES):
+        out = outwards + tau * number / ENTRIES
+        place = moved(Pose(centre.north, centre.east, out), 0.0, radius)
+        way = way_to_pose(pose, replace(place, yaw=out + side * pi / 2), anyhow)
+        ways.append((*(way or ()), arc))
+    return _best(pose, ways, steering.fence) or _best(pose, ways, None) or (arc,)
 
 
 def set_out_to(

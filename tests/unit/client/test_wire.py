@@ -10,7 +10,8 @@ from mav_tasks.client import wire
 from mav_tasks.client.wire import Goal, TaskOptions
 from mav_tasks.engine.commands import goals as engine_goals
 from mav_tasks.engine.commands.ability import Ability
-from mav_tasks.engine.missions.plan_items import MissionParseOptions, plan_of, steps_of
+from mav_tasks.engine.missions.plan_items import plan_of, steps_of
+from mav_tasks.engine.missions.plan_table import MissionParseOptions
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.enums import MavCmd
