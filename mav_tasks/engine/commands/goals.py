@@ -343,14 +343,12 @@ def _delay(command: Command, _driving: Driving) -> SingleGoal:
 
 
 def _time_of_day(command: Command) -> SingleGoal:
-    highs = ((2, "hour", 23), (3, "minute", 59), (4, "second", 59))
-    until = tuple(whole(command, *each[:2], low=-1, high=each[2], default=-1) for each in highs)
-    for part, again in zip(until, (DAY, HOUR, MINUTE), strict=True):
-        if part >= 0:
-            return Wait(again, until)
-    if command.params[0] == 0.0:
-        return Wait(0.0)
-    raise bad("param1 delay: neither seconds nor a time of day (param2 to param4)", param=1)
+    until = tuple(
+        whole(command, index, name, low=-1, high=high, default=-1)
+        for index, name, high in ((2, "hour", 23), (3, "minute", 59), (4, "second", 59))
+    )
+    again = [period for part, period in zip(until, (DAY, HOUR, MINUTE), strict=True) if part >= 0]
+    return Wait(again[0], until) if again else Wait(0.0)
 
 
 def _condition_yaw(command: Command, driving: Driving) -> SingleGoal:

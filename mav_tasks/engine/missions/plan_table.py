@@ -6,6 +6,7 @@ row of its own is treated by its kind in the policy table. tools/plan_table.py p
 dialects/README.md.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from math import copysign, inf, isnan
 from typing import NamedTuple
@@ -360,12 +361,5 @@ ACTION-bound | refuses | limits or identifies the rover: do that before the plan
 """
 
 
-def _read(table: str) -> Mapping[str, PlanRow]:
-    rows: dict[str, PlanRow] = {}
-    for line in table.strip().split("\n\n"):
-        names, *cells = (" ".join(cell.split()) for cell in line.split("|"))
-        rows |= dict.fromkeys(names.split(), PlanRow(*cells))
-    return rows
-
-
-ROWS = _read(TABLE)
+_PARAGRAPHS = (re.split(r"\s*\|\s*", " ".join(each.split())) for each in TABLE.split("\n\n"))
+ROWS = {name: PlanRow(*row) for names, *row in _PARAGRAPHS for name in names.split()}

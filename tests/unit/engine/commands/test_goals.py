@@ -157,7 +157,7 @@ def test_every_command_that_becomes_a_task_is_tried_here() -> None:
         (command(C.DO_REPOSITION, -1, 0, 0, nan, 47, 8, inf), "param7 is infinite"),
         (command(C.DO_REPOSITION, -1, 0, -inf, nan, 47, 8), "param3 is infinite"),
         (command(C.NAV_RETURN_TO_LAUNCH, 0, inf), "param2 is infinite"),
-        (command(C.NAV_DELAY, -1, -1, -1, nan), "param1 delay: neither seconds nor a time"),
+        (command(C.NAV_DELAY, -1, 24), "param2 hour 24 not in -1..23"),
         (command(C.NAV_DELAY, nan), "param1 delay is not given"),
         (command(C.CONDITION_YAW, 90, 0, 2), "param3 direction 2 not in -1..1"),
         (command(C.CONDITION_YAW, 90, 0, 0, 2), "param4 relative 2 not in 0..1"),
