@@ -123,6 +123,17 @@ def test_a_circle_is_driven_as_a_circle(
     assert hypot(world.truth.north - 3, world.truth.east) == pytest.approx(abs(radius), abs=0.25)
 
 
+def test_a_circle_over_the_fence_is_not_begun(world: World) -> None:
+    corners = [(-3, -3), (-3, 3), (3, 3), (3, -3)]
+    fence = [Item(5001, **at(*corner), param1=4, param4=0, frame=0) for corner in corners]
+    kept = Upload(world.client, fence, kind=1)
+    world.until(lambda: kept.result == 0, within=5)
+    upload = Upload(world.client, [circle(2, 0, turns=1, radius=2)], target=(1, 191))
+    world.until(lambda: upload.result is not None, within=5)
+    world.until_state(1, S.FAILED, within=10)
+    assert hypot(world.truth.north, world.truth.east) < 0.05
+
+
 @pytest.mark.parametrize("profile", [None, ARDUPILOT_CAR], ids=["skid", "car"])
 def test_what_is_to_be_driven_backwards_is(
     make_rover: MakeRover, profile: VehicleProfile | None
