@@ -25,7 +25,7 @@ from tests.kit.store import LateStore
 from tests.kit.world import World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
-WAYPOINT, DELAY, SPEED, JUMP, SERVO, TAKEOFF, MODE, OPTIONS = 16, 93, 178, 177, 183, 22, 176, 54014
+WAYPOINT, DELAY, SPEED, JUMP, SERVO, MODE, OPTIONS = 16, 93, 178, 177, 183, 176, 54014
 START, SET_CURRENT, MOVE, PICTURE = 300, 224, 54000, 2000
 HOME = Item(WAYPOINT, frame=0, current=1)
 NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 2, 3, 4, 5
@@ -321,15 +321,6 @@ def test_options_are_those_of_the_whole_plan(world: World) -> None:
     task = world.task(1)
     assert (task.priority, task.state) == (9, S.SCHEDULED)
     assert task.terms.deadline is not None
-
-
-def test_a_servo_is_moved_and_a_takeoff_passed_over(world: World) -> None:
-    items = (HOME, Item(TAKEOFF), place(1, 0), Item(SERVO, param1=5, param2=1500, frame=2))
-    uploaded(world, *items, place(1.5, 0, hold=0.1))
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert reached(world.client) == [2, 3, 4]
-    assert world.observer.sent_since(0).count(str(SERVO)) == 1
 
 
 def test_what_the_rover_will_not_do_of_a_plan_is_told_and_the_plan_goes_on(world: World) -> None:

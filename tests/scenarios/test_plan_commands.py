@@ -162,17 +162,14 @@ def test_a_tag_is_gone_on_from(world: World) -> None:
     assert reached(world.client)[:5] == [1, 2, 1, 2, 4]
 
 
-@pytest.mark.parametrize(
-    ("params", "until"), [((0, 12, 0, 9), 9.0), ((-1, -1, -1, 8), 8.0), ((5,), 0.0)]
-)
+@pytest.mark.parametrize(("params", "until"), [((0, 12, 0, 9), 9.0), ((-1, -1, -1, 8), 8.0)])
 def test_it_stands_until_a_time_of_day(
     make_world: MakeWorld, params: tuple[float, ...], until: float
 ) -> None:
     world = make_world(wall_offset=NOON)
-    began = world.now
     track = driven(world, do(DELAY, *params), place(0.5, 0))
     moved_at = next(seen.at for seen in track if hypot(seen.north, seen.east) > 0.05)
-    assert (until or began + 5) < moved_at < (until or began + 7) + 2
+    assert until < moved_at < until + 2
 
 
 def test_a_time_of_day_that_comes_while_it_is_paused_is_not_waited_for_till_tomorrow(
@@ -189,7 +186,7 @@ def test_a_time_of_day_that_comes_while_it_is_paused_is_not_waited_for_till_tomo
 
 
 @pytest.mark.parametrize(
-    ("persona", "wish", "speed"), [(PROMPT, 0.0, 0.3), (PROMPT, -1.0, 0.3), (PROMPT_PX4, -1.0, 0.5)]
+    ("persona", "wish", "speed"), [(PROMPT, 0.0, 0.3), (PROMPT_PX4, -1.0, 0.5)]
 )
 def test_no_speed_means_what_it_means_to_the_autopilot(
     make_world: MakeWorld, persona: Persona, wish: float, speed: float
@@ -221,6 +218,7 @@ def test_a_gate_holds_back_a_command_until_it_is_passed(world: World) -> None:
 
     world.until(is_over, within=60)
     assert sent == [pytest.approx(2.0, abs=0.2)]
+    assert world.observer.sent_since(0).count(str(SERVO)) == 1
 
 
 def test_what_is_skipped_is_said_once(world: World) -> None:
