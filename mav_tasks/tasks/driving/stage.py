@@ -13,7 +13,18 @@ from mav_tasks.tasks.driving.path import path_length, pose_on
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.driving.recovery_path import resumed
-from mav_tasks.tasks.goal import Delay, Face, Goal, GoTo, LocalPlace, Near, Perform, Plan, SetSpeed
+from mav_tasks.tasks.goal import (
+    Delay,
+    Face,
+    Goal,
+    GoTo,
+    LocalPlace,
+    Near,
+    Perform,
+    Plan,
+    SetSpeed,
+    SingleGoal,
+)
 from mav_tasks.tasks.scheduler import place_of
 from mav_tasks.tasks.task import Pose, Progress
 from mav_tasks.tasks.view import VehicleView
@@ -55,7 +66,7 @@ def set_out(
         progress = started(goal, progress)
     single = present_goal(goal, progress)
     turns_first = seen.honours_yaw_rate and steering is None
-    if progress.anchor is not None:
+    if progress.anchor is not None and not _has_home_moved(single, progress, seen):
         return resumed(single, progress, motion, turns_first=turns_first, steering=steering)
     if not isinstance(single, GoTo):
         done = 0.0 if isinstance(single, Face) else progress.done  # its heading is absolute
@@ -73,6 +84,13 @@ def set_out(
     anchor = anchor_of(single, leg, motion.pose, target)
     begun_here = replace(progress, anchor=anchor, frame=seen.frame, leg=leg, done=0.0)
     return replace(begun_here, target=target, path=())
+
+
+def _has_home_moved(goal: SingleGoal, progress: Progress, seen: VehicleView) -> bool:
+    """Return whether a return that was interrupted leads to another place now."""
+    if not isinstance(goal, GoTo) or goal.place is not None:
+        return False
+    return place_of(goal, seen) != progress.target
 
 
 def may_go_on_rolling(
