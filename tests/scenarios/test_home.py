@@ -5,14 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.messages import CommandInt
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import PROMPT, World, at
+from tests.kit.world import PROMPT, World, at, put_home
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_restart import restart
 
@@ -126,8 +124,7 @@ def test_home_that_another_station_sets_at_the_rover_is_home(
     make_world: MakeWorld, persona: Persona, path: Path
 ) -> None:
     world = make(make_world, persona, path)
-    command = CommandInt(1, 1, 0, SET_HOME, 0, 0, 0, 0, 0, nan, *at(1.0, 2.0).values(), 0)
-    world.rover.autopilot.handle(command, Address(255, 190), now=world.now)
+    put_home(world, 1.0, 2.0)
     world.run(2.1)  # the server reads it each 2 s
     go_home(world, tasks=3)
     assert far_from(world, 1.0, 2.0) < NEAR
