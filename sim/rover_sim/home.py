@@ -3,7 +3,8 @@
 From the sources of ArduPilot Rover 4.6 (commands.cpp, update_home) and PX4 1.17 (HomePosition.cpp):
 while disarmed, home follows the rover. DO_SET_HOME fixes it: on ArduPilot in either form, until a
 restart; on PX4 only with a place, not with "here". ArduPilot sends HOME_POSITION whenever home
-moves, PX4 only as it streams it.
+moves, PX4 only as it streams it. Not imitated: PX4 forgets such a place when it corrects home's
+altitude, by more than 1 m and within 120 s of an arming.
 """
 
 import math
