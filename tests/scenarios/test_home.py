@@ -119,11 +119,10 @@ def test_a_client_sets_home_and_it_lasts_over_arming_and_the_server(
     assert far_from(world, 2.0, 1.0) < NEAR
 
 
-@both
 def test_home_that_another_station_sets_at_the_rover_is_home(
-    make_world: MakeWorld, persona: Persona, path: Path
+    make_world: MakeWorld, path: Path
 ) -> None:
-    world = make(make_world, persona, path)
+    world = make(make_world, PROMPT_PX4, path)
     put_home(world, 1.0, 2.0)
     world.run(2.1)  # the server reads it each 2 s
     go_home(world, tasks=3)
@@ -149,11 +148,10 @@ def test_a_return_that_was_paused_goes_on_to_the_home_of_now(
     assert far_from(world, 1.0, 3.0) < NEAR
 
 
-@both
 def test_a_rover_that_has_booted_again_says_where_home_is(
-    make_world: MakeWorld, persona: Persona, path: Path
+    make_world: MakeWorld, path: Path
 ) -> None:
-    world = make(make_world, persona, path)
+    world = make(make_world, PROMPT, path)
     world.client.command_int(SET_HOME, 0, 0, 0, nan, **at(2.0, 1.0), frame=0, target=(1, 1))
     world.run(20)  # longer than two estimates of when it booted may differ
     world.rover.autopilot.reboot(now=world.now)
