@@ -108,7 +108,7 @@ async def upload_fence(file: PlanIn, common: Common, empty: EmptyFence = False) 
     """Upload the fence from a file to the rover."""
     plan = read_plan(file)
     if not plan.fence and not empty:
-        raise UsageError(f"{file} has no fence; use --empty to remove the rover's fence")
+        raise UsageError(f"{file} has no fence; the rover's stays (--empty removes it)")
     async with opened(common) as client:
         count = await client.set_fence(plan)
     output.say_done(common.json, "fence upload", f"fence: {count} items", items=count)
@@ -131,7 +131,7 @@ async def upload_rally_points(file: PlanIn, common: Common, empty: EmptyRally = 
     """Upload the rally points from a file to the rover."""
     plan = read_plan(file)
     if not plan.rally and not empty:
-        raise UsageError(f"{file} has no rally points; use --empty to remove the rover's")
+        raise UsageError(f"{file} has no rally points; the rover's stay (--empty removes them)")
     async with opened(common) as client:
         count = await client.set_rally_points(plan)
     output.say_done(common.json, "rally upload", f"rally: {count} items", items=count)

@@ -19,11 +19,14 @@ def file_of(plan: PlanFile | Path | str) -> PlanFile:
 
 def items_of(plan: Plan) -> tuple[Item, ...]:
     """Return a mission's items. Raise PlanFileError for a bad file, ValueError if it is empty."""
-    items = (
-        wire.items_of_file(file_of(plan).items)
-        if isinstance(plan, PlanFile | Path | str)
-        else wire.items_of_goals(plan)
-    )
+    if not isinstance(plan, PlanFile | Path | str):
+        items = wire.items_of_goals(plan)
+    elif (file := file_of(plan)).items or not (file.fence or file.rally):
+        items = wire.items_of_file(file.items)
+    else:
+        raise ValueError(
+            "there is no mission in it, only a fence or rally points: upload it as these"
+        )
     if not items:
-        raise ValueError("the mission has no items")
+        raise ValueError("there is no mission in it: it has no items")
     return items

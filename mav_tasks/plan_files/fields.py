@@ -25,11 +25,15 @@ def typed(where: str, name: str, value: object, kind: type[T]) -> T:
     return value
 
 
-def check_version(where: str, holder: dict[str, Any], needed: int) -> None:
+def check_version(where: str, holder: dict[str, Any], *known: int | str) -> None:
     """Refuse what is of another version: the same words could mean something else there."""
-    if (version := get(where, holder, "version", float)) != needed:
+    kind = str if isinstance(holder.get("version"), str) else float
+    version = get(where, holder, "version", kind)
+    if version not in known:
+        expected = " or ".join(str(each) for each in known)
         raise PlanFileError(
-            f"{where}: version {shown(version)} is not supported, expected {needed}"
+            f"{where}: version {shown(version)} is not supported, expected {expected}:"
+            " save it with another version of the program that wrote it"
         )
 
 
@@ -57,6 +61,11 @@ def refuse_more(what: str, count: int, most: int) -> None:
     """Refuse more than ``most`` of something."""
     if count > most:
         raise PlanFileError(f"more than {most} {what}")
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number of things in words."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def shown(value: object) -> str:

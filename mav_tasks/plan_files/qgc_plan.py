@@ -1,8 +1,9 @@
-"""The .plan format (JSON); QGroundControl developer guide, "Plan File Format".
+"""QGroundControl's formats in JSON: .plan, and the older .mission, .fence and .rally.
 
-Surveys and corridors carry the items that they come to, and these are read; refused are complex
-items that do not. Items are counted from 1 as QGroundControl's map counts them: those inside a
-survey count, home does not. ``breachReturn`` and what only the planner needs are not read.
+QGroundControl developer guide, "Plan File Format"; older ones have no page any more. Surveys and
+corridors carry the items that they come to, and these are read; refused are complex items that do
+not. Items are counted from 1 as QGroundControl's map counts them: those inside a survey count, home
+does not. ``breachReturn`` and what only the planner needs are not read.
 """
 
 import json
@@ -15,6 +16,10 @@ from mav_tasks.plan_files.fields import check_version, get, number, shown, typed
 from mav_tasks.plan_files.values import FenceCircle, FencePolygon, GeoPoint, PlanFile
 
 MAX_JUMP_ID = 2**31 - 1
+WITHOUT_ITEMS = (
+    "does not contain its items: if a newer QGroundControl does not save it with them, upload it"
+    " from there to a rover, download it, and save it again"
+)
 
 
 def from_json(text: str) -> PlanFile:
@@ -26,15 +31,34 @@ def from_json(text: str) -> PlanFile:
         raise PlanFileError(f"not a plan file: {place}: {error.msg}") from None
     except RecursionError:
         raise PlanFileError("not a plan file: JSON nested too deep") from None
-    if (kind := get("file", root, "fileType", str)) != "Plan":
-        raise PlanFileError(f'file: fileType is {shown(kind)}, "Plan" is needed')
-    check_version("file", root, 1)
-    mission = get("file", root, "mission", dict)
-    check_version("mission", mission, 2)
+    # the first version had no fileType
+    match kind := get("file", {"fileType": "Mission"} | root, "fileType", str):
+        case "Plan":
+            check_version("file", root, 1)
+            mission = get("file", root, "mission", dict)
+            check_version("mission", mission, 2)
+            return _mission(mission, root)
+        case "Mission":
+            check_version("file", root, "1.0", 1, 2)
+            return _mission(get("file", {"mission": root} | root, "mission", dict), root)
+        case "GeoFence":
+            return _mission({"items": []}, {"geoFence": root})
+        case "RallyPoints":
+            return _mission({"items": []}, {"rallyPoints": root})
+    words = "is neither Plan nor Mission, GeoFence or RallyPoints"
+    raise PlanFileError(f"file: fileType {shown(kind)} {words}")
+
+
+def _mission(mission: dict[str, Any], root: dict[str, Any]) -> PlanFile:
+    """Return a mission, with the fence and the rally points of a root."""
+    if mission.get("complexItems"):
+        raise PlanFileError(f"complexItems: a survey {WITHOUT_ITEMS}")
     entries: list[Entry] = []
     for value in get("mission", mission, "items", list):
         entries += _entries(value, len(entries) + 1)
     home = mission.get("plannedHomePosition")
+    if isinstance(home, dict):  # once it was an item
+        home = get("home", home, "coordinate", list)
     return PlanFile(
         with_targets(entries),
         None if home is None else point("home", home, 3),
@@ -57,7 +81,7 @@ def _entries(value: object, first: int) -> list[Entry]:
     transects = fields.get("TransectStyleComplexItem")
     inner = transects.get("Items") if isinstance(transects, dict) else None
     if not isinstance(inner, list) or not inner:
-        raise PlanFileError(f"{where}: complex item {name} does not contain its items")
+        raise PlanFileError(f"{where}: complex item {name} {WITHOUT_ITEMS}")
     # not known to a DO_JUMP: in QGroundControl one leads to the list's own simple items only
     return [
         _simple(f"item {index} (in {name})", part)._replace(known_as=None)
@@ -67,14 +91,19 @@ def _entries(value: object, first: int) -> list[Entry]:
 
 def _simple(where: str, value: object) -> Entry:
     fields = typed(where, "it", value, dict)
-    if (kind := get(where, fields, "type", str)) != "SimpleItem":
+    if (kind := get(where, fields, "type", str)) not in ("SimpleItem", "missionItem"):
         raise PlanFileError(f"{where}: type {shown(kind)} is unknown")
-    params = get(where, fields, "params", list)
+    if "param1" in fields:  # version 1
+        params = [get(where, fields, f"param{number}", float) for number in range(1, 5)]
+    else:
+        params = get(where, fields, "params", list)
+    if "coordinate" in fields:  # up to 2017
+        params = [*params, *get(where, fields, "coordinate", list)]
     if len(params) != 7:
         raise PlanFileError(f"{where}: {len(params)} params, expected 7")
     frame, command = (get(where, fields, key, float) for key in ("frame", "command"))
     autocontinue = get(where, fields, "autoContinue", bool)
-    jump_id = fields.get("doJumpId")
+    jump_id = fields.get("doJumpId", fields.get("id"))
     return Entry(
         where,
         None if jump_id is None else whole(where, "doJumpId", jump_id, MAX_JUMP_ID),
@@ -83,21 +112,22 @@ def _simple(where: str, value: object) -> Entry:
 
 
 def _part(root: dict[str, Any], name: str) -> dict[str, Any] | None:
-    """The fence or the rally points, None if there is nothing in it.
-
-    Version 1 had other keys, and its points must not be lost unseen; planners left it where empty.
-    """
+    """The fence or the rally points, None if there is nothing in it."""
     if root.get(name) is None:
         return None
     part = get("file", root, name, dict)
     if not any(value for key, value in part.items() if key != "version"):
         return None
-    check_version(name, part, 2)
+    check_version(name, part, 1, 2)
     return part
 
 
 def _fence(root: dict[str, Any]) -> Iterator[FencePolygon | FenceCircle]:
     if (fence := _part(root, "geoFence")) is None:
+        return
+    if fence["version"] == 1:
+        if vertices := get("geoFence", fence, "polygon", list):
+            yield _polygon("fence", {"version": 1.0, "inclusion": True, "polygon": vertices})
         return
     for index, value in enumerate(get("geoFence", fence, "polygons", list), 1):
         yield _polygon(f"fence polygon {index}", value)

@@ -1,11 +1,12 @@
-"""Read a mission file of either format, told apart by what is in it and not by its name."""
+"""Read a mission, fence or rally file; what is in it says which format it has, not its name."""
 
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 
 from mav_tasks.errors import PlanFileError
 from mav_tasks.plan_files.fields import refuse_more
 from mav_tasks.plan_files.qgc_plan import from_json
-from mav_tasks.plan_files.qgc_wpl import from_wpl
+from mav_tasks.plan_files.qgc_wpl import from_text
 from mav_tasks.plan_files.values import PlanFile, fence_items
 
 MAX_SIZE = 10_000_000  # bytes or characters; a large survey has some 100,000
@@ -13,7 +14,7 @@ MAX_ITEMS = 65_534  # of a kind: MISSION_COUNT.count is a uint16, and home may c
 
 
 def read_plan(path: Path) -> PlanFile:
-    """Return what a file says; PlanFileError also where it cannot be opened or is no UTF-8."""
+    """Return what a file says; PlanFileError also where it cannot be opened."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_SIZE + 1)
@@ -26,12 +27,16 @@ def read_plan(path: Path) -> PlanFile:
 
 
 def parse_plan_bytes(data: bytes) -> PlanFile:
-    """Return what the bytes of a file say; PlanFileError, and nothing else, if they are no plan."""
+    """Return what the bytes of a file say; PlanFileError, and nothing else, if they are no plan.
+
+    Windows' editors also write UTF-16, and older ones their own 8-bit code: comments may be in it.
+    """
     refuse_more("bytes", len(data), MAX_SIZE)
+    encoding = "utf-16" if data[:2] in (BOM_UTF16_LE, BOM_UTF16_BE) else "utf-8"
     try:
-        text = data.decode("utf-8")
+        text = data.decode(encoding)
     except UnicodeDecodeError:
-        raise PlanFileError("not a plan file: not UTF-8 text") from None
+        text = data.decode("latin-1")
     return parse_plan(text)
 
 
@@ -41,8 +46,8 @@ def parse_plan(text: str) -> PlanFile:
     A byte order mark may come first; lines may end in any way.
     """
     refuse_more("characters", len(text), MAX_SIZE)
-    text = text.removeprefix("\ufeff")
-    plan = from_json(text) if text.lstrip().startswith("{") else from_wpl(text)
+    text = text.removeprefix("\ufeff").rstrip("\0\x1a")  # DOS ended texts so
+    plan = from_json(text) if text.lstrip().startswith("{") else from_text(text)
     refuse_more("mission items", len(plan.items), MAX_ITEMS)
     refuse_more("fence items", len(fence_items(plan)), MAX_ITEMS)
     refuse_more("rally points", len(plan.rally), MAX_ITEMS)

@@ -8,11 +8,10 @@ from dataclasses import astuple, fields, is_dataclass
 from typing import Any
 
 from mav_tasks.settings import Settings, VehicleProfile
-from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import SignatureTime
-from mav_tasks.tasks.task import Frame, Task
+from mav_tasks.tasks.task import Task
 
 
 def settings_of(values: Mapping[str, Any], kind: Any = Settings) -> Any:
@@ -44,7 +43,6 @@ def restored_to_json(restored: Restored) -> dict[str, Any]:
         "paused": [[vehicle, int(reason)] for vehicle, reason in restored.paused.items()],
         "uids": list(restored.uids.items()),
         "speeds": list(restored.speeds.items()),
-        "homes": [astuple(home) for home in restored.homes.values()],
         "halt_epochs": list(restored.halt_epochs.items()),
         "halted": [[vehicle, int(why), at] for vehicle, (why, at) in restored.halted.items()],
         "disarmed": sorted(restored.disarmed),
@@ -68,7 +66,6 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         paused={vehicle: TaskReason(reason) for vehicle, reason in values["paused"]},
         uids=dict(values["uids"]),
         speeds=dict(values["speeds"]),
-        homes={row[0]: _home_of(row) for row in values.get("homes", ())},
         halt_epochs=dict(values.get("halt_epochs", ())),
         halted={vehicle: (TaskReason(why), at) for vehicle, why, at in values.get("halted", ())},
         disarmed=frozenset(values.get("disarmed", ())),
@@ -84,8 +81,3 @@ def restored_of(values: Mapping[str, Any], tasks: tuple[Task, ...]) -> Restored:
         gateway=values.get("gateway", ""),
         signing_lead=values.get("signing_lead", 0.0),
     )
-
-
-def _home_of(row: list[Any]) -> VehicleHomeSet:
-    vehicle, latitude, longitude, of_frame, actor, at = row
-    return VehicleHomeSet(vehicle, latitude, longitude, Frame(*of_frame), actor, at)

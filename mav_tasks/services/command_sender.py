@@ -202,6 +202,10 @@ class CommandSender:
         lane = self._lanes.get((component, command))
         return lane is not None and any(request.origin is None for request in lane.requests)
 
+    def awaits(self, command: int) -> bool:
+        """Whether a command of this id, ours or a client's, is in flight or waits."""
+        return any(lane.requests for (_, each), lane in self._lanes.items() if each == command)
+
     def receive(self, ack: CommandAck, *, component: int, now: float) -> None:
         """Take an ack of a component of the vehicle; one that nobody waits for is dropped."""
         lane = self._lanes.get((component, ack.command))

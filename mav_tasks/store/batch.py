@@ -18,7 +18,6 @@ from mav_tasks.tasks.events import (
     TaskWithdrawn,
     VehicleArmingSet,
     VehicleHalted,
-    VehicleHomeSet,
     VehicleIdentified,
     VehicleSpeedSet,
 )
@@ -135,8 +134,6 @@ class Batch:
                     self.vehicles["halted_utc", event.vehicle] = utc
             case VehicleIdentified():
                 self.vehicles["uid", event.vehicle] = event.uid
-            case VehicleHomeSet():
-                self.vehicles["home", event.vehicle] = body
             case PlanStored():
                 row = (event.vehicle, event.kind, event.plan_id, event.source)
                 self.plans[event.vehicle, event.kind] = row

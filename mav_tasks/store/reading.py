@@ -21,7 +21,6 @@ from mav_tasks.tasks.events import (
     TaskChanged,
     TaskModified,
     TaskSubmitted,
-    VehicleHomeSet,
 )
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
@@ -72,8 +71,6 @@ def read_restored(
             "SELECT vehicle, paused, uid, speed, halt_epoch, may_arm, halt_reason, halted_utc"
             f" FROM vehicles {of_theirs}"
         ).fetchall()
-        found = connection.execute(f"SELECT home FROM vehicles {of_theirs}")
-        homes = rows.values(VehicleHomeSet, [row[0] for row in found if row[0]], offset)
         plans = connection.execute(
             f"SELECT vehicle, kind, plan_id, source FROM plans {of_theirs}"
         ).fetchall()
@@ -87,7 +84,6 @@ def read_restored(
             paused={row[0]: TaskReason(row[1]) for row in known if row[1] is not None},
             uids={row[0]: row[2] for row in known if row[2] is not None},
             speeds={row[0]: row[3] for row in known if row[3] is not None},
-            homes={home.vehicle: home for home in homes},
             halt_epochs={row[0]: row[4] for row in known if row[4] is not None},
             halted={
                 row[0]: (TaskReason(row[6]), row[7] - offset) for row in known if row[7] is not None

@@ -54,7 +54,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         ),
         "ALTER TABLE meta ADD COLUMN signed_until INTEGER NOT NULL DEFAULT 0",
     ),
-    ("ALTER TABLE vehicles ADD COLUMN home TEXT",),  # the VehicleHomeSet event
+    ("ALTER TABLE vehicles ADD COLUMN home TEXT",),  # not used any more
     ("ALTER TABLE vehicles ADD COLUMN halt_epoch INTEGER",),
     ("ALTER TABLE vehicles ADD COLUMN may_arm INTEGER",),  # 0: a client disarmed the vehicle
     (  # the last halt

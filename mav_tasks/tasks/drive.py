@@ -4,7 +4,7 @@ It never changes the task's state: it returns the outcome, which the executor re
 """
 
 from dataclasses import replace
-from math import copysign, isnan
+from math import copysign, inf, isnan
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving, Settings
@@ -15,12 +15,13 @@ from mav_tasks.tasks.driving.estimate import Known, time_left
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.limits import limited, within_fence
-from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal
+from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal, started
 from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_divergence import AstrayWatch
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.recovery_path import recovery_path
 from mav_tasks.tasks.driving.stage import (
+    OnTheWay,
     course_of,
     look_on_the_way,
     may_go_on_rolling,
@@ -29,7 +30,7 @@ from mav_tasks.tasks.driving.stage import (
 )
 from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
 from mav_tasks.tasks.events import VehicleNoted
-from mav_tasks.tasks.goal import Face, Move, MoveTurned, Near, Plan, Rotate, Wait
+from mav_tasks.tasks.goal import Face, GoTo, Move, MoveTurned, Near, Plan, Rotate, Wait
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Progress, Task
@@ -115,8 +116,9 @@ class Drive:
     ) -> Progress | Becomes:
         """Plan the path of a task that starts or resumes where the vehicle stands."""
         self._driven = task.progress.driven
+        self._way_back = None
         here = self._set_out(task, task.progress, seen, motion, now=now)
-        if isinstance(here, Becomes):
+        if isinstance(here, Becomes) or self._course is None:
             return here
         self._way_back, self._astray = None, AstrayWatch()
         if task.progress.anchor is not None:
@@ -132,8 +134,13 @@ class Drive:
     def _set_out(
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
     ) -> Progress | Becomes:
-        """Plan the path of a stage that begins here, if it can begin."""
+        """Plan the path of a stage that begins here, if it can begin; without one, it waits."""
         single = present_goal(task.goal, progress)
+        if isinstance(single, GoTo) and single.place is None:
+            progress, waits = self._before_return(task, progress, seen, now=now)
+            if waits:
+                self._course = None
+                return progress
         steering = steering_of(single, seen, self._bounds)
         if steering is not None and isinstance(single, Rotate | Face | MoveTurned):
             return Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
@@ -157,6 +164,22 @@ class Drive:
         self._course = course_of(task.goal, here, seen, driving=driving, steering=steering)
         self._begin_leg(now=now)
         return here
+
+    def _before_return(
+        self, task: Task, progress: Progress, seen: VehicleView, *, now: float
+    ) -> tuple[Progress, bool]:
+        """Do the steps before a return, one of which may set home; return whether it waits."""
+        if not self._registry.is_durable(task.id):
+            return progress, True
+        if isinstance(task.goal, Plan):
+            if progress.step < 0:
+                progress = started(task.goal, progress)
+            looked = look_on_the_way(task.goal, progress, to_place=inf, elapsed=0.0)
+            progress = looked.progress
+            self._note_done(task, looked, now=now)
+            if looked.performed:
+                return progress, True
+        return progress, seen.is_home_old
 
     def _end_of_way(self, task: Task, left: float, *, now: float) -> Becomes | None:
         """Return the end of a task that drives farther than its submitter may, and say so."""
@@ -189,8 +212,8 @@ class Drive:
                 task.goal, task.progress, seen, motion, steering=steering
             ):
                 return view.STAND
-            if stopped := self._go_on(task, task.progress, seen, motion, now=now):
-                return stopped
+            if waits := self._go_on(task, task.progress, seen, motion, now=now):
+                return waits
         course = self._way_back or self._course
         assert course is not None, "EXECUTING begins by setting the course"
         is_held_back = not self._registry.is_durable(task.id)
@@ -216,9 +239,9 @@ class Drive:
             driving=self._settings.driving,
             now=now,
         ):
-            arrives = stands or isinstance(course.leg, Wait)
-            end = self._arrive(task, course, seen, motion, now) if arrives else None
-            return end or view.STAND
+            if not stands and not isinstance(course.leg, Wait):
+                return view.STAND
+            return self._arrive(task, course, seen, motion, now) or view.STAND
         if is_held_back:
             self._stuck.begin(now=now)
             return view.STAND
@@ -269,7 +292,7 @@ class Drive:
 
     def _arrive(
         self, task: Task, course: PathFollower, seen: VehicleView, motion: Motion, now: float
-    ) -> Becomes | None:
+    ) -> Demand | Becomes | None:
         """End a leg: begin the next leg or step, leave the recovery path, or complete the task."""
         self._begin_leg(now=now)
         if course.advance(motion):
@@ -304,10 +327,13 @@ class Drive:
         to_place = None if target is None else distance(motion.pose, target)
         looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
         course.progress = looked.progress
+        self._note_done(task, looked, now=now)
+
+    def _note_done(self, task: Task, looked: OnTheWay, *, now: float) -> None:
         for step in looked.done:
             self._registry.reached(task.id, step, performs=step in looked.performed, now=now)
         if looked.done:
-            self._registry.advance(task.id, course.progress, now=now)
+            self._registry.advance(task.id, looked.progress, now=now)
 
     def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
         """End the current step. Return the progress of the next one, or COMPLETED."""
@@ -321,12 +347,15 @@ class Drive:
 
     def _go_on(
         self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
-    ) -> Becomes | None:
+    ) -> Demand | Becomes | None:
         """Begin the next step where the vehicle is, moving or not. Return why not, or None."""
         self._registry.note_progress(task.id, progress)  # in any case the last step is done
         here = self._set_out(task, progress, seen, motion, now=now)
         if isinstance(here, Becomes):
             return here
+        if self._course is None:
+            self._registry.note_progress(task.id, here)
+            return view.STAND
         self._registry.advance(task.id, here, now=now)
         return None
 

@@ -295,10 +295,7 @@ class VehicleIdentified:
 
 @dataclass(frozen=True, slots=True)
 class VehicleHomeSet:
-    """A vehicle's home was set: where it was first armed since boot, or where a client set it.
-
-    ``frame`` is the vehicle's frame at that time. After a reboot the vehicle has another home.
-    """
+    """A home that an older server kept itself; only its journal has it. Home is the rover's own."""
 
     vehicle: int
     latitude_degE7: int

@@ -141,7 +141,7 @@ class Fleet:
                 waiting.add(task.vehicle)
         self.room.restore(restored.tasks, now=now)
         pauses = self._settings.on_restart == "pause"
-        of_note = {*restored.paused, *restored.speeds, *restored.uids, *restored.homes}
+        of_note = {*restored.paused, *restored.speeds, *restored.uids}
         of_note |= restored.halt_epochs.keys() | restored.disarmed
         for vehicle in active.keys() | waiting | of_note:
             paused = restored.paused.get(vehicle, R.NONE)
@@ -165,7 +165,6 @@ class Fleet:
                 resuming=goes_on,
                 now=now,
             )
-            self.of(vehicle).bounds.home = restored.homes.get(vehicle)
             if paused is R.STOPPED and halt.reason is R.STOPPED:
                 self.of(vehicle).was_stopped(at=halt.at, now=now)
 

@@ -63,7 +63,7 @@ class Lineup:
         self.bounds = Bounds()
         self.executor = Executor(registry, settings, self.bounds, room.times)
         #: values of the vehicle that hold for all its tasks
-        self.terms = VehicleTerms(vehicle, registry, self.executor, self.bounds, settings)
+        self.terms = VehicleTerms(vehicle, registry, self.executor, settings)
         #: how many tasks of a submitter's owner wait, on any vehicle
         self.count_of = room.count_of
         #: add a task; raise Rejection if too many wait

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.server_events import SignatureTime
 from mav_tasks.tasks.task import Task
@@ -18,7 +17,7 @@ class Restored:
 
     ``tasks`` are in the order of their submission, ``next_id`` is the id of the next. By system id:
     ``paused`` are the paused queues with the reason, ``uids`` the vehicles' unique ids, ``speeds``
-    their default speeds in m/s, ``homes`` their homes, ``halt_epochs`` their numbers of halts,
+    their default speeds in m/s, ``halt_epochs`` their numbers of halts,
     ``halted`` the reason and time of the last halt, ``disarmed`` the vehicles that a person
     disarmed. ``plans`` by system id and kind are (id, source) as in PlanStored, ``parameters`` the
     last value of each by name, ``signatures`` and ``signed_until`` those of SignaturesSeen.
@@ -34,7 +33,6 @@ class Restored:
     paused: Mapping[int, TaskReason] = field(default_factory=dict)
     uids: Mapping[int, str] = field(default_factory=dict)
     speeds: Mapping[int, float] = field(default_factory=dict)
-    homes: Mapping[int, VehicleHomeSet] = field(default_factory=dict)
     halt_epochs: Mapping[int, int] = field(default_factory=dict)
     halted: Mapping[int, tuple[TaskReason, float]] = field(default_factory=dict)
     disarmed: frozenset[int] = frozenset()

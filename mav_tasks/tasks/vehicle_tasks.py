@@ -91,7 +91,6 @@ class VehicleTasks(Lineup):
         self.hold(R.FRAME_RESET, now=now)
         self._wait_for_somebody(now=now)
         self.stopping_after_kill = False
-        self.bounds.home = None
 
     def unidentified(self, *, now: float) -> None:
         """Pause these tasks: their vehicle has a unique id, and this one reports none."""

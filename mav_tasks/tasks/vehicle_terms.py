@@ -1,20 +1,16 @@
-"""Values of one vehicle that hold for all its tasks: speed, braking, home, identity, arming."""
+"""Values of one vehicle that hold for all its tasks: speed, braking, identity, arming."""
 
 from dataclasses import replace
 
 from mav_tasks.settings import Driving, Settings
-from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.limits import safe_braking
 from mav_tasks.tasks.events import (
     VehicleArmingSet,
-    VehicleHomeSet,
     VehicleIdentified,
     VehicleSpeedSet,
 )
 from mav_tasks.tasks.executor import Executor
-from mav_tasks.tasks.goal import GlobalPlace
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Frame
 
 
 class VehicleTerms:
@@ -25,13 +21,11 @@ class VehicleTerms:
         vehicle: int,
         registry: TaskRegistry,
         executor: Executor,
-        bounds: Bounds,
         settings: Settings,
     ) -> None:
         self._vehicle = vehicle
         self._registry = registry
         self._executor = executor
-        self._bounds = bounds
         self._settings = settings
         #: the unique id of the vehicle of these tasks, "" until it was heard
         self.uid = ""
@@ -97,13 +91,6 @@ class VehicleTerms:
     def forget_which(self) -> None:
         """Forget the unique id: the vehicle reports none, but the vehicle of these tasks did."""
         self.uid = ""
-
-    def set_home(self, place: GlobalPlace, frame: Frame, *, actor: str, now: float) -> None:
-        """Set the vehicle's home, which holds until it reboots."""
-        latitude, longitude = place.latitude_degE7, place.longitude_degE7
-        home = VehicleHomeSet(self._vehicle, latitude, longitude, frame, actor, now)
-        self._bounds.home = home
-        self._registry.record(home)
 
     def set_speed(self, speed: float | None, *, actor: str, now: float) -> None:
         """Set the speed of the active task, and of later goals that name none."""

@@ -37,7 +37,8 @@ class VehicleView:
     still: bool  # measured to stand still
     other_controller: bool  # somebody else's setpoints were seen just now
     frame: Frame | None = None  # of the positions, if it is known
-    home: GlobalPlace | None = None  # its home
+    home: GlobalPlace | None = None  # where it returns to
+    is_home_old: bool = False  # home may have moved, and the vehicle is about to say where to
     is_fence_unknown: bool = False  # there is a fence, but its place in this frame is unknown
     is_outside_own_fence: bool = False  # as the vehicle itself reports
     honours_yaw_rate: bool = True  # and reverses; otherwise it is steered by course

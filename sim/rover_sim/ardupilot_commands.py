@@ -32,7 +32,7 @@ def ardupilot_commands(parts: CommandParts) -> CommandTable:
     return CommandTable(
         actions={
             **asking.actions(),
-            **HomeCommand(parts, refusal=MavResult.FAILED).actions(),
+            **HomeCommand(parts, MavResult.FAILED, nowhere_is_here=True).actions(),
             MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
             MavCmd.DO_SET_MODE: commands.do_set_mode,
             MavCmd.NAV_RETURN_TO_LAUNCH: commands.return_to_launch,

@@ -21,7 +21,6 @@ class ArduPilotRules:
     """ArduPilot Rover's rules; implements ``FlightRules``."""
 
     reposition_mode = Mode.GUIDED
-    home_is_where_armed = False
     sticks_present = False
     no_position_text = "Arm: Need Position Estimate"
     hold_destination: Destination | None = None  # HOLD stops the rover; it drives to no place

@@ -30,7 +30,7 @@ from rover_sim.mission_storage import MissionStorage
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
 from rover_sim.personas import Mode, Persona
-from rover_sim.realism import Change, Home, Realism, Wire
+from rover_sim.realism import Change, Realism, Wire
 from rover_sim.setpoints import Destination
 from rover_sim.sticks import Sticks
 from rover_sim.streams import OFF, Streams, with_sticks
@@ -92,6 +92,7 @@ class Autopilot:
         self._faults = NO_FAULTS
         self._clock_stopped_at = now  # time of the last step with a running clock
         self.boots = 0  #: number of restarts
+        self._home_told: Destination
         self._start(now)
 
     def __repr__(self) -> str:
@@ -118,6 +119,10 @@ class Autopilot:
         if self._gps.watch(self._faults, now=now):
             self._flight.lose_position()
         demand = self._flight.demand(self._estimate, now=now)
+        if self._flight.home != self._home_told:
+            self._home_told = self._flight.home
+            if self._persona.home.is_told:
+                self._send(messages.HomePosition.id, now)
         self._missions.step(now=now)
         self._count_runtime(now)
         self._announce(now)
@@ -246,9 +251,10 @@ class Autopilot:
             home=Destination(self._estimate.north, self._estimate.east),
             boot=boot,
             sticks=self._sticks,
-            follower=Follower(persona.home) if realism.home is Home.FOLLOWS else None,
+            follower=Follower(persona.home),
         )
         self._flight.faults = self._faults
+        self._home_told = self._flight.home
         missions.go_to = self._go_to_item
         self._telemetry = Telemetry(
             persona=persona,

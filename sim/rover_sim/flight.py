@@ -35,7 +35,7 @@ class FlightControl:
         home: Destination,
         boot: Boot,
         sticks: Sticks,
-        follower: Follower | None,
+        follower: Follower,
     ) -> None:
         self.home = home
         self.faults: Faults = NO_FAULTS
@@ -48,20 +48,14 @@ class FlightControl:
         self._outbox = outbox
         self._boot = boot
         self._radio = sticks
-        self._follower = follower  # None: home moves only at arming, if at all
+        self._follower = follower
         self._route: Route | None = None
         self._sticks = STOP
-        self._home_due = False  # set home to the present position in the next step
+        self._here = home  # the present position
         self._announced = (self.mode, self.armed)
 
     def __repr__(self) -> str:
         return f"FlightControl({self.mode.name}, {'armed' if self.armed else 'disarmed'})"
-
-    @property
-    def _home_follows_arming(self) -> bool:
-        if self._follower is not None:
-            return self._follower.follows_arming
-        return self._rules.home_is_where_armed
 
     @property
     def custom_mode(self) -> int:
@@ -195,17 +189,15 @@ class FlightControl:
         """Arm or disarm, without checks. A disarmed rover coasts."""
         if armed is not self.armed:
             self.armed = armed
-            self._home_due = armed and self._home_follows_arming
+            if armed and self._follower.follows_arming:
+                self.home = self._here
             self._rules.choose(self.mode)
             self._outbox.say(MavSeverity.INFO, text or self._rules.arming_text(armed=armed))
 
     def set_home(self, place: Destination | None) -> None:
         """Set home to a place; None sets it to the rover's position."""
-        self._home_due = place is None
-        if self._follower is not None:
-            self._follower.name(here=place is None)
-        if place is not None:
-            self.home = place
+        self._follower.name(here=place is None)
+        self.home = place or self._here
 
     def set_sticks(self, speed: float, yaw_rate: float) -> None:
         """Drive manually; has an effect only in MANUAL and POSITION."""
@@ -237,10 +229,8 @@ class FlightControl:
     def demand(self, estimate: Estimate, *, now: float) -> Demand:
         """Return the demand. Call once per control step: it also advances time-outs."""
         self._pass_time(now)
-        if self._home_due:
-            self.home = Destination(estimate.north, estimate.east)
-            self._home_due = False
-        elif self._follower is not None and not self.armed:
+        self._here = Destination(estimate.north, estimate.east)
+        if not self.armed:
             self.home = self._follower.moved(self.home, estimate, now=now)
         match self.mode:
             case Mode.INITIALISING:

@@ -53,7 +53,6 @@ class FlightRules(Protocol):
     reposition_mode: Mode  # for the place of DO_REPOSITION
     sticks_present: bool  # a person holds the sticks of the RC transmitter
     no_position_text: str  # refuses arming without GPS
-    home_is_where_armed: bool  # else home is where the rover was switched on
 
     @property
     def target(self) -> Target | None:

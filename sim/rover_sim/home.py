@@ -2,7 +2,9 @@
 
 From the sources of ArduPilot Rover 4.6 (commands.cpp, update_home) and PX4 1.17 (HomePosition.cpp):
 while disarmed, home follows the rover. DO_SET_HOME fixes it: on ArduPilot in either form, until a
-restart; on PX4 only with a place, not with "here".
+restart; on PX4 only with a place, not with "here". ArduPilot sends HOME_POSITION whenever home
+moves, PX4 only as it streams it. Not imitated: PX4 forgets such a place when it corrects home's
+altitude, by more than 1 m and within 120 s of an arming.
 """
 
 import math
@@ -21,10 +23,11 @@ class HomeRule:
     where_armed: bool  # sets home at each arming
     least_move: float  # m; while disarmed, home follows a rover that is at least this far away
     here_is_kept: bool  # DO_SET_HOME with "here" also fixes home
+    is_told: bool  # HOME_POSITION is sent when home moves
 
 
-ARDUPILOT_HOME = HomeRule(where_armed=False, least_move=0.5, here_is_kept=True)
-PX4_HOME = HomeRule(where_armed=True, least_move=1.0, here_is_kept=False)
+ARDUPILOT_HOME = HomeRule(where_armed=False, least_move=0.5, here_is_kept=True, is_told=True)
+PX4_HOME = HomeRule(where_armed=True, least_move=1.0, here_is_kept=False, is_told=False)
 
 
 class Follower:

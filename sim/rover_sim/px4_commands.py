@@ -43,7 +43,7 @@ def px4_commands(parts: CommandParts) -> CommandTable:
     return CommandTable(
         actions={
             **asking.actions(),
-            **HomeCommand(parts, refusal=MavResult.DENIED).actions(),
+            **HomeCommand(parts, MavResult.DENIED, nowhere_is_here=False).actions(),
             MavCmd.COMPONENT_ARM_DISARM: commands.arm_disarm,
             MavCmd.DO_SET_MODE: commands.do_set_mode,
             DO_SET_STANDARD_MODE: commands.do_set_standard_mode,

@@ -52,7 +52,6 @@ class Px4Rules:
     """The idealised PX4 rules; implements ``FlightRules``."""
 
     reposition_mode = Mode.HOLD
-    home_is_where_armed = True
     sticks_present = False
     no_position_text = "Arming denied: Resolve system health failures first"
 

@@ -19,13 +19,6 @@ class Drive(Enum):
     REAL = "real"  # overshoot, least speed, rolling on, like the make's controllers
 
 
-class Home(Enum):
-    """When home moves by itself."""
-
-    AS_ARMED = "as armed"  # at arming, if the make does so; else never
-    FOLLOWS = "follows"  # also to the rover's position while it is disarmed
-
-
 class Wire(Enum):
     """Whether messages are consistent, or have the quirks of the real autopilots."""
 
@@ -125,7 +118,6 @@ class Realism:
     boot: BootTimes
     timing: LinkTiming | None  # None: it answers at once and sends evenly
     drive: Drive
-    home: Home
     wire: Wire
     stick_speed: float | None = None  # m/s at full throttle, in GUIDED. None: ignored
     tells_origin: bool = True  # GPS_GLOBAL_ORIGIN
@@ -149,7 +141,6 @@ EXACT = Realism(
     boot=NO_BOOT,
     timing=None,
     drive=Drive.EXACT,
-    home=Home.AS_ARMED,
     wire=Wire.TIDY,
 )
 
@@ -226,7 +217,6 @@ ARDUPILOT_REALISM = Realism(
     boot=ARDUPILOT_BOOT.scaled(SHORT),
     timing=ARDUPILOT_TIMING,
     drive=Drive.REAL,
-    home=Home.FOLLOWS,
     wire=Wire.REAL,
     stick_speed=STICK_SPEEDS[Frame.SKID],
 )
@@ -235,6 +225,5 @@ PX4_REALISM = Realism(
     boot=PX4_BOOT.scaled(SHORT),
     timing=PX4_TIMING,
     drive=Drive.REAL,
-    home=Home.FOLLOWS,
     wire=Wire.REAL,
 )

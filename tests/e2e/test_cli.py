@@ -14,6 +14,7 @@ import pytest
 from mav_tasks import Drive, Move, Refused, SyncClient, TaskState, Wait, read_plan
 from mav_tasks.plan_files import PlanFile, parse_plan
 from tests.kit.commands import Done, called, mav_tasks, surroundings
+from tests.kit.found_files import FILES
 from tests.kit.processes import Stand, process, stand, wait_until
 
 NOBODY = "udpout:127.0.0.1:9"
@@ -498,6 +499,26 @@ def test_a_mission_is_a_task_with_terms(server: str, client: SyncClient, tmp_pat
     (later,) = called(*late, str(task["id"]), "--json", server=server).objects
     assert (later["what"], later["after"]) == ("rotate -90 deg", task["id"])
     assert 3500 < later["time_to_start"] <= 3630
+
+
+def test_files_as_people_have_them_go_up_or_are_refused_in_words(
+    server: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "theirs"
+    for found in FILES:
+        file.write_bytes(found.data)
+        if found.holds is None:
+            assert_one_line(called("mission", "upload", str(file)), 2, found.words)
+        elif not found.holds[0]:
+            kind = "fence" if found.holds[1] else "rally" if found.holds[2] else "mission"
+            done = called(kind, "upload", str(file), server=server)
+            if kind == "mission":
+                assert_one_line(done, 2, "there is no mission in it")
+            else:
+                assert done.status == 0, (found.name, done.output)
+    file.write_bytes(FILES[0].data)
+    for kind in ("fence", "rally"):
+        assert called(kind, "upload", str(file), "--empty", server=server).status == 0
 
 
 def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(

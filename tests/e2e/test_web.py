@@ -24,6 +24,7 @@ from mav_tasks.client.wire import Goal
 from mav_tasks.web.events import EVENTS
 from mav_tasks.web.schemas import SCHEMAS
 from tests.kit.awaited import awaited
+from tests.kit.found_files import FILES
 from tests.kit.processes import Stand, process, stand, wait_until
 from tests.kit.web import Web, add_key, has_rover, web
 
@@ -255,6 +256,19 @@ def test_a_plan_is_shown_and_then_queued(page: Web) -> None:
     page.wait_for(task["id"], "completed")
     wrong = page.send("POST", "/plans", {"text": "no plan"})
     assert wrong.status_code == 422
+
+
+def test_files_as_people_have_them_are_shown_or_refused_in_words(page: Web) -> None:
+    for found in FILES:
+        answer = page.send("POST", "/plans", {"name": found.name, "text": found.text})
+        shown = answer.json()
+        if found.holds is None:
+            assert answer.status_code == 422
+            assert f"{found.name}: " in shown["detail"]
+            assert found.words in shown["detail"]
+        else:
+            parts = shown["items"], len(shown["fence"]), len(shown["rally"])
+            assert parts == found.holds, found.name
 
 
 def test_the_fence_is_set_shown_and_removed(page: Web) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from math import degrees, hypot, radians, remainder
+from math import degrees, hypot, nan, radians, remainder
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,6 +11,7 @@ from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.messages import CommandInt
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.recording.decisions import Decisions
 from mav_tasks.settings import Settings
@@ -41,6 +42,7 @@ COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG packet
 
 
 INT_COMMAND, MODE_COMMAND = 75, 76  # COMMAND_INT, COMMAND_LONG
+SET_HOME = 179
 SETPOINT = 84  # SET_POSITION_TARGET_LOCAL_NED
 HEADER = 10  # bytes
 MEASURED = (30, 32)  # ATTITUDE, LOCAL_POSITION_NED
@@ -538,6 +540,13 @@ def at(north: float, east: float) -> dict[str, Any]:
     """Return x and y of a COMMAND_INT for a place in metres from the origin."""
     x, y = DEFAULT_ORIGIN.to_global(north, east)
     return {"x": x, "y": y}
+
+
+def put_home(world: World, north: float, east: float) -> None:
+    """Set home at the rover itself, as by another link: it stays, and does not follow the rover."""
+    place = at(north, east)
+    command = CommandInt(1, 1, 0, SET_HOME, 0, 0, 0, 0, 0, nan, place["x"], place["y"], 0)
+    world.rover.autopilot.handle(command, Address(255, 190), now=world.now)
 
 
 def is_at(world: World, north: float, east: float) -> bool:

@@ -20,7 +20,7 @@ from tests.kit.client import DENIED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_PX4, go_to
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import PROMPT, World, at, near_pose
+from tests.kit.world import PROMPT, World, at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_profiles import ARDUPILOT_PROFILE, PX4_PROFILE
 from tests.scenarios.test_restart import REMAINDER, UTC, release, restart
@@ -62,6 +62,7 @@ def test_a_go_to_is_driven(make_car: Drive, persona: Persona) -> None:
 
 def test_it_returns(make_car: Drive) -> None:
     world = make_car(PROMPT)
+    put_home(world, 0.0, 0.0)
     go_to(world, -3.0, 4.0)
     world.until_idle(tasks=1, within=90)
     world.client.command(RETURN)

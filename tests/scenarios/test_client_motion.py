@@ -11,7 +11,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.client import ACCEPTED, DENIED, GUIDED, HOLD, RTL, heartbeat, setpoint
-from tests.kit.world import World, at, is_at
+from tests.kit.world import World, at, is_at, put_home
 from tests.scenarios.conftest import MakeWorld
 
 GLOBAL = 0  # MAV_FRAME
@@ -275,6 +275,7 @@ class TestUnclaimed:
 
 
 def test_return_hold_return_goes_home(world: World) -> None:
+    put_home(world, 0.0, 0.0)
     world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
     world.client.move(4)
     world.until_idle(tasks=1)

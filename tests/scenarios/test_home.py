@@ -1,20 +1,25 @@
-"""Where a rover returns to: where it was first armed, or where somebody has put its home."""
+"""One home: what the rover says is home, a ground station shows it, and a return drives there."""
 
 from math import hypot, nan
 from pathlib import Path
 
 import pytest
 
-from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.px4 import PROMPT_PX4
+from rover_sim.personas import Persona
+from tests.kit.mission import Item, Upload
+from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import World, at
+from tests.kit.world import PROMPT, World, at, put_home
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_restart import restart
 
-RETURN, SET_HOME = 20, 179
+WAYPOINT, RETURN, SET_HOME = 16, 20, 179
+RTL, PX4_RETURN = 11, 4 << 16 | 5 << 24
 NEAR = 0.2  # m
+HERE = Item(SET_HOME, frame=2, param1=1)
+
+both = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
 
 
 def far_from(world: World, north: float, east: float) -> float:
@@ -22,9 +27,27 @@ def far_from(world: World, north: float, east: float) -> float:
 
 
 def go_home(world: World, *, tasks: int) -> None:
+    """Return, and be where a ground station shows home."""
     world.client.command(RETURN, target=(1, 1))
     world.until_idle(tasks=tasks)
     assert world.state(tasks)[0] is S.COMPLETED
+    world.run(2.1)
+    shown = world.client.of_type("HOME_POSITION")[-1]
+    assert far_from(world, shown.x, shown.y) < NEAR
+
+
+def drive(world: World, *places: tuple[float, float] | Item) -> None:
+    """Drive a plan, armed by the operator and left armed."""
+    items = [each if isinstance(each, Item) else Item(WAYPOINT, **at(*each)) for each in places]
+    upload = Upload(world.client, items, target=(1, 191))
+    world.until(lambda: upload.result is not None, within=5)
+    assert upload.result == 0
+
+
+def arm(world: World) -> None:
+    world.client.arm()
+    world.until(lambda: world.rover.autopilot.armed, within=3)
+    world.run(1.0)
 
 
 @pytest.fixture
@@ -32,58 +55,107 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
 
-@pytest.fixture
-def world(make_world: MakeWorld, path: Path) -> World:
-    """A PX4, which says at each arming that home is where it is, after two moves."""
-    world = make_world(persona=PROMPT_PX4, store=PromptSqliteStore(path, wall_offset=1.8e9))
+def make(make_world: MakeWorld, persona: Persona, path: Path) -> World:
+    """A rover that has driven to (3, 0) and was disarmed there."""
+    world = make_world(persona=persona, store=PromptSqliteStore(path, wall_offset=1.8e9))
     for number in (1, 2):
         world.client.move(1.5)
         world.until_idle(tasks=number)
     assert far_from(world, 3.0, 0.0) < NEAR
+    world.until(lambda: not world.rover.autopilot.armed, within=10)
     return world
 
 
-def test_a_return_drives_to_where_it_was_first_armed(world: World) -> None:
-    go_home(world, tasks=3)
-    assert far_from(world, 0.0, 0.0) < NEAR
-    assert len(world.events(VehicleHomeSet)) == 1
+@both
+def test_home_is_where_the_rover_was_armed_last(
+    make_world: MakeWorld, persona: Persona, path: Path
+) -> None:
+    world = make(make_world, persona, path)
+    world.run(1.1)
+    arm(world)
+    drive(world, (3.0, 3.0))
+    world.until_idle(tasks=3)
+    go_home(world, tasks=4)
+    assert far_from(world, 3.0, 0.0) < NEAR
 
 
-def test_home_is_kept_over_a_restart_of_the_server(world: World, path: Path) -> None:
+@both
+def test_a_return_at_once_after_the_arming_knows_the_new_home(
+    make_world: MakeWorld, persona: Persona, path: Path
+) -> None:
+    world = make(make_world, persona, path)
+    world.run(1.1)  # ArduPilot looks each second; the server was told of a home at (0, 0)
+    world.client.command(RETURN, target=(1, 1))
+    world.run(15)
+    assert world.is_idle(tasks=3)
+    assert far_from(world, 3.0, 0.0) < NEAR
+
+
+@both
+@pytest.mark.parametrize("place", [None, (1.0, 3.0)], ids=["here", "there"])
+def test_a_plan_sets_the_home_that_its_return_drives_to(
+    make_world: MakeWorld, persona: Persona, path: Path, place: tuple[float, float] | None
+) -> None:
+    world = make(make_world, persona, path)
+    item = HERE if place is None else Item(SET_HOME, frame=0, **at(*place))
+    drive(world, (4.0, 1.0), item, Item(RETURN))
+    world.until_idle(tasks=3)
+    assert far_from(world, *(place or (4.0, 1.0))) < NEAR
+
+
+@both
+def test_a_client_sets_home_and_it_lasts_over_arming_and_the_server(
+    make_world: MakeWorld, persona: Persona, path: Path
+) -> None:
+    world = make(make_world, persona, path)
+    world.client.command_int(SET_HOME, 0, 0, 0, nan, **at(2.0, 1.0), frame=0, target=(1, 1))
+    world.client.command(RETURN, target=(1, 1))  # before it is acknowledged
+    world.until_idle(tasks=3)
+    assert far_from(world, 2.0, 1.0) < NEAR
+    world.client.move(1.0)
+    world.until_idle(tasks=4)
     restart(world, path, well=True)
-    go_home(world, tasks=3)
-    assert far_from(world, 0.0, 0.0) < NEAR
-
-
-def test_home_is_where_a_client_has_put_it(world: World) -> None:
-    place = at(2.0, 1.0)
-    world.client.command_int(SET_HOME, 0, 0, 0, nan, **place, frame=0, target=(1, 1))
-    world.run(0.5)
-    go_home(world, tasks=3)
+    go_home(world, tasks=5)
     assert far_from(world, 2.0, 1.0) < NEAR
 
 
-def test_home_is_put_where_the_rover_is(world: World) -> None:
-    world.client.command(SET_HOME, 1, target=(1, 1))
-    world.run(0.5)
-    world.client.move(1.0)
+def test_home_that_another_station_sets_at_the_rover_is_home(
+    make_world: MakeWorld, path: Path
+) -> None:
+    world = make(make_world, PROMPT_PX4, path)
+    put_home(world, 1.0, 2.0)
+    world.run(2.1)  # the server reads it each 2 s
+    go_home(world, tasks=3)
+    assert far_from(world, 1.0, 2.0) < NEAR
+
+
+@both
+def test_a_return_that_was_paused_goes_on_to_the_home_of_now(
+    make_world: MakeWorld, persona: Persona, path: Path
+) -> None:
+    world = make(make_world, persona, path)
+    arm(world)
+    drive(world, (3.0, 4.0))
     world.until_idle(tasks=3)
-    go_home(world, tasks=4)
-    assert far_from(world, 3.0, 0.0) < NEAR
+    ask_mode(world.client, PX4_RETURN) if persona is PROMPT_PX4 else world.client.mode(RTL)
+    world.run(3)
+    world.client.pause()
+    world.run(2)
+    world.client.command_int(SET_HOME, 0, 0, 0, nan, **at(1.0, 3.0), frame=0, target=(1, 1))
+    world.run(0.5)
+    world.client.proceed()
+    world.until_idle(tasks=4)
+    assert far_from(world, 1.0, 3.0) < NEAR
 
 
-def test_one_that_has_booted_again_has_the_home_of_its_next_first_arming(world: World) -> None:
+def test_a_rover_that_has_booted_again_says_where_home_is(
+    make_world: MakeWorld, path: Path
+) -> None:
+    world = make(make_world, PROMPT, path)
+    world.client.command_int(SET_HOME, 0, 0, 0, nan, **at(2.0, 1.0), frame=0, target=(1, 1))
     world.run(20)  # longer than two estimates of when it booted may differ
     world.rover.autopilot.reboot(now=world.now)
     world.run(10)
-    world.client.move(1.0)
+    drive(world, (5.0, 0.0), Item(RETURN))
     world.until_idle(tasks=3)
-    go_home(world, tasks=4)
     assert far_from(world, 3.0, 0.0) < NEAR
-
-
-def test_one_that_is_met_armed_has_said_where_that_was(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    world.operator_arm(True)
-    world.run(2)
-    assert world.events(VehicleHomeSet)

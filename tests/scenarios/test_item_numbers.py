@@ -76,3 +76,14 @@ def test_an_item_that_is_chosen_is_named_as_in_the_file(
     world.client.command(SET_CURRENT, len(before) + 7, target=(1, 1))
     world.run(0.2)
     assert any("item 8: the last item is 2" in text for text in world.client.texts())
+
+
+@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda persona: persona.name)
+@pytest.mark.parametrize("seq", [0, 1])
+def test_without_a_mission_it_says_that_there_is_none(
+    make_world: MakeWorld, persona: Persona, seq: int
+) -> None:
+    world = make_world(persona=persona)
+    world.client.command(SET_CURRENT, seq, target=(1, 1))
+    world.run(0.5)
+    assert any("there is no mission: upload one first" in text for text in world.client.texts())

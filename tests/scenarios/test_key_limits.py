@@ -30,7 +30,7 @@ from tests.kit.client import (
 )
 from tests.kit.mission import Item, Upload
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import World, at
+from tests.kit.world import World, at, put_home
 from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
@@ -239,6 +239,7 @@ def test_a_longer_way_is_refused_in_words(
 def test_a_return_is_as_long_as_the_way_home(
     world: World, limited: Callable[..., FakeClient]
 ) -> None:
+    put_home(world, 0.0, 0.0)
     agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
     boss.move(4.0)
     world.run(0.3)

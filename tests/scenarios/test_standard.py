@@ -12,7 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import ACCEPTED, AUTO, DENIED, RTL, set_mode
-from tests.kit.world import World, at, is_at, near_pose
+from tests.kit.world import World, at, is_at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, LOITER_TIME, RETURN, TAKEOFF, DELAY = 16, 19, 20, 22, 93
@@ -98,6 +98,7 @@ def test_go_to_now_runs_at_once_and_the_other_goes_on_when_continued(
 
 @pytest.mark.parametrize("how", ["command", "mode", "old mode message"])
 def test_return_drives_home(world: World, how: str) -> None:
+    put_home(world, 0.0, 0.0)
     world.client.move(1.0)
     world.until_idle(tasks=1)
     if how == "command":

@@ -228,11 +228,16 @@ def test_another_program_reads_the_same_from_a_text_file(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     "first", ["1 3 16 0 0 0 0 47 8 0 1", "1 0 17 0 0 0 0 47 8 0 1"], ids=["frame", "command"]
 )
-def test_a_first_line_that_is_no_home_is_an_item(first: str) -> None:
-    plan = parse_plan(wpl(line(0, first), line(1), line(2, "0 2 177 1 3 0 0 0 0 0 1")))
+def test_line_0_is_home_whatever_stands_in_it_and_without_one_no_line_is(first: str) -> None:
+    jump = "0 2 177 1 3 0 0 0 0 0 1"
+    plan = parse_plan(wpl(line(0, first), line(1), line(2, jump)))
+    assert plan.home == (470000000, 80000000, 0.0)
+    assert [item.command for item in plan.items] == [16, 177]
+    assert plan.items[1].params[0] == 0.0
+    plan = parse_plan(wpl(line(1, first), line(2), line(3, jump)))
     assert plan.home is None
     assert [item.command for item in plan.items][1:] == [16, 177]
-    assert plan.items[2].params[0] == 1.0
+    assert plan.items[2].params[0] == 0.0
 
 
 def test_the_target_of_a_jump_is_an_index_into_the_items() -> None:
@@ -304,7 +309,7 @@ def test_x_and_y_are_ints_in_the_unit_of_the_frame(
 
 @given(st.decimals(-90, 90, places=12), st.floats(-180, 180))
 def test_degrees_become_the_nearest_int(latitude: object, longitude: float) -> None:
-    item = parse_plan(wpl(line(0, f"0 3 16 0 0 0 0 {latitude} {longitude!r} 0 1"))).items[0]
+    item = parse_plan(wpl(line(1, f"0 3 16 0 0 0 0 {latitude} {longitude!r} 0 1"))).items[0]
     assert item.x == round(Fraction(str(latitude)) * 10**7)
     assert item.y == round(Fraction(repr(longitude)) * 10**7)
 
@@ -312,18 +317,17 @@ def test_degrees_become_the_nearest_int(latitude: object, longitude: float) -> N
 ROOT_PROBLEMS: list[tuple[str, str]] = [
     ("", "not a plan file: it is empty"),
     ("\ufeff \r\n", "not a plan file: it is empty"),
-    ("<?xml version='1.0'?>", "not a plan file: neither JSON nor QGC WPL 110"),
-    ("[1]", "not a plan file: neither JSON nor QGC WPL 110"),
-    ("QGC WPL 120\n" + line(0), "'QGC WPL 120' is not supported, expected 'QGC WPL 110'"),
-    ("QGC WPL 100", "'QGC WPL 100' is not supported, expected 'QGC WPL 110'"),
-    ("QGC WPL", "'QGC WPL' is not supported, expected 'QGC WPL 110'"),
+    ("[1]", "not a plan file: line 1 is '[1]', expected JSON"),
+    ("QGC WPL 130", "'QGC WPL 130' is not supported, expected 110 or 120"),
+    ("QGC WPL", "'QGC WPL ' is not supported, expected 110 or 120"),
     ("{", "not a plan file: JSON line 1 column 2: Expecting property name enclosed in double"),
     ('{\n"a": 1}\n]', "not a plan file: JSON line 3 column 1: Extra data"),
     ('{"a": NaN}', "not a plan file: NaN is not a JSON number"),
     ('{"a": -Infinity}', "not a plan file: -Infinity is not a JSON number"),
     ('{"a": ' + "[" * 100_000, "not a plan file: JSON nested too deep"),
-    ("{}", "file: fileType is missing"),
-    ('{"fileType": "Mission"}', 'file: fileType is "Mission", "Plan" is needed'),
+    ("{}", "file: version is missing"),
+    ('{"fileType": "Parameters"}', 'file: fileType "Parameters" is neither Plan nor Mission,'),
+    ('{"fileType": "Mission", "version": "2.0"}', 'file: version "2.0" is not supported, expected'),
     ('{"fileType": ' + "[" * 400 + "]" * 400 + "}", "file: fileType is a list, expected text"),
     (edited(lambda root: root.pop("version")), "file: version is missing"),
     (edited(lambda root: root.update(version=2)), "file: version 2 is not supported, expected 1"),
@@ -344,8 +348,8 @@ ROOT_PROBLEMS: list[tuple[str, str]] = [
         "home: longitude 181 not in -180..180",
     ),
     (
-        edited(lambda root: root["geoFence"].update(version=1)),
-        "geoFence: version 1 is not supported, expected 2",
+        edited(lambda root: root["geoFence"].update(version=3)),
+        "geoFence: version 3 is not supported, expected 1 or 2",
     ),
     (
         edited(lambda root: root["geoFence"]["polygons"][1]["polygon"].pop()),
@@ -369,15 +373,15 @@ ROOT_PROBLEMS: list[tuple[str, str]] = [
     ),
     (
         edited(lambda root: root.update(geoFence={"polygon": [[1, 2]], "version": 1})),
-        "geoFence: version 1 is not supported, expected 2",
+        "fence: 1 points, at least 3 are needed",
     ),
     (
         edited(lambda root: root["geoFence"].update(circles={"1": 2})),
         "geoFence: circles is an object, expected a list",
     ),
     (
-        edited(lambda root: root["rallyPoints"].update(version=1)),
-        "rallyPoints: version 1 is not supported, expected 2",
+        edited(lambda root: root["rallyPoints"].update(version=3)),
+        "rallyPoints: version 3 is not supported, expected 1 or 2",
     ),
     (
         edited(lambda root: root["rallyPoints"]["points"][1].__setitem__(0, None)),
@@ -388,7 +392,7 @@ ROOT_PROBLEMS: list[tuple[str, str]] = [
 ITEM_PROBLEMS: list[tuple[object, str]] = [
     (None, "it is null, expected an object"),
     ({}, "type is missing"),
-    (waypoint(type="missionItem"), 'type "missionItem" is unknown'),
+    (waypoint(type="something"), 'type "something" is unknown'),
     (waypoint(params=[0] * 6), "6 params, expected 7"),
     (waypoint(params=at(91, 8)), "latitude 91 not in -90..90"),
     (waypoint(params=at(-90.0000001, 8)), "latitude -90.0000001 not in -90..90"),
@@ -429,11 +433,12 @@ ITEM_PROBLEMS: list[tuple[object, str]] = [
 ]
 
 LINE_PROBLEMS: list[tuple[str, str]] = [
-    ("1 0 3 16 0 0 0 0 47 8 0", "11 fields, expected 12"),
-    ("1 0 3 16 0 0 0 0 47 8 0 1 1", "13 fields, expected 12"),
-    ("2 0 3 16 0 0 0 0 47 8 0 1", "numbered 2, expected 1"),
-    ("1 0 3 16 0 0 0 0 47,5 8 0 1", "field 9 is '47,5', expected a number"),
-    ("1 0 3 16 0 0 0 0 4_7 8 0 1", "field 9 is '4_7', expected a number"),
+    ("1 0 3 16 0 0 0 0 1.047,5 8 0 1", "1.047,5 is not a number: decimal comma? Write 1047.5"),
+    (
+        "1 0 3 16 0 0 0 0 4_7 8 0 1",
+        "4_7 is not a number: write it with the digits 0 to 9 and a point",
+    ),
+    ("1.5 0 3 16 0 0 0 0 4 8 0 1", "the number of the line is 1.5, expected a whole number from"),
     ("1 0 3 16 0 0 0 0 147 8 0 1", "latitude 147 not in -90..90"),
     ("1 0 3 16 0 0 0 0 nan nan 0 1", "command 16 needs a place, but has none"),
     ("1 0 3 16 inf 0 0 0 47 8 0 1", "param 1 inf is too large"),
@@ -456,7 +461,7 @@ def test_an_error_names_the_item(item: object, words: str) -> None:
 @pytest.mark.parametrize(("words_of_line", "words"), LINE_PROBLEMS)
 def test_an_error_names_the_line(words_of_line: str, words: str) -> None:
     text = wpl(line(0, "1 0 16 0 0 0 0 47 8 0 1"), "# a comment counts as a line\n", words_of_line)
-    assert problem(text) == f"line 4: {words}"
+    assert problem(text).startswith(f"line 4: {words}")
 
 
 def test_items_are_counted_as_on_the_map_of_the_planner() -> None:
@@ -480,9 +485,6 @@ def test_a_file_that_cannot_be_read_is_such_an_error(tmp_path: Path) -> None:
         read_plan(missing)
     with pytest.raises(PlanFileError, match="Is a directory"):
         read_plan(tmp_path)
-    missing.write_bytes(b'{"fileType": "Pl\xe4n"}')
-    with pytest.raises(PlanFileError, match=r"missing\.plan: not a plan file: not UTF-8 text$"):
-        read_plan(missing)
 
 
 def test_size_and_number_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

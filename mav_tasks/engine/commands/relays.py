@@ -87,9 +87,6 @@ def deliver(
     is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
     if is_accepted and _disarms(answered.request):
         vehicle.parts.armings.was_answered()
-    if is_accepted and answered.command == MavCmd.DO_SET_HOME:
-        actor = f"{asker.source.system_id}/{asker.source.component_id}"
-        vehicle.home_was_set(answered.request, actor=actor, now=now)
     client = gcs.client(asker.client)
     if client is None:
         return

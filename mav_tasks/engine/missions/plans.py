@@ -261,6 +261,8 @@ class Plans:
         if seq >= count:
             has_home = self._has_home(vehicle)
             number, last = (number_of(n, has_home=has_home) for n in (seq, count - 1))
+            if last < 1:
+                raise Rejection(R.BAD_PARAMETER, "there is no mission: upload one first", param=1)
             raise Rejection(R.BAD_PARAMETER, f"item {number}: the last item is {last}", param=1)
         if task is None or task.state in TERMINAL:
             self.begin_at(vehicle, seq)

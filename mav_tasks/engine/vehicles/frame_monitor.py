@@ -33,6 +33,7 @@ class FrameMonitor:
         self._heard_at = 0.0  # when the boot time was determined
         self._global: m.GlobalPositionInt | None = None
         self._local: m.LocalPositionNed | None = None
+        #: what HOME_POSITION says; None: nothing since the vehicle booted
         self.home: GlobalPlace | None = None
         #: the origin has changed; the reader resets this flag
         self.changed = False
@@ -68,7 +69,7 @@ class FrameMonitor:
 
     def forget(self) -> None:
         """Forget the frame, as after a restart of the vehicle."""
-        self.origin = self._global = self._local = None
+        self.origin = self.home = self._global = self._local = None
         self._is_said = False
         self._booted_at = None
         self.changed = False

@@ -160,6 +160,7 @@ class Parts:
             other_controller=self.authority.since_other(now=now) < watch.other_controller,
             frame=where.frame.frame(),
             home=where.home,
+            is_home_old=self.requests.is_home_old and where.frame.home is not None,
             is_fence_unknown=where.is_fence_unknown,
             is_outside_own_fence=self.failsafes.is_outside_fence,
             honours_yaw_rate=persona.honours_yaw_rate,

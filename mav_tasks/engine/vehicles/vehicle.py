@@ -21,7 +21,7 @@ from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.takeovers import Takeovers
-from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition, home_meant
+from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -33,8 +33,7 @@ from mav_tasks.services.heartbeat import HeartbeatMonitor, kind_of
 from mav_tasks.services.identity import identity_of, uid_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import SERVER, VehicleSeen
-from mav_tasks.tasks.goal import GlobalPlace
+from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -217,6 +216,8 @@ class Vehicle:
             if not self.tasks.is_idle:
                 self.joint.wake(now=now)
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition):
+            if isinstance(message, m.HomePosition):
+                self.requests.heard_home()
             self.where.frame.receive(message)
             self._look_at_frame(now=now)
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
@@ -261,8 +262,8 @@ class Vehicle:
         before = Before(now, parts.authority.may_arm, self.tasks.paused)
         monitor.receive(heartbeat, now=now)
         self.control.heard(armed=monitor.armed, mode=monitor.custom_mode, now=now)
-        if monitor.armed:
-            self._keep_home(self.where.frame.home if was_armed else self.where.here, now=now)
+        if monitor.armed and not was_armed:  # which sets home on PX4, and ends what moved it before
+            self.requests.ask_for_home(now=now)
         if not self._was_heard:
             self._heard_again(now=now)
         self._takeovers.look(was_mode=was_mode, was_armed=was_armed, before=before, now=now)
@@ -270,18 +271,6 @@ class Vehicle:
         self._ask_for_rates(now=now)
         self.requests.ask_for_parameters()
         self._says.look(now=now)
-
-    def _keep_home(self, place: GlobalPlace | None, *, now: float) -> None:
-        """Store its home: where it was first armed, or what it reports if it was found armed."""
-        frame = self.where.frame.frame()
-        if place and frame and self.tasks.bounds.home_in(frame) is None:
-            self.tasks.terms.set_home(place, frame, actor=SERVER, now=now)
-
-    def home_was_set(self, command: m.Message, *, actor: str, now: float) -> None:
-        """Store the home of a client's accepted DO_SET_HOME: tasks return there, too."""
-        place, frame = home_meant(command) or self.where.here, self.where.frame.frame()
-        if place and frame:
-            self.tasks.terms.set_home(place, frame, actor=actor, now=now)
 
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True

@@ -1,19 +1,16 @@
 """Where a vehicle is, how it moves, where its local frame begins, and where home and fence are."""
 
 from collections.abc import Sequence
-from math import isfinite
 
 from mav_tasks.engine.vehicles.frame_monitor import FrameMonitor
 from mav_tasks.engine.vehicles.motion_monitor import MotionMonitor
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
-from mav_tasks.mavlink.messages import CommandInt, CommandLong, GlobalPositionInt, Message
+from mav_tasks.mavlink.messages import GlobalPositionInt
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.legs import distance
-from mav_tasks.tasks.frames import local_place, to_global
+from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Step
-
-PRESENT = 1.0  # param1 of DO_SET_HOME: use the vehicle's position
 
 
 class VehiclePosition:
@@ -48,22 +45,10 @@ class VehiclePosition:
 
     @property
     def home(self) -> GlobalPlace | None:
-        """The place to which the vehicle returns: the nearest rally point, else its home.
-
-        Home is where it was first armed, or what somebody set. Its own home is the last resort:
-        that moves with it while disarmed (ArduPilot), or at each arming (PX4).
-        """
+        """The place to which the vehicle returns: the nearest rally point, else its home."""
         motion = self.motion.latest() if self._bounds.rally else None
         rally = None if motion is None else self._bounds.refuge(motion.pose, self.frame.origin)
-        return rally or self._bounds.home_in(self.frame.frame()) or self.frame.home
-
-    @property
-    def here(self) -> GlobalPlace | None:
-        """The global position of the vehicle, or None if it is unknown."""
-        motion, origin = self.motion.latest(), self.frame.origin
-        if motion is None or origin is None:
-            return None
-        return to_global(LocalPlace(motion.pose.north, motion.pose.east), origin)
+        return rally or self.frame.home
 
     @property
     def is_fence_unknown(self) -> bool:
@@ -89,14 +74,3 @@ class VehiclePosition:
 
     def _place_of(self, goal: GoTo) -> LocalPlace | None:
         return local_place(self.home if goal.place is None else goal.place, self.frame.origin)
-
-
-def home_meant(command: Message) -> GlobalPlace | None:
-    """Return the place that a DO_SET_HOME names; None: it means the vehicle's position."""
-    if isinstance(command, CommandInt) and command.param1 != PRESENT:
-        return GlobalPlace(command.x, command.y)
-    if isinstance(command, CommandLong) and command.param1 != PRESENT:
-        latitude, longitude = command.param5, command.param6
-        if isfinite(latitude) and isfinite(longitude):
-            return GlobalPlace(round(latitude * 1e7), round(longitude * 1e7))
-    return None

@@ -69,6 +69,8 @@ class VehicleRequests:
             is_bytewise=persona.has_bytewise_parameters,
         )
         self._shows = ASK_TO_SHOW  # how many more times it is asked for a heartbeat
+        #: home may have moved since the vehicle said it last: by an arming or a DO_SET_HOME
+        self.is_home_old = False
         self._versions_asked = 0
         self._ask_version_at = now
         #: whether the vehicle has sent its identity
@@ -130,6 +132,7 @@ class VehicleRequests:
         now: float,
     ) -> None:
         """Forward a client's command; its answer comes from ``take_answers``."""
+        self.is_home_old |= command == MavCmd.DO_SET_HOME
         self._sender.relay(
             packet,
             message,
@@ -146,6 +149,7 @@ class VehicleRequests:
     def perform(self, command: m.CommandLong | m.CommandInt, *, now: float) -> None:
         """Send a command that a plan orders, and repeat it until it is answered or given up."""
         self._performed.add(command.command)
+        self.is_home_old |= command.command == MavCmd.DO_SET_HOME
         self._sender.request(command, now=now, give_up_after=self._watch.ask_vehicle)
         self.flush(now=now)
 
@@ -180,6 +184,17 @@ class VehicleRequests:
         """Send a zero and ask for HOLD, once each, without waiting for an answer."""
         for message in self.control.zero_and_hold():
             self._outlet.send(message, self._source)
+
+    def ask_for_home(self, *, now: float) -> None:
+        """Ask where home is now; until the vehicle says it, no return sets out."""
+        self.is_home_old = True
+        request = self._message_request(m.HomePosition.id)
+        self._sender.request(request, now=now, give_up_after=self._watch.ask_vehicle)
+        self.flush(now=now)
+
+    def heard_home(self) -> None:
+        """Note that the vehicle has said where home is; it counts unless it is being set."""
+        self.is_home_old = self._sender.awaits(MavCmd.DO_SET_HOME)
 
     def ask_for_rates(self, *, now: float) -> None:
         """Ask for the next message interval that is due, if any."""
@@ -281,6 +296,8 @@ class VehicleRequests:
             self.intervals.answered(accepted=accepted)
         if answer.command in SHOWN and result == MavResult.ACCEPTED:
             self.ask_to_show(now=now)
+        if answer.command == MavCmd.DO_SET_HOME:
+            self.ask_for_home(now=now)
 
     def _note_shown(self, answer: Answered) -> None:
         """Stop asking for heartbeats if it does not send them on request.

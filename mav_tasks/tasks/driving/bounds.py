@@ -1,4 +1,4 @@
-"""Where one vehicle may drive, and where it returns to: fence, rally points and home."""
+"""Where one vehicle may drive, and which rally point it returns to."""
 
 from collections.abc import Sequence
 from math import cos, sin
@@ -7,7 +7,6 @@ from mav_tasks.tasks.driving.fence import Fence, LocalFence
 from mav_tasks.tasks.driving.legs import WAY, distance
 from mav_tasks.tasks.driving.path import pose_on, rest_of
 from mav_tasks.tasks.driving.planner import is_allowed
-from mav_tasks.tasks.events import VehicleHomeSet
 from mav_tasks.tasks.frames import local_place, to_local
 from mav_tasks.tasks.goal import (
     Drive,
@@ -21,29 +20,20 @@ from mav_tasks.tasks.goal import (
     SingleGoal,
     Step,
 )
-from mav_tasks.tasks.task import Frame, Pose, Progress, same_frame
+from mav_tasks.tasks.task import Pose, Progress
 
 
 class Bounds:
-    """The fence, rally points and home of one vehicle; ``origin`` is that of its local frame."""
+    """The fence and rally points of one vehicle; ``origin`` is that of its local frame."""
 
     def __init__(self) -> None:
         self.fence = Fence()
         self.rally: tuple[GlobalPlace, ...] = ()
-        #: where it was first armed, or what a client has set; None: not known
-        self.home: VehicleHomeSet | None = None
         self._local: LocalFence | None = None
         self._made_of: tuple[Fence, GlobalPlace] | None = None
 
     def __repr__(self) -> str:
         return f"Bounds({len(self.fence.zones)} zones, {len(self.rally)} rally points)"
-
-    def home_in(self, frame: Frame | None) -> GlobalPlace | None:
-        """Return the vehicle's home in this frame; None if it has none since it booted."""
-        home = self.home
-        if home is None or not same_frame(home.frame, frame):
-            return None
-        return GlobalPlace(home.latitude_degE7, home.longitude_degE7)
 
     def is_unknown(self, origin: GlobalPlace | None) -> bool:
         """Return whether there is a fence whose place in the vehicle's frame is unknown."""

@@ -81,7 +81,7 @@ def set_out(
         progress = started(goal, progress)
     single = present_goal(goal, progress)
     turns_first = seen.honours_yaw_rate and steering is None
-    if progress.anchor is not None:
+    if progress.anchor is not None and not _has_home_moved(single, progress, seen):
         return resumed(single, progress, motion, turns_first=turns_first, steering=steering)
     if not isinstance(single, GoTo):
         done = 0.0 if isinstance(single, Face) else progress.done  # its heading is absolute
@@ -99,6 +99,13 @@ def set_out(
     anchor = anchor_of(single, leg, motion.pose, target)
     begun_here = replace(progress, anchor=anchor, frame=seen.frame, leg=leg, done=0.0)
     return replace(begun_here, target=target, path=())
+
+
+def _has_home_moved(goal: SingleGoal, progress: Progress, seen: VehicleView) -> bool:
+    """Return whether a return that was interrupted leads to another place now."""
+    if not isinstance(goal, GoTo) or goal.place is not None:
+        return False
+    return place_of(goal, seen) != progress.target
 
 
 def may_go_on_rolling(

@@ -53,7 +53,9 @@ export function planDrop() {
 
 async function open(file) {
   if (file.size > LARGEST) throw new RangeError("it is larger than 10 MB");
-  const text = await file.text();
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  const wide = { "255,254": "utf-16le", "254,255": "utf-16be" }[bytes.slice(0, 2)]; // Windows' editors
+  const text = new TextDecoder(wide ?? "utf-8").decode(bytes);
   const plan = await post("/plans", { name: file.name, text });
   const vehicle = state.chosen;
   const key = newKey();

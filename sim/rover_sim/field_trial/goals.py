@@ -98,7 +98,7 @@ def mission(where: Where) -> TrialTask:
 
 
 def home(where: Where) -> TrialTask:
-    """Return a go-to home, the place of the first arming, which the trial does not know."""
+    """Return a go-to home, the place that the rover says, which the trial does not know."""
     del where
     return TrialTask("return", (GoTo(None),))
 

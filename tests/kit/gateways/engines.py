@@ -72,7 +72,6 @@ def part_of(restored: Restored, vehicles: frozenset[int]) -> Restored:
         paused=some(restored.paused),
         uids=some(restored.uids),
         speeds=some(restored.speeds),
-        homes=some(restored.homes),
         halt_epochs=some(restored.halt_epochs),
         halted=some(restored.halted),
         disarmed=restored.disarmed & vehicles,

@@ -37,7 +37,7 @@ from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import MISSION, PROMPT_PX4, REPOSITION, ask_mode
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import World, at
+from tests.kit.world import World, at, put_home
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_signing import ALICE, BOB, put, signing
 
@@ -75,6 +75,7 @@ def stays(world: World, seconds: float) -> bool:
 
 def away_from_home(world: World) -> None:
     """Drive the rover to where a return moves it, and arm it there."""
+    put_home(world, 0.0, 0.0)
     world.client.move(5)
     world.until_state(1, S.COMPLETED, within=60)
     world.run(3)

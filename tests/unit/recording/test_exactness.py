@@ -46,12 +46,12 @@ from mav_tasks.recording.surroundings import (
 )
 from mav_tasks.settings import Clients, Retention, Settings
 from mav_tasks.store.codec import Decoder
-from mav_tasks.tasks.events import ServerStopped, VehicleHomeSet, VehicleSeen
+from mav_tasks.tasks.events import ServerStopped, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
-from mav_tasks.tasks.task import Frame, Pose, Progress, Task, TaskId, Terms
+from mav_tasks.tasks.task import Pose, Progress, Task, TaskId, Terms
 from tests.unit.tasks.samples import draft
 
 PEERS = [("127.0.0.1", 14550), ("::1", 14550, 0, 0), "/dev/ttyUSB0", "rover1", 7]
@@ -176,7 +176,6 @@ def test_what_was_restored_comes_back_as_it_was() -> None:
         paused={2: TaskReason.STOPPED, 1: TaskReason.RESTARTED},
         uids={1: "x"},
         speeds={2: 0.3, 1: 1},
-        homes={2: VehicleHomeSet(2, 5, 6, Frame(None, 1, -0.0, None), "a", 3.0)},
         halt_epochs={2: 7, 1: 1},
         halted={2: (TaskReason.OPERATOR, -0.0), 1: (TaskReason.STOPPED, 0.1)},
         plans={(2, 0): (7, "[]"), (1, 1): (3, "ä")},

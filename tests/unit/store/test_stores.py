@@ -14,7 +14,6 @@ from mav_tasks.tasks.events import (
     QueuePaused,
     ServerStopped,
     TaskModified,
-    VehicleHomeSet,
     VehicleIdentified,
     VehicleSeen,
     VehicleSpeedSet,
@@ -24,7 +23,7 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
-from mav_tasks.tasks.task import MAX_TASK_ID, Frame, Pose, Progress, TaskId, Terms
+from mav_tasks.tasks.task import MAX_TASK_ID, Pose, Progress, TaskId, Terms
 from tests.kit.databases import disk_error, locked, tables
 from tests.unit.store.samples import (
     OFFSET,
@@ -143,8 +142,6 @@ def test_what_is_known_of_vehicles_comes_back(place: str) -> None:
         ParameterSet("TSK_SPEED", 0.8, "client", 5.0),
         ParameterSet("TSK_QUOTA", 20.0, "client", 5.0),
         ParameterSet("TSK_QUOTA", None, "client", 6.0),
-        VehicleHomeSet(1, 1, 2, Frame(1, 2, 0.5, 1.5), "server", 7.0),
-        VehicleHomeSet(1, 3, 4, Frame(1, 2, 0.5, 1.5), "client", 8.0),
     ]
     with opened(place) as store:
         for event in events:
@@ -154,7 +151,6 @@ def test_what_is_known_of_vehicles_comes_back(place: str) -> None:
         assert (found.paused, found.uids, found.speeds) == ({1: R.STOPPED}, {1: "uid-1"}, {1: 0.75})
         assert found.plans == {(1, 0): (17, "items")}
         assert found.parameters == {"TSK_SPEED": 0.8}
-        assert found.homes == {1: events[-1]}
 
 
 def test_times_are_those_of_the_process_that_loads(place: str) -> None:
