@@ -87,6 +87,8 @@ def deliver(
     is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
     if is_accepted and _disarms(answered.request):
         vehicle.parts.armings.was_answered()
+    if answered.command == MavCmd.COMPONENT_ARM_DISARM and answered.ack and not is_accepted:
+        vehicle.parts.armings.client_was_refused()
     if is_accepted and answered.command == MavCmd.DO_SET_HOME:
         actor = f"{asker.source.system_id}/{asker.source.component_id}"
         vehicle.home_was_set(answered.request, actor=actor, now=now)
