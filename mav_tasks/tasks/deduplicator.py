@@ -8,7 +8,6 @@ from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from math import hypot
-from typing import NamedTuple
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.frames import to_local
@@ -42,7 +41,8 @@ class Rule(Enum):
     SAME_PAYLOAD = auto()
 
 
-class Known(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Known:
     """The task that a submission repeats, and the rule that found it.
 
     ``is_news``: by a rule that may be mistaken, and for the first time: the client is told.
@@ -50,7 +50,7 @@ class Known(NamedTuple):
 
     task_id: TaskId
     rule: Rule
-    is_news: bool = False
+    is_news: bool = field(default=False, compare=False)
 
 
 @dataclass(slots=True)
