@@ -116,7 +116,7 @@ class Engine:
         plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
         self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
         displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
-        refusals = Refusals(registry)
+        refusals = Refusals(registry, vehicles)
         modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
         control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
         assignments = self._assignments = Assignments(

@@ -175,6 +175,8 @@ class Reception:
         ):
             return
         else:
+            if isinstance(message, m.Heartbeat) and packet.system_id in self.vehicles.by_id:
+                return  # of a rover's component: back by another link, it would be on its side
             if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
                 self.operator.receive(message, now=now)
             elif isinstance(message, ParamMessage):

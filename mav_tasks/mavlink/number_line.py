@@ -66,6 +66,16 @@ class NumberLine:
                 return self._passed[each & 0xFF]
         return 0.0
 
+    def has_all(self, seq: int, *, since: float) -> bool:
+        """Whether each packet before this one came, back to one that came before ``since``, s."""
+        number = self.number_of(seq)
+        for each in range(number - 1, max(self._first, self.last - 256), -1):
+            if self._came[each & 0xFF] != each:
+                return False
+            if self._passed[each & 0xFF] < since:
+                return True
+        return False
+
     def jumped_to(self, number: int) -> bool:
         """Whether a packet seemed to be so far ahead that it may as well be far behind."""
         came = self._came[number & 0xFF] == number

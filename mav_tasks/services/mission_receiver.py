@@ -234,6 +234,13 @@ class MissionReceiver:
             self._session = None
             self._note_in_vain(session, now=now)
 
+    def end_gone(self, is_there: Callable[[Sender], object], *, now: float) -> None:
+        """Give up an upload that is not whole if its client is gone: it keeps nobody out."""
+        session = self._session
+        if session is not None and not session.is_whole and not is_there(session.sender):
+            self._session = None
+            self._note_in_vain(session, now=now)
+
     def finish(self, result: MavMissionResult, *, opaque_id: int, now: float) -> None:
         """A whole plan has been decided about: tell the client."""
         session = self._session

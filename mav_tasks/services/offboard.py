@@ -508,9 +508,10 @@ class OffboardControl:
             return
         self._send_setpoint(STANDING)
 
-    def zero_setpoint(self) -> SetPositionTargetLocalNed:
-        """Return the setpoint that asks the vehicle to stand."""
-        return self._orders.velocity(self._standing)
+    def zero_setpoint(self, *, armed: bool = False) -> SetPositionTargetLocalNed:
+        """Return the setpoint that asks the vehicle to stand; ``armed``: it may be so by then."""
+        armed = armed or self._news.armed
+        return self._orders.velocity(to_stand(self._persona, self.posture, armed=armed))
 
     @property
     def holds_first(self) -> bool:

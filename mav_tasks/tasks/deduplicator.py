@@ -8,7 +8,6 @@ from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from math import hypot
-from typing import NamedTuple
 
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.frames import to_local
@@ -42,11 +41,16 @@ class Rule(Enum):
     SAME_PAYLOAD = auto()
 
 
-class Known(NamedTuple):
-    """The task that a submission repeats, and the rule that found it."""
+@dataclass(frozen=True, slots=True)
+class Known:
+    """The task that a submission repeats, and the rule that found it.
+
+    ``is_news``: by a rule that may be mistaken, and for the first time: the client is told.
+    """
 
     task_id: TaskId
     rule: Rule
+    is_news: bool = field(default=False, compare=False)
 
 
 @dataclass(slots=True)
@@ -56,6 +60,12 @@ class _Last:
     task_id: TaskId
     draft: Draft
     at: float  # of the last copy
+    is_told: bool = False
+
+    def repeated(self, rule: Rule) -> Known:
+        """Return what a repeat of it is, and note that its client is told."""
+        is_news, self.is_told = not self.is_told, True
+        return Known(self.task_id, rule, is_news)
 
 
 @dataclass(slots=True)
@@ -111,16 +121,17 @@ class SubmissionDeduplicator:
                 return Known(last.task_id, Rule.CONFIRMED)
             if now - last.at <= SAME_PAYLOAD:
                 last.at = now
-                return Known(last.task_id, Rule.SAME_PAYLOAD)
+                return last.repeated(Rule.SAME_PAYLOAD)
         goal = client.goals.get(draft.vehicle)
         if (
             goal is not None
             and now - goal.at <= SAME_GOAL
             and _same_place(goal.draft, draft, origin)
         ):
-            copy = _Last(goal.task_id, draft, now)  # copies of this command may follow
+            # copies of this command may follow
+            copy = _Last(goal.task_id, draft, now, is_told=True)
             client.of_command[draft.vehicle, draft.command] = copy
-            return Known(goal.task_id, Rule.SAME_GOAL)
+            return goal.repeated(Rule.SAME_GOAL)
         return None
 
     def remember(self, task: Task, *, at: float, now: float) -> None:

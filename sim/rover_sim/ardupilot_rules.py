@@ -67,9 +67,9 @@ class ArduPilotRules:
         """Return the text for a mode number that does not exist."""
         return f"No such mode {custom_mode}"
 
-    def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
+    def mode_refusal(self, wanted: Mode, present: Mode, *, armed: bool, now: float) -> str | None:
         """Return a refusal if INITIALISING would be entered or left, else None."""
-        del now
+        del armed, now
         return "Flight mode change failed" if Mode.INITIALISING in (wanted, present) else None
 
     def arming_refusal(self, mode: Mode, *, forced: bool, now: float) -> str | None:

@@ -107,7 +107,7 @@ class FlightControl:
         """Change the mode for a client; return False if refused."""
         refusal = None
         if self.mode is not Mode.INITIALISING or not self._boot.takes_modes(now=now):
-            refusal = self._rules.mode_refusal(mode, self.mode, now=now)
+            refusal = self._rules.mode_refusal(mode, self.mode, armed=self.armed, now=now)
         if self.faults.refuse_mode:
             refusal = "Flight mode change failed"
         if refusal is not None:

@@ -76,7 +76,7 @@ class FlightRules(Protocol):
         """Return the text for a mode number that does not exist."""
         ...
 
-    def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
+    def mode_refusal(self, wanted: Mode, present: Mode, *, armed: bool, now: float) -> str | None:
         """Return the text that refuses a client's mode change; None allows it."""
         ...
 

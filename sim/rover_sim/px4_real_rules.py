@@ -10,6 +10,7 @@ Recorded and tried on 1.17.0. It differs from PX4's guide, in ways that matter t
   rover drives home.
 - HOLD keeps the place where it began: a rover that rolled beyond NAV_ACC_RAD drives back to it.
 - After a return it counts as landed, and disarms itself.
+- While disarmed it accepts any mode; it is not armed in one that cannot run.
 """
 
 from rover_sim.estimate import Estimate
@@ -40,6 +41,11 @@ class RealPx4Rules(Px4Rules):
         self._guidance = Px4Guidance(parts.frame, parts.parameters)
         self._landing = Landing(parts.outbox)
         self._held_at: Destination | None = None  # where HOLD began; None: set at the next step
+
+    def mode_refusal(self, wanted: Mode, present: Mode, *, armed: bool, now: float) -> str | None:
+        """Return a refusal for a mode that cannot run now, if it is armed."""
+        refusal = super().mode_refusal(wanted, present, armed=armed, now=now)
+        return refusal if armed else None
 
     def enter(self, mode: Mode) -> None:
         """Begin a mode; HOLD keeps the rover's place at its first step."""

@@ -97,9 +97,9 @@ class Px4Rules:
         """Return the text for a mode number that does not exist."""
         return f"Unsupported mode {custom_mode:#010x}"
 
-    def mode_refusal(self, wanted: Mode, present: Mode, *, now: float) -> str | None:
+    def mode_refusal(self, wanted: Mode, present: Mode, *, armed: bool, now: float) -> str | None:
         """Return a refusal for a mode that cannot run now, else None."""
-        del present
+        del present, armed
         if self._can_run(wanted, now):
             return None
         return f"Switching to {NAMES[wanted]} is currently not available"

@@ -432,7 +432,8 @@ class Observer:
             self._zero_in_mode = True
             if self._stop_due is not None:
                 self._stop_due[1].discard("zero")
-        self._in_row = self._in_row + 1 if now - self._setpoint_at <= GAP else 1
+        # before it is armed, zeros stand in for the setpoints of a client that may drive it
+        self._in_row = self._in_row * self.armed + 1 if now - self._setpoint_at <= GAP else 1
         self._setpoint_at = now
         self._brakes = not moves and (self._moved_last or self._brakes)
         self._moved_last = moves

@@ -5,6 +5,8 @@ from math import hypot, inf, nan
 import pytest
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.inputs import PeerChanged
+from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -272,13 +274,36 @@ def test_another_item_is_gone_on_with(world: World, how: str) -> None:
     assert reached(world.client) == [3]
 
 
-def test_an_item_that_is_not_there_is_answered_all_the_same(world: World) -> None:
+def test_an_item_that_is_not_there_is_not_answered_as_by_an_ardupilot(world: World) -> None:
+    """MAVSDK gives up after 2.5 s without MISSION_CURRENT; others go on to get it."""
+    other = world.add_client("other")
     uploaded(world)
-    before = len(currents(world.client))
+    world.run(1.5)
+    before, others = len(currents(world.client)), len(currents(other))
     world.client.send(set_current(77))
-    world.run(0.05)
-    assert currents(world.client)[before].seq == 77
-    assert any("item 77" in text for text in world.client.texts())
+    world.run(2.8)
+    assert len(currents(world.client)) == before
+    assert len(currents(other)) > others
+    assert [text for text in world.client.texts() if "item 77" in text]
+    world.run(2)
+    assert {each.seq for each in currents(world.client)[before:]} == {0}
+
+
+def test_without_a_mission_no_item_is_chosen(world: World) -> None:
+    world.client.send(set_current(1))
+    world.run(0.1)
+    assert "no plan is uploaded" in world.client.texts()
+
+
+def test_an_upload_ends_with_the_connection_of_its_client(world: World) -> None:
+    world.client.send(common.MAVLink_mission_count_message(1, 1, 4, 0))
+    world.run(0.1)
+    other = world.add_client("other")
+    end = PeerChanged(CLIENT_LINK, world.client.name, up=False)
+    world.server.engine.handle(end, now=world.now)
+    upload = Upload(other, PLAN)
+    world.run(0.2)
+    assert upload.result == 0
 
 
 def test_clearing_takes_away_what_waits_and_not_what_is_driven(world: World) -> None:

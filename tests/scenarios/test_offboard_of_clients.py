@@ -1,5 +1,6 @@
 """A client's own OFFBOARD on a PX4 rover, which is entered only while setpoints stream."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -8,6 +9,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
+from rover_sim.realism import EXACT, Drive
 from tests.kit.client import ACCEPTED, setpoint
 from tests.kit.px4 import HOLD, OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
 from tests.kit.world import World
@@ -66,6 +68,39 @@ def test_works_also_before_it_was_heard_that_the_rover_is_armed(
     assert sent.answer is not None
     assert sent.answer[0] == ACCEPTED
     assert world.truth.forward_speed > 0.4
+
+
+@pytest.mark.parametrize("drive", [Drive.EXACT, Drive.REAL])
+@pytest.mark.parametrize("again", [False, True], ids=["once", "each again"])
+def test_the_recipe_of_stream_mode_and_arming_drives(
+    make_world: MakeWorld, drive: Drive, *, again: bool
+) -> None:
+    """PX4's example: until it is armed, zeros stand in for the setpoints; its client is told."""
+    world = make_world(persona=PX4, realism=replace(EXACT, drive=drive))
+    world.client.reads_dialect = False
+    world.until(lambda: world.client.heard("LOCAL_POSITION_NED"), within=10)
+    world.client.stream(northwards(1.0), rate=20)
+    world.run(2)
+    begun = world.now
+    ask_mode(world.client, OFFBOARD)
+    world.run(5)
+    assert world.stands()
+    streamed = [e for e in world.observer.sent_since(begun) if e in ("zero", "move")]
+    assert len(streamed) > 90
+    assert set(streamed) == {"zero"}
+    for _ in range(1 + again):
+        if again:
+            ask_mode(world.client, OFFBOARD)
+        armed = world.client.arm()
+        world.run(0.5)
+    assert armed.answer is not None
+    assert armed.answer[0] == ACCEPTED
+    world.until(lambda: world.truth.forward_speed > 0.5, within=5)
+    assert world.rover.autopilot.mode is Mode.GUIDED
+    assert [t for t in world.client.texts() if "setpoints dropped" in t] == [
+        "setpoints dropped: set Offboard first",
+        "setpoints dropped: the rover is not armed",
+    ]
 
 
 def test_is_refused_by_the_rover_without_a_stream(world: World) -> None:

@@ -61,7 +61,7 @@ def test_what_has_no_acknowledgement_has_its_line_too(world: World) -> None:
     world.run(0.1)
     first, second = refusals(world)
     assert f"message {SET_CURRENT} by" in first
-    assert "item 7" in first
+    assert "no plan is uploaded" in first
     assert f"message {SET_MODE} by" in second
     assert "STOP" in second
 
@@ -82,7 +82,7 @@ def test_a_stream_that_does_not_pass_has_one_line_in_half_a_minute(world: World)
     world.run(20)
     assert len(refusals(world)) == 1
     assert f"message {SETPOINT} by 255/190" in refusals(world)[0]
-    assert "not armed" in refusals(world)[0]
+    assert "setpoints dropped: set GUIDED first" in refusals(world)[0]
     world.run(12)
     assert len(refusals(world)) == 2
 

@@ -391,7 +391,7 @@ def test_who_may_submit_no_more_calls_off_nothing_by_command_cancel(make_world: 
     assert world.state(running)[0] is S.EXECUTING
 
 
-@pytest.mark.parametrize("who", [(250, 191), (1, 1), (1, 191)])
+@pytest.mark.parametrize("who", [(250, 191), (1, 1)])
 def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
     make_world: MakeWorld, who: tuple[int, int]
 ) -> None:

@@ -88,6 +88,14 @@ def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, tas
     assert told == ["repeated command, no new task: see task 1, queued"] * (2 - task_id)
 
 
+def test_a_client_that_goes_on_repeating_is_told_once(paused: World) -> None:
+    """DroneKit sends its "go to" ten times a second."""
+    paused.client.stream(command_long(MOVE, 1.0), rate=10)
+    paused.run(12)
+    assert len(paused.tasks()) == 1
+    assert len([text for text in paused.client.texts() if "repeated" in text]) == 1
+
+
 def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:
     ids = []
     for distance in (1.0, 2.0, 1.0):

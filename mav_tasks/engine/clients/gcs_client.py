@@ -97,6 +97,8 @@ class GcsClient:
         #: vehicles whose autopilot's heartbeat it was sent
         self.introduced: set[int] = set()
         self._informed: set[int] = set()  # vehicles whose summary it was sent since it came
+        #: until when it gets no MISSION_CURRENT, s: it was refused an item
+        self.gives_up_at = -inf
         self.listed_at: dict[int, float] = {}  # by system id, when it was last sent all parameters
         self._submitters: dict[
             tuple[Address, str], Submitter

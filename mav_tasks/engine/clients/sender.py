@@ -19,6 +19,7 @@ class _Said(NamedTuple):
     epoch: int  # halt epoch of the vehicle when the first copy came
     at: float  # s, of the last copy
     packets: frozenset[bytes]  # the latest copies
+    copies: int  # confirmation of the last one
 
 
 class Memory:
@@ -71,6 +72,17 @@ class Sender:
         within = DOUBLED if is_counted or packet.raw in said.packets else COPIED
         return said.epoch if now - said.at <= within else None
 
+    def counts_on(self, content: Hashable, packet: Packet, copies: int, *, since: float) -> bool:
+        """Return whether a command's ``confirmation``, ``copies``, makes it a copy of another.
+
+        It has counted on since the last copy that came. Without one the first may be lost, unless
+        each of the sender's packets came ``since`` then: mavros always says 1.
+        """
+        said = self._said.get((self, content))
+        if said is not None and said.life == self.line.lives:
+            return copies > said.copies
+        return copies > 0 and not self.line.has_all(packet.seq, since=since)
+
     def has_said(self, content: Hashable, packet: Packet) -> bool:
         """Return whether this very packet came before, since the sender last restarted."""
         said = self._said.get((self, content))
@@ -81,10 +93,14 @@ class Sender:
         said = self._said.get((self, content))
         return -inf if said is None or said.life != self.line.lives else said.at
 
-    def says(self, content: Hashable, packet: Packet, *, epoch: int, now: float) -> None:
-        """Remember a command, or one more copy of it."""
+    def says(
+        self, content: Hashable, packet: Packet, copies: int, *, epoch: int, now: float
+    ) -> None:
+        """Remember a command, or one more copy of it; ``copies`` is its confirmation."""
         before = self._said.pop((self, content), None)
         packets = frozenset() if before is None or len(before.packets) >= COPIES else before.packets
-        self._said[self, content] = _Said(self.line.lives, epoch, now, packets | {packet.raw})
+        self._said[self, content] = _Said(
+            self.line.lives, epoch, now, packets | {packet.raw}, copies
+        )
         if len(self._said) > REMEMBERED:
             self._said.popitem(last=False)

@@ -6,7 +6,7 @@ A packet goes to the link on which its target was seen.
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import SAFETY, SUBMITTER
-from mav_tasks.engine.commands.motion_gate import may_pass, passed, why_not_sent
+from mav_tasks.engine.commands.motion_gate import UNARMED, may_pass, passed, why_not_sent
 from mav_tasks.engine.inputs import Peer
 from mav_tasks.engine.policy import Kind, Row, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -78,7 +78,10 @@ class Forwarder:
                 vehicle.parts.authority.note_withheld(client.key, now=now)
             for vehicle in refusing if message is not None else ():
                 words = why_not_sent(row, vehicle, client.key)
+                if row.needs_grant and words == UNARMED:
+                    vehicle.pilot.stand_in(now=now)
                 words = words or "a number is not finite, or the server delayed it"
+                words = f"setpoints dropped: {words}" if row.needs_grant else words
                 why_not = Rejection(R.NOT_ALLOWED, words)
                 self._refusals.stream(client, vehicle.system_id, packet, why_not, now=now)
 

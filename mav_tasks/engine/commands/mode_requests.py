@@ -131,7 +131,13 @@ class ModeRequests:
         self._registry.record(started.asked.refuse(refusal, now=now))
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
-        """Start the mission of a vehicle that was to be armed first and is armed now."""
+        """Start the mission of a vehicle that was to be armed first and is armed now.
+
+        If a client armed it in a manual mode and started the mission meanwhile, leave that mode.
+        """
+        armings = vehicle.parts.armings
+        if self._plans.is_starting(vehicle, now=now) and armings.are_by_client(now=now):
+            vehicle.joint.leave_manual(now=now)
         mark = vehicle.start_mark
         if mark.marker is None or not mark.is_put(now=now) or not vehicle.parts.is_armed(now=now):
             return
@@ -142,7 +148,7 @@ class ModeRequests:
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
         if marker is None or marker.plan_id != plan_id:
             return
-        if vehicle.parts.is_manual and not vehicle.parts.armings.are_by_client(now=now):
+        if vehicle.parts.is_manual and not armings.are_by_client(now=now):
             return  # armed by a person who means to drive
         try:
             self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)

@@ -21,6 +21,8 @@ NO_PLACE = 7  # type_mask that ignores x, y and z
 STICKS_CENTRED = 50  # of ±1000 (MANUAL_CONTROL) or µs around 1500 (RC override)
 RC_CENTRE = 1500
 RC_IGNORED = (0, 65535)
+#: the one reason why the setpoints of a client do not pass that may drive
+UNARMED = "the rover is not armed"
 
 
 def why_not_moved(parts: Parts, client: Hashable, *, takes_over: bool = False) -> str:
@@ -33,11 +35,9 @@ def why_not_moved(parts: Parts, client: Hashable, *, takes_over: bool = False) -
         return why_not
     if parts.tasks.is_driving:  # also one that is paused
         return "not during a task"
-    if not parts.monitor.armed:
-        return "the rover is not armed"
     if not takes_over and not parts.authority.has_granted(client):
         return f"set {parts.persona.mode_name(parts.persona.control_mode)} first"
-    return ""
+    return "" if parts.monitor.armed else UNARMED
 
 
 def why_no_motion(parts: Parts, *, takes_over: bool = False) -> str:

@@ -51,24 +51,26 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     named = _epoch_in(asked.command)
     content = (asked.command.target, asked.command.command, repr(asked.command.params))
     copies = asked.command.confirmation
+    window = min(copies * COPIED, DOUBLED)
+    is_counted = sender.counts_on(content, packet, copies, since=asked.arrived - window)
     first = sender.first_epoch(
         content,
         packet,
-        is_counted=copies > 0,
+        is_counted=is_counted,
         is_anothers=halts.by is not sender,
         now=now,
     )
     elsewhere = asked.vehicle.go_words.first_epoch(packet.raw, sender, now=now)
     if elsewhere is not None:
         first = elsewhere if first is None else min(first, elsewhere)
-    if first is None and copies:  # the first copy was lost; it was sent before this one
-        sent_after = min(sent_after, asked.arrived - min(copies * COPIED, DOUBLED))
+    if first is None and is_counted:  # the first copy was lost; it was sent before this one
+        sent_after = min(sent_after, asked.arrived - window)
     # The sender of the last halt sent this after it. It is no repeat of an older command if that
     # halt was undone since, if the halt has the same command number (no stock client has two of one
     # number under way), or if no copy came for REPEATED s.
     follows = halts.by is sender and number > halts.number
     is_over = halts.is_undone or halts.command == asked.command.command
-    is_repeated = copies > 0 or sender.has_said(content, packet)
+    is_repeated = is_counted or sender.has_said(content, packet)
     if follows and not is_repeated and (is_over or now - sender.last_copy_at(content) > REPEATED):
         epoch = halts.epoch
     else:
@@ -81,7 +83,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
         epoch = halts.epoch if named == halts.epoch % EPOCHS else halts.epoch - 1
     if is_old or (sender.line.jumped_to(number) and not named):
         epoch = min(epoch, halts.epoch - 1)
-    sender.says(content, packet, epoch=epoch, now=now)
+    sender.says(content, packet, copies, epoch=epoch, now=now)
     asked.vehicle.go_words.says(packet.raw, sender, epoch=epoch, now=now)
     if epoch == halts.epoch:
         return ""

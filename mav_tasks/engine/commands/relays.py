@@ -87,6 +87,8 @@ def deliver(
     is_accepted = answered.ack is not None and answered.ack.result == MavResult.ACCEPTED
     if is_accepted and _disarms(answered.request):
         vehicle.parts.armings.was_answered()
+    if answered.command == MavCmd.COMPONENT_ARM_DISARM and answered.ack and not is_accepted:
+        vehicle.parts.armings.client_was_refused()
     client = gcs.client(asker.client)
     if client is None:
         return

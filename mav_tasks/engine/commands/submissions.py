@@ -357,7 +357,7 @@ class Submissions:
         task = self._registry.get(known.task_id)
         # one click in QGroundControl sends a command and an item: not a repeat to be told
         is_other_message = task is not None and task.command != asked.command.command
-        if known.rule in (Rule.SAME_PAYLOAD, Rule.SAME_GOAL) and not is_other_message:
+        if known.is_news and not is_other_message:
             what = "command" if known.rule is Rule.SAME_PAYLOAD else "goal"
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"repeated {what}, no new task: see task {known.task_id}{state}"

@@ -148,6 +148,7 @@ class AnyUploads:
             self._answers.ack(sender, kind, result_of(refusal), refusal.reason)
             self._tell_refused(sender, refusal, now=now)
             return
+        self._receiver.end_gone(self._answers.client, now=now)
         self._receiver.count(message, sender, rank=client.rights.rank, now=now)
 
     def _ask_again(self, *, now: float) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.plan_items import result_of
-from mav_tasks.engine.missions.plans import MISSION, NOTHING, STORED, Plans, Stored
+from mav_tasks.engine.missions.plans import AT_REST, MISSION, NOTHING, STORED, Plans, Stored
 from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -20,9 +20,6 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Task, TaskId
 
 R = TaskReason
-
-#: active, but not being driven: a stock autopilot, too, clears a mission in HOLD
-AT_REST = frozenset({TaskState.PAUSED, TaskState.HELD})
 
 
 class _Cleared(NamedTuple):
@@ -112,9 +109,6 @@ class MissionClearing:
     def _accept(self, cleared: _Cleared, *, now: float) -> None:
         vehicle, task, actor = cleared.vehicle, cleared.task, str(cleared.sender.address)
         self._vehicles.mark_dirty(vehicle)
-        current = None if task is None else self._registry.get(task.id)
-        if current is not None and current.state in AT_REST:  # nobody could resume it
-            vehicle.joint.cancel(current, kill=False, actor=actor, now=now)
         self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
         self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ACCEPTED)
 

@@ -109,14 +109,14 @@ class MissionReports:
                         changed.add(event.vehicle)
         for system_id in changed:
             if vehicle := self._vehicles.get(system_id):
-                self._tell(vehicle, self._plans.current(vehicle))
+                self._tell(vehicle, self._plans.current(vehicle), now=now)
 
     def _report(self, *, now: float) -> None:
         self._next_at = now + INTERVAL
         self._timer.set(self._next_at)
         for vehicle in self._vehicles.all:
             if vehicle.is_heard(now=now):
-                self._tell(vehicle, self._plans.current(vehicle))
+                self._tell(vehicle, self._plans.current(vehicle), now=now)
                 if vehicle.system_id in self._last:
                     self._tell_end_again(vehicle, self._last[vehicle.system_id])
 
@@ -150,8 +150,11 @@ class MissionReports:
                 words = f"refused command {command} of the plan (result {ack.result})"
             self._registry.record(VehicleNoted(vehicle.system_id, words, now))
 
-    def _tell(self, vehicle: Vehicle, message: m.Message) -> None:
+    def _tell(self, vehicle: Vehicle, message: m.Message, *, now: float = inf) -> None:
+        """Send a report to all clients but those that are to give up waiting for it ``now``."""
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs.clients:
+            if now < client.gives_up_at:
+                continue
             if client.is_heard and vehicle.system_id in client.introduced:
                 client.outlet.send(message, source)

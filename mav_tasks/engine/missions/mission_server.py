@@ -48,6 +48,9 @@ MissionMessage = (
 )
 
 
+GIVES_UP = 3.0  # s without MISSION_CURRENT, after which MAVSDK has taken a refusal in
+
+
 class _Desk:
     """The uploads to and downloads from one address, of one plan type."""
 
@@ -114,6 +117,7 @@ class MissionServers:
                 unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
                 self._uploads.refused(sender, vehicle, unknown, now=now)
             case m.MissionCount():
+                desk.uploads.receiver.end_gone(self._answers.client, now=now)
                 desk.uploads.receiver.count(message, sender, rank=client.rights.rank, now=now)
             case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
                 self._vehicles.mark_dirty(vehicle)  # never a plan item, even during an upload
@@ -219,7 +223,11 @@ class MissionServers:
     def _set_current(
         self, vehicle: Vehicle, client: GcsClient, sender: Sender, seq: int, *, now: float
     ) -> None:
-        """Handle MISSION_SET_CURRENT. MAVSDK waits for an answer with this number for ever."""
+        """Handle MISSION_SET_CURRENT. An ArduPilot (4.6.3) does not answer one that it refuses.
+
+        MAVSDK asks again at each MISSION_CURRENT with another number, for ever; after 2.5 s without
+        any it gives up, so its client gets none for a while.
+        """
         try:
             self._plans.check_start(client.rights, vehicle, client.submitter(sender.address))
             if self._plans.go_on_with(vehicle, seq, now=now) is None:
@@ -228,6 +236,8 @@ class MissionServers:
         except Rejection as refusal:
             message_id = m.MissionSetCurrent.id
             self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+            client.gives_up_at = now + GIVES_UP
+            return
         client.outlet.send(
             self._plans.current(vehicle, seq=seq), Address(vehicle.system_id, AUTOPILOT)
         )

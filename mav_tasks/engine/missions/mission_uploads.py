@@ -18,7 +18,7 @@ from mav_tasks.engine.missions.fence_items import fence_for_vehicle, fence_of
 from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.plan_items import ParsedMission, result_of, skipped
-from mav_tasks.engine.missions.plans import MISSION, Plans, Stored
+from mav_tasks.engine.missions.plans import MISSION, Plans, Stored, is_of_autopilot
 from mav_tasks.engine.missions.write_through import write_through
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -36,7 +36,7 @@ from mav_tasks.services.mission_receiver import (
 from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Draft, Marks, Submitter, Task, TaskId
+from mav_tasks.tasks.task import Draft, Marks, Submitter, Task
 
 R = TaskReason
 
@@ -206,16 +206,19 @@ class MissionUploads:
         self._submissions.gate.hold(_Mission(desk, vehicle, sender, task, before), now=now)
 
     def _accept(self, mission: _Mission, *, now: float) -> None:
-        desk, vehicle, sender, task, before = mission
+        desk, vehicle, sender, task, _ = mission
         self._vehicles.get(vehicle.system_id)  # marks it dirty: a task may start
         desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
         self.flush(desk, vehicle, now=now)
-        replaced = self._registry.get(TaskId(before.plan_id))
-        if task.terms.is_staged and replaced is not None:
-            self._plans.end(vehicle, replaced, R.REPLACED, actor=str(sender.address), now=now)
+        what = "queued"
         if task.terms.is_staged:
+            actor = str(sender.address)
+            self._plans.end_replaced(vehicle, is_started=False, actor=actor, now=now)
             self._plans.begin_at(vehicle, 0)
-        what = "ready to start" if task.terms.is_staged else "queued"
+            what = "ready to start"
+            active = vehicle.tasks.active
+            if active is not None and is_of_autopilot(active) and not vehicle.tasks.paused:
+                what += f", task {active.id} goes on until then"
         words = f"Task {task.id} {what}: {describe(task.goal)}{skipped(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 

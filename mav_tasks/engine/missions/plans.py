@@ -37,6 +37,7 @@ R, S = TaskReason, TaskState
 MISSION = MavMissionType.MISSION
 STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
 NOT_STARTED = 2  # MISSION_STATE
+STARTS_WITHIN = 10.0  # s in which an arming under way, and its effect, may show
 STARTED_TWICE = 2.5  # s in which a second start counts as the first: MAVSDK sends two
 
 
@@ -49,6 +50,8 @@ class Stored:
 
 
 NOTHING = Stored(0, ())
+#: active, but not being driven: a stock autopilot, too, clears a mission in HOLD
+AT_REST = frozenset({S.PAUSED, S.HELD})
 CALLED_OFF = TERMINAL - {S.COMPLETED}
 
 
@@ -117,21 +120,26 @@ class Plans:
         elif kind == MavMissionType.RALLY:
             bounds.rally = rally_of(items)
 
-    def end(
-        self, vehicle: Vehicle, task: Task, reason: TaskReason, *, actor: str, now: float
-    ) -> None:
-        """Cancel a mission that has not started."""
-        if task.state not in WAITING:
-            return
-        vehicle.tasks.cancel(task, kill=False, reason=reason, actor=actor, now=now)
+    def end_replaced(self, vehicle: Vehicle, *, is_started: bool, actor: str, now: float) -> None:
+        """End the missions that the staged one has replaced, as on an autopilot.
+
+        ``is_started``: the staged one is started; else it was uploaded. Then one that drives, or
+        goes on by itself, drives on until that start, and nothing else may begin in its place.
+        """
+        last = self.stored(vehicle.system_id, MISSION).plan_id
+        for task in vehicle.tasks.unfinished:
+            is_at_rest = task.state is S.PAUSED and bool(vehicle.tasks.paused)
+            ends = is_started or is_at_rest or task.state in WAITING
+            if ends and is_of_autopilot(task) and task.id != last:
+                vehicle.joint.cancel(task, kill=False, reason=R.REPLACED, actor=actor, now=now)
 
     def let_go(
         self, vehicle: Vehicle, task: Task | None, reason: TaskReason, *, actor: str, now: float
     ) -> None:
-        """Drop a removed mission: cancel it if it has not started."""
+        """Drop a removed mission: cancel it unless it drives; nobody could resume it."""
         current = None if task is None else self._registry.get(task.id)
-        if current is not None:
-            self.end(vehicle, current, reason, actor=actor, now=now)
+        if current is not None and current.state in WAITING | AT_REST:
+            vehicle.joint.cancel(current, kill=False, reason=reason, actor=actor, now=now)
         self._first.pop(vehicle.system_id, None)
 
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
@@ -206,6 +214,8 @@ class Plans:
             if vehicle.tasks.paused:
                 vehicle.joint.go_on(actor=actor, now=now)
             return
+        if is_of_autopilot(task):
+            self.end_replaced(vehicle, is_started=True, actor=actor, now=now)
         if task.terms.is_staged:
             vehicle.tasks.modify(task, replace(task.terms, is_staged=False), actor=actor, now=now)
         if vehicle.tasks.paused:
@@ -226,6 +236,13 @@ class Plans:
         self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
         self._set_going(vehicle, task, actor=str(task.submitter), now=now)
         self._started[vehicle.system_id] = _Started(task.submitter, task.id, now)
+
+    def is_starting(self, vehicle: Vehicle, *, now: float) -> bool:
+        """Return whether a client has just started a mission that does not drive yet."""
+        started = self._started.get(vehicle.system_id)
+        if started is None or now - started.at > STARTS_WITHIN or vehicle.tasks.paused:
+            return False
+        return started.task_id in vehicle.tasks.waiting
 
     def _is_started_again(
         self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
@@ -258,6 +275,8 @@ class Plans:
         count = len(self.stored(vehicle.system_id, MISSION).items)
         if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
             count = len(task.goal.steps)
+        if not count:
+            raise Rejection(R.NOT_FOUND, "no plan is uploaded")
         if seq >= count:
             has_home = self._has_home(vehicle)
             number, last = (number_of(n, has_home=has_home) for n in (seq, count - 1))
@@ -305,6 +324,11 @@ class Plans:
             self.stored(system_id, MavMissionType.FENCE).plan_id,
             self.stored(system_id, MavMissionType.RALLY).plan_id,
         )
+
+
+def is_of_autopilot(task: Task) -> bool:
+    """Return whether a task is a mission of the autopilot's address, which has one at a time."""
+    return isinstance(task.goal, Plan) and task.terms.is_cruising
 
 
 def _mission_state(task: Task | None, *, has_plan: bool) -> int:

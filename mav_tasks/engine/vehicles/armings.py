@@ -11,7 +11,7 @@ LATE = 3.5  # s after a request, in which packets sent before it may still reach
 SHOWN_LATE = LATE + 1.5
 RESENT = 1.0  # s in which an unanswered arming is sent again
 UNSHOWN = 0.3  # s after a disarming, in which a heartbeat may still be from before it
-BY_CLIENT = 2.0  # s in which an arming or mode counts as the result of a client's request
+BY_CLIENT = 2.0  # s in which a mode counts as the result of a client's request
 
 
 class Armings:
@@ -23,6 +23,7 @@ class Armings:
         self._may_show_until = -inf  # s, that such a request shows as armed
         self._was_disarmed = False  # at that time, or since
         self._is_to_be_disarmed = False  # a client asked for it, and it shows armed still
+        self._is_armed = self._is_clients = False  # as shown; by a client through us
 
     def __repr__(self) -> str:
         return f"Armings(outdated at {self._outdated_at})"
@@ -32,9 +33,15 @@ class Armings:
         self._client_at = now
         self.forget_halts()
 
+    def client_was_refused(self) -> None:
+        """Note that the vehicle has refused it: if it shows armed now, somebody else did it."""
+        self._client_at = -inf
+
     def are_by_client(self, *, now: float) -> bool:
-        """Return whether a client, through us, has armed the vehicle just now."""
-        return self._client_at > self._outdated_at and now - self._client_at <= BY_CLIENT
+        """Return whether a client, through us, has armed the vehicle, or has just asked for it."""
+        is_soon = now - self._client_at <= SHOWN_LATE
+        may_be = is_soon and self._client_at > self._outdated_at
+        return self._is_clients if self._is_armed else may_be
 
     def outdate(self, *, ours: float, armed: bool, now: float) -> None:
         """Outdate earlier requests to arm, because the vehicle is to be disarmed or stopped.
@@ -57,8 +64,10 @@ class Armings:
         """Note a client's disarming: until the vehicle shows it, the vehicle counts as disarmed."""
         self._is_to_be_disarmed = armed
 
-    def shows(self, *, armed: bool) -> None:
-        """Note the armed state in a heartbeat."""
+    def shows(self, *, armed: bool, now: float) -> None:
+        """Note the armed state in a heartbeat, and who armed it if it is the first to show it."""
+        self._is_clients = self.are_by_client(now=now)
+        self._is_armed = armed
         self._was_disarmed |= not armed
         self._is_to_be_disarmed &= armed
 

@@ -1,17 +1,17 @@
 """The components inside one vehicle's system, and the id that is left for the server."""
 
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import AUTOPILOT, Address
 
 PLACES = 4  # component ids that the server may use, from the configured one on
 
 
 class Components:
-    """The components heard in one vehicle's system, besides the autopilot."""
+    """The components heard in one vehicle's system, among them the autopilot."""
 
     def __init__(self, system_id: int, *, first: int) -> None:
         self._system_id = system_id
         self._first = first
-        self._own: set[int] = set()
+        self._own = {AUTOPILOT}
         #: the task server's address inside this vehicle's system
         self.server = self._free()
 

@@ -140,13 +140,21 @@ class JointControl:
 
     # cancelling
 
-    def cancel(self, task: Task, *, kill: bool, actor: str, now: float) -> None:
+    def cancel(
+        self,
+        task: Task,
+        *,
+        kill: bool,
+        actor: str,
+        now: float,
+        reason: TaskReason = R.CANCELLED,
+    ) -> None:
         """Cancel a task; if it is the active one, zeros leave in this very step."""
         tasks = self._parts.tasks
         active = tasks.active
         event = Event.CANCEL if active is not None and active.id == task.id else Event.UNQUEUE
-        do = partial(tasks.cancel, task, kill=kill, reason=R.CANCELLED, actor=actor, now=now)
-        self.on(event, Word(R.CANCELLED, actor, do=do), now=now)
+        do = partial(tasks.cancel, task, kill=kill, reason=reason, actor=actor, now=now)
+        self.on(event, Word(reason, actor, do=do), now=now)
 
     def skip(self, task: Task, *, actor: str, now: float) -> None:
         """End a held task."""

@@ -120,6 +120,16 @@ class Pilot:
         self._parts.control.begin_release(now=now)
         self._send_at_once(now=now)
 
+    def stand_in(self, *, now: float) -> None:
+        """Ask a rover to stand, in place of a setpoint of the client that may drive it.
+
+        A PX4 is armed in our mode only while setpoints stream. The client's own would move it as
+        soon as it is armed, before a heartbeat shows that; from then on they pass.
+        """
+        if self._parts.persona.arms_in_hold:
+            self._face(now=now)
+            self._parts.requests.send_stand_in()
+
     def watch(self, *, now: float) -> None:
         """Watch from here on that it comes to stand."""
         self.guard.ladder.begin(now=now)

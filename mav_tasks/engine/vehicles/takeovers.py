@@ -105,7 +105,7 @@ class Takeovers:
             self._mode_changed(was_mode, mode, was_armed=was_armed, now=now)
         if was_armed and not armed:
             self._disarmed(before, now=now)
-        parts.armings.shows(armed=armed)
+        parts.armings.shows(armed=armed, now=now)
         if armed and parts.armings.are_older(ours=parts.control.arming_asked_at, now=now):
             words = (
                 "was armed by a delayed command: disarmed again."

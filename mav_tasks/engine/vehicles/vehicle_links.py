@@ -49,7 +49,7 @@ class VehicleLinks:
         registry: TaskRegistry,
         timers: Timers,
         beat: Callable[..., None],
-        note_once: Callable[..., None],
+        note_once: Callable[..., object],
     ) -> None:
         """``vehicles`` has all vehicles by system id; ``note_once`` reports a text about one, once.
 

@@ -12,9 +12,10 @@ from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
-from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.router import Place
+from mav_tasks.services import statustext
 from mav_tasks.services.command_sender import Answered, CommandSender, Standing
 from mav_tasks.services.cruise_speed import CruiseSpeed
 from mav_tasks.services.interval_requester import IntervalRequester
@@ -176,9 +177,18 @@ class VehicleRequests:
             self._uploader.receive(message, now=now)
             self.flush(now=now)
 
+    def tell(self, text: str, source: Address) -> None:
+        """Send a text to those on the vehicle's side."""
+        for chunk in statustext.chunks(MavSeverity.WARNING, text, text_id=1):
+            self._outlet.send(chunk, source)
+
     def send_zero(self) -> None:
         """Send one zero setpoint, whoever drives the vehicle."""
         self._outlet.send(self.control.zero_setpoint(), self._source)
+
+    def send_stand_in(self) -> None:
+        """Send one setpoint that asks a vehicle to stand that may be armed at any moment."""
+        self._outlet.send(self.control.zero_setpoint(armed=True), self._source)
 
     def send_zero_and_hold(self) -> None:
         """Send a zero and ask for HOLD, once each, without waiting for an answer."""

@@ -142,7 +142,7 @@ class VehicleSide:
             registry=registry,
             timers=timers,
             beat=self._beat,
-            note_once=self._note_once,
+            note_once=self.note_once,
         )
 
     def get(self, system_id: int) -> Vehicle | None:
@@ -403,7 +403,7 @@ class VehicleSide:
             and heartbeat.autopilot != NO_AUTOPILOT
             and not self._strangers.is_alone(beat, (kind_of(heartbeat), tasks.terms.uid))
         ):
-            self._note_once(number, SHARED, now=now)
+            self.note_once(number, SHARED, now=now)
             return None
         if persona is None:
             return None
@@ -448,11 +448,11 @@ class VehicleSide:
             return None  # 0 addresses every vehicle, and our own id belongs to no vehicle
         if heartbeat.type not in DRIVEN:  # other types give the mode numbers other meanings
             words = f"has vehicle type {heartbeat.type}, not that of a rover: not driven"
-            self._note_once(packet.system_id, words, now=now)
+            self.note_once(packet.system_id, words, now=now)
             return None
         persona = persona_of(heartbeat, honours_yaw_rate=self._settings.yaw_rate == "honoured")
         if persona is None:
-            self._note_once(
+            self.note_once(
                 packet.system_id,
                 f"has autopilot type {heartbeat.autopilot}, which is not supported: not driven",
                 now=now,
@@ -470,11 +470,14 @@ class VehicleSide:
                 self.deadline_heap.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
 
-    def _note_once(self, system_id: int, text: str, *, now: float) -> None:
+    def note_once(self, system_id: int, text: str, *, now: float) -> bool:
+        """Report a text about a vehicle unless it was reported before; return whether it is new."""
         key = f"{system_id} {text}"
-        if key not in self._noted and len(self._noted) < MOST_NOTES:
+        is_new = key not in self._noted and len(self._noted) < MOST_NOTES
+        if is_new:
             self._noted.add(key)
             self._registry.record(VehicleNoted(system_id, text, now))
+        return is_new
 
 
 def _own_address(settings: Settings) -> Address:

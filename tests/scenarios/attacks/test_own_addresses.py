@@ -16,8 +16,9 @@ from rover_sim.personas import Mode
 from tests.kit.client import DENIED, GUIDED, FakeClient, heartbeat, set_mode
 from tests.kit.world import World
 
-#: of the server towards rovers, of a rover, and of the server in that rover
-OWN = ((250, 191), (1, 1), (1, 191))
+#: of the server towards rovers, and of a rover. That of the server in the rover's system is free
+#: for clients (see ``test_mavros``)
+OWN = ((250, 191), (1, 1))
 SERVO, SPEED, MISSION_START, DO_SET_MODE = 183, 178, 300, 176
 MISSION_COUNT = 44
 
@@ -73,7 +74,7 @@ def test_nothing_is_done_for_who_calls_itself_the_server_or_a_rover(
     refused = [
         event
         for event in world.events(SubmissionRefused)
-        if "belongs to the server or a rover" in str(event)
+        if "change this client's component id" in str(event)
     ]
     assert len(refused) == 1
 

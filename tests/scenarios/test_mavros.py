@@ -1,0 +1,152 @@
+"""mavros with its defaults, whose address is the server's own inside the rover's system."""
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.tasks.events import SubmissionRefused, VehicleNoted
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from tests.kit.client import ACCEPTED, ARM, AUTO, DENIED, GUIDED, HOLD, IDS
+from tests.kit.mavros import Mavros
+from tests.kit.mavros import heartbeat as onboard_heartbeat
+from tests.kit.mission import Item
+from tests.kit.observer import ARDUPILOT_WAYS
+from tests.kit.px4 import MISSION, OFFBOARD, PROMPT_PX4
+from tests.kit.world import PROMPT, World, at, is_at
+from tests.scenarios.conftest import MakeWorld
+
+WAYPOINT = 16
+HOME = Item(WAYPOINT, **at(0, 0))
+
+
+@pytest.fixture(params=[PROMPT, PROMPT_PX4], ids=lambda persona: persona.name)
+def world(make_world: MakeWorld, request: pytest.FixtureRequest) -> World:
+    return make_world(persona=request.param)
+
+
+def is_ardupilot(world: World) -> bool:
+    return world.observer.ways is ARDUPILOT_WAYS
+
+
+def test_stock_mavros_is_served(world: World) -> None:
+    mavros = Mavros(world)
+    world.run(17)
+    connected, armed, _ = mavros.state
+    assert (connected, armed) == (True, False)
+    for asked in ("AUTOPILOT_VERSION", "PARAM_VALUE", "HOME_POSITION", "TIMESYNC"):
+        assert mavros.client.heard(asked), asked
+    assert mavros.waypoints == []
+    items = [Item(WAYPOINT, **at(north, 0)) for north in (1.0, 2.0)]
+    assert mavros.push([HOME, *items] if is_ardupilot(world) else items)
+    assert mavros.pull()
+    assert [each.x for each in mavros.waypoints or ()][-2:] == [each.x for each in items]
+    armed_by = mavros.arm()
+    world.run(0.5)
+    assert armed_by.answer is not None
+    assert armed_by.answer[0] == ACCEPTED
+    assert mavros.state[1]
+    mavros.set_mode(AUTO if is_ardupilot(world) else MISSION)
+    world.until_idle(tasks=1, within=60)
+    assert is_at(world, 2.0, 0.0)
+    assert world.events(SubmissionRefused) == []
+
+
+def test_its_setpoints_drive(world: World) -> None:
+    mavros = Mavros(world)
+    world.run(2)
+    mavros.velocity(0.5)
+    world.run(1)
+    mavros.set_mode(GUIDED if is_ardupilot(world) else OFFBOARD)
+    world.run(5)
+    assert world.stands()
+    mavros.arm()
+    world.until(lambda: world.truth.forward_speed > 0.4, within=4)
+
+
+def test_two_with_one_address_are_told_apart_by_where_they_are(make_world: MakeWorld) -> None:
+    world = make_world()
+    one, other = Mavros(world, "one"), Mavros(world, "other")
+    world.run(2)
+    one.velocity(0.5)
+    one.set_mode(GUIDED)
+    world.run(0.5)
+    one.arm()
+    world.until(lambda: world.truth.forward_speed > 0.4, within=4)
+    assert other.client.acks_of(ARM) == [], "nobody gets the other's answer"
+    other.velocity(-0.5)
+    world.run(1)
+    assert world.truth.forward_speed > 0.4, "nor drives by what was granted to the other"
+    dropped = [text for text in other.client.texts() if "setpoints" in text]
+    assert len(dropped) == 1, "which it is told once"
+    other.client.heartbeats = False
+    stopped = other.client.stop(target=(1, 1))
+    world.until(world.stands, within=4)
+    assert stopped.answer is not None
+    assert stopped.answer[0] == ACCEPTED
+
+
+def test_one_on_the_rovers_side_keeps_its_address(make_world: MakeWorld) -> None:
+    """Two onboard computers 1/191 in one net get each other's answers: both are told."""
+    world = make_world()
+    mavros = Mavros(world)
+    world.run(1)
+    companion = world.add_client("companion", system_id=1, component_id=191)
+    told: list[str] = []
+    reader = common.MAVLink(None)
+
+    def hear(sender: str, target: str, data: bytes) -> bool:
+        if (sender, target) == (VEHICLE_LINK, "rover1") and data[7] == IDS["STATUSTEXT"]:
+            told.append(reader.decode(bytearray(data)).text)
+        return False
+
+    world.watched.loses = hear
+    world.from_vehicle_side(companion.packed(onboard_heartbeat()), peer="rover1")
+    world.run(0.1)
+    refused = mavros.arm()
+    world.run(1)
+    assert refused.answer == (DENIED, R.NOT_ALLOWED)
+    assert not world.rover.autopilot.armed
+    words = "address 1/191 is taken on the rover's side: change this client's component id"
+    assert mavros.client.texts().count(words) == 1
+    both = "component 1/191 on its side and the client at mavros have one address"
+    assert [both in str(e) for e in world.events(VehicleNoted)].count(True) == 1
+    assert both in "".join(told), "in the name of a component of the companion's own system"
+    stopped = mavros.client.stop(target=(1, 1))
+    world.run(0.2)
+    assert stopped.answer is not None
+    assert stopped.answer[0] == ACCEPTED
+    other = Mavros(world, "other", component=195)
+    world.run(1)
+    assert other.state[0]
+    assert not [text for text in other.client.texts() if "address" in text]
+
+
+def test_its_heartbeat_does_not_come_back_by_another_link(make_world: MakeWorld) -> None:
+    """A rover forwards what is for everybody to its other radio, where the server listens, too."""
+    world = make_world()
+    passed = world.passed_on((1, 191))
+    mavros = Mavros(world)
+    world.run(3)
+    assert IDS["TIMESYNC"] in passed
+    assert IDS["HEARTBEAT"] not in passed
+    assert mavros.state[0]
+
+
+@pytest.mark.parametrize("halt", [HOLD, None], ids=["HOLD", "disarm"])
+def test_it_arms_right_after_its_own_halt(make_world: MakeWorld, halt: int | None) -> None:
+    """Each arming of mavros says that it is a repeat, and none is."""
+    world = make_world()
+    mavros = Mavros(world)
+    world.run(4)
+    if halt is None:
+        mavros.arm()
+        world.run(1)
+        mavros.arm(False)
+    else:
+        mavros.set_mode(halt)
+    world.run(1)
+    again = mavros.arm()
+    world.run(1)
+    assert again.answer is not None
+    assert again.answer[0] == ACCEPTED
+    assert world.rover.autopilot.armed

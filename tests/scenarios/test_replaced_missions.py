@@ -1,0 +1,87 @@
+"""The autopilot's address has one mission: what drives is what was uploaded last, as on it."""
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.client import AUTO, HOLD
+from tests.kit.mission import Item, Upload
+from tests.kit.observer import ARDUPILOT_WAYS
+from tests.kit.px4 import HOLD as PX4_HOLD
+from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
+from tests.kit.world import PROMPT, World, at, is_at
+from tests.scenarios.conftest import MakeWorld
+
+WAYPOINT, MISSION_START = 16, 300
+
+
+@pytest.fixture(params=[PROMPT, PROMPT_PX4], ids=lambda persona: persona.name)
+def world(make_world: MakeWorld, request: pytest.FixtureRequest) -> World:
+    """A rover that drives the first mission, northwards, in sight of a stock client."""
+    world = make_world(persona=request.param)
+    world.client.reads_dialect = False
+    upload(world, 3.0, 6.0)
+    start(world)
+    world.until(lambda: world.truth.north > 0.5, within=20)
+    return world
+
+
+def is_ardupilot(world: World) -> bool:
+    return world.observer.ways is ARDUPILOT_WAYS
+
+
+def upload(world: World, *norths: float) -> None:
+    home = [Item(WAYPOINT, **at(0, 0))] if is_ardupilot(world) else []
+    sent = Upload(world.client, [*home, *(Item(WAYPOINT, **at(n, 0.0)) for n in norths)])
+    world.until(lambda: sent.result is not None, within=5)
+    assert sent.result == 0
+
+
+def start(world: World) -> None:
+    world.client.arm()
+    world.run(0.3)
+    ask(world, AUTO, MISSION)
+
+
+def ask(world: World, ardupilot: int, px4: int) -> None:
+    if is_ardupilot(world):
+        world.client.mode(ardupilot)
+    else:
+        ask_mode(world.client, px4)
+
+
+@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@pytest.mark.parametrize("by", ["mode", "MISSION_START"])
+def test_paused_edited_uploaded_and_started(world: World, halt: str, by: str) -> None:
+    if halt == "pause":
+        world.client.pause(target=(1, 1))
+    else:
+        ask(world, HOLD, PX4_HOLD)
+    world.until(world.stands, within=10)
+    world.run(1)
+    upload(world, -2.0)
+    assert world.state(1) == (S.CANCELLED, R.REPLACED), "nobody finds it in the queue later"
+    where = world.truth.north
+    world.run(2)
+    assert abs(world.truth.north - where) < 0.05, "an upload moves nothing"
+    if by == "mode":
+        ask(world, AUTO, MISSION)
+    else:
+        world.client.command(MISSION_START, target=(1, 1))
+    world.until(lambda: world.state(2)[0] is S.COMPLETED, within=60)
+    assert is_at(world, -2.0, 0.0)
+    world.client.proceed()
+    world.run(5)
+    assert is_at(world, -2.0, 0.0)
+
+
+def test_one_that_drives_is_told_of_and_ends_when_the_new_one_starts(world: World) -> None:
+    upload(world, -2.0)
+    told = [text for text in world.client.texts() if text.startswith("Task 2 ready to start")]
+    assert "task 1 goes on until then" in told[0]
+    world.run(1)
+    assert world.state(1)[0] is S.EXECUTING
+    ask(world, AUTO, MISSION)
+    world.until(lambda: world.state(2)[0] is S.COMPLETED, within=60)
+    assert world.state(1) == (S.CANCELLED, R.REPLACED)
+    assert is_at(world, -2.0, 0.0)
