@@ -28,6 +28,7 @@ from mav_tasks.links.url import LinkUrl
 from mav_tasks.logs.field_notes import FieldNotes
 from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
+from mav_tasks.logs.unreadable import Unreadable
 from mav_tasks.logs.vehicle_texts import VehicleTexts
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
@@ -245,7 +246,7 @@ async def _run(
     for recorder in recorders:
         say(f"{recorder}")
     tame_collector()
-    listeners: list[EngineObserver] = [VehicleTexts(), *recorders]
+    listeners: list[EngineObserver] = [VehicleTexts(), Unreadable(), *recorders]
     if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
         listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
     if metrics is not None:
