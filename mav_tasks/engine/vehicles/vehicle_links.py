@@ -1,5 +1,6 @@
 """The links to vehicles: their endpoints, which vehicle is where, and what a link carries."""
 
+from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -11,17 +12,20 @@ from mav_tasks.engine.packet_sender import Fence, PacketSender
 from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.ways import BOTH_THERE, TRIES, Ways
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import INTERVAL
+from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry
 
 MAX_PEERS = 256  # endpoints on one vehicle link
-BOTH_THERE = 1.0  # s; by then, delayed packets from the old place have come
+MOST_SENT = 1_024  # packets that are known when they come back: seconds of ten driven rovers
+REQUESTS = 4.0  # a second, to places at which a known vehicle's id is heard
 
 
 @dataclass(slots=True)
@@ -69,8 +73,10 @@ class VehicleLinks:
         #: the place of each vehicle
         self.router = Router()
         self._outlets: dict[Place, PacketSender] = {}  # kept, because their numbering continues
-        #: when the first heartbeat of a known vehicle's id came from another place
-        self._rivals: dict[tuple[int, str, Peer], float] = {}
+        #: the places at which a vehicle's id is heard
+        self.ways = Ways()
+        self._requests = TokenBucket(rate=REQUESTS, burst=2 * REQUESTS, now=-inf)  # to these
+        self._sent: deque[Outgoing] = deque(maxlen=MOST_SENT)
         #: places whose peer has disconnected: it may be back at once, anywhere
         self._left: set[Place] = set()
         #: by endpoint; cleared when a link, a setting or the place of a vehicle changes
@@ -126,6 +132,10 @@ class VehicleLinks:
         """Return whether a link of this name is a vehicle link."""
         return link in self._links
 
+    def has_sent(self, raw: bytes) -> bool:
+        """Return whether a packet is one that the server has sent to a vehicle lately."""
+        return any(sent.data == raw for sent in self._sent)
+
     def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
         """Return the sender to a vehicle's endpoint, and whether it is new; None: full, or down."""
         link = self._links.get(link_name)
@@ -147,8 +157,7 @@ class VehicleLinks:
         """Forget a vehicle, which this gateway does not have any more; its endpoint stays."""
         place = self.router.place_of(system_id)
         self.router.forget(system_id)
-        for rival in [each for each in self._rivals if each[0] == system_id]:
-            del self._rivals[rival]
+        self.ways.forget(system_id)
         self._budgets.clear()
         self._forget_if_empty(place)
 
@@ -164,34 +173,54 @@ class VehicleLinks:
         arming = self._settings.arming
         return arming == "server" or (arming == "auto" and self._links[name].is_local)
 
-    def moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
-        """Move a vehicle that fell silent to the place of this heartbeat. Return whether it moved.
+    def moves(
+        self, vehicle: Vehicle, link: str, peer: Peer, message: m.Message, *, now: float
+    ) -> bool:
+        """Note a message from another place than the vehicle's. Return whether it moved there.
 
-        An id that was heard there while the vehicle was still heard is another vehicle, for good.
+        One that fell silent moves to where its unique id, or else its id alone, is heard. An id
+        that was heard there while the vehicle was still heard is another vehicle, for good, unless
+        its unique id and its clock show that it is the same.
         """
-        rival = vehicle.system_id, link, peer
-        if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
-            del self._rivals[next(iter(self._rivals))]
-        is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
-        old = self.router.place_of(vehicle.system_id)
-        if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
+        number, new = vehicle.system_id, (link, peer)
+        old, is_heard = self.router.place_of(number), vehicle.is_heard(now=now)
+        assert old is not None, "each vehicle is somewhere"
+        way, used = self.ways.at(number, new, now=now), self.ways.look_at(number, old)
+        way.hear(message, lost_after=self._settings.watch.heartbeat_lost, now=now)
+        was_same = way.is_same
+        way.judge(vehicle.uid(now=now), vehicle.kind, used, is_heard=is_heard)
+        has_left = old in self._left
+        is_better = way.is_better_than(used, vehicle.counted_at, now=now)
+        is_beat = isinstance(message, m.Heartbeat)
+        overlaps = vehicle.heard_at > way.first_at + BOTH_THERE
+        outlets = self._links[link].outlets
+        if self._signatures.has_key(old[0]) > self._signatures.has_key(link):
             words = f"shares its id with a rover at {_named(peer)}: ignored, that link has no key"
-            self._note_once(vehicle.system_id, words, now=now)
+            self._note_once(number, words, now=now)
             return False
-        if is_another or (old not in self._left and vehicle.is_heard(now=now)):
+        if way.is_another or (not way.is_same and way.asked >= TRIES and (overlaps or is_heard)):
             words = (
                 f"shares its id with a rover at {_named(peer)}: ignored. Give that one another id"
             )
-            self._note_once(vehicle.system_id, words, now=now)
+            self._note_once(number, words, now=now)
+        if way.is_same and not was_same and (peer in outlets or len(outlets) < MAX_PEERS):
+            outlets.setdefault(peer, self._outlet(link, peer))
+            self._registry.record(VehicleSeen(number, f"is also heard at {_named(peer)}", now))
+        if way.is_same:
+            is_moving = has_left or is_better or not is_heard or old[0] not in self._links
+        else:
+            is_moving = is_beat and not (overlaps or way.is_another or (is_heard and not has_left))
+        if not is_moving or (peer not in outlets and len(outlets) >= MAX_PEERS):
+            if is_beat and way.take_request() and self._requests.take(now=now):
+                outlet = outlets.get(peer) or self._outlet(link, peer)
+                self._beat({peer: outlet}, now=now)
+                vehicle.requests.ask_there(outlet, is_same=way.is_same)
             return False
-        outlets, may_arm = self._links[link].outlets, self.may_arm(link)
-        if peer not in outlets and len(outlets) >= MAX_PEERS:
-            return False
-        del self._rivals[rival]
-        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
-        self.learn(vehicle.system_id, (link, peer))
+        outlet = outlets.setdefault(peer, self._outlet(link, peer))
+        vehicle.move_to(outlet, may_arm=self.may_arm(link), is_same=way.is_same)
+        self.learn(number, new)
         self._forget_if_empty(old)
-        self._registry.record(VehicleSeen(vehicle.system_id, f"is now at {_named(peer)}", now))
+        self._registry.record(VehicleSeen(number, f"is now at {_named(peer)}", now))
         return True
 
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
@@ -220,7 +249,7 @@ class VehicleLinks:
         outlet = self._outlets.get((link, peer))
         if outlet is None:
             outlet = self._outlets[link, peer] = PacketSender(
-                link, peer, self._queue, self._packer, self._signatures, self._fence
+                link, peer, self._queue, self._packer, self._signatures, self._fence, self._sent
             )
         return outlet
 

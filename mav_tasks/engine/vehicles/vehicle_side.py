@@ -26,6 +26,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.router import Place
 from mav_tasks.services.heartbeat import gcs_heartbeat, kind_of
 from mav_tasks.services.orders import DRIVEN, Orders
 from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
@@ -52,6 +53,10 @@ ANOTHER = (
     " one, then Continue"
 )
 SHARED = "shares its id with another vehicle: none is driven before one is alone. Change one id"
+ECHO = (
+    "sends the server's own packets back on {}. Look for a router on this link that is in a loop,"
+    " or an adapter that hears itself"
+)
 
 #: messages that only a controller of the vehicle sends
 SETPOINTS = frozenset(
@@ -294,9 +299,13 @@ class VehicleSide:
                 return None
         elif packet.message_id not in m.ALL:
             self.counts.unknown += 1
+        is_of_controller = packet.source == self.our_address or packet.message_id in SETPOINTS
+        if is_of_controller and self.links.has_sent(packet.raw):
+            self._note_echo((link, peer), now=now)
+            return None
         if self._signatures.admit(link, peer, packet) is None:
             return None
-        if packet.source == self.our_address or packet.message_id in SETPOINTS:
+        if is_of_controller:
             if self._ours is not None and isinstance(message, m.Heartbeat | m.Timesync):
                 return None  # another gateway's, which listens here, too
             self._note_intruder(link, packet, message, now=now)
@@ -317,20 +326,29 @@ class VehicleSide:
             vehicle = self._meet(beat, now=now)
         elif beat and beat.message.autopilot == NO_AUTOPILOT:
             return None  # from a program that uses the rover's address
-        elif self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
-            beat and self.links.moves(vehicle, link, peer, now=now)
-        ):
-            return None
-        elif from_autopilot and vehicle.shows_another(message, now=now):
-            latest = vehicle.parts.monitor.latest
-            vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
+        else:
+            number = vehicle.system_id
+            answer = message if isinstance(message, m.Timesync) else None
+            if answer is not None and answer.ts1 not in self._asked:
+                answer = None
+            if answer is not None and answer.tc1 and from_autopilot:
+                self.links.ways.note_answer(number, (link, peer), answer, now=now)
+            if self.links.router.place_of(number) != (link, peer) and not (
+                from_autopilot
+                and message is not None
+                and self.links.moves(vehicle, link, peer, message, now=now)
+            ):
+                return None
+            if answer is not None:
+                self._answer = packet
+                if answer.tc1 and from_autopilot:
+                    offset = vehicle.where.motion.clock.offset
+                    offset.exchange(answer.ts1 / NANO, answer.tc1 / NANO, now=now)
+            if from_autopilot and vehicle.shows_another(message, now=now):
+                latest = vehicle.parts.monitor.latest
+                vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
         if vehicle is None:
             return None
-        if isinstance(message, m.Timesync) and message.ts1 in self._asked:
-            self._answer = packet
-            if message.tc1 and from_autopilot:
-                offset = vehicle.where.motion.clock.offset
-                offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
         if from_autopilot:
             vehicle.count(packet.seq, now=now)
         vehicle.requests.intervals.heard(packet.message_id)
@@ -469,6 +487,13 @@ class VehicleSide:
             if target in (0, vehicle.system_id) and place is not None and place[0] == link:
                 self.deadline_heap.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
+
+    def _note_echo(self, place: Place, *, now: float) -> None:
+        """Report that our own packets come back, unless a rover passes them from link to link."""
+        if not self.links.ways.is_second(place):
+            for vehicle in self.all:
+                if self.links.router.place_of(vehicle.system_id) == place:
+                    self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
         key = f"{system_id} {text}"
