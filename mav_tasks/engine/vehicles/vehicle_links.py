@@ -132,9 +132,9 @@ class VehicleLinks:
         """Return whether a link of this name is a vehicle link."""
         return link in self._links
 
-    def has_sent(self, raw: bytes) -> bool:
-        """Return whether a packet is one that the server has sent to a vehicle lately."""
-        return any(sent.data == raw for sent in self._sent)
+    def where_sent(self, raw: bytes) -> set[Place]:
+        """Return to which places the server has sent this packet lately."""
+        return {(sent.link, sent.peer) for sent in self._sent if sent.data == raw}
 
     def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
         """Return the sender to a vehicle's endpoint, and whether it is new; None: full, or down."""

@@ -300,8 +300,8 @@ class VehicleSide:
         elif packet.message_id not in m.ALL:
             self.counts.unknown += 1
         is_of_controller = packet.source == self.our_address or packet.message_id in SETPOINTS
-        if is_of_controller and self.links.has_sent(packet.raw):
-            self._note_echo((link, peer), now=now)
+        if is_of_controller and (sent_to := self.links.where_sent(packet.raw)):
+            self._note_echo((link, peer), sent_to, now=now)
             return None
         if self._signatures.admit(link, peer, packet) is None:
             return None
@@ -488,12 +488,11 @@ class VehicleSide:
                 self.deadline_heap.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
 
-    def _note_echo(self, place: Place, *, now: float) -> None:
+    def _note_echo(self, place: Place, sent_to: AbstractSet[Place], *, now: float) -> None:
         """Report that our own packets come back, unless a rover passes them from link to link."""
-        if not self.links.ways.is_second(place):
-            for vehicle in self.all:
-                if self.links.router.place_of(vehicle.system_id) == place:
-                    self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
+        for vehicle in self.all:
+            if place in sent_to and self.links.router.place_of(vehicle.system_id) == place:
+                self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
         key = f"{system_id} {text}"

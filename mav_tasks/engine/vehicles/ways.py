@@ -118,10 +118,6 @@ class Ways:
         way.answered_at = now
         way.clock = answer.tc1 / NANO - now, (answer.tc1 - answer.ts1) / NANO
 
-    def is_second(self, place: Place) -> bool:
-        """Return whether a place is one of several ways to a vehicle."""
-        return any(way.is_same for (_, there), way in self._ways.items() if there == place)
-
     def forget(self, system_id: int) -> None:
         """Forget all places of a vehicle."""
         for key in [each for each in self._ways if each[0] == system_id]:
