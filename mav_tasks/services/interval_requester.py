@@ -107,7 +107,10 @@ class IntervalRequester:
         self._needed.pop(message_id, None)
         self._changed.pop(message_id, None)
         self._asked = message_id
-        return interval_request(message_id, self._wanted.get(message_id, DEFAULT))
+        interval_us = round(self._wanted.get(message_id, DEFAULT) * 1e6)
+        return m.CommandLong(
+            0, 0, MavCmd.SET_MESSAGE_INTERVAL, 0, message_id, interval_us, 0, 0, 0, 0, 0
+        )
 
     def answered(self, *, accepted: bool | None) -> None:
         """Take the answer to the last request: None if there was none in time."""
@@ -149,11 +152,3 @@ class IntervalRequester:
                 pile[message_id] = None
         self._count.clear()
         self._check_at = now + CHECK
-
-
-def interval_request(message_id: int, interval: float) -> m.CommandLong:
-    """Return the command that asks for a message each ``interval`` seconds, without a target."""
-    interval_us = round(interval * 1e6)
-    return m.CommandLong(
-        0, 0, MavCmd.SET_MESSAGE_INTERVAL, 0, message_id, interval_us, 0, 0, 0, 0, 0
-    )

@@ -135,16 +135,6 @@ class Vehicle:
         """When its last heartbeat came, s."""
         return self._monitor.heard_at
 
-    @property
-    def kind(self) -> tuple[int, int]:
-        """What tells this kind of vehicle from another."""
-        return kind_of(self._monitor.latest)
-
-    def uid(self, *, now: float) -> str:
-        """Return its unique id; "" if that is unknown, or must be asked again."""
-        is_known = self.requests.is_identified or not self.is_heard(now=now)
-        return self.tasks.terms.uid if is_known else ""
-
     def is_heard(self, *, now: float) -> bool:
         """Return whether its last heartbeat is recent."""
         return now - self._monitor.heard_at <= self._monitor.lost_after
@@ -172,7 +162,9 @@ class Vehicle:
         terms = self.tasks.terms
         if isinstance(message, m.AutopilotVersion):
             return terms.is_another(uid_of(message), now=now)
-        if not isinstance(message, m.Heartbeat) or kind_of(message) == self.kind:
+        if not isinstance(message, m.Heartbeat) or kind_of(message) == kind_of(
+            self._monitor.latest
+        ):
             return False
         terms.forget_which()
         return True

@@ -7,16 +7,15 @@ from functools import partial
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
-from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
+from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged, Place
 from mav_tasks.engine.packet_sender import Fence, PacketSender
 from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.engine.vehicles.ways import BOTH_THERE, TRIES, Ways
+from mav_tasks.engine.vehicles.ways import Way
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import INTERVAL
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
@@ -24,6 +23,8 @@ from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry
 
 MAX_PEERS = 256  # endpoints on one vehicle link
+BOTH_THERE = 1.0  # s; by then, delayed packets from the old place have come
+SAYS = 10.0  # s in which a rover has said which one it is, if it ever does
 MOST_SENT = 1_024  # packets that are known when they come back: seconds of ten driven rovers
 REQUESTS = 4.0  # a second, to places at which a known vehicle's id is heard
 
@@ -70,15 +71,11 @@ class VehicleLinks:
         self._registry = registry
         self._note_once = note_once
         self._links: dict[str, Link] = {}
-        #: the place of each vehicle
-        self.router = Router()
         self._outlets: dict[Place, PacketSender] = {}  # kept, because their numbering continues
         #: the places at which a vehicle's id is heard
-        self.ways = Ways()
+        self._ways: dict[tuple[int, Place], Way] = {}
         self._requests = TokenBucket(rate=REQUESTS, burst=2 * REQUESTS, now=-inf)  # to these
         self._sent: deque[Outgoing] = deque(maxlen=MOST_SENT)
-        #: places whose peer has disconnected: it may be back at once, anywhere
-        self._left: set[Place] = set()
         #: by endpoint; cleared when a link, a setting or the place of a vehicle changes
         self._budgets: dict[Place, LinkBudget] = {}
 
@@ -101,8 +98,8 @@ class VehicleLinks:
         if not change.up:
             return
         self._budgets.clear()
-        places = [self.router.place_of(vehicle.system_id) for vehicle in self._all.values()]
-        known = [place[1] for place in places if place is not None and place[0] == change.link]
+        places = [vehicle.requests.place for vehicle in self._all.values()]
+        known = [peer for link, peer in places if link == change.link]
         outlets = {peer: self._outlet(change.link, peer) for peer in (*change.peers, *known)}
         beat = partial(self._beat, outlets)
         heartbeat = self._timers.rhythm(Turn.LINKS, beat, period=INTERVAL, now=now)
@@ -115,18 +112,16 @@ class VehicleLinks:
             return
         if not change.up:
             link.outlets.pop(change.peer, None)
-            self._left.add(place)
             self._forget_if_empty(place)
         elif len(link.outlets) < MAX_PEERS:
-            self._left.discard(place)
             link.outlets[change.peer] = self._outlet(*place)
             for vehicle in self._all.values():
-                if self.router.place_of(vehicle.system_id) == place:
+                if vehicle.requests.place == place:
                     vehicle.comes_anew()
 
     def has_vehicle_at(self, link: str, peer: Peer) -> bool:
         """Return whether one of our vehicles is at an endpoint."""
-        return any(self.router.place_of(each) == (link, peer) for each in self._all)
+        return any(each.requests.place == (link, peer) for each in self._all.values())
 
     def owns(self, link: str) -> bool:
         """Return whether a link of this name is a vehicle link."""
@@ -148,24 +143,23 @@ class VehicleLinks:
         link.outlets[peer] = self._outlet(link_name, peer)
         return link.outlets[peer], True
 
-    def learn(self, system_id: int, place: Place) -> None:
-        """Note that a vehicle is at a place."""
-        self.router.learn(system_id, place)
+    def forget_budgets(self) -> None:
+        """Divide what each link carries anew: a vehicle came, or is at another place."""
         self._budgets.clear()
 
-    def forget(self, system_id: int) -> None:
+    def forget(self, vehicle: Vehicle) -> None:
         """Forget a vehicle, which this gateway does not have any more; its endpoint stays."""
-        place = self.router.place_of(system_id)
-        self.router.forget(system_id)
-        self.ways.forget(system_id)
+        for way in [each for each in self._ways if each[0] == vehicle.system_id]:
+            del self._ways[way]
         self._budgets.clear()
-        self._forget_if_empty(place)
+        self._forget_if_empty(vehicle.requests.place)
 
-    def withdraw(self, system_id: int) -> None:
+    def withdraw(self, vehicle: Vehicle) -> None:
         """Drop what waits to leave for a vehicle's endpoint, except HOLD: another one is there."""
-        place = self.router.place_of(system_id)
         self._queue[:] = [
-            each for each in self._queue if each.is_first or (each.link, each.peer) != place
+            each
+            for each in self._queue
+            if each.is_first or (each.link, each.peer) != vehicle.requests.place
         ]
 
     def may_arm(self, name: str) -> bool:
@@ -173,55 +167,61 @@ class VehicleLinks:
         arming = self._settings.arming
         return arming == "server" or (arming == "auto" and self._links[name].is_local)
 
+    def way(self, system_id: int, place: Place, *, now: float) -> Way:
+        """Return what is known about a place at which the id of a vehicle is heard."""
+        way = self._ways.get((system_id, place))
+        if way is None:
+            if len(self._ways) >= MAX_PEERS:
+                del self._ways[next(iter(self._ways))]
+            way = self._ways[system_id, place] = Way(now)
+        return way
+
     def moves(
         self, vehicle: Vehicle, link: str, peer: Peer, message: m.Message, *, now: float
     ) -> bool:
         """Note a message from another place than the vehicle's. Return whether it moved there.
 
-        One that fell silent moves to where its unique id, or else its id alone, is heard. An id
-        that was heard there while the vehicle was still heard is another vehicle, for good, unless
-        its unique id and its clock show that it is the same.
+        One with two ways moves to the better one; one that fell silent to where its id is heard.
+        An id that was heard there while the vehicle was still heard is another vehicle, for good,
+        unless its unique id and its clock show that it is the same.
         """
-        number, new = vehicle.system_id, (link, peer)
-        old, is_heard = self.router.place_of(number), vehicle.is_heard(now=now)
-        assert old is not None, "each vehicle is somewhere"
-        way, used = self.ways.at(number, new, now=now), self.ways.look_at(number, old)
-        way.hear(message, lost_after=self._settings.watch.heartbeat_lost, now=now)
-        was_same = way.is_same
-        way.judge(vehicle.uid(now=now), vehicle.kind, used, is_heard=is_heard)
-        has_left = old in self._left
+        number, old, is_heard = vehicle.system_id, vehicle.requests.place, vehicle.is_heard(now=now)
+        way, used = self.way(number, (link, peer), now=now), self._ways.get((number, old))
+        is_beat, was_same = isinstance(message, m.Heartbeat), way.is_same
+        if was_same and now - way.heard_at > self._settings.watch.heartbeat_lost:
+            way.is_same = None  # another one may be there now
+        uid = "" if is_heard and not vehicle.requests.is_identified else vehicle.tasks.terms.uid
+        way.judge(message, uid, used, is_heard=is_heard)
+        is_gone = not is_heard or self._is_gone(old)
         is_better = way.is_better_than(used, vehicle.counted_at, now=now)
-        is_beat = isinstance(message, m.Heartbeat)
-        overlaps = vehicle.heard_at > way.first_at + BOTH_THERE
-        outlets = self._links[link].outlets
+        is_another = vehicle.heard_at > way.first_at + BOTH_THERE or way.is_same is False
+        way.heard_at = now
+        why = ""
         if self._signatures.has_key(old[0]) > self._signatures.has_key(link):
-            words = f"shares its id with a rover at {_named(peer)}: ignored, that link has no key"
+            why = ", that link has no key"
+        elif not way.is_same and is_another and (way.is_same is False or now > way.first_at + SAYS):
+            why = ". Give that one another id"
+        outlets = self._links[link].outlets
+        outlet = outlets.get(peer) or self._outlet(link, peer)
+        if why:
+            words = f"shares its id with a rover at {_named(peer)}: ignored{why}"
             self._note_once(number, words, now=now)
-            return False
-        if way.is_another or (not way.is_same and way.asked >= TRIES and (overlaps or is_heard)):
-            words = (
-                f"shares its id with a rover at {_named(peer)}: ignored. Give that one another id"
-            )
-            self._note_once(number, words, now=now)
-        if way.is_same and not was_same and (peer in outlets or len(outlets) < MAX_PEERS):
-            outlets.setdefault(peer, self._outlet(link, peer))
-            self._registry.record(VehicleSeen(number, f"is also heard at {_named(peer)}", now))
-        if way.is_same:
-            is_moving = has_left or is_better or not is_heard or old[0] not in self._links
-        else:
-            is_moving = is_beat and not (overlaps or way.is_another or (is_heard and not has_left))
-        if not is_moving or (peer not in outlets and len(outlets) >= MAX_PEERS):
-            if is_beat and way.take_request() and self._requests.take(now=now):
-                outlet = outlets.get(peer) or self._outlet(link, peer)
-                self._beat({peer: outlet}, now=now)
-                vehicle.requests.ask_there(outlet, is_same=way.is_same)
-            return False
-        outlet = outlets.setdefault(peer, self._outlet(link, peer))
-        vehicle.move_to(outlet, may_arm=self.may_arm(link), is_same=way.is_same)
-        self.learn(number, new)
-        self._forget_if_empty(old)
-        self._registry.record(VehicleSeen(number, f"is now at {_named(peer)}", now))
-        return True
+        elif len(outlets) < MAX_PEERS or peer in outlets:
+            if is_gone or is_better if way.is_same else is_gone and is_beat and not is_another:
+                outlets[peer] = outlet
+                vehicle.move_to(outlet, may_arm=self.may_arm(link), is_same=bool(way.is_same))
+                self._budgets.clear()
+                self._forget_if_empty(old)
+                self._registry.record(VehicleSeen(number, f"is now at {_named(peer)}", now))
+                return True
+            if way.is_same:
+                outlets[peer] = outlet
+            if way.is_same and not was_same:
+                self._registry.record(VehicleSeen(number, f"is also heard at {_named(peer)}", now))
+        if is_beat and way.is_same is not False and self._requests.take(now=now):
+            self._beat({peer: outlet}, now=now)
+            vehicle.requests.ask_there(outlet, is_same=bool(way.is_same))
+        return False
 
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
         """Return what the link to a vehicle carries, shared by all vehicles at its endpoint."""
@@ -253,12 +253,14 @@ class VehicleLinks:
             )
         return outlet
 
-    def _forget_if_empty(self, place: Place | None) -> None:
+    def _is_gone(self, place: Place) -> bool:
+        """Return whether a link is down, or its peer has disconnected: it may be back anywhere."""
+        link = self._links.get(place[0])
+        return link is None or place[1] not in link.outlets
+
+    def _forget_if_empty(self, place: Place) -> None:
         """Forget a place that was left, unless a vehicle may still come back to it."""
-        if place in self._left and all(
-            self.router.place_of(vehicle.system_id) != place for vehicle in self._all.values()
-        ):
-            self._left.discard(place)
+        if self._is_gone(place) and not self.has_vehicle_at(*place):
             self._outlets.pop(place, None)
 
 

@@ -6,7 +6,7 @@ It decides nothing but the order in which packets leave.
 from collections.abc import Hashable
 from math import inf
 
-from mav_tasks.engine.inputs import Outgoing
+from mav_tasks.engine.inputs import Outgoing, Place
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
@@ -14,10 +14,9 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place
 from mav_tasks.services.command_sender import Answered, CommandSender, Standing
 from mav_tasks.services.cruise_speed import CruiseSpeed
-from mav_tasks.services.interval_requester import IntervalRequester, interval_request
+from mav_tasks.services.interval_requester import IntervalRequester
 from mav_tasks.services.loss_failsafe import LossFailsafe
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import Done, MissionUploader
@@ -30,7 +29,7 @@ from mav_tasks.settings import Watch
 
 ASK_WHICH = 5  # times that a vehicle is asked for AUTOPILOT_VERSION
 ASK_WHICH_EACH = 3.0  # s
-SPARE = 0.2  # s between two positions on a link that is not in use, but may be at any time
+SPARE_US = 200_000.0  # between two positions on a link that is not in use, but may be soon
 SHOW = 0.25  # s in which a requested heartbeat must come; the next regular one is not far
 ASK_TO_SHOW = 3  # times in a row that a vehicle may leave that request unanswered
 #: commands after which clients wait for a heartbeat that shows the result
@@ -217,14 +216,12 @@ class VehicleRequests:
         self._versions_asked, self._ask_version_at = 0, -inf
 
     def ask_there(self, outlet: PacketSender, *, is_same: bool) -> None:
-        """Ask at another place which vehicle is there; once that is known, for position data."""
-        if not is_same:
-            outlet.send(self._message_request(m.AutopilotVersion.id), self._source)
-            return
-        for number in (m.LocalPositionNed.id, m.Attitude.id):
-            request = interval_request(number, SPARE)
-            request.target_system, request.target_component = self._target
-            outlet.send(request, self._source)
+        """Ask at another place which vehicle is there; once that is known, for its position."""
+        request = self._message_request(m.AutopilotVersion.id)
+        if is_same:
+            request.command, request.param2 = MavCmd.SET_MESSAGE_INTERVAL, SPARE_US
+            request.param1 = m.LocalPositionNed.id
+        outlet.send(request, self._source)
 
     def next_deadline(self) -> float | None:
         """Return when a command is to be repeated or given up, or None."""

@@ -10,7 +10,7 @@ from collections.abc import Set as AbstractSet
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
-from mav_tasks.engine.inputs import Outgoing, Peer
+from mav_tasks.engine.inputs import Outgoing, Peer, Place
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.snapshot import Reach
 from mav_tasks.engine.timers import Timers
@@ -26,7 +26,6 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Packer
 from mav_tasks.mavlink.enums import MavAutopilot, MavType
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place
 from mav_tasks.services.heartbeat import gcs_heartbeat, kind_of
 from mav_tasks.services.orders import DRIVEN, Orders
 from mav_tasks.services.persona import ARDUPILOT, Persona, persona_of
@@ -224,10 +223,11 @@ class VehicleSide:
     def _drop(self, system_id: int) -> bool:
         """Drop all control of a vehicle. Return whether it was driven."""
         vehicle = self._vehicles.pop(system_id, None)
-        was_driven = vehicle is not None and vehicle.shut()
-        self.links.forget(system_id)
         self.deadline_heap.forget(system_id)
-        return was_driven
+        if vehicle is None:
+            return False
+        self.links.forget(vehicle)
+        return vehicle.shut()
 
     def forget(self, system_id: int) -> None:
         """Forget a vehicle, which another gateway may have from here on."""
@@ -299,16 +299,12 @@ class VehicleSide:
                 return None
         elif packet.message_id not in m.ALL:
             self.counts.unknown += 1
-        is_of_controller = packet.source == self.our_address or packet.message_id in SETPOINTS
-        if is_of_controller and (sent_to := self.links.where_sent(packet.raw)):
-            self._note_echo((link, peer), sent_to, now=now)
-            return None
         if self._signatures.admit(link, peer, packet) is None:
             return None
-        if is_of_controller:
+        if packet.source == self.our_address or packet.message_id in SETPOINTS:
             if self._ours is not None and isinstance(message, m.Heartbeat | m.Timesync):
                 return None  # another gateway's, which listens here, too
-            self._note_intruder(link, packet, message, now=now)
+            self._note_intruder((link, peer), packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
         from_autopilot, beat = packet.component_id == AUTOPILOT, None
@@ -332,8 +328,8 @@ class VehicleSide:
             if answer is not None and answer.ts1 not in self._asked:
                 answer = None
             if answer is not None and answer.tc1 and from_autopilot:
-                self.links.ways.note_answer(number, (link, peer), answer, now=now)
-            if self.links.router.place_of(number) != (link, peer) and not (
+                self.links.way(number, (link, peer), now=now).note_answer(answer, now=now)
+            if vehicle.requests.place != (link, peer) and not (
                 from_autopilot
                 and message is not None
                 and self.links.moves(vehicle, link, peer, message, now=now)
@@ -397,7 +393,7 @@ class VehicleSide:
     def _succeed(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Meet another vehicle at a known address: nothing of the old one's control survives."""
         number = beat.packet.system_id
-        self.links.withdraw(number)
+        self.links.withdraw(self._vehicles[number])
         if self._drop(number):
             self._ask_to_hold(beat)
         self.gone.append(number)
@@ -446,7 +442,7 @@ class VehicleSide:
         if self._ours is not None:
             vehicle.parts.listens_until = now + LISTENS
         self._vehicles[number] = vehicle
-        self.links.learn(number, (link_name, peer))
+        self.links.forget_budgets()
         self.deadline_heap.mark_dirty(vehicle)
         self._registry.record(VehicleSeen(number, f"found ({persona.name})", now))
         for moved in self._strangers.take_motion(number, link_name, peer, now=now):
@@ -478,21 +474,20 @@ class VehicleSide:
         return persona
 
     def _note_intruder(
-        self, link: str, packet: Packet, message: m.Message | None, *, now: float
+        self, place: Place, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
-        """Handle setpoints, or our own address, from the vehicles' side: a second server drives."""
-        target = getattr(message, "target_system", 0)
+        """Handle setpoints, or our own address, from the vehicles' side: a second server drives.
+
+        What this server has sent itself drives nothing. A rover passes it from link to link, too.
+        """
+        target, sent_to = getattr(message, "target_system", 0), self.links.where_sent(packet.raw)
         for vehicle in self.all:
-            place = self.links.router.place_of(vehicle.system_id)
-            if target in (0, vehicle.system_id) and place is not None and place[0] == link:
+            there = vehicle.requests.place
+            if there == place and there in sent_to:
+                self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
+            elif not sent_to and target in (0, vehicle.system_id) and there[0] == place[0]:
                 self.deadline_heap.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
-
-    def _note_echo(self, place: Place, sent_to: AbstractSet[Place], *, now: float) -> None:
-        """Report that our own packets come back, unless a rover passes them from link to link."""
-        for vehicle in self.all:
-            if place in sent_to and self.links.router.place_of(vehicle.system_id) == place:
-                self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
 
     def _note_once(self, system_id: int, text: str, *, now: float) -> None:
         key = f"{system_id} {text}"
