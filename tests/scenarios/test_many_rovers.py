@@ -48,7 +48,7 @@ from tests.scenarios.conftest import MakeFleet
 
 CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
 PRIORITY = 1
-HEARTBEAT, TIMESYNC = 0, 111
+HEARTBEAT, COMMAND, TIMESYNC = 0, 76, 111
 OFF = Faults(silent=True, deaf=True)
 GOOD = Conditions()
 BRAKING = 3.5  # s, from the speeds driven here to a stand
@@ -611,7 +611,8 @@ def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes
     assert notes == ["shares its id with a rover at twin: ignored. Give that one another id"]
     assert any("shares its id with a rover" in text for text in fleet.client.texts())
     assert (twin.truth.north, twin.truth.east) == (50.0, 5.0)
-    assert {data[7] for _, data in fleet.watched.towards["twin"]} == {HEARTBEAT, TIMESYNC}
+    asked = {HEARTBEAT, TIMESYNC, COMMAND}  # which vehicle it is
+    assert {data[7] for _, data in fleet.watched.towards["twin"]} == asked
     assert max(m.x for m in fleet.client.of_type("LOCAL_POSITION_NED")) < 3.0
 
     mine, before = diary_of(fleet, 1), diary_of(alone, 1)

@@ -127,9 +127,17 @@ class VehicleLinks:
         """Return whether a link of this name is a vehicle link."""
         return link in self._links
 
-    def where_sent(self, raw: bytes) -> set[Place]:
-        """Return to which places the server has sent this packet lately."""
-        return {(sent.link, sent.peer) for sent in self._sent if sent.data == raw}
+    def where_sent(self, packet: Packet, place: Place) -> set[Place]:
+        """Return where the server has sent this packet lately, which comes from a place now.
+
+        Two servers with one address may send the same heartbeat: one counts only if a vehicle that
+        it was sent to is heard at this place, too.
+        """
+        sent_to = {(sent.link, sent.peer) for sent in self._sent if sent.data == packet.raw}
+        if packet.message_id == m.Heartbeat.id and place not in sent_to:
+            here = {number for number, there in self._ways if there == place}
+            sent_to &= {there for number, there in self._ways if number in here}
+        return sent_to
 
     def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
         """Return the sender to a vehicle's endpoint, and whether it is new; None: full, or down."""
@@ -211,6 +219,7 @@ class VehicleLinks:
                 outlets[peer] = outlet
                 vehicle.move_to(outlet, may_arm=self.may_arm(link), is_same=bool(way.is_same))
                 self._budgets.clear()
+                self._ways.pop((number, old), None)
                 self._forget_if_empty(old)
                 self._registry.record(VehicleSeen(number, f"is now at {_named(peer)}", now))
                 return True

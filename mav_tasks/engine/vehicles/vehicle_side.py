@@ -480,10 +480,11 @@ class VehicleSide:
 
         What this server has sent itself drives nothing. A rover passes it from link to link, too.
         """
-        target, sent_to = getattr(message, "target_system", 0), self.links.where_sent(packet.raw)
+        target = getattr(message, "target_system", 0)
+        sent_to = self.links.where_sent(packet, place)
         for vehicle in self.all:
             there = vehicle.requests.place
-            if there == place and there in sent_to:
+            if place in sent_to and there == place:
                 self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
             elif not sent_to and target in (0, vehicle.system_id) and there[0] == place[0]:
                 self.deadline_heap.mark_dirty(vehicle)
