@@ -11,7 +11,6 @@ from mav_tasks.client.handle import Task
 from mav_tasks.client.values import TaskStatus, VehicleStatus
 from mav_tasks.client.wire import Goal
 from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
-from mav_tasks.settings import SET_FAILSAFE
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from rover_sim.field_trial.ground import Ground, Limits
 from rover_sim.field_trial.track import Place, Track
@@ -193,8 +192,8 @@ class Session:
         status = await self.client.status(task.id)
         if status.state is TaskState.QUEUED and status.reason is TaskReason.LOSS_FAILSAFE:
             raise UsageError(
-                f"the rover might drive on when setpoints end, so no task starts. First run:"
-                f" {SET_FAILSAFE} and the rover's URL"
+                "the rover might drive on when setpoints end, so no task starts. First run:"
+                " mav-tasks probe --set-failsafe and the rover's URL"
             )
         if status.state is TaskState.QUEUED and status.words != self._said:
             self._said = status.words
