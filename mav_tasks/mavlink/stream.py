@@ -44,18 +44,15 @@ class PeerStreams:
 
     def feed(self, peer: Hashable, data: bytes, *, now: float) -> list[Packet]:
         """Return the packets of a peer that are whole with these bytes, in order."""
-        alone: list[Packet] = []
+        alone = [] if self._is_stream else split_datagram(data)
+        if len(alone) == 1 and len(alone[0].raw) == len(data) and not self._splitters:
+            return alone  # nearly always
         splitter = self._splitters.get(peer)
-        if not self._is_stream:
-            alone = split_datagram(data)
-            if splitter is None and len(alone) == 1 and len(alone[0].raw) == len(data):
-                return alone  # nearly always
-            if sum(len(packet.raw) for packet in alone) != len(data):
-                alone = []
-            elif splitter is None:
-                return alone
-            elif not all(map(crc_fits, alone)):
-                alone = []
+        is_whole = not self._is_stream and sum([len(each.raw) for each in alone]) == len(data)
+        if is_whole and splitter is None:
+            return alone
+        if not is_whole or not all(map(crc_fits, alone)):
+            alone = []
         if splitter is None:
             if len(self._splitters) >= MAX_STREAMS:
                 self.forget(next(iter(self._splitters)))

@@ -167,11 +167,11 @@ class UdpEnd:
         data, server = self._server.recvfrom(4096)
         os.write(self._line, data)
         while not self._is_over.is_set():
-            ready = select.select([self._line, self._server], [], [], TICK)[0]
+            ready = select.select([self._line, self._server.fileno()], [], [], TICK)[0]
             with suppress(OSError):  # the server has ended
                 if self._line in ready:
                     self._server.sendto(os.read(self._line, self._piece), server)
-                if self._server in ready:
+                if self._server.fileno() in ready:
                     os.write(self._line, self._server.recv(4096))
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from math import degrees
 from random import Random
-from typing import Any
+from typing import Any, cast
 
 from pymavlink.dialects.v20 import common
 
@@ -185,7 +185,7 @@ class TwoRadios:
 
     def _send(self, links: Sequence[MemoryLink]) -> None:
         for to, packet in self.rover.take_packets():
-            radio, peer = to  # type: ignore[misc]  # as given to ``receive``
+            radio, peer = cast(tuple[str, str], to)  # as given to ``receive``
             for link in links:
                 if link.name == radio:
                     link.send(peer, packet)
