@@ -40,7 +40,7 @@ def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
         host.encode("idna")  # as the system's look-up of names does
     except UnicodeError:
         raise LinkUrlError(f"{what}: no host has such a name") from None
-    if not host.isprintable() or " " in host:
+    if not host.isprintable():
         raise LinkUrlError(f"{what}: no host has such a name")
     return host, int(port)
 

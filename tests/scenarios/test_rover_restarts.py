@@ -8,7 +8,7 @@ from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from rover_sim.personas import PX4, Mode, Persona
 from rover_sim.realism import ARDUPILOT_BOOT, EXACT
 from tests.kit import px4
 from tests.kit.client import ACCEPTED, DENIED, Sent
@@ -422,18 +422,3 @@ def test_a_word_is_newer_than_the_mode_that_was_seen_before_it(idle: World, word
     world.run(12)
     assert ("arm" in world.observer.sent_since(at)) is (word == "resume")
     assert (world.state(2)[0] is S.COMPLETED) is (word == "resume")
-
-
-@pytest.mark.parametrize("after", [0.0, 0.5])
-def test_a_rover_that_restarts_while_it_is_handed_back_drives_what_comes_later(
-    make_world: MakeWorld, after: float
-) -> None:
-    """Nobody has disarmed it, and no task waits that a person may not want any more."""
-    world = make_world(persona=ARDUPILOT, shows_on_request=False)
-    world.client.move(1)
-    world.until_state(1, S.COMPLETED)
-    world.run(after)
-    world.replace_rover(switched_on=world.now, persona=PROMPT, is_same=True)
-    world.run(3)
-    world.client.move(1, nonce=2)
-    world.until_state(2, S.COMPLETED)

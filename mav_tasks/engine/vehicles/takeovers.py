@@ -102,7 +102,7 @@ class Takeovers:
         if armed or mode != was_mode or now - self._undecided_at > UNDECIDED:
             self._joint.decide(now=now)
         if mode != was_mode:
-            self._mode_changed(was_mode, mode, now=now)
+            self._mode_changed(was_mode, mode, was_armed=was_armed, now=now)
         if was_armed and not armed:
             self._disarmed(before, now=now)
         parts.armings.shows(armed=armed)
@@ -145,9 +145,9 @@ class Takeovers:
             was_paused = parts.tasks.paused if before is None else before.paused
             begins_again = parts.tasks.restarted(was_paused=was_paused, now=now)
             if before is not None:
-                self._disarmed_by_restart(before.may_arm, now=now)
+                parts.authority.restarted(was_allowed=before.may_arm)
             elif was_engaged and not begins_again:
-                self._disarmed_by_restart(parts.authority.may_arm, now=now)
+                parts.authority.restarted(was_allowed=parts.authority.may_arm)
             held, words = parts.tasks.held, "restarted"
             if held is not None:
                 words += f": task {held.id} is held. Press {BUTTONS}, then Continue"
@@ -156,7 +156,7 @@ class Takeovers:
         self._joint.on(Event.REBOOTED, Word(R.FRAME_RESET, text="restarted", do=restart), now=now)
         # heartbeats that show the disarming may be lost or under way
         if parts.monitor.armed and not parts.control.may_have_disarmed(now=now):
-            self._disarmed_by_restart(parts.authority.may_arm, now=now)
+            self._disarmed_by_restart(parts.authority.may_arm)
         parts.monitor.restarted()
         parts.control.restarted()
 
@@ -180,7 +180,7 @@ class Takeovers:
     ) -> None:
         self._joint.on(event, Word(reason, self._parts.actor, what), now=now)
 
-    def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
+    def _mode_changed(self, was_mode: int, mode: int, *, was_armed: bool, now: float) -> None:
         parts = self._parts
         persona, control = parts.persona, parts.control
         by_us, is_late = control.may_have_set(mode, now=now), self._comes_late(mode, now=now)
@@ -197,7 +197,7 @@ class Takeovers:
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         elif ours or was_mode == persona.booting_mode:
             pass
-        elif not self._may_come_from_restart(mode):
+        elif was_armed or not self._may_come_from_restart(mode):
             self._changed_by_person(mode, now)
             self._look_for_parking(was_mode, mode, now=now)
         else:
@@ -210,8 +210,9 @@ class Takeovers:
         Its first heartbeat may come before a message with its clock, which tells of the restart.
         """
         parts = self._parts
+        is_idle = parts.tasks.active is None and not parts.control.is_engaged
         boots_in = {parts.persona.hold_mode, *parts.persona.manual_modes}
-        return parts.tasks.active is None and not parts.monitor.armed and mode in boots_in
+        return is_idle and not parts.monitor.armed and mode in boots_in
 
     def _changed_by_person(self, mode: int, now: float) -> None:
         """Handle a mode that a person, another program or a failsafe has set."""
@@ -272,21 +273,15 @@ class Takeovers:
         if parts.control.may_have_disarmed(now=now):
             return
         if self._shows_restart:  # this heartbeat, or the clock before it, has shown it
-            self._disarmed_by_restart(before.may_arm, now=now)
+            self._disarmed_by_restart(before.may_arm)
             return
         parts.tasks.halts.shows_disarmed(now=now)
         self._taken(Event.DISARMED, "disarmed", now=now)
         parts.authority.note_disarmed(before)  # it may turn out that a restart did it
 
-    def _disarmed_by_restart(self, could_arm: bool, *, now: float) -> None:
-        """Let no task that is there arm it; a later one is a new decision."""
-        authority, tasks = self._parts.authority, self._parts.tasks
-        could_arm = could_arm or authority.is_withdrawn_by_restart
-        if tasks.unfinished or not could_arm:
-            authority.restarted(was_allowed=could_arm)
-        else:
-            authority.may_arm = True
-            tasks.terms.let_arm(may_be_armed=True, now=now)
+    def _disarmed_by_restart(self, could_arm: bool) -> None:
+        authority = self._parts.authority
+        authority.restarted(was_allowed=could_arm or authority.is_withdrawn_by_restart)
 
     def _note_rest(self, *, now: float) -> None:
         """Learn its noise at rest while nothing can be telling it to move."""

@@ -26,6 +26,7 @@ MAX_PEERS = 256  # endpoints on one vehicle link
 BOTH_THERE = 1.0  # s; by then, delayed packets from the old place have come
 SAYS = 10.0  # s in which a rover has said which one it is, if it ever does
 MOST_SENT = 1_024  # packets that are known when they come back: seconds of ten driven rovers
+NO_KEY = ", that link has no key"
 REQUESTS = 4.0  # a second, to places at which a known vehicle's id is heard
 
 
@@ -206,7 +207,7 @@ class VehicleLinks:
         way.heard_at = now
         why = ""
         if self._signatures.has_key(old[0]) > self._signatures.has_key(link):
-            why = ", that link has no key"
+            why = NO_KEY
         elif not way.is_same and is_another and (way.is_same is False or now > way.first_at + SAYS):
             why = ". Give that one another id"
         outlets = self._links[link].outlets
@@ -227,7 +228,8 @@ class VehicleLinks:
                 outlets[peer] = outlet
             if way.is_same and not was_same:
                 self._registry.record(VehicleSeen(number, f"is also heard at {_named(peer)}", now))
-        if is_beat and way.is_same is not False and self._requests.take(now=now):
+        is_open = is_beat and way.is_same is not False and why != NO_KEY
+        if is_open and self._requests.take(now=now):
             self._beat({peer: outlet}, now=now)
             vehicle.requests.ask_there(outlet, is_same=bool(way.is_same))
         return False

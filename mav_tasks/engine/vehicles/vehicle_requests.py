@@ -216,12 +216,13 @@ class VehicleRequests:
         self._versions_asked, self._ask_version_at = 0, -inf
 
     def ask_there(self, outlet: PacketSender, *, is_same: bool) -> None:
-        """Ask at another place which vehicle is there; once that is known, for its position."""
-        request = self._message_request(m.AutopilotVersion.id)
-        if is_same:
+        """Ask at another place which vehicle is there; once that is known, for what guides it."""
+        for number in (m.LocalPositionNed.id, m.Attitude.id) if is_same else ():
+            request = self._message_request(number)
             request.command, request.param2 = MavCmd.SET_MESSAGE_INTERVAL, SPARE_US
-            request.param1 = m.LocalPositionNed.id
-        outlet.send(request, self._source)
+            outlet.send(request, self._source)
+        if not is_same:
+            outlet.send(self._message_request(m.AutopilotVersion.id), self._source)
 
     def next_deadline(self) -> float | None:
         """Return when a command is to be repeated or given up, or None."""
