@@ -102,7 +102,12 @@ def test_a_radio_on_which_nothing_reaches_the_rover_is_left_too(make_fleet: Make
 
 def test_two_good_radios_are_not_used_in_turns(make_fleet: MakeFleet) -> None:
     fleet = with_two(make_fleet)
-    fleet.run(60)
+    fleet.run(20)
+    silence(fleet, "b")
+    fleet.run(10)
+    silence(fleet)
+    fleet.run(10)
+    assert notes(fleet) == []
     assert [each.text for each in fleet.events(VehicleSeen)].count("is now at b") == 0
 
 

@@ -198,7 +198,7 @@ class VehicleLinks:
         way, used = self.way(number, (link, peer), now=now), self._ways.get((number, old))
         is_beat, was_same = isinstance(message, m.Heartbeat), way.is_same
         if was_same and now - way.heard_at > self._settings.watch.heartbeat_lost:
-            way.is_same = None  # another one may be there now
+            way.is_same, way.first_at = None, now  # another one may be there now
         uid = "" if is_heard and not vehicle.requests.is_identified else vehicle.tasks.terms.uid
         way.judge(message, uid, used, is_heard=is_heard)
         is_gone = not is_heard or self._is_gone(old)
