@@ -21,13 +21,13 @@ from mav_tasks.key_ring.ring_file import Loaded, load, path_of_ring
 from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.link_keys import check_keys, in_words
 from mav_tasks.links.base import Link
-from mav_tasks.links.config_check import faults_of, links_of, pushing_url
-from mav_tasks.links.endpoint import parse_endpoint
+from mav_tasks.links.config_check import faults_of, links_of, pushed_to, pushing_url
 from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES, LinkLimits
 from mav_tasks.links.url import LinkUrl
 from mav_tasks.logs.field_notes import FieldNotes
 from mav_tasks.logs.rendering import utc_text
 from mav_tasks.logs.setup import log_to_stderr
+from mav_tasks.logs.unreadable import Unreadable
 from mav_tasks.logs.vehicle_texts import VehicleTexts
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
@@ -85,7 +85,7 @@ def _serve(settings: ServerSettings, reload: Reload | None) -> int:
     for _, fault in faults_of(links):
         raise fault
     asked, pushing = links_of(links), pushing_url(links)
-    pushed = tuple(parse_endpoint(text, what=f"--push {text}") for text in links.push)
+    pushed = pushed_to(links)
     _take_signals()
     if reload is not None:
         signal.signal(signal.SIGHUP, reload.note)
@@ -245,7 +245,7 @@ async def _run(
     for recorder in recorders:
         say(f"{recorder}")
     tame_collector()
-    listeners: list[EngineObserver] = [VehicleTexts(), *recorders]
+    listeners: list[EngineObserver] = [VehicleTexts(), Unreadable(), *recorders]
     if logging.getLogger("mav_tasks").isEnabledFor(logging.DEBUG):
         listeners.append(FieldNotes(lambda: engine.snapshot(now=now).decoded))
     if metrics is not None:

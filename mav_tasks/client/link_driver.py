@@ -11,8 +11,8 @@ from typing import Protocol
 
 from mav_tasks.client.signatures import ClientSignatures
 from mav_tasks.links.base import TEND_PERIOD, Link, Peer, PeerState, StreamLink
-from mav_tasks.mavlink.packet import Packet, split_datagram
-from mav_tasks.mavlink.stream import StreamSplitter
+from mav_tasks.mavlink.packet import Packet
+from mav_tasks.mavlink.stream import PeerStreams
 
 DRAIN = 64  # datagrams read per callback, so that other tasks get to run
 
@@ -43,7 +43,7 @@ class LinkDriver:
         self._signatures = signatures
         self._loop = asyncio.get_running_loop()
         self._peers: dict[Peer, None] = dict.fromkeys(link.peers)
-        self._splitters: dict[Peer, StreamSplitter] = {}
+        self._streams = PeerStreams(is_stream=link.is_stream)
         self._timer: asyncio.TimerHandle | None = None
         self._tending: asyncio.TimerHandle | None = None
         self._is_closed = False
@@ -111,15 +111,11 @@ class LinkDriver:
     def _read(self) -> None:
         self._take_changes()
         for peer, data in self.link.receive(DRAIN):
-            for packet in filter(self._believes, self._packets(peer, data)):
+            packets = self._streams.feed(peer, data, now=self.now)
+            for packet in filter(self._believes, packets):
                 self._peers.setdefault(peer)
                 self._talk.receive(packet, now=self.now)
         self._take_changes()
-
-    def _packets(self, peer: Peer, data: bytes) -> list[Packet]:
-        if not self.link.is_stream:
-            return split_datagram(data)
-        return self._splitters.setdefault(peer, StreamSplitter()).feed(data, now=self.now)
 
     def _believes(self, packet: Packet) -> bool:
         return self._signatures is None or self._signatures.believes(packet, utc=time.time())
@@ -133,7 +129,7 @@ class LinkDriver:
                 self._on_up()
             elif change.state is PeerState.DOWN:
                 self._peers.pop(change.peer, None)
-                self._splitters.pop(change.peer, None)
+                self._streams.forget(change.peer)
 
     def _tend(self, link: StreamLink) -> None:
         self._tending = self._loop.call_later(TEND_PERIOD, self._tend, link)

@@ -12,6 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskState
 from mav_tasks.tasks.restored import Restored
 
 Peer = Hashable  # an endpoint on a link; only the link knows what it is
+Place = tuple[str, Peer]  # link name, endpoint on it
 
 FLEET_LINK = "fleet"  # on which the gateways of a fleet pass on each other's clients
 

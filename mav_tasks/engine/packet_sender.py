@@ -1,5 +1,6 @@
 """Output to one endpoint: sequence numbers per source, packing, and the shared packet queue."""
 
+from collections import deque
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
@@ -43,8 +44,12 @@ class PacketSender:
         packer: Packer,
         signatures: Signatures | None = None,
         fence: Fence | None = None,
+        sent: deque[Outgoing] | None = None,
     ) -> None:
-        """``fence``: of all packets but those that are sent ``unfenced``."""
+        """``fence``: of all packets but those that are sent ``unfenced``.
+
+        ``sent`` takes each packet, too.
+        """
         self.link = link
         self.peer = peer
         self._queue = queue
@@ -52,6 +57,7 @@ class PacketSender:
         self._signatures = signatures
         self._fence = fence or Fence()
         self._sequence = SequenceKeeper()
+        self._sent = sent
 
     def __repr__(self) -> str:
         return f"PacketSender({self.link}, {self.peer})"
@@ -109,4 +115,7 @@ class PacketSender:
                 raw = self._signatures.sealed_as_holder(self.link, self.peer, raw)
             else:
                 raw = self._signatures.sealed(self.link, self.peer, raw)
-        self._queue.append(Outgoing(self.link, self.peer, raw, first, until))
+        outgoing = Outgoing(self.link, self.peer, raw, first, until)
+        self._queue.append(outgoing)
+        if self._sent is not None:
+            self._sent.append(outgoing)

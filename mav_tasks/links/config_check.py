@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 from mav_tasks.errors import UsageError
 from mav_tasks.links.endpoint import is_loopback, parse_endpoint
 from mav_tasks.links.policy import LinkPolicy, Rules, Side, check, policy_of, unsigned_beyond
+from mav_tasks.links.udp import UdpUrl
 from mav_tasks.links.url import LinkUrl, parse_url
 
 SIDES: tuple[Side, ...] = ("clients", "vehicles")
@@ -56,6 +57,14 @@ def pushing_url(asked: LinkSettings) -> LinkUrl | None:
     """Return the URL of the link that pushes to clients: the first that can; None if none can."""
     urls = map(parse_url, asked.clients)
     return next((url for url in urls if url.can_push), None)
+
+
+def pushed_to(asked: LinkSettings) -> tuple[tuple[str, int], ...]:
+    """Return the push addresses without those at which this server itself listens."""
+    texts = (*asked.clients, *asked.vehicles)
+    own = [url for url in map(parse_url, texts) if isinstance(url, UdpUrl) and url.kind == "udpin"]
+    pushed = (parse_endpoint(text, what=f"--push {text}") for text in asked.push)
+    return tuple(each for each in pushed if not any(url.hears(*each) for url in own))
 
 
 def faults_of(asked: LinkSettings) -> list[tuple[str, UsageError]]:

@@ -36,6 +36,12 @@ def parse_endpoint(text: str, *, what: str) -> tuple[str, int]:
     host = host.strip("[]")
     if not host or number_in(port, PORTS) is None:
         raise LinkUrlError(f"{what}: expected host:port with a port from 1 to 65535")
+    try:
+        host.encode("idna")  # as the system's look-up of names does
+    except UnicodeError:
+        raise LinkUrlError(f"{what}: no host has such a name") from None
+    if not host.isprintable():
+        raise LinkUrlError(f"{what}: no host has such a name")
     return host, int(port)
 
 

@@ -29,6 +29,11 @@ class UdpUrl(HostUrl):
 
     can_push = True  # a datagram needs no connection
 
+    def hears(self, host: str, port: int) -> bool:
+        """Return whether this socket, which listens, gets what is sent to an address."""
+        is_here = self.is_nearby or self.host in ANY.values()
+        return port == self.port and (host == self.host or (is_here and is_loopback(host)))
+
     def open(self, *, limits: LinkLimits, push: tuple[tuple[str, int], ...] = ()) -> Link:
         """Open the socket; a rover is dialled from a port of its own."""
         is_rover_dialled = self.kind == "udpout" and limits is TO_VEHICLES

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 
 from mav_tasks.engine.inputs import (
@@ -12,6 +12,7 @@ from mav_tasks.engine.inputs import (
     LinkSide,
     Outgoing,
     Packets,
+    Peer,
     PeerChanged,
 )
 from mav_tasks.engine.packet_reader import PacketReader
@@ -21,12 +22,14 @@ from mav_tasks.mavlink.codec import DecodeCounts, Decoder
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.messages import Statustext
 from mav_tasks.mavlink.packet import MAGIC_V1, Packet
+from mav_tasks.mavlink.stream import is_whole
 from mav_tasks.services.text_receiver import Text, TextReceiver
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.tasks.events import Event
 
 RATE = 10.0  # texts per second of one vehicle; more are only counted
 BURST = 50  # texts at once: an autopilot that starts sends many
+COPIED = 5.0  # s in which a second link to a vehicle may bring a text once more
 TELL = 30.0  # s from the first dropped text to the line with their number
 
 TEXT = Statustext.id
@@ -54,6 +57,18 @@ class _Talk:
     limit: TokenBucket
     left_out: int = 0
     tell_at: float = inf
+    #: by payload: the link and peer that brought a text last, and when
+    latest: dict[bytes, tuple[tuple[str, Peer], float]] = field(default_factory=dict)
+
+    def is_copy(self, payload: bytes, place: tuple[str, Peer], now: float) -> bool:
+        """Return whether another link has just brought this text."""
+        before, at = self.latest.get(payload, (place, -inf))
+        if before != place and now - at < COPIED:
+            return True
+        if len(self.latest) >= BURST:
+            self.latest.clear()
+        self.latest[payload] = place, now
+        return False
 
 
 class VehicleTexts:
@@ -80,8 +95,8 @@ class VehicleTexts:
                 for each in several:
                     self.on_input(each, now=now)
             case Packets() if item.link in self._links:
-                for packet in self._texts_in(item, now):
-                    self._receive(packet, now)
+                for peer, packet in self._texts_in(item, now):
+                    self._receive(packet, (item.link, peer), now)
             case LinkChanged(side=LinkSide.VEHICLES, up=True):
                 self._links[item.link] = item.is_stream
                 self._intake.change_link(item)
@@ -100,17 +115,19 @@ class VehicleTexts:
         """Log incomplete texts and pending counts."""
         self._handle_deadline(inf)
 
-    def _texts_in(self, item: Packets, now: float) -> Iterator[Packet]:
+    def _texts_in(self, item: Packets, now: float) -> Iterator[tuple[Peer, Packet]]:
         if not self._links[item.link]:
-            datagrams = [each for each in item.datagrams if _may_hold_text(each[1])]
+            datagrams = [
+                each for each in item.datagrams if _may_hold_text(each[1]) or not is_whole(each[1])
+            ]
             if not datagrams:
                 return
             item = Packets(item.link, datagrams)
-        for _, packet, _ in self._intake.packets(item, self._counts, now=now):
+        for peer, packet, _ in self._intake.packets(item, self._counts, now=now):
             if packet.message_id == TEXT:
-                yield packet
+                yield peer, packet
 
-    def _receive(self, packet: Packet, now: float) -> None:
+    def _receive(self, packet: Packet, place: tuple[str, Peer], now: float) -> None:
         message = self._decoder.decode(packet)
         if not isinstance(message, Statustext):
             return
@@ -118,6 +135,8 @@ class VehicleTexts:
         if talk is None:
             limit = TokenBucket(rate=RATE, burst=BURST, now=now)
             talk = self._talks[packet.system_id] = _Talk(limit)
+        if talk.is_copy(packet.payload, place, now):
+            return
         if not talk.limit.take(now=now):
             talk.left_out += 1
             talk.tell_at = min(talk.tell_at, now + TELL)

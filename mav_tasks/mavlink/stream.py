@@ -1,8 +1,10 @@
-"""Packets out of a stream of bytes that may be cut anywhere: TCP, a serial line. Needs no peer.
+"""Packets out of bytes that may be cut anywhere: TCP, a serial line, a bridge from one to UDP.
 
 What has a wrong CRC is no packet, whatever its first byte: the search goes on one byte after it.
 MAVLink guide, "Packet Serialization".
 """
+
+from collections.abc import Hashable
 
 from mav_tasks.mavlink.codec import crc_fits
 from mav_tasks.mavlink.packet import (
@@ -22,6 +24,50 @@ from mav_tasks.mavlink.packet import (
 #: for packets inside an unfinished one is no way out: a log that is being downloaded has some.)
 PATIENCE = 1.0
 
+MAX_STREAMS = 256  # per link; one more replaces the oldest
+
+
+class PeerStreams:
+    """The packets of all peers of one link. What one peer sends is one stream.
+
+    A datagram of whole packets stands alone, so that a truncated one before it does not delay it.
+    """
+
+    def __init__(self, *, is_stream: bool) -> None:
+        """``is_stream``: whether the link delivers pieces of streams, or datagrams."""
+        self._is_stream = is_stream
+        self._splitters: dict[Hashable, StreamSplitter] = {}
+        self.noise = 0  # bytes that belonged to no packet
+
+    def __repr__(self) -> str:
+        return f"PeerStreams({self._splitters})"
+
+    def feed(self, peer: Hashable, data: bytes, *, now: float) -> list[Packet]:
+        """Return the packets of a peer that are whole with these bytes, in order."""
+        alone = [] if self._is_stream else split_datagram(data)
+        if len(alone) == 1 and len(alone[0].raw) == len(data) and not self._splitters:
+            return alone  # nearly always
+        splitter = self._splitters.get(peer)
+        is_whole = not self._is_stream and sum([len(each.raw) for each in alone]) == len(data)
+        if is_whole and splitter is None:
+            return alone
+        if not is_whole or not all(map(crc_fits, alone)):
+            alone = []
+        if splitter is None:
+            if len(self._splitters) >= MAX_STREAMS:
+                self.forget(next(iter(self._splitters)))
+            splitter = self._splitters[peer] = StreamSplitter()
+        before = splitter.noise
+        packets = [*splitter.end(), *alone] if alone else splitter.feed(data, now=now)
+        self.noise += splitter.noise - before
+        if alone:
+            self.forget(peer)
+        return packets
+
+    def forget(self, peer: Hashable) -> None:
+        """Forget what a peer left unfinished."""
+        self._splitters.pop(peer, None)
+
 
 class StreamSplitter:
     """Cuts one peer's stream into packets; keeps less than one packet between two calls."""
@@ -38,12 +84,25 @@ class StreamSplitter:
         """Return the packets that are whole with these bytes, in order."""
         kept = len(self._rest)
         is_late = kept > 0 and now - self._since > PATIENCE
-        data = self._rest + data
+        packets, used = self._cut(self._rest + data, waits_from=1 if is_late else 0)
+        if used > 0 or not kept:
+            self._since = now
+        return packets
+
+    def end(self) -> list[Packet]:
+        """Return the packets that are inside what was kept: nothing continues it."""
+        return self._cut(self._rest, waits_from=len(self._rest))[0]
+
+    def _cut(self, data: bytes, *, waits_from: int) -> tuple[list[Packet], int]:
+        """Return the packets in these bytes, and how many bytes are done; keep the others.
+
+        A packet that begins before ``waits_from`` and is not whole is none.
+        """
         packets: list[Packet] = []
         start, end = 0, len(data)
         while start < end:
             stop = end_of(data, start)
-            if stop is not None and stop > end and not (is_late and start == 0):
+            if stop is not None and stop > end and start >= waits_from:
                 break
             packet = None if stop is None or stop > end else _packet(data[start:stop])
             if packet is None:
@@ -53,9 +112,15 @@ class StreamSplitter:
                 packets.append(packet)
                 start += len(packet.raw)
         self._rest = data[start:]
-        if start > 0 or not kept:
-            self._since = now
-        return packets
+        return packets, start
+
+
+def is_whole(data: bytes) -> bool:
+    """Return whether a datagram has whole packets only, by their lengths."""
+    start: int | None = 0
+    while start is not None and start < len(data):
+        start = end_of(data, start)
+    return start == len(data)
 
 
 def end_of(data: bytes, start: int) -> int | None:

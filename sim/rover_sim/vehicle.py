@@ -8,8 +8,8 @@ from collections.abc import Hashable
 from enum import Enum
 
 from mav_tasks.mavlink.codec import Decoder, Encoder
-from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.mavlink.stream import PeerStreams
 from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
@@ -49,6 +49,7 @@ class Vehicle:
         self.body = body
         self._signatures = signatures
         self.autopilot = autopilot
+        self._streams = PeerStreams(is_stream=False)
         self._decoder = Decoder()
         self._encoder = Encoder(autopilot.address)
         self._peers: dict[Hashable, float] = {}
@@ -66,7 +67,7 @@ class Vehicle:
 
     def receive(self, data: bytes, peer: Hashable, *, now: float) -> None:
         """Take a datagram of any bytes. Raise only SimulatedCrash."""
-        for packet in split_datagram(data):
+        for packet in self._streams.feed(peer, data, now=now):
             if self._signatures is not None and not self._signatures.believes(packet, now=now):
                 continue
             message = self._decoder.decode(packet)

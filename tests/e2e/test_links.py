@@ -4,7 +4,7 @@ import os
 import socket
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -15,11 +15,20 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.kit.bridges import Bridge, DiallingFar, SerialFar, TcpFar, bridge
+from tests.kit.bridges import (
+    Bridge,
+    DiallingFar,
+    LineFar,
+    SerialFar,
+    TcpFar,
+    UdpEnd,
+    bridge,
+)
 from tests.kit.lines import slow_line
 from tests.kit.processes import (
     Stand,
     free_tcp_ports,
+    free_udp_ports,
     stand,
     submit,
     wait_for,
@@ -277,3 +286,32 @@ def memory(pid: int) -> int:
     """Resident bytes of a process."""
     pages = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.slow
+def test_two_radios_behind_bridges_that_cut_packets_and_one_dies(tmp_path: Path) -> None:
+    """Each is a line of 57,600 baud between pseudo-terminals, and 13 bytes make a datagram."""
+    ports = free_udp_ports(2)
+    ends: list[UdpEnd] = []
+
+    @contextmanager
+    def radios(rover_port: int) -> Iterator[str]:
+        with ExitStack() as stack:
+            for port in ports:
+                folder = tmp_path / str(port)
+                folder.mkdir()
+                one, other = stack.enter_context(slow_line(folder, baud=BAUD))
+                ends.append(UdpEnd(other, port, piece=13))
+                stack.callback(ends[-1].close)
+                far = LineFar(one, f"udpout:{HOST}:{port}")
+                stack.enter_context(bridge(rover_port, far))
+            yield f"udpout:{HOST}:{ports[0]}"
+
+    with stand(tmp_path, "--vehicle", f"udpout:{HOST}:{ports[1]}", way=radios) as running:
+        link = running.connect()
+        running.server.wait_for("rover 1: is also heard at")
+        task_id = running.drive(link, 2.5)
+        # either may be in use: the first one that was heard
+        ends[0].close()
+        wait_for(link, "STATUSTEXT", f"'Task {task_id} done' in STATUSTEXT.text", within=30)
+        assert "paused" not in running.server.text

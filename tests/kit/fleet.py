@@ -1,11 +1,11 @@
 """Many rovers on many links: links that go down, and several rovers behind one radio."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import degrees
 from random import Random
-from typing import Any
+from typing import Any, cast
 
 from pymavlink.dialects.v20 import common
 
@@ -163,6 +163,34 @@ class Radio:
                 self.link.send(to, packet)
 
 
+class TwoRadios:
+    """One rover that sends and hears everything by the radios at two endpoints."""
+
+    def __init__(self, rover: Vehicle, one: Radio, other: Radio) -> None:
+        self.rover = rover
+        self.links = (one.link, other.link)
+
+    def next_deadline(self) -> float | None:
+        """Return when the rover's next control step is due."""
+        return self.rover.next_deadline()
+
+    def turn(self, *, now: float) -> None:
+        """Receive, answer by the same radio, run due control steps, and send by both."""
+        for link in self.links:
+            for peer, data in link.receive(len(link.arrived)):
+                self.rover.receive(data, (link.name, peer), now=now)
+            self._send([link])
+        self.rover.handle_deadline(now=now)
+        self._send(self.links)
+
+    def _send(self, links: Sequence[MemoryLink]) -> None:
+        for to, packet in self.rover.take_packets():
+            radio, peer = cast(tuple[str, str], to)  # as given to ``receive``
+            for link in links:
+                if link.name == radio:
+                    link.send(peer, packet)
+
+
 class Fleet(World):
     """One server, rovers 1, 2, 3 ... on several vehicle links, and two clients."""
 
@@ -174,7 +202,9 @@ class Fleet(World):
         conditions: Conditions | None = None,
         settings: Settings | None = None,
         dials_in: tuple[str, ...] = (),
+        second_radio: tuple[str, str] | None = None,
     ) -> None:
+        """``second_radio``: the endpoint of rover 1 and another one, at which it is as well."""
         self.seed = seed
         self.watched: FleetNet = FleetNet(seed=seed, conditions=conditions or Conditions())
         VirtualWorld.__init__(self, self.watched)  # World's own has no radios
@@ -204,6 +234,12 @@ class Fleet(World):
                     greeting = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
                     self.net.send(self.links[name].name, endpoint, packed(greeting, 250, 191))
             self.server.up(self.links[name], now=0.0)
+        if second_radio is not None:
+            one, other = (self.radios[endpoint] for endpoint in second_radio)
+            self.leave(one)
+            self.leave(other)
+            self.join(TwoRadios(self.rovers[0], one, other))
+            self.watched.observers_at[second_radio[1]] = (self.observers[0],)
         self.client = self.add_client("client")
         self.other = self.add_client("other", system_id=245)
 

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import pytest
 
+from tests.kit.fleet import Fleet, Layout
 from tests.kit.joint.agreement import Agreement
 from tests.kit.needs import Needs
 from tests.kit.world import World
@@ -52,3 +53,25 @@ def make_world(monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeWorld]:
 def world(make_world: MakeWorld) -> World:
     """Return a world in which nothing is unusual."""
     return make_world()
+
+
+class MakeFleet(Protocol):
+    """Makes a fleet (see Fleet) whose observers are asked at the end of the test."""
+
+    def __call__(self, layout: Layout, **kw: Any) -> Fleet: ...
+
+
+@pytest.fixture
+def make_fleet() -> Iterator[MakeFleet]:
+    """Return a factory of fleets that are ready to be used."""
+    fleets: list[Fleet] = []
+
+    def make(layout: Layout, **kw: Any) -> Fleet:
+        fleet = Fleet(layout, **kw)
+        fleets.append(fleet)
+        fleet.ready()
+        return fleet
+
+    yield make
+    for fleet in fleets:
+        fleet.check()

@@ -8,11 +8,13 @@ from typing import Any
 
 import pytest
 
+from mav_tasks.errors import UsageError
 from rover_sim.field_trial.ground import Limits
 from rover_sim.field_trial.rows import Row, Verdict, table
 from rover_sim.field_trial.rows_run import run_rows
 from rover_sim.field_trial.session import Session
-from tests.kit.trial_ground import MAKES, TrialGround
+from rover_sim.frames import Frame
+from tests.kit.trial_ground import MAKES, Make, TrialGround
 
 #: by default, and what each kind of rover can do
 LIMITS = {
@@ -60,3 +62,17 @@ def test_a_rover_as_it_is_holds_the_table(make: str, row: str) -> None:
     rows = trial(make, row)
     assert rows
     assert {each.verdict for each in rows} == {Verdict.PASS}
+
+
+def test_a_rover_whose_failsafe_is_not_set_ends_the_trial_at_once() -> None:
+    ground = TrialGround(Make("px4", Frame.DIFFERENTIAL))
+
+    async def run() -> list[Row]:
+        session = Session(ground, limits=LIMITS["px4 differential"], say=print)
+        try:
+            return list(await run_rows(session, ("restart",)))
+        finally:
+            await session.end()
+
+    with pytest.raises(UsageError, match="mav-tasks probe --set-failsafe"):
+        ground.run(run())

@@ -1,11 +1,11 @@
 """Many rovers on many links: each has its own tasks, what befalls one is no other's business."""
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache, partial
 from itertools import pairwise
 from math import cos, degrees, radians, sin
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -44,36 +44,15 @@ from tests.kit.client import (
 )
 from tests.kit.fleet import Fleet, Layout, Radio, packed, start_of
 from tests.kit.world import near_pose, twin_of
+from tests.scenarios.conftest import MakeFleet
 
 CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
 PRIORITY = 1
-HEARTBEAT, TIMESYNC = 0, 111
+HEARTBEAT, COMMAND, TIMESYNC = 0, 76, 111
 OFF = Faults(silent=True, deaf=True)
 GOOD = Conditions()
 BRAKING = 3.5  # s, from the speeds driven here to a stand
 SERVER = (250, 191)  # on the vehicle links
-
-
-class MakeFleet(Protocol):
-    """Makes a fleet (see Fleet) whose observers are asked at the end of the test."""
-
-    def __call__(self, layout: Layout, **kw: Any) -> Fleet: ...
-
-
-@pytest.fixture
-def make_fleet() -> Iterator[MakeFleet]:
-    """Return a factory of fleets that are ready to be used."""
-    fleets: list[Fleet] = []
-
-    def make(layout: Layout, **kw: Any) -> Fleet:
-        fleet = Fleet(layout, **kw)
-        fleets.append(fleet)
-        fleet.ready()
-        return fleet
-
-    yield make
-    for fleet in fleets:
-        fleet.check()
 
 
 TEN: Layout = {
@@ -632,7 +611,8 @@ def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes
     assert notes == ["shares its id with a rover at twin: ignored. Give that one another id"]
     assert any("shares its id with a rover" in text for text in fleet.client.texts())
     assert (twin.truth.north, twin.truth.east) == (50.0, 5.0)
-    assert {data[7] for _, data in fleet.watched.towards["twin"]} == {HEARTBEAT, TIMESYNC}
+    asked = {HEARTBEAT, TIMESYNC, COMMAND}  # which vehicle it is
+    assert {data[7] for _, data in fleet.watched.towards["twin"]} == asked
     assert max(m.x for m in fleet.client.of_type("LOCAL_POSITION_NED")) < 3.0
 
     mine, before = diary_of(fleet, 1), diary_of(alone, 1)

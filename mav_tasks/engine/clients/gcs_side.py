@@ -11,7 +11,7 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
 from mav_tasks.engine.clients.rights import RightsBook
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
-from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged
+from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged, Place
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
@@ -19,7 +19,6 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Decoder, Packer, target_of
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.services.command_receiver import is_stop
 from mav_tasks.services.token_bucket import TokenBucket

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
-from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Outgoing, Peer
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Outgoing, Peer, Place
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import MAGIC_V2, Packet
-from mav_tasks.mavlink.router import Place
 from mav_tasks.mavlink.signing import (
     FROM_RADIOS,
     HIGHEST_TIMESTAMP,

@@ -7,7 +7,7 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import SAFETY, SUBMITTER
 from mav_tasks.engine.commands.motion_gate import UNARMED, may_pass, passed, why_not_sent
-from mav_tasks.engine.inputs import Peer
+from mav_tasks.engine.inputs import Peer, Place
 from mav_tasks.engine.policy import Kind, Row, row_of
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -16,7 +16,6 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place
 from mav_tasks.services import file_transfer
 from mav_tasks.tasks.lifecycle import TaskReason
 

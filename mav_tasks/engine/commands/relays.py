@@ -9,13 +9,13 @@ from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.commands.motion_gate import why_not_sent
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.translate import IN_FORCE
+from mav_tasks.engine.inputs import Place
 from mav_tasks.engine.policy import Kind, Row
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
-from mav_tasks.mavlink.router import Place
 from mav_tasks.services.command_receiver import Answer, Pending
 from mav_tasks.services.command_sender import Answered, Standing
 from mav_tasks.settings import ROLES

@@ -96,7 +96,8 @@ class Vehicle:
         self.last_heartbeat: Packet | None = None
         self.last_seq = 0  # sequence number of the autopilot's last packet
         self._number = 0  # the same, counted on beyond 255
-        self._counted_at = -inf  # s, when that packet came
+        #: when that packet came, s
+        self.counted_at = -inf
         self._last_beat = (0, -inf)  # number and time of the last heartbeat
         self._overtaken: tuple[m.Heartbeat | None, float] = (None, -inf)  # the last such heartbeat
         self._was_heard = True
@@ -142,9 +143,9 @@ class Vehicle:
 
         After a silence it counts as ahead, however many were lost: no packet is that late.
         """
-        behind = 0 if now - self._counted_at > SILENT else 0x80
+        behind = 0 if now - self.counted_at > SILENT else 0x80
         self._number += (seq - self.last_seq + behind & 0xFF) - behind
-        self.last_seq, self._counted_at = seq, now
+        self.last_seq, self.counted_at = seq, now
 
     def is_overtaken(self, heartbeat: m.Heartbeat, *, now: float) -> bool:
         """Return whether a newer heartbeat came just before this one. Call ``count`` first."""
@@ -181,10 +182,17 @@ class Vehicle:
         self._last_beat = (0, -inf)
         self.requests.ask_which_again()
 
-    def move_to(self, outlet: PacketSender, *, may_arm: bool) -> None:
-        """Send to another endpoint from now on; ``may_arm``: whether we may arm it there."""
-        self.comes_anew()
+    def move_to(self, outlet: PacketSender, *, may_arm: bool, is_same: bool) -> None:
+        """Send to another endpoint from now on.
+
+        ``may_arm``: whether we may arm it there. ``is_same``: its unique id was heard there.
+        """
+        if is_same:
+            self._last_beat = (0, -inf)
+        else:
+            self.comes_anew()
         self.requests.move_to(outlet)
+        self.requests.intervals.ask_all_again()
         self.parts.authority.moved(may_arm=may_arm)
 
     def come_back(self, *, was_driven: bool, halt: LastHalt | None, now: float) -> None:

@@ -1,27 +1,33 @@
 """The links to vehicles: their endpoints, which vehicle is where, and what a link carries."""
 
+from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
-from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged
+from mav_tasks.engine.inputs import LinkChanged, Outgoing, Peer, PeerChanged, Place
 from mav_tasks.engine.packet_sender import Fence, PacketSender
 from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.ways import Way
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place, Router
 from mav_tasks.services.heartbeat import INTERVAL
+from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.registry import TaskRegistry
 
 MAX_PEERS = 256  # endpoints on one vehicle link
 BOTH_THERE = 1.0  # s; by then, delayed packets from the old place have come
+SAYS = 10.0  # s in which a rover has said which one it is, if it ever does
+MOST_SENT = 1_024  # packets that are known when they come back: seconds of ten driven rovers
+NO_KEY = ", that link has no key"
+REQUESTS = 4.0  # a second, to places at which a known vehicle's id is heard
 
 
 @dataclass(slots=True)
@@ -66,13 +72,11 @@ class VehicleLinks:
         self._registry = registry
         self._note_once = note_once
         self._links: dict[str, Link] = {}
-        #: the place of each vehicle
-        self.router = Router()
         self._outlets: dict[Place, PacketSender] = {}  # kept, because their numbering continues
-        #: when the first heartbeat of a known vehicle's id came from another place
-        self._rivals: dict[tuple[int, str, Peer], float] = {}
-        #: places whose peer has disconnected: it may be back at once, anywhere
-        self._left: set[Place] = set()
+        #: the places at which a vehicle's id is heard
+        self._ways: dict[tuple[int, Place], Way] = {}
+        self._requests = TokenBucket(rate=REQUESTS, burst=2 * REQUESTS, now=-inf)  # to these
+        self._sent: deque[Outgoing] = deque(maxlen=MOST_SENT)
         #: by endpoint; cleared when a link, a setting or the place of a vehicle changes
         self._budgets: dict[Place, LinkBudget] = {}
 
@@ -95,8 +99,8 @@ class VehicleLinks:
         if not change.up:
             return
         self._budgets.clear()
-        places = [self.router.place_of(vehicle.system_id) for vehicle in self._all.values()]
-        known = [place[1] for place in places if place is not None and place[0] == change.link]
+        places = [vehicle.requests.place for vehicle in self._all.values()]
+        known = [peer for link, peer in places if link == change.link]
         outlets = {peer: self._outlet(change.link, peer) for peer in (*change.peers, *known)}
         beat = partial(self._beat, outlets)
         heartbeat = self._timers.rhythm(Turn.LINKS, beat, period=INTERVAL, now=now)
@@ -109,22 +113,32 @@ class VehicleLinks:
             return
         if not change.up:
             link.outlets.pop(change.peer, None)
-            self._left.add(place)
             self._forget_if_empty(place)
         elif len(link.outlets) < MAX_PEERS:
-            self._left.discard(place)
             link.outlets[change.peer] = self._outlet(*place)
             for vehicle in self._all.values():
-                if self.router.place_of(vehicle.system_id) == place:
+                if vehicle.requests.place == place:
                     vehicle.comes_anew()
 
     def has_vehicle_at(self, link: str, peer: Peer) -> bool:
         """Return whether one of our vehicles is at an endpoint."""
-        return any(self.router.place_of(each) == (link, peer) for each in self._all)
+        return any(each.requests.place == (link, peer) for each in self._all.values())
 
     def owns(self, link: str) -> bool:
         """Return whether a link of this name is a vehicle link."""
         return link in self._links
+
+    def where_sent(self, packet: Packet, place: Place) -> set[Place]:
+        """Return where the server has sent this packet lately, which comes from a place now.
+
+        Two servers with one address may send the same heartbeat: one counts only if a vehicle that
+        it was sent to is heard at this place, too.
+        """
+        sent_to = {(sent.link, sent.peer) for sent in self._sent if sent.data == packet.raw}
+        if packet.message_id == m.Heartbeat.id and place not in sent_to:
+            here = {number for number, there in self._ways if there == place}
+            sent_to &= {there for number, there in self._ways if number in here}
+        return sent_to
 
     def meets(self, link_name: str, peer: Peer) -> tuple[PacketSender, bool] | None:
         """Return the sender to a vehicle's endpoint, and whether it is new; None: full, or down."""
@@ -138,25 +152,23 @@ class VehicleLinks:
         link.outlets[peer] = self._outlet(link_name, peer)
         return link.outlets[peer], True
 
-    def learn(self, system_id: int, place: Place) -> None:
-        """Note that a vehicle is at a place."""
-        self.router.learn(system_id, place)
+    def forget_budgets(self) -> None:
+        """Divide what each link carries anew: a vehicle came, or is at another place."""
         self._budgets.clear()
 
-    def forget(self, system_id: int) -> None:
+    def forget(self, vehicle: Vehicle) -> None:
         """Forget a vehicle, which this gateway does not have any more; its endpoint stays."""
-        place = self.router.place_of(system_id)
-        self.router.forget(system_id)
-        for rival in [each for each in self._rivals if each[0] == system_id]:
-            del self._rivals[rival]
+        for way in [each for each in self._ways if each[0] == vehicle.system_id]:
+            del self._ways[way]
         self._budgets.clear()
-        self._forget_if_empty(place)
+        self._forget_if_empty(vehicle.requests.place)
 
-    def withdraw(self, system_id: int) -> None:
+    def withdraw(self, vehicle: Vehicle) -> None:
         """Drop what waits to leave for a vehicle's endpoint, except HOLD: another one is there."""
-        place = self.router.place_of(system_id)
         self._queue[:] = [
-            each for each in self._queue if each.is_first or (each.link, each.peer) != place
+            each
+            for each in self._queue
+            if each.is_first or (each.link, each.peer) != vehicle.requests.place
         ]
 
     def may_arm(self, name: str) -> bool:
@@ -164,35 +176,63 @@ class VehicleLinks:
         arming = self._settings.arming
         return arming == "server" or (arming == "auto" and self._links[name].is_local)
 
-    def moves(self, vehicle: Vehicle, link: str, peer: Peer, *, now: float) -> bool:
-        """Move a vehicle that fell silent to the place of this heartbeat. Return whether it moved.
+    def way(self, system_id: int, place: Place, *, now: float) -> Way:
+        """Return what is known about a place at which the id of a vehicle is heard."""
+        way = self._ways.get((system_id, place))
+        if way is None:
+            if len(self._ways) >= MAX_PEERS:
+                del self._ways[next(iter(self._ways))]
+            way = self._ways[system_id, place] = Way(now)
+        return way
 
-        An id that was heard there while the vehicle was still heard is another vehicle, for good.
+    def moves(
+        self, vehicle: Vehicle, link: str, peer: Peer, message: m.Message, *, now: float
+    ) -> bool:
+        """Note a message from another place than the vehicle's. Return whether it moved there.
+
+        One with two ways moves to the better one; one that fell silent to where its id is heard.
+        An id that was heard there while the vehicle was still heard is another vehicle, for good,
+        unless its unique id and its clock show that it is the same.
         """
-        rival = vehicle.system_id, link, peer
-        if rival not in self._rivals and len(self._rivals) >= MAX_PEERS:
-            del self._rivals[next(iter(self._rivals))]
-        is_another = vehicle.heard_at > self._rivals.setdefault(rival, now) + BOTH_THERE
-        old = self.router.place_of(vehicle.system_id)
-        if old is not None and self._signatures.has_key(old[0]) > self._signatures.has_key(link):
-            words = f"shares its id with a rover at {_named(peer)}: ignored, that link has no key"
-            self._note_once(vehicle.system_id, words, now=now)
-            return False
-        if is_another or (old not in self._left and vehicle.is_heard(now=now)):
-            words = (
-                f"shares its id with a rover at {_named(peer)}: ignored. Give that one another id"
-            )
-            self._note_once(vehicle.system_id, words, now=now)
-            return False
-        outlets, may_arm = self._links[link].outlets, self.may_arm(link)
-        if peer not in outlets and len(outlets) >= MAX_PEERS:
-            return False
-        del self._rivals[rival]
-        vehicle.move_to(outlets.setdefault(peer, self._outlet(link, peer)), may_arm=may_arm)
-        self.learn(vehicle.system_id, (link, peer))
-        self._forget_if_empty(old)
-        self._registry.record(VehicleSeen(vehicle.system_id, f"is now at {_named(peer)}", now))
-        return True
+        number, old, is_heard = vehicle.system_id, vehicle.requests.place, vehicle.is_heard(now=now)
+        way, used = self.way(number, (link, peer), now=now), self._ways.get((number, old))
+        is_beat, was_same = isinstance(message, m.Heartbeat), way.is_same
+        if was_same and now - way.heard_at > self._settings.watch.heartbeat_lost:
+            way.is_same, way.first_at = None, now  # another one may be there now
+        uid = "" if is_heard and not vehicle.requests.is_identified else vehicle.tasks.terms.uid
+        way.judge(message, uid, used, is_heard=is_heard)
+        is_gone = not is_heard or self._is_gone(old)
+        is_better = way.is_better_than(used, vehicle.counted_at, now=now)
+        is_another = vehicle.heard_at > way.first_at + BOTH_THERE or way.is_same is False
+        way.heard_at = now
+        why = ""
+        if self._signatures.has_key(old[0]) > self._signatures.has_key(link):
+            why = NO_KEY
+        elif not way.is_same and is_another and (way.is_same is False or now > way.first_at + SAYS):
+            why = ". Give that one another id"
+        outlets = self._links[link].outlets
+        outlet = outlets.get(peer) or self._outlet(link, peer)
+        if why:
+            words = f"shares its id with a rover at {_named(peer)}: ignored{why}"
+            self._note_once(number, words, now=now)
+        elif len(outlets) < MAX_PEERS or peer in outlets:
+            if is_gone or is_better if way.is_same else is_gone and is_beat and not is_another:
+                outlets[peer] = outlet
+                vehicle.move_to(outlet, may_arm=self.may_arm(link), is_same=bool(way.is_same))
+                self._budgets.clear()
+                self._ways.pop((number, old), None)
+                self._forget_if_empty(old)
+                self._registry.record(VehicleSeen(number, f"is now at {_named(peer)}", now))
+                return True
+            if way.is_same:
+                outlets[peer] = outlet
+            if way.is_same and not was_same:
+                self._registry.record(VehicleSeen(number, f"is also heard at {_named(peer)}", now))
+        is_open = is_beat and way.is_same is not False and why != NO_KEY
+        if is_open and self._requests.take(now=now):
+            self._beat({peer: outlet}, now=now)
+            vehicle.requests.ask_there(outlet, is_same=bool(way.is_same))
+        return False
 
     def link_budget(self, vehicle: Vehicle, *, now: float) -> LinkBudget:
         """Return what the link to a vehicle carries, shared by all vehicles at its endpoint."""
@@ -220,16 +260,18 @@ class VehicleLinks:
         outlet = self._outlets.get((link, peer))
         if outlet is None:
             outlet = self._outlets[link, peer] = PacketSender(
-                link, peer, self._queue, self._packer, self._signatures, self._fence
+                link, peer, self._queue, self._packer, self._signatures, self._fence, self._sent
             )
         return outlet
 
-    def _forget_if_empty(self, place: Place | None) -> None:
+    def _is_gone(self, place: Place) -> bool:
+        """Return whether a link is down, or its peer has disconnected: it may be back anywhere."""
+        link = self._links.get(place[0])
+        return link is None or place[1] not in link.outlets
+
+    def _forget_if_empty(self, place: Place) -> None:
         """Forget a place that was left, unless a vehicle may still come back to it."""
-        if place in self._left and all(
-            self.router.place_of(vehicle.system_id) != place for vehicle in self._all.values()
-        ):
-            self._left.discard(place)
+        if self._is_gone(place) and not self.has_vehicle_at(*place):
             self._outlets.pop(place, None)
 
 

@@ -6,7 +6,7 @@ It decides nothing but the order in which packets leave.
 from collections.abc import Hashable
 from math import inf
 
-from mav_tasks.engine.inputs import Outgoing
+from mav_tasks.engine.inputs import Outgoing, Place
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.policy import row_of_command
 from mav_tasks.mavlink import messages as m
@@ -14,7 +14,6 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.mavlink.router import Place
 from mav_tasks.services import statustext
 from mav_tasks.services.command_sender import Answered, CommandSender, Standing
 from mav_tasks.services.cruise_speed import CruiseSpeed
@@ -31,6 +30,7 @@ from mav_tasks.settings import Watch
 
 ASK_WHICH = 5  # times that a vehicle is asked for AUTOPILOT_VERSION
 ASK_WHICH_EACH = 3.0  # s
+SPARE_US = 200_000.0  # between two positions on a link that is not in use, but may be soon
 SHOW = 0.25  # s in which a requested heartbeat must come; the next regular one is not far
 ASK_TO_SHOW = 3  # times in a row that a vehicle may leave that request unanswered
 #: commands after which clients wait for a heartbeat that shows the result
@@ -239,6 +239,15 @@ class VehicleRequests:
         self._shows = max(self._shows, 1)
         self.is_identified = False
         self._versions_asked, self._ask_version_at = 0, -inf
+
+    def ask_there(self, outlet: PacketSender, *, is_same: bool) -> None:
+        """Ask at another place which vehicle is there; once that is known, for what guides it."""
+        for number in (m.LocalPositionNed.id, m.Attitude.id) if is_same else ():
+            request = self._message_request(number)
+            request.command, request.param2 = MavCmd.SET_MESSAGE_INTERVAL, SPARE_US
+            outlet.send(request, self._source)
+        if not is_same:
+            outlet.send(self._message_request(m.AutopilotVersion.id), self._source)
 
     def next_deadline(self) -> float | None:
         """Return when a command is to be repeated or given up, or None."""

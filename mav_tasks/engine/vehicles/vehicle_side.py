@@ -10,7 +10,7 @@ from collections.abc import Set as AbstractSet
 from math import inf
 
 from mav_tasks.engine.clients.signatures import Signatures
-from mav_tasks.engine.inputs import Outgoing, Peer
+from mav_tasks.engine.inputs import Outgoing, Peer, Place
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.snapshot import Reach
 from mav_tasks.engine.timers import Timers
@@ -52,6 +52,10 @@ ANOTHER = (
     " one, then Continue"
 )
 SHARED = "shares its id with another vehicle: none is driven before one is alone. Change one id"
+ECHO = (
+    "sends the server's own packets back on {}. Look for a router on this link that is in a loop,"
+    " or an adapter that hears itself"
+)
 
 #: messages that only a controller of the vehicle sends
 SETPOINTS = frozenset(
@@ -219,10 +223,11 @@ class VehicleSide:
     def _drop(self, system_id: int) -> bool:
         """Drop all control of a vehicle. Return whether it was driven."""
         vehicle = self._vehicles.pop(system_id, None)
-        was_driven = vehicle is not None and vehicle.shut()
-        self.links.forget(system_id)
         self.deadline_heap.forget(system_id)
-        return was_driven
+        if vehicle is None:
+            return False
+        self.links.forget(vehicle)
+        return vehicle.shut()
 
     def forget(self, system_id: int) -> None:
         """Forget a vehicle, which another gateway may have from here on."""
@@ -299,7 +304,7 @@ class VehicleSide:
         if packet.source == self.our_address or packet.message_id in SETPOINTS:
             if self._ours is not None and isinstance(message, m.Heartbeat | m.Timesync):
                 return None  # another gateway's, which listens here, too
-            self._note_intruder(link, packet, message, now=now)
+            self._note_intruder((link, peer), packet, message, now=now)
             return None
         vehicle = self.get(packet.system_id)
         from_autopilot, beat = packet.component_id == AUTOPILOT, None
@@ -317,20 +322,29 @@ class VehicleSide:
             vehicle = self._meet(beat, now=now)
         elif beat and beat.message.autopilot == NO_AUTOPILOT:
             return None  # from a program that uses the rover's address
-        elif self.links.router.place_of(vehicle.system_id) != (link, peer) and not (
-            beat and self.links.moves(vehicle, link, peer, now=now)
-        ):
-            return None
-        elif from_autopilot and vehicle.shows_another(message, now=now):
-            latest = vehicle.parts.monitor.latest
-            vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
+        else:
+            number = vehicle.system_id
+            answer = message if isinstance(message, m.Timesync) else None
+            if answer is not None and answer.ts1 not in self._asked:
+                answer = None
+            if answer is not None and answer.tc1 and from_autopilot:
+                self.links.way(number, (link, peer), now=now).note_answer(answer, now=now)
+            if vehicle.requests.place != (link, peer) and not (
+                from_autopilot
+                and message is not None
+                and self.links.moves(vehicle, link, peer, message, now=now)
+            ):
+                return None
+            if answer is not None:
+                self._answer = packet
+                if answer.tc1 and from_autopilot:
+                    offset = vehicle.where.motion.clock.offset
+                    offset.exchange(answer.ts1 / NANO, answer.tc1 / NANO, now=now)
+            if from_autopilot and vehicle.shows_another(message, now=now):
+                latest = vehicle.parts.monitor.latest
+                vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
         if vehicle is None:
             return None
-        if isinstance(message, m.Timesync) and message.ts1 in self._asked:
-            self._answer = packet
-            if message.tc1 and from_autopilot:
-                offset = vehicle.where.motion.clock.offset
-                offset.exchange(message.ts1 / NANO, message.tc1 / NANO, now=now)
         if from_autopilot:
             vehicle.count(packet.seq, now=now)
         vehicle.requests.intervals.heard(packet.message_id)
@@ -379,7 +393,7 @@ class VehicleSide:
     def _succeed(self, beat: Beat, *, now: float) -> Vehicle | None:
         """Meet another vehicle at a known address: nothing of the old one's control survives."""
         number = beat.packet.system_id
-        self.links.withdraw(number)
+        self.links.withdraw(self._vehicles[number])
         if self._drop(number):
             self._ask_to_hold(beat)
         self.gone.append(number)
@@ -428,7 +442,7 @@ class VehicleSide:
         if self._ours is not None:
             vehicle.parts.listens_until = now + LISTENS
         self._vehicles[number] = vehicle
-        self.links.learn(number, (link_name, peer))
+        self.links.forget_budgets()
         self.deadline_heap.mark_dirty(vehicle)
         self._registry.record(VehicleSeen(number, f"found ({persona.name})", now))
         for moved in self._strangers.take_motion(number, link_name, peer, now=now):
@@ -460,13 +474,19 @@ class VehicleSide:
         return persona
 
     def _note_intruder(
-        self, link: str, packet: Packet, message: m.Message | None, *, now: float
+        self, place: Place, packet: Packet, message: m.Message | None, *, now: float
     ) -> None:
-        """Handle setpoints, or our own address, from the vehicles' side: a second server drives."""
+        """Handle setpoints, or our own address, from the vehicles' side: a second server drives.
+
+        What this server has sent itself drives nothing. A rover passes it from link to link, too.
+        """
         target = getattr(message, "target_system", 0)
+        sent_to = self.links.where_sent(packet, place)
         for vehicle in self.all:
-            place = self.links.router.place_of(vehicle.system_id)
-            if target in (0, vehicle.system_id) and place is not None and place[0] == link:
+            there = vehicle.requests.place
+            if sent_to == {place} and there == place:
+                self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
+            elif not sent_to and target in (0, vehicle.system_id) and there[0] == place[0]:
                 self.deadline_heap.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
 

@@ -10,8 +10,8 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import TaskStatus, VehicleStatus
 from mav_tasks.client.wire import Goal
-from mav_tasks.errors import ClientError, NoAnswer, Refused
-from mav_tasks.tasks.lifecycle import TaskState
+from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from rover_sim.field_trial.ground import Ground, Limits
 from rover_sim.field_trial.track import Place, Track
 
@@ -63,6 +63,7 @@ class Session:
         self.told = Track()
         self._client: Client | None = None
         self._sampling: asyncio.Task[None] | None = None
+        self._said = ""  # why a task waits
 
     # server and client
 
@@ -174,7 +175,7 @@ class Session:
         driven_at = begun
         while self.now < begun + within:
             with suppress(NoAnswer):
-                status = await self.client.status(task.id)
+                status = await self._status(task)
                 if status.state is not TaskState.HELD:
                     driven_at = self.now
                 late = self.now > driven_at + RELEASED_WITHIN
@@ -185,6 +186,19 @@ class Session:
             await self.client.cancel(task.id)
         words = "no answer" if status is None else f"{status.state.name.lower()}: {status.words}"
         return End("TIMEOUT", f"{words}, after {within:g} s", self.now - begun)
+
+    async def _status(self, task: Task) -> TaskStatus:
+        """Return a task's state; say why it waits. Raise UsageError if it waits for a setting."""
+        status = await self.client.status(task.id)
+        if status.state is TaskState.QUEUED and status.reason is TaskReason.LOSS_FAILSAFE:
+            raise UsageError(
+                "the rover might drive on when setpoints end, so no task starts. First run:"
+                " mav-tasks probe --set-failsafe and the rover's URL"
+            )
+        if status.state is TaskState.QUEUED and status.words != self._said:
+            self._said = status.words
+            self.say(f"  {status.words}")
+        return status
 
     async def _waits_for_somebody(self, status: TaskStatus) -> bool:
         """Return whether a person must decide; a released task stays held until it starts."""
@@ -202,12 +216,12 @@ class Session:
 
     async def running_since(self, task: Task, distance: float, *, within: float) -> Place:
         """Wait until the rover has moved this far; return its start. Raise TrialError."""
-        begun = self.track.last
-        await self.until(
-            lambda: self.track.last.apart(begun) >= distance,
-            within=within,
-            what=f"task {task.id} driving {distance:g} m",
-        )
+        begun, end = self.track.last, self.now + within
+        while not await self.comes_true(lambda: self.track.last.apart(begun) >= distance, within=1):
+            with suppress(NoAnswer):
+                await self._status(task)
+            if self.now >= end:
+                raise TrialError(f"task {task.id} driving {distance:g} m: not within {within:g} s")
         return begun
 
     async def clean(self) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from mav_tasks.errors import InsecureLinkError, UsageError
-from mav_tasks.links.config_check import faults_of, links_of
+from mav_tasks.links.config_check import faults_of, links_of, pushed_to
 from mav_tasks.links.policy import LinkPolicy, Side, policy_of
 from mav_tasks.links.url import parse_url
 from mav_tasks.settings import Links
@@ -127,3 +127,11 @@ def test_faults_are_of_the_kinds_that_they_were() -> None:
         for _, fault in faults_of(Links(vehicles=(url,), push=()))
     }
     assert kinds == {InsecureLinkError, UsageError}
+
+
+def test_a_server_does_not_push_to_itself() -> None:
+    """Its heartbeats would come in as those of a rover."""
+    links = Links(vehicles=("udpin:127.0.0.1:14540", "udpin:0.0.0.0:7", "udpin:10.0.0.5:8"))
+    assert pushed_to(links) == (("127.0.0.1", 14550),)
+    links = replace(links, push=("127.0.0.1:7", "localhost:14540", "10.0.0.5:8", "127.0.0.1:8"))
+    assert pushed_to(links) == (("127.0.0.1", 8),)

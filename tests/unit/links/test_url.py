@@ -57,6 +57,9 @@ def test_a_url_reads_as_it_is_written(text: str) -> None:
     ("text", "words"),
     [
         ("14560", f"link '14560': {EXPECTED}"),
+        (f"udpout:{300 * 'a'}:1", f"link 'udpout:{300 * 'a'}:1': no host has such a name"),
+        ("tcp:a..b:1", "link 'tcp:a..b:1': no host has such a name"),
+        ("udpin:a\0b:1", "link 'udpin:a\\x00b:1': no host has such a name"),
         ("udp:127.0.0.1:1", f"link 'udp:127.0.0.1:1': {EXPECTED}"),
         ("", f"link '': {EXPECTED}"),
         *[

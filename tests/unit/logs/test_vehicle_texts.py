@@ -73,15 +73,25 @@ def test_texts_are_found_beside_other_packets_and_in_mavlink_1(
     assert said(caplog) == ["WARNING rover 1 says: new", "ERROR rover 1 says: old"]
 
 
-def test_on_a_stream_a_text_may_be_cut_anywhere(
+def test_a_text_that_two_links_bring_is_said_once(
     texts: VehicleTexts, caplog: pytest.LogCaptureFixture
+) -> None:
+    """And one that one link brings again is said again."""
+    for at, source in ((0.0, PEER), (0.3, "radio"), (3.0, PEER), (3.1, "radio")):
+        texts.on_input(Packets("rovers", [(source, packet("hot"))]), now=at)
+    assert said(caplog) == ["WARNING rover 1 says: hot"] * 2
+
+
+@pytest.mark.parametrize("link", ["line", "rovers"])
+def test_on_any_link_a_text_may_be_cut_anywhere(
+    texts: VehicleTexts, caplog: pytest.LogCaptureFixture, link: str
 ) -> None:
     data = packet("one") + packet("two")
     for at in range(len(data)):
         now = float(at)
         texts.on_input(PeerChanged("line", PEER, up=True), now=now)
-        texts.on_input(Packets("line", [(PEER, data[:at])]), now=now)
-        texts.on_input(Packets("line", [(PEER, data[at:])]), now=now + 0.1)
+        texts.on_input(Packets(link, [(PEER, data[:at])]), now=now)
+        texts.on_input(Packets(link, [(PEER, data[at:])]), now=now + 0.1)
         assert said(caplog) == ["WARNING rover 1 says: one", "WARNING rover 1 says: two"]
 
 
