@@ -136,6 +136,7 @@ QUEUE = whole(
         "next": or_null(INTEGER, "id of the task that runs next"),
         "paused": or_null(REASON, "why it is paused; null: it is not"),
         "paused_words": or_null(TEXT),
+        "paused_remedy": or_null(TEXT, "what a person can do about it"),
         "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
         "heartbeat_age": or_null(NUMBER, "s since the rover's heartbeat"),
         "gateway": or_null(TEXT, "gateway of a fleet that has the rover"),
