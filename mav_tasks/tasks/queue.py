@@ -19,10 +19,10 @@ class Rank(NamedTuple):
     is_ordinary: bool  # not of the highest priority
     urgency: float
     came_at: float
-    task_id: int
+    task_id: float  # of a task that was moved: between those of others
 
 
-def rank_of(priority: int, *, came_at: float, task_id: TaskId, aging: float) -> Rank:
+def rank_of(priority: int, *, came_at: float, task_id: float, aging: float) -> Rank:
     """Return a task's own rank; ``came_at`` in monotonic seconds, ``aging`` 0 for none."""
     if priority == MAX_PRIORITY:
         return Rank(False, 0.0, came_at, task_id)
