@@ -87,6 +87,12 @@ def remedy_for(reason: TaskReason, *, resume: str) -> str:
     return REMEDIES.get(reason, "").format(resume=resume)
 
 
+def with_resume(text: str, resume: str) -> str:
+    """Return a text for ground stations, whose button is "Continue", with another way to resume."""
+    text = text.replace("press Continue", resume)
+    return text.replace("Press Continue", resume[:1].upper() + resume[1:])
+
+
 def waits_of(queue: QueueStatus) -> dict[int, str]:
     """Return why each task of a queue waits, by its id: "behind task 4"."""
     waits: dict[int, str] = {}

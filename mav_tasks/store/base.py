@@ -98,7 +98,10 @@ Outcome = (
 
 @dataclass(frozen=True, slots=True)
 class Which:
-    """A filter of events; None matches all. ``since`` in UTC seconds; ``after``: an event's number."""
+    """A filter of events; None matches all.
+
+    ``since`` is in UTC seconds, ``after`` the number of an event.
+    """
 
     task: int | None = None
     vehicle: int | None = None

@@ -124,6 +124,22 @@ class Submitter:
         return f"{self.system_id}/{self.component_id}"
 
 
+#: who uses an address, in words
+_PEOPLE = {
+    "243/190": "the web page",
+    "244/190": "the command line or a script",
+    "245/190": "a MAVSDK script",
+    "255/190": "a ground station",
+}
+
+
+def who_is(actor: str) -> str:
+    """Return a submitter's text in words: the name of its key, else what uses such an address."""
+    place, _, key = actor.partition(" signed ")
+    address = place.partition("@")[0]
+    return key or _PEOPLE.get(address, address)
+
+
 @dataclass(frozen=True, slots=True)
 class Marks:
     """The fields that identify a repeated submission.
@@ -156,8 +172,8 @@ class Terms:
     command. ``top_speed`` in m/s limits any other speed; None: only the settings limit it.
     ``max_distance`` in m limits the way of the whole task, with all interruptions; None: nothing.
     ``is_cruising``: if the goal names no speed, the task drives at the vehicle's own cruise speed.
-    ``label`` is the submitter's name for the task, "" for none; it changes nothing. ``place``: where
-    somebody has put it in the queue; None: where its priority puts it.
+    ``label`` is the submitter's name for the task, "" for none; it changes nothing. ``place`` is
+    where somebody has put it in the queue; None: where its priority puts it.
 
     ``repeat`` says when the task runs again (``tasks/repetition.py``), "" for never; ``series`` is
     the id of the first run of its series, 0 if it is in none. A task that repeats has a start time,

@@ -29,7 +29,8 @@ def operations(services: Services) -> list[Operation]:
             after=call.query["after"],
             limit=call.query["limit"] or 200,
         )
-        return {"entries": entries, "next": entries[-1]["number"] if entries else call.query["after"]}
+        last = entries[-1]["number"] if entries else call.query["after"]
+        return {"entries": entries, "next": last}
 
     async def records(_call: Call) -> Any:
         if services.records is None:

@@ -45,7 +45,7 @@ CHANGES = (
     AT,
     DEADLINE,
     LABEL,
-    Field("every", "integer", "repeat: s between starts; 0: this run is the last", False, 0, MAX_PERIOD),
+    Field("every", "integer", "repeat: s between starts; 0: do not", False, 0, MAX_PERIOD),
     CRON,
     Field("preemptible", "boolean", "other tasks may interrupt it"),
     Field("preemptive", "boolean", "it may interrupt other tasks"),
@@ -85,6 +85,7 @@ def operations(services: Services) -> list[Operation]:
             headers=call.headers,
             by=call.identity.name,
         )
+        live.remember_user(task.id, call.identity.name)
         if places:
             live.remember_places(task.id, places)
         live.hurry(task.vehicle)
@@ -121,8 +122,9 @@ def operations(services: Services) -> list[Operation]:
 
     async def modify(call: Call, by: Client) -> Any:
         status = await status_of(call)
-        changes = dict(call.body) | {"at": moment_of(call.body["at"]), "every": repeat_of(call.body)}
-        changes.pop("cron")
+        repeat, at = repeat_of(call.body), moment_of(call.body["at"])
+        changes = {**call.body, "at": at, "every": repeat}
+        del changes["cron"]
         await by.modify(status.id, vehicle=status.vehicle, **changes)
         live.hurry(status.vehicle)
         return live.task_form(await client.status(status.id, vehicle=status.vehicle))

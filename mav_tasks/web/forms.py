@@ -11,12 +11,16 @@ from mav_tasks.client.descriptions import (
     remedy_for,
     waits_of,
     why_of,
+    with_resume,
 )
 from mav_tasks.client.json_form import queue_json, task_json, vehicle_json
 from mav_tasks.client.values import QueueStatus, TaskStatus, Text, VehicleStatus
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
+from mav_tasks.tasks.task import who_is
 
+#: how one resumes a rover on the page
 PRESS = "press Resume"
+
 WHY_PAUSED = {
     TaskReason.OPERATOR: "somebody paused it",
     TaskReason.QUEUE_PAUSED: "somebody paused it",
@@ -28,15 +32,23 @@ WHY_PAUSED = {
 
 
 def task_form(
-    status: TaskStatus, *, why: str | None = None, goals: Mapping[int, Any] | None = None
+    status: TaskStatus,
+    *,
+    why: str | None = None,
+    goals: Mapping[int, Any] | None = None,
+    user: str = "",
 ) -> dict[str, Any]:
-    """Return a task; ``why`` it waits, if its queue tells more than its own status."""
+    """Return a task; ``why`` it waits, if its queue tells more than its own status.
+
+    ``user``: of the page, who submitted it; "": not known.
+    """
     words = why if why is not None else end_of(status)
     ago = status.ended_ago
     ended = None if ago is None else datetime.now(UTC) - timedelta(seconds=ago)
     return task_json(status) | {
         "why": words or None,
         "remedy": remedy_of(status),
+        "submitted_by": user or who_is(status.submitter),
         "halt_epoch": status.halt_epoch,
         "ended_ago": None if ago is None else round(ago, 3),
         "ended_at": None if ended is None else ended.isoformat(timespec="milliseconds"),
@@ -109,7 +121,7 @@ def text_form(text: Text, *, number: int, at: float) -> dict[str, Any]:
         "vehicle": text.vehicle,
         "component": text.component,
         "severity": text.severity,
-        "words": text.words,
+        "words": with_resume(text.words, PRESS),
     }
 
 

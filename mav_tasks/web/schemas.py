@@ -115,6 +115,7 @@ TASK = whole(
         "time_to_finish": or_null(NUMBER, "s"),
         "execution_time": or_null(NUMBER, "s"),
         "nonce": or_null(INTEGER),
+        "submitted_by": said(TEXT, "who submitted it, in words"),
         "submitter": said(TEXT, "system and component id of who submitted it"),
         "version": INTEGER,
         "halt_epoch": said(

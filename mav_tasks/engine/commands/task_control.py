@@ -18,8 +18,8 @@ from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
-from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.pending_tasks import PendingTasks
+from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, canonical, repeating
 from mav_tasks.tasks.task import MAX_PRIORITY, Task, TaskId, Terms
 from mav_tasks.tasks.times import Times

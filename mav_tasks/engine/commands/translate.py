@@ -30,7 +30,7 @@ from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate, describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
-from mav_tasks.tasks.task import Progress, Task
+from mav_tasks.tasks.task import Progress, Task, who_is
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
@@ -263,8 +263,7 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
 
 
 def _by(actor: str) -> str:
-    """Return " by" and the actor without its endpoint, which says nothing to people."""
-    return "" if actor == SERVER else f" by {actor.partition('@')[0]}"
+    return "" if actor == SERVER else f" by {who_is(actor)}"
 
 
 def _severity(reason: TaskReason) -> MavSeverity:
