@@ -219,7 +219,7 @@ def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
     with web(tmp_path, both[0], name="first") as first:
         port = first.url.rpartition(":")[2]
         with opened(chromium, first, path=f"/tasks/{task}", may_fail=True) as page:
-            says(page, "#link", "you: local")
+            says(page, "#link", "you: a local user")
             page.wait_for_selector("#panel-past >> text=Cancel…")
             first.process.end(signal.SIGKILL)
             says(page, "#banner", "The connection to the web process is lost")

@@ -22,6 +22,8 @@ const LINES = 2; // outcomes shown at once
 /** What was pressed and is not acknowledged yet, in words; by rover, null: all. @type {Map<number|null, {words: string, isFailure: boolean}>} */
 const tries = new Map();
 
+const held = new Set(); // numbers of STOPs that were seen in force
+
 export function begin() {
   press(all, () => null);
   press(one, () => state.chosen);
@@ -35,7 +37,7 @@ export function begin() {
   });
   onChange((names) => {
     if (names.has("chosen") || names.has("vehicles")) drawOne();
-    if (names.has("stops") || names.has("clock")) draw();
+    if (["stops", "clock", "queues", "vehicles"].some((name) => names.has(name))) draw();
   });
 }
 
@@ -97,7 +99,7 @@ function draw() {
   for (const [vehicle, each] of tries) if (each.isFailure && wasStoppedSince(vehicle, each)) tries.delete(vehicle);
   const lines = [...tries].map(([vehicle, each]) => ({ key: `of ${vehicle}`, words: each.words, isFailure: each.isFailure }));
   // what this page tries is told above, until it is acknowledged
-  const recent = state.stops.filter((each) => now() - each.takenAt < SHOWN && (each.acknowledged_after !== null || !tries.has(each.vehicle)));
+  const recent = state.stops.filter((each) => now() - each.takenAt < SHOWN && holds(each) && (each.acknowledged_after !== null || !tries.has(each.vehicle)));
   for (const each of recent.slice(-LINES)) lines.push({ key: each.number, words: outcomeWords(each), isFailure: ["refused", "unanswered"].includes(each.phase) });
   reconcile(outcome, lines.slice(-LINES - 1), (line) => line.key, () => {
     const element = h("span", {});
@@ -109,6 +111,13 @@ function draw() {
       },
     };
   });
+}
+
+// not any more once a rover that it stopped was resumed, or is lost
+function holds(stop) {
+  const isInForce = [...state.vehicles.values()].some((each) => [null, each.vehicle].includes(stop.vehicle) && each.heard && state.queues.get(each.vehicle)?.paused === "stopped");
+  if (isInForce) held.add(stop.number);
+  return isInForce || !held.has(stop.number);
 }
 
 // a later STOP that was acknowledged, of this page or another one, makes a failure history
