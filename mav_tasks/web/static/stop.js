@@ -9,6 +9,7 @@ const all = document.getElementById("stop-all");
 const one = document.getElementById("stop-one");
 const outcome = document.getElementById("stop-outcome");
 const SHOWN = 30; // s
+const FRESH = 3; // s until the queues show a STOP
 
 // the same request would get the same answer; but a rover that is silent or unknown may soon be heard
 const FINAL = new Set([400, 401, 403, 415, 422]);
@@ -21,8 +22,6 @@ const LINES = 2; // outcomes shown at once
 
 /** What was pressed and is not acknowledged yet, in words; by rover, null: all. @type {Map<number|null, {words: string, isFailure: boolean}>} */
 const tries = new Map();
-
-const held = new Set(); // numbers of STOPs that were seen in force
 
 export function begin() {
   press(all, () => null);
@@ -113,11 +112,11 @@ function draw() {
   });
 }
 
-// not any more once a rover that it stopped was resumed, or is lost
+// a result is told as long as it is true: not after a resume, nor is a rover known to stand that is lost
 function holds(stop) {
-  const isInForce = [...state.vehicles.values()].some((each) => [null, each.vehicle].includes(stop.vehicle) && each.heard && state.queues.get(each.vehicle)?.paused === "stopped");
-  if (isInForce) held.add(stop.number);
-  return isInForce || !held.has(stop.number);
+  if (["refused", "unanswered"].includes(stop.phase) || now() - stop.takenAt < FRESH) return true;
+  return [...state.vehicles.values()].some((each) => [null, each.vehicle].includes(stop.vehicle) && (each.heard || stop.standing_after === null)
+    && state.queues.get(each.vehicle)?.paused === "stopped");
 }
 
 // a later STOP that was acknowledged, of this page or another one, makes a failure history
