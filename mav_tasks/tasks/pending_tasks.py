@@ -254,18 +254,6 @@ class PendingTasks:
         self.queue(task.vehicle).discard(task.id)  # it may be pre-emptive now
         self._settle(task, now=now)
 
-    def place_before(self, other: int, task: Task) -> QueuePlace:
-        """Return a task's place before another ready one, 0: behind all. Raise Rejection."""
-        ready = [each for each in self.queue(task.vehicle).in_order() if each != task.id]
-        if other not in (0, *ready):
-            raise Rejection(R.WRONG_STATE, f"task {other} is not in this queue")
-        at = ready.index(TaskId(other)) if other else len(ready)
-        around = map(self._registry.__getitem__, ready[max(at - 1, 0) : at + 1] or [task.id])
-        *before, place = [_place(each, self._waiters[each.id].came_at) for each in around]
-        if before and replace(place, task_id=before[0].task_id) == before[0]:
-            return replace(place, task_id=(before[0].task_id + place.task_id) / 2)
-        return replace(place, task_id=place.task_id - (1 if other else -1))
-
     def assign(self, task: Task, vehicle: int, *, choice: str, now: float) -> None:
         """Give a waiting task to another vehicle, in whose queue it keeps its rank."""
         is_ready = task.id in self.queue(task.vehicle)
@@ -506,9 +494,6 @@ class PendingTasks:
 
 def _own_rank(settings: Settings, task: Task, came_at: float) -> Rank:
     """Return a task's own rank, if it has competed with others since ``came_at``."""
-    place, aging = _place(task, came_at), settings.queueing.aging
+    place = task.terms.place or QueuePlace(task.terms.priority, came_at, task.id)
+    aging = settings.queueing.aging
     return rank_of(place.priority, came_at=place.at, task_id=place.task_id, aging=aging)
-
-
-def _place(task: Task, came_at: float) -> QueuePlace:
-    return task.terms.place or QueuePlace(task.terms.priority, came_at, task.id)

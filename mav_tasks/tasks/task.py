@@ -124,22 +124,6 @@ class Submitter:
         return f"{self.system_id}/{self.component_id}"
 
 
-#: who uses an address, in words
-_PEOPLE = {
-    "243/190": "the web page",
-    "244/190": "the command line or a script",
-    "245/190": "a MAVSDK script",
-    "255/190": "a ground station",
-}
-
-
-def who_is(actor: str) -> str:
-    """Return a submitter's text in words: the name of its key, else what uses such an address."""
-    place, _, key = actor.partition(" signed ")
-    address = place.partition("@")[0]
-    return key or _PEOPLE.get(address, address)
-
-
 @dataclass(frozen=True, slots=True)
 class Marks:
     """The fields that identify a repeated submission.
@@ -196,6 +180,11 @@ class Terms:
     start_within: float | None = None
     max_distance: float | None = None
     place: QueuePlace | None = None
+
+    @property
+    def standing(self) -> int:
+        """The highest priority that counts for it: its own, or that of its place."""
+        return max(self.priority, self.place.priority if self.place else 0)
 
 
 @dataclass(frozen=True, slots=True)

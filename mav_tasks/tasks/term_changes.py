@@ -17,7 +17,7 @@ def changes_of(before: Terms, after: Terms, *, at: float) -> str:
 def _changes(before: Terms, after: Terms, at: float) -> Iterator[str]:
     if after.priority != before.priority:
         yield f"priority {after.priority} (was {before.priority})"
-    if after.place != before.place and after.place:
+    if after.place != before.place:
         yield "another place in the queue"
     if after.after != before.after:
         yield f"runs after task {after.after}" if after.after else "runs after no other task"

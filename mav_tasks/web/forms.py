@@ -15,8 +15,8 @@ from mav_tasks.client.descriptions import (
 )
 from mav_tasks.client.json_form import queue_json, task_json, vehicle_json
 from mav_tasks.client.values import QueueStatus, TaskStatus, Text, VehicleStatus
+from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
-from mav_tasks.tasks.task import who_is
 
 #: how one resumes a rover on the page
 PRESS = "press Resume"

@@ -76,10 +76,8 @@ class Rights(NamedTuple):
     def check_terms(self, terms: Terms, before: Terms = UNASKED) -> None:
         """Raise Rejection if terms, of a new task or in place of others, are not allowed."""
         most = self.limits.max_priority
-        place = None if terms.place == before.place else terms.place
-        priority = max(terms.priority, place.priority if place else 0)
-        if priority > max(most, before.priority):
-            raise self.refusal(f"may use priority {most} at most, not {priority}")
+        if terms.standing > max(most, before.standing):
+            raise self.refusal(f"may use priority {most} at most, not {terms.standing}")
         if terms.is_preemptive > before.is_preemptive:
             self.require(OPERATOR, "make a task pre-emptive")
 

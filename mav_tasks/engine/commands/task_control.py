@@ -205,7 +205,10 @@ def _modified(task: Task, command: Command, room: PendingTasks, *, now: float) -
             return replace(terms, priority=priority, place=None)
         case P.RUN_BEFORE:
             other = identifier(command, 3, "run before", default=None)
-            return replace(terms, place=room.place_before(other, task))
+            place = room.queue(task.vehicle).place_before(other)
+            if place is None:
+                raise Rejection(R.WRONG_STATE, f"task {other} is not in this queue")
+            return replace(terms, place=place)
         case P.START_DELAY:
             delay = number(command, 3, "start delay", low=0.0, high=MAX_DELAY)
             return replace(terms, start_at=now + delay if delay else None, start_utc=None)

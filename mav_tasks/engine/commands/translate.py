@@ -6,7 +6,7 @@
 from math import isfinite, nan
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
@@ -30,7 +30,7 @@ from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate, describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
-from mav_tasks.tasks.task import Progress, Task, who_is
+from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.timing import Timing
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
