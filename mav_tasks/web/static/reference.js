@@ -40,12 +40,14 @@ function shown(method, path, { summary, description, parameters, requestBody, re
   return h("details", {}, h("summary", {}, h("code", {}, `${method} ${path}`), ` ${summary}`), form);
 }
 
-const sample = ({ type, items, anyOf, oneOf, properties, required, ...rest }) => {
-  const one = (anyOf ?? oneOf)?.[0];
-  if (one) return sample(one);
-  if (rest.const !== undefined || rest.enum) return rest.const ?? rest.enum[0];
-  if (type === "object") return Object.fromEntries((required ?? []).map((name) => [name, sample(properties[name])]));
-  return { array: items ? [sample(items)] : [], integer: rest.minimum ?? 0, number: rest.minimum ?? 0, boolean: false }[type] ?? "";
-};
+function sample({ type, items, anyOf, oneOf, properties, required = [], minimum = 0, enum: choices, const: only }) {
+  if (anyOf ?? oneOf) return sample((anyOf ?? oneOf)[0]);
+  if (only ?? choices) return only ?? choices[0];
+  if (type === "object") return Object.fromEntries(required.map((name) => [name, sample(properties[name])]));
+  return { array: items ? [sample(items)] : [], integer: minimum, number: minimum, boolean: false }[type] ?? "";
+}
 
-const table = ({ properties, required }) => h("dl", { class: "facts-table" }, ...Object.entries(properties).flatMap(([name, each]) => [h("dt", {}, `${name}${required.includes(name) ? "" : ", optional"}`), h("dd", {}, `${[each.type].flat().filter((type) => type !== "null").join(" or ")}: ${each.description}`)]));
+function table({ properties, required }) {
+  return h("dl", { class: "facts-table" }, ...Object.entries(properties).flatMap(([name, { type, description }]) => [
+    h("dt", {}, `${name}${required.includes(name) ? "" : ", optional"}`), h("dd", {}, `${[type].flat()[0]}: ${description}`)]));
+}
