@@ -16,7 +16,7 @@ for (const [path, methods] of Object.entries(document_.paths)) {
 function shown(method, path, { summary, description, parameters, requestBody, responses }) {
   const fields = parameters.map((each) => ({ ...each, input: h("input", { required: each.required }) }));
   const schema = requestBody?.content["application/json"].schema;
-  const body = schema && h("textarea", { rows: 4, spellcheck: false }, JSON.stringify(Object.fromEntries(schema.required.map((name) => [name, sample(schema.properties[name])]))));
+  const body = schema && h("textarea", { rows: 4, cols: 70, spellcheck: false }, JSON.stringify(Object.fromEntries(schema.required.map((name) => [name, sample(schema.properties[name])]))));
   const answer = h("pre", { "aria-live": "polite" });
   const isStream = "text/event-stream" in (responses[200]?.content ?? {});
   const form = h("form", {},
