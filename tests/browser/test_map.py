@@ -24,7 +24,8 @@ HOME = (-35.363262, 149.165237)
 ZOOM = 19
 #: pairs of points of a track: driven, silent, placed anew, standing; (time, metres north, east)
 GAPS = """() => import('/static/tracks.js').then(({ isGap }) => [[[0, 0, 0], [0.2, 0.3, 0]],
-  [[0, 0, 0], [8, 5, 0]], [[0, 0, 0], [0.1, 30, 0]], [[0, 0, 0], [60, 0.2, 0]]].map((each) => isGap(...each)))"""
+  [[0, 0, 0], [8, 5, 0]], [[0, 0, 0], [0.1, 30, 0]], [[0, 0, 0], [60, 0.2, 0]]]
+  .map((each) => isGap(...each)))"""
 
 #: the address and the colour of the tile below the first rover's mark
 BELOW = """() => {
