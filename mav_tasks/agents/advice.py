@@ -1,23 +1,8 @@
 """Advice to an agent about a task, which names the tools to call. Pure."""
 
-from mav_tasks.client.descriptions import UNTIL_RESUMED, why_of
+from mav_tasks.client.descriptions import UNTIL_RESUMED, needs_decision, remedy_for, why_of
 from mav_tasks.client.values import QueueStatus, TaskStatus
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-
-#: what a person has to do about a task that waits, by its reason
-BY_A_PERSON = {
-    TaskReason.DISARMED: "A person must arm the rover in HOLD, or call resume if a person agrees.",
-    TaskReason.WRONG_MODE: "A person must set HOLD. Then call resume.",
-    TaskReason.NOT_READY: "The rover is not ready. Wait, or tell a person what it reports.",
-    TaskReason.LOSS_FAILSAFE: "An operator must run: mav-tasks probe --set-failsafe",
-    TaskReason.OUTSIDE_OWN_FENCE: "A person must drive the rover back inside its fence.",
-    TaskReason.WAITING_FOR_START: "A person must start this mission.",
-}
-
-
-def needs_decision(status: TaskStatus) -> bool:
-    """Return whether a task is held and nobody has released it yet."""
-    return status.state is TaskState.HELD and status.reason >= TaskReason.OUTCOME_UNKNOWN
 
 
 def advice_of(status: TaskStatus) -> str:
@@ -38,11 +23,10 @@ def advice_of(status: TaskStatus) -> str:
             "submit a new task with a new idempotency_key."
         )
     if status.reason in UNTIL_RESUMED or status.reason is TaskReason.STOPPED:
-        return _resume(why_of(status), epoch)
-    if status.reason is TaskReason.HELD_AHEAD:
-        return "A held task of this rover blocks it: look at queue, and release that task."
-    waits = BY_A_PERSON.get(status.reason)
-    return waits or "No action is needed: call wait until it has ended."
+        return _resume(status.reason, why_of(status), epoch)
+    if remedy := remedy_for(status.reason, resume=f"call resume with epoch: {epoch}"):
+        return f"It waits: {why_of(status)}. Do this, or tell a person to do it: {remedy}"
+    return "No action is needed: call wait until it has ended."
 
 
 def advice_on_queue(queue: QueueStatus) -> str:
@@ -50,12 +34,13 @@ def advice_on_queue(queue: QueueStatus) -> str:
     if queue.current is not None and needs_decision(queue.current):
         return advice_of(queue.current)
     if queue.paused is not None:
-        return _resume(words_of(queue.paused), queue.halt_epoch)
+        return _resume(queue.paused, words_of(queue.paused), queue.halt_epoch)
     return ""
 
 
-def _resume(why: str, epoch: int) -> str:
+def _resume(reason: TaskReason, why: str, epoch: int) -> str:
     return (
         f"The queue is paused ({why}): no task runs. If the rover may drive again, and a person "
-        f"agrees if a person has stopped it, call resume with epoch: {epoch}."
+        "agrees if a person has stopped it: "
+        + remedy_for(reason, resume=f"call resume with epoch: {epoch}")
     )

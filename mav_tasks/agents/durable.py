@@ -14,10 +14,10 @@ from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any, Literal, NamedTuple
 
-from mav_tasks.agents.advice import advice_of, needs_decision
+from mav_tasks.agents.advice import advice_of
 from mav_tasks.agents.forms import result, task_form
 from mav_tasks.agents.rovers import Rovers
-from mav_tasks.client.descriptions import state_of, what_of, why_of
+from mav_tasks.client.descriptions import needs_decision, state_of, what_of, why_of
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import Refused, UsageError
 from mav_tasks.mavlink.enums import MavResult

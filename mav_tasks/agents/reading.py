@@ -4,7 +4,6 @@ import asyncio
 from datetime import UTC, datetime
 from typing import Any
 
-from mav_tasks.agents.advice import needs_decision
 from mav_tasks.agents.arguments import Argument
 from mav_tasks.agents.forms import (
     FINISHED,
@@ -19,7 +18,7 @@ from mav_tasks.agents.forms import (
 )
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.tool import Report, Tool, Values
-from mav_tasks.client.descriptions import state_of, what_of, why_of
+from mav_tasks.client.descriptions import needs_decision, state_of, what_of, why_of
 from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import vehicle_json
 from mav_tasks.client.values import TaskStatus

@@ -277,6 +277,7 @@ class Client:
         delay: float | None = None,
         deadline: float | None = None,
         after: int | Task | None = None,
+        before: int | Task | None = None,
         preemptible: bool | None = None,
         preemptive: bool | None = None,
         at: datetime | None = None,
@@ -288,6 +289,8 @@ class Client:
 
         Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
         it may interrupt other tasks. ``every`` as in ``submit``; 0: it does not repeat any more.
+        ``before``: its place in the queue is just before this task, whatever their priorities; 0:
+        behind all.
         """
         if every is not None:
             await self._set_repeat(task_id, wire.repeat_of(every), vehicle=vehicle)
@@ -296,6 +299,7 @@ class Client:
             (TaskProperty.PRIORITY, priority),
             (TaskProperty.DEADLINE, deadline),
             (TaskProperty.RUN_AFTER, None if after is None else to_param(_id_of(after))),
+            (TaskProperty.RUN_BEFORE, None if before is None else to_param(_id_of(before))),
             (TaskProperty.PREEMPTIBLE, preemptible),
             (TaskProperty.PREEMPTIVE, preemptive),
             (TaskProperty.START_DELAY, delay),

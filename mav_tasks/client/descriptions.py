@@ -16,6 +16,30 @@ UNTIL_RESUMED = (
     TaskReason.RESTARTED,
 )
 
+#: what a person can do about a task that waits or is paused; ``{resume}``: how one resumes here
+REMEDIES: dict[TaskReason, str] = {
+    **dict.fromkeys((*UNTIL_RESUMED, TaskReason.STOPPED), "To let it run, {resume}."),
+    TaskReason.TAKEOVER: (
+        "Once nobody else drives it, centre the sticks, set HOLD, then {resume}."
+    ),
+    TaskReason.FAILSAFE: "Remove the cause of the failsafe, set HOLD, then {resume}.",
+    TaskReason.DISARMED: "Arm the rover in HOLD; or, if the server may arm it, {resume}.",
+    TaskReason.WRONG_MODE: "Set the rover to HOLD, then {resume}.",
+    TaskReason.NOT_READY: "Wait, or mend what the rover reports.",
+    TaskReason.NO_POSITION: "Wait until the rover knows its position; check its GPS.",
+    TaskReason.POSITION_LOST: "Wait until the rover knows its position; check its GPS.",
+    TaskReason.VEHICLE_SILENT: "Check the rover's radio and power.",
+    TaskReason.LINK_LOST: "Check the rover's radio and power.",
+    TaskReason.LEASE_LOST: "Check the database and the network to it.",
+    TaskReason.LOSS_FAILSAFE: (
+        "Let the rover stop when setpoints end: run 'mav-tasks probe --set-failsafe'."
+    ),
+    TaskReason.OUTSIDE_OWN_FENCE: "Drive the rover back manually, or switch that fence off.",
+    TaskReason.OTHER_CONTROLLER: "End the other program that drives the rover.",
+    TaskReason.HELD_AHEAD: "Look at the queue, and release the held task before it.",
+    TaskReason.WAITING_FOR_START: "Start this mission.",
+}
+
 #: what a STOP that is in force has not reached, by the reason of its answer
 STOP_IN_FORCE: dict[int, str] = {
     TaskReason.VEHICLE_SILENT: (
@@ -51,6 +75,22 @@ def end_of(status: TaskStatus) -> str:
     """Return why a task is in its state; "" if it repeats the state ("cancelled: cancelled")."""
     why = why_of(status)
     return "" if why == state_of(status) else why
+
+
+def needs_decision(status: TaskStatus) -> bool:
+    """Return whether a task is held and nobody has released it yet."""
+    return status.state is TaskState.HELD and status.reason >= TaskReason.OUTCOME_UNKNOWN
+
+
+def remedy_for(reason: TaskReason, *, resume: str) -> str:
+    """Return what a person can do about a reason to wait; "" if nothing. ``resume``: how."""
+    return REMEDIES.get(reason, "").format(resume=resume)
+
+
+def with_resume(text: str, resume: str) -> str:
+    """Return a text for ground stations, whose button is "Continue", with another way to resume."""
+    text = text.replace("press Continue", resume)
+    return text.replace("Press Continue", resume[:1].upper() + resume[1:])
 
 
 def waits_of(queue: QueueStatus) -> dict[int, str]:

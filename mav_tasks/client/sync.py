@@ -78,6 +78,7 @@ class SyncTask(BlockingTask):
         delay: float | None = None,
         deadline: float | None = None,
         after: "int | SyncTask | None" = None,
+        before: "int | SyncTask | None" = None,
         preemptible: bool | None = None,
         preemptive: bool | None = None,
         at: datetime | None = None,
@@ -91,6 +92,7 @@ class SyncTask(BlockingTask):
                 delay=delay,
                 deadline=deadline,
                 after=None if after is None else id_of(after),
+                before=None if before is None else id_of(before),
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=at,
@@ -252,6 +254,7 @@ class SyncClient(BlockingClient):
         delay: float | None = None,
         deadline: float | None = None,
         after: int | SyncTask | None = None,
+        before: int | SyncTask | None = None,
         preemptible: bool | None = None,
         preemptive: bool | None = None,
         at: datetime | None = None,
@@ -263,6 +266,8 @@ class SyncClient(BlockingClient):
 
         Times in seconds from now. ``preemptible``: other tasks may interrupt it. ``preemptive``:
         it may interrupt other tasks. ``every`` as in ``submit``; 0: it does not repeat any more.
+        ``before``: its place in the queue is just before this task, whatever their priorities; 0:
+        behind all.
         """
         self._call(
             self._aio.modify(
@@ -271,6 +276,7 @@ class SyncClient(BlockingClient):
                 delay=delay,
                 deadline=deadline,
                 after=None if after is None else id_of(after),
+                before=None if before is None else id_of(before),
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=at,

@@ -232,3 +232,4 @@ class TaskProperty(IntEnum):
     LABEL = 8
     EVERY = 9
     REPEAT = 10
+    RUN_BEFORE = 11

@@ -98,11 +98,15 @@ Outcome = (
 
 @dataclass(frozen=True, slots=True)
 class Which:
-    """A filter of events; None matches all. ``since`` is in UTC seconds."""
+    """A filter of events; None matches all.
+
+    ``since`` is in UTC seconds, ``after`` the number of an event.
+    """
 
     task: int | None = None
     vehicle: int | None = None
     since: float | None = None
+    after: int | None = None
 
 
 class Store(Protocol):

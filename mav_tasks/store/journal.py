@@ -75,6 +75,7 @@ class Journal:
             f"{key} > ?": after,
             "id = ?" if is_tasks else "task_id = ?": self._which.task,
             "vehicle = ?": self._which.vehicle,
+            "? < number": self._which.after,
             "changed_at >= ?" if is_tasks else "utc >= ?": self._which.since,
         }
         asked = {term: value for term, value in wanted.items() if value is not None}

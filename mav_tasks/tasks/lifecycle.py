@@ -118,6 +118,8 @@ _WORDS = {
     # reasons whose name is not what people say
     TaskReason.BEHIND_OTHERS: "behind other tasks",
     TaskReason.WAITING_FOR_START: "needs a start command",
+    TaskReason.VEHICLE_SILENT: "rover silent",
+    TaskReason.LINK_LOST: "rover silent",
     TaskReason.OTHER_CONTROLLER: "another controller drives",
     TaskReason.HELD_AHEAD: "behind a held task",
     TaskReason.RESTARTED: "after a restart",

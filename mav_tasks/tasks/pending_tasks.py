@@ -25,7 +25,7 @@ from mav_tasks.tasks.repetition import (
     next_run,
     why_series_ends,
 )
-from mav_tasks.tasks.task import Draft, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.task import Draft, QueuePlace, Submitter, Task, TaskId, Terms
 from mav_tasks.tasks.times import Times
 
 R, S = TaskReason, TaskState
@@ -288,7 +288,7 @@ class PendingTasks:
             why_not = why_not or "it has no further time"
             self._note(task, f"will not repeat task {task.id}: {why_not}", now=now)
             return True
-        terms = replace(run.terms, after=0, is_staged=False)
+        terms = replace(run.terms, after=0, is_staged=False, place=None)
         draft = Draft(
             task.vehicle, task.command, task.goal, task.submitter, terms, choice=task.choice
         )
@@ -494,5 +494,6 @@ class PendingTasks:
 
 def _own_rank(settings: Settings, task: Task, came_at: float) -> Rank:
     """Return a task's own rank, if it has competed with others since ``came_at``."""
+    place = task.terms.place or QueuePlace(task.terms.priority, came_at, task.id)
     aging = settings.queueing.aging
-    return rank_of(task.terms.priority, came_at=came_at, task_id=task.id, aging=aging)
+    return rank_of(place.priority, came_at=place.at, task_id=place.task_id, aging=aging)

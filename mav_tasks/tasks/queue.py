@@ -10,7 +10,7 @@ from bisect import bisect_left, insort
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, TaskId
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_PRIORITY, QueuePlace, TaskId
 
 
 class Rank(NamedTuple):
@@ -19,15 +19,16 @@ class Rank(NamedTuple):
     is_ordinary: bool  # not of the highest priority
     urgency: float
     came_at: float
-    task_id: int
+    task_id: float  # of a task that was moved: between those of others
+    priority: int
 
 
-def rank_of(priority: int, *, came_at: float, task_id: TaskId, aging: float) -> Rank:
+def rank_of(priority: int, *, came_at: float, task_id: float, aging: float) -> Rank:
     """Return a task's own rank; ``came_at`` in monotonic seconds, ``aging`` 0 for none."""
     if priority == MAX_PRIORITY:
-        return Rank(False, 0.0, came_at, task_id)
+        return Rank(False, 0.0, came_at, task_id, priority)
     urgency = came_at - priority * aging if aging > 0 else -float(priority)
-    return Rank(True, urgency, came_at, task_id)
+    return Rank(True, urgency, came_at, task_id, priority)
 
 
 class Entry(NamedTuple):
@@ -118,6 +119,17 @@ class TaskQueue:
         """Return how many queued tasks run before this one, or None if it is not queued."""
         entry = self._entries.get(task_id)
         return None if entry is None else bisect_left(self._order, (entry.rank, task_id))
+
+    def place_before(self, task_id: int) -> QueuePlace | None:
+        """Return a place just before a task, 0: behind all; None: that task is not here."""
+        at = self.position(TaskId(task_id)) if task_id else len(self)
+        if at is None or not self._order:
+            return None
+        *before, rank = [each for each, _ in self._order[max(at - 1, 0) : at + 1]]
+        beyond = rank.task_id + (-2 if task_id else 2)
+        if before and before[0][:3] == rank[:3]:
+            beyond = before[0].task_id
+        return QueuePlace(rank.priority, rank.came_at, (beyond + rank.task_id) / 2)
 
     def page(self, first: int, count: int) -> list[TaskId]:
         """Return up to ``count`` tasks from the position ``first`` on."""

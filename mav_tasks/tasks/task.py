@@ -138,6 +138,15 @@ class Marks:
 
 
 @dataclass(frozen=True, slots=True)
+class QueuePlace:
+    """The place in the queue of a task of this priority and id that came at this time."""
+
+    priority: int
+    at: float
+    task_id: float
+
+
+@dataclass(frozen=True, slots=True)
 class Terms:
     """When and how a task runs; every term can be modified later.
 
@@ -147,7 +156,8 @@ class Terms:
     command. ``top_speed`` in m/s limits any other speed; None: only the settings limit it.
     ``max_distance`` in m limits the way of the whole task, with all interruptions; None: nothing.
     ``is_cruising``: if the goal names no speed, the task drives at the vehicle's own cruise speed.
-    ``label`` is the submitter's name for the task, "" for none; it changes nothing.
+    ``label`` is the submitter's name for the task, "" for none; it changes nothing. ``place`` is
+    where somebody has put it in the queue; None: where its priority puts it.
 
     ``repeat`` says when the task runs again (``tasks/repetition.py``), "" for never; ``series`` is
     the id of the first run of its series, 0 if it is in none. A task that repeats has a start time,
@@ -169,6 +179,12 @@ class Terms:
     series: int = 0
     start_within: float | None = None
     max_distance: float | None = None
+    place: QueuePlace | None = None
+
+    @property
+    def standing(self) -> int:
+        """The highest priority that counts for it: its own, or that of its place."""
+        return max(self.priority, self.place.priority if self.place else 0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,8 @@ def changes_of(before: Terms, after: Terms, *, at: float) -> str:
 def _changes(before: Terms, after: Terms, at: float) -> Iterator[str]:
     if after.priority != before.priority:
         yield f"priority {after.priority} (was {before.priority})"
+    if after.place != before.place:
+        yield "another place in the queue"
     if after.after != before.after:
         yield f"runs after task {after.after}" if after.after else "runs after no other task"
     if (after.start_at, after.start_utc) != (before.start_at, before.start_utc):

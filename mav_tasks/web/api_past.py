@@ -12,7 +12,7 @@ from mav_tasks.web.problems import not_found
 from mav_tasks.web.services import Services
 
 NO_RECORDS = "the web process shows no recordings: start it with --records FOLDER"
-LIMIT = Field("limit", "integer", "at most this many, the latest", False, 1, 2000)
+LIMIT = Field("limit", "integer", "at most this many", False, 1, 2000)
 
 
 def operations(services: Services) -> list[Operation]:
@@ -26,10 +26,11 @@ def operations(services: Services) -> list[Operation]:
         entries = await services.entries(
             task=call.query["task"],
             vehicle=call.query["vehicle"],
-            after=call.query["after"] or 0,
+            after=call.query["after"],
             limit=call.query["limit"] or 200,
         )
-        return {"entries": entries, "next": entries[-1]["number"] if entries else None}
+        last = entries[-1]["number"] if entries else call.query["after"]
+        return {"entries": entries, "next": last}
 
     async def records(_call: Call) -> Any:
         if services.records is None:
@@ -62,12 +63,12 @@ def operations(services: Services) -> list[Operation]:
         Operation(
             "GET",
             "/journal",
-            "Events of the store, of the last day unless a task is named",
+            "Events of the store: the latest of a day or of a task, or those after a number",
             journal,
             query=[
                 Field("task", "integer", "only of this task", False, 1, MAX_TASK_ID),
                 Field("vehicle", "integer", "only of this rover", False, 1, 255),
-                Field("after", "integer", "number of an event; later ones", False, 0),
+                Field("after", "integer", "the first ones after this event", False, 0),
                 LIMIT,
             ],
             answer="Entries",

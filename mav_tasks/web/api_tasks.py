@@ -9,7 +9,8 @@ from mav_tasks.client.json_form import timing_json
 from mav_tasks.client.plan_sources import Plan
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import NoSuchVehicle
-from mav_tasks.tasks.task import DEFAULT_PRIORITY
+from mav_tasks.tasks.repetition import MAX_PERIOD
+from mav_tasks.tasks.task import DEFAULT_PRIORITY, MAX_TASK_ID
 from mav_tasks.web.epochs import EPOCH, seen_epoch
 from mav_tasks.web.fields import Field
 from mav_tasks.web.goal_places import Place, places_of_goals, places_of_items
@@ -17,8 +18,8 @@ from mav_tasks.web.operation import Call, Operation
 from mav_tasks.web.plan_text import NAME, text_field
 from mav_tasks.web.services import Services
 from mav_tasks.web.submissions import (
-    AFTER,
     AT,
+    CRON,
     DEADLINE,
     DELAY,
     GOALS,
@@ -28,6 +29,7 @@ from mav_tasks.web.submissions import (
     TERMS,
     goals_of,
     moment_of,
+    repeat_of,
     submit,
 )
 
@@ -37,11 +39,14 @@ FILE = (NAME, text_field("contents of a .plan or QGC WPL 110 file"))
 KEYED = (Field(KEY, "string", "a text of yours: the same key makes no second task", False, 1, 200),)
 CHANGES = (
     PRIORITY,
-    AFTER,
+    Field("after", "integer", "task that must complete first; 0: none", False, 0, MAX_TASK_ID),
+    Field("before", "integer", "it runs just before this task; 0: last", False, 0, MAX_TASK_ID),
     DELAY,
     AT,
     DEADLINE,
     LABEL,
+    Field("every", "integer", "repeat: s between starts; 0: do not", False, 0, MAX_PERIOD),
+    CRON,
     Field("preemptible", "boolean", "other tasks may interrupt it"),
     Field("preemptive", "boolean", "it may interrupt other tasks"),
 )
@@ -80,6 +85,7 @@ def operations(services: Services) -> list[Operation]:
             headers=call.headers,
             by=call.identity.name,
         )
+        live.remember_user(task.id, call.identity.name)
         if places:
             live.remember_places(task.id, places)
         live.hurry(task.vehicle)
@@ -116,7 +122,9 @@ def operations(services: Services) -> list[Operation]:
 
     async def modify(call: Call, by: Client) -> Any:
         status = await status_of(call)
-        changes = dict(call.body) | {"at": moment_of(call.body["at"])}
+        repeat, at = repeat_of(call.body), moment_of(call.body["at"])
+        changes = {**call.body, "at": at, "every": repeat}
+        del changes["cron"]
         await by.modify(status.id, vehicle=status.vehicle, **changes)
         live.hurry(status.vehicle)
         return live.task_form(await client.status(status.id, vehicle=status.vehicle))

@@ -4,24 +4,22 @@ from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from mav_tasks.client.descriptions import UNTIL_RESUMED, end_of, waits_of, why_of
+from mav_tasks.client.descriptions import (
+    UNTIL_RESUMED,
+    end_of,
+    needs_decision,
+    remedy_for,
+    waits_of,
+    why_of,
+    with_resume,
+)
 from mav_tasks.client.json_form import queue_json, task_json, vehicle_json
 from mav_tasks.client.values import QueueStatus, TaskStatus, Text, VehicleStatus
+from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, TaskState, words_of
 
-#: reasons that keep one task from starting, and what a person can do at the rover
-AT_THE_ROVER = {
-    TaskReason.DISARMED: "Arm the rover in HOLD, or resume if the server may arm it.",
-    TaskReason.WRONG_MODE: "Set the rover to HOLD, then resume.",
-    TaskReason.NOT_READY: "Wait, or mend what the rover reports.",
-    TaskReason.NO_POSITION: "Wait until the rover knows its position.",
-    TaskReason.VEHICLE_SILENT: "Check the rover's radio and power.",
-    TaskReason.LOSS_FAILSAFE: (
-        "Let the rover stop when setpoints end: run 'mav-tasks probe --set-failsafe'."
-    ),
-    TaskReason.OUTSIDE_OWN_FENCE: "Drive it back manually, or switch that fence off.",
-    TaskReason.OTHER_CONTROLLER: "Wait until the other program has stopped driving.",
-}
+#: how one resumes a rover on the page
+PRESS = "press Resume"
 
 WHY_PAUSED = {
     TaskReason.OPERATOR: "somebody paused it",
@@ -34,15 +32,23 @@ WHY_PAUSED = {
 
 
 def task_form(
-    status: TaskStatus, *, why: str | None = None, goals: Mapping[int, Any] | None = None
+    status: TaskStatus,
+    *,
+    why: str | None = None,
+    goals: Mapping[int, Any] | None = None,
+    user: str = "",
 ) -> dict[str, Any]:
-    """Return a task; ``why`` it waits, if its queue tells more than its own status."""
+    """Return a task; ``why`` it waits, if its queue tells more than its own status.
+
+    ``user``: of the page, who submitted it; "": not known.
+    """
     words = why if why is not None else end_of(status)
     ago = status.ended_ago
     ended = None if ago is None else datetime.now(UTC) - timedelta(seconds=ago)
     return task_json(status) | {
         "why": words or None,
         "remedy": remedy_of(status),
+        "submitted_by": user or who_is(status.submitter),
         "halt_epoch": status.halt_epoch,
         "ended_ago": None if ago is None else round(ago, 3),
         "ended_at": None if ended is None else ended.isoformat(timespec="milliseconds"),
@@ -54,14 +60,12 @@ def remedy_of(status: TaskStatus) -> dict[str, str] | None:
     """Return what a person can do about a task that waits; None: nothing needs to be done."""
     if status.is_over:
         return None
-    is_decided = status.reason < TaskReason.OUTCOME_UNKNOWN  # released already, waits to start
-    if status.state is TaskState.HELD and not is_decided:
+    if needs_decision(status):
         words = "Release it: again from here, only the rest of it, or skip it."
         return {"action": "release", "words": words}
-    if status.reason in UNTIL_RESUMED or status.reason is TaskReason.STOPPED:
-        return {"action": "resume", "words": "Resume lets it run."}
-    words = AT_THE_ROVER.get(status.reason, "")
-    return {"action": "none", "words": words} if words else None
+    words = remedy_for(status.reason, resume=PRESS)
+    is_resume = status.reason in UNTIL_RESUMED or status.reason is TaskReason.STOPPED
+    return {"action": "resume" if is_resume else "none", "words": words} if words else None
 
 
 def queue_form(queue: QueueStatus, *, goals: Mapping[int, Any] | None = None) -> dict[str, Any]:
@@ -70,6 +74,7 @@ def queue_form(queue: QueueStatus, *, goals: Mapping[int, Any] | None = None) ->
     current = queue.current
     return queue_json(queue) | {
         "paused_words": paused_words(queue.paused),
+        "paused_remedy": queue.paused and remedy_for(queue.paused, resume=PRESS),
         "more": max(queue.waiting_count - len(queue.waiting), 0),
         "current": None if current is None else task_form(current, goals=goals),
         "waiting": [task_form(e, why=waits[e.id], goals=goals) for e in queue.waiting],
@@ -116,14 +121,14 @@ def text_form(text: Text, *, number: int, at: float) -> dict[str, Any]:
         "vehicle": text.vehicle,
         "component": text.component,
         "severity": text.severity,
-        "words": text.words,
+        "words": with_resume(text.words, PRESS),
     }
 
 
 def _control_of(vehicle: VehicleStatus, queue: QueueStatus | None) -> tuple[str, str]:
     name = f"Rover {vehicle.id}"
     if not vehicle.is_heard:
-        return "silent", f"{name} is silent. Check its radio and power."
+        return "silent", f"{name} is silent. {remedy_for(TaskReason.VEHICLE_SILENT, resume=PRESS)}"
     if queue is None or queue.paused is None:
         current = None if queue is None else queue.current
         if current is not None and current.state is TaskState.HELD:
@@ -131,8 +136,7 @@ def _control_of(vehicle: VehicleStatus, queue: QueueStatus | None) -> tuple[str,
             return "tasks", f"{held} Release it, so that the queue goes on."
         return "tasks", f"{name} runs its tasks."
     why = paused_words(queue.paused)
+    control = "taken over" if queue.paused in TAKEN else "paused"
     if queue.paused is TaskReason.STOPPED:
-        return "stopped", f"{name} was stopped: STOP is in force. Resume ends it."
-    if queue.paused in TAKEN:
-        return "taken over", f"{name}: {why}. Set HOLD there, then resume."
-    return "paused", f"{name} is paused: {why}. Resume lets its tasks run."
+        control = "stopped"
+    return control, f"{name} is paused: {why}. {remedy_for(queue.paused, resume=PRESS)}"

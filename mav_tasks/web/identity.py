@@ -43,4 +43,4 @@ class Identity:
         return sorted(what for what, row in OFFERED.items() if RANKS[row.role] <= rank)
 
 
-LOCAL = Identity("local")
+LOCAL = Identity("a local user")

@@ -3,6 +3,7 @@
 import time
 from collections import deque
 from contextlib import closing
+from itertools import islice
 from typing import Any
 
 from mav_tasks.errors import StoreError
@@ -33,16 +34,14 @@ class Journal:
             return False
 
     def entries(
-        self, *, task: int | None, vehicle: int | None, after: int, limit: int
+        self, *, task: int | None, vehicle: int | None, after: int | None, limit: int
     ) -> list[dict[str, Any]]:
-        """Return the latest events after a number, oldest first. Without a task: of a day."""
-        since = None if task is not None else time.time() - DAY
-        which = Which(task=task, vehicle=vehicle, since=since)
+        """Return the first events after a number; None: the latest, without a task of a day."""
+        since = time.time() - DAY if task is None and after is None else None
+        which = Which(task=task, vehicle=vehicle, since=since, after=after)
         with closing(kind_of(self._place).open_journal(self._place, which)) as reader:
-            found = deque(
-                ((number, event) for number, event in reader.take(offset=0.0) if number > after),
-                maxlen=limit,
-            )
+            events = reader.take(offset=0.0)
+            found = deque(events if after is None else islice(events, limit), maxlen=limit)
         return [
             {"number": number, "at": round(event.at, 3)} | event_values(event, offset=0.0)
             for number, event in found

@@ -52,6 +52,7 @@ class Live:
         self.stops = Stops(client, self._publish_stop)
         self.queues: dict[int, QueueStatus] = {}
         self.places: dict[int, list[Place]] = {}
+        self.users: dict[int, str] = {}  # who submitted tasks by this page
         self._places_count = 0
         self._rows = QueueRows()
         self._server = server
@@ -111,7 +112,8 @@ class Live:
     def task_form(self, status: TaskStatus, *, is_whole: bool = False) -> dict[str, Any]:
         """Return a task as JSON, with its places if they are few, or it is to be whole."""
         places = self.places_of(status) if is_whole else self._few_places_of(status)
-        return task_form(status, goals={status.id: places})
+        user = self.users.get(status.id, "")
+        return task_form(status, goals={status.id: places}, user=user)
 
     def _few_places_of(self, status: TaskStatus) -> list[Place] | None:
         """Return the places of a task; [] if they are many."""
@@ -134,6 +136,11 @@ class Live:
         self.places[task_id] = places
         while self._places_count > PLACES:
             self._places_count -= len(self.places.pop(next(iter(self.places))))
+
+    def remember_user(self, task_id: int, user: str) -> None:
+        """Keep who submitted a task by the page."""
+        self.users[task_id] = user
+        _shorten(self.users, MOST_TOLD)
 
     def show_again(self, task_id: int) -> None:
         """Publish the queue of a task again: its places are known now."""

@@ -34,6 +34,9 @@ def routes(tiles: Tiles | None) -> list[Route | Mount]:
     async def index(_request: Request) -> Response:
         return FileResponse(STATIC / "index.html", headers=FRESH)
 
+    async def reference(_request: Request) -> Response:
+        return FileResponse(STATIC / "api.html", headers=FRESH)
+
     async def tile(request: Request) -> Response:
         if tiles is None:
             return Response(status_code=404)
@@ -46,6 +49,7 @@ def routes(tiles: Tiles | None) -> list[Route | Mount]:
 
     return [
         Route("/", index),
+        Route("/api", reference),
         Route("/tasks/{task:number}", index),
         Route("/tiles/{zoom:number}/{column:number}/{row:number}", tile),
         Mount("/static/leaflet", Files(directory=_leaflet())),

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from starlette.responses import JSONResponse
 
+from mav_tasks.client.descriptions import with_resume
 from mav_tasks.errors import (
     ClientError,
     MavTasksError,
@@ -83,7 +84,8 @@ def problem_of(error: Exception) -> Problem:
             reason = TaskReason(number) if is_known else TaskReason.NONE
             status = _STATUS.get(reason, 409)
             name = reason.name.lower() if reason else None
-            return Problem(status, "The task server refused", str(error), reason=name)
+            words = with_resume(str(error), "press Resume")
+            return Problem(status, "The task server refused", words, reason=name)
         case PlanFileError() | ValueError():
             return invalid(str(error))
         case ClientError() | UsageError():  # a connection to the server that cannot be opened

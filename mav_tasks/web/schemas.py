@@ -115,6 +115,7 @@ TASK = whole(
         "time_to_finish": or_null(NUMBER, "s"),
         "execution_time": or_null(NUMBER, "s"),
         "nonce": or_null(INTEGER),
+        "submitted_by": said(TEXT, "who submitted it, in words"),
         "submitter": said(TEXT, "system and component id of who submitted it"),
         "version": INTEGER,
         "halt_epoch": said(
@@ -136,6 +137,7 @@ QUEUE = whole(
         "next": or_null(INTEGER, "id of the task that runs next"),
         "paused": or_null(REASON, "why it is paused; null: it is not"),
         "paused_words": or_null(TEXT),
+        "paused_remedy": or_null(TEXT, "what a person can do about it"),
         "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
         "heartbeat_age": or_null(NUMBER, "s since the rover's heartbeat"),
         "gateway": or_null(TEXT, "gateway of a fleet that has the rover"),

@@ -70,7 +70,7 @@ class Services:
         return run
 
     async def entries(
-        self, *, task: int | None, vehicle: int | None = None, after: int = 0, limit: int
+        self, *, task: int | None, vehicle: int | None = None, after: int | None = None, limit: int
     ) -> list[dict[str, Any]]:
         """Return events of the journal; raise Problem if there is none, or it cannot be read."""
         if self.journal is None:

@@ -78,6 +78,14 @@ def moment_of(text: str | None) -> datetime | None:
     return moment
 
 
+def repeat_of(terms: Mapping[str, Any]) -> int | str | None:
+    """Return when a task repeats, None if nothing is said. Raise Problem if it is said twice."""
+    if terms["every"] is not None and terms["cron"]:
+        raise invalid("every and cron: choose one of them")
+    repeat: int | str | None = terms["cron"] or terms["every"]
+    return repeat
+
+
 async def submit(
     client: Client,
     plan: Plan,
@@ -90,13 +98,11 @@ async def submit(
     """Submit a task. Return it once it is durable. Raise Problem for a key of another task."""
     key = headers.get(KEY)
     label = terms["label"] or ""
-    if terms["every"] and terms["cron"]:
-        raise invalid("every and cron: choose one of them")
+    repeat = repeat_of(terms)
     numbers: dict[str, int] = {}
     if key is not None:
         if not 0 < len(key) <= LONGEST:
             raise invalid(f"Idempotency-Key: expected 1 to {LONGEST} characters")
-        repeat = terms["every"] or terms["cron"]
         named = f"{label}\0{repeat}" if repeat else label
         numbers = numbers_of(f"{by} {key}", label=named)._asdict()
     try:
@@ -109,7 +115,7 @@ async def submit(
             at=moment_of(terms["at"]),
             deadline=terms["deadline"] or 0.0,
             label=label,
-            every=terms["every"] or terms["cron"] or 0.0,
+            every=repeat or 0.0,
             **numbers,
         )
     except Refused as error:

@@ -195,7 +195,11 @@ def test_hostile_texts_names_and_files_and_a_rover_that_falls_silent(
                     assert str(folder) not in text_of(page, "#panel-records")
                     assert page.query_selector("img[src=x]") is None
                     is_over.set()
-                    says(page, ".card.silent", "Rover 7 is silent. Check its radio and power.")
+                    says(
+                        page,
+                        ".card.silent",
+                        "Rover 7 is silent. Check the rover's radio and power.",
+                    )
                     assert "not heard for" in text_of(page, ".card")
                     judge(page, "silent")
                     page.screenshot(path=str(shots / "silent.png"))

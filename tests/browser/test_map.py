@@ -22,6 +22,11 @@ pytestmark = pytest.mark.slow
 DRIVEN = 1.5  # m
 HOME = (-35.363262, 149.165237)
 ZOOM = 19
+#: pairs of points of a track: driven, silent, placed anew, standing; (time, metres north, east)
+GAPS = """() => import('/static/tracks.js').then(({ isGap }) => [[[0, 0, 0], [0.2, 0.3, 0]],
+  [[0, 0, 0], [8, 5, 0]], [[0, 0, 0], [0.1, 30, 0]], [[0, 0, 0], [60, 0.2, 0]]]
+  .map((each) => isGap(...each)))"""
+
 #: the address and the colour of the tile below the first rover's mark
 BELOW = """() => {
   const box = document.querySelector('.rover-mark').getBoundingClientRect();
@@ -120,6 +125,9 @@ def test_tiles_of_a_file_are_below_the_rover(
         says(page, ".leaflet-control-attribution", HOSTILE)  # words, not HTML
         assert page.query_selector("img[src=x]") is None
         page.screenshot(path=str(shots / "tiles.png"))
+        assert page.evaluate(GAPS) == [False, True, True, False]
+        page.check("#map-follow input")
+        page.click("#map-fit")
 
 
 AT = """() => { const {x, y} = document.querySelector('.rover-mark').getBoundingClientRect();

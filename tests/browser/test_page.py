@@ -28,9 +28,11 @@ def test_a_new_user_finds_out_why_a_paused_task_does_not_run_and_gets_it_going(
     it.post("/vehicles/1/pause", {})
     task = move(it, 0.5, label="to the gate")
     with opened(chromium, it) as page:
-        says(page, ".card", "Rover 1 is paused: somebody paused it. Resume lets its tasks run.")
+        says(page, ".card", "Rover 1 is paused: somebody paused it. To let it run, press Resume.")
         says(page, ".notice", "No task runs: somebody paused it.")
-        says(page, f"[data-task='{task['id']}']", "Waits: queue paused. Resume lets it run.")
+        says(
+            page, f"[data-task='{task['id']}']", "Waits: queue paused. To let it run, press Resume."
+        )
         page.screenshot(path=str(shots / "1 paused.png"))
         page.click(".card >> text=Resume…")
         box = text_of(page, ".box")
@@ -60,10 +62,12 @@ def test_stop_acts_at_once_and_says_what_came_of_it(
         says(page, "#stop-outcome", "acknowledged")
         says(page, "#stop-outcome", "standing")
         says(page, "#stop-outcome", f"ended task {task['id']}")
-        says(page, ".card", "STOP is in force. Resume ends it.")
+        says(page, ".card", "STOP is in force. To let it run, press Resume.")
         outcome = text_of(page, "#stop-outcome")
         assert re.search(r"acknowledged \d+ ms · standing [\d.]+ m?s", outcome)
         page.screenshot(path=str(shots / f"stop by {how}.png"))
+        it.resume()
+        page.wait_for_function("() => !document.getElementById('stop-outcome').textContent")
     assert it.task(task["id"])["state"] == "killed"
 
 
@@ -200,7 +204,7 @@ def test_the_form_says_what_is_wrong(chromium: Any, it: Web) -> None:
     with opened(chromium, it, may_fail=True) as page:
         page.click("text=Add a task…")
         page.click(".box >> text='Add the task'")
-        says(page, ".box .failure", "distance: missing; expected distance")
+        says(page, ".box .failure", "Distance (m): Please fill out this field.")
         page.fill(".box [name=distance]", "1000000")
         page.click(".box >> text='Add the task'")
         says(page, ".box .failure", "param1 distance")
@@ -214,29 +218,57 @@ def test_the_form_says_what_is_wrong(chromium: Any, it: Web) -> None:
         page.wait_for_selector(".box", state="detached")
 
 
-def test_priorities_by_buttons_and_by_dragging(chromium: Any, it: Web) -> None:
+def test_order_by_arrows_and_by_dragging_leaves_priorities_alone(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
-    first, second, third = (move(it, 0.1 * n)["id"] for n in (1, 2, 3))
+    first, second, third = (move(it, 0.1 * n, priority=n)["id"] for n in (5, 4, 3))
+    later = move(it, 1, delay=600)["id"]
     with opened(chromium, it) as page:
         row = "#panel-queue [data-task='{}']"
-        page.focus(f"{row.format(second)} >> text=▲")
+
+        def runs(*ids: int) -> None:
+            page.wait_for_function(f"() => {ORDER}.join() === '{','.join(map(str, ids))},{later}'")
+
+        page.focus(f"{row.format(third)} >> text=▲")
         page.keyboard.press("Enter")
-        says(page, row.format(second), "priority 6")
-        page.wait_for_function(f"() => {ORDER}.join() === '{second},{first},{third}'")
+        runs(first, third, second)
         assert page.evaluate(FOCUSED) == "▲"  # though its row has moved
-        page.drag_and_drop(row.format(third), row.format(second))
-        says(page, row.format(third), "priority 7")
-        page.wait_for_function(f"() => {ORDER}.join() === '{third},{second},{first}'")
-        page.click(f"{row.format(third)} >> text=▼")
-        says(page, row.format(third), "priority 6")
-        page.drag_and_drop(row.format(second), row.format(first))  # down: behind that one
-        says(page, row.format(second), "priority 5")
-        page.wait_for_function(f"() => {ORDER}.join() === '{third},{first},{second}'")
-        it.send("PATCH", f"/tasks/{third}", {"priority": 10})
-        it.send("PATCH", f"/tasks/{first}", {"priority": 10})
-        says(page, row.format(first), "priority 10")
-        page.drag_and_drop(row.format(third), row.format(first))
-        says(page, "#panel-queue .failure", f"No priority puts task {third} before task {first}")
+        page.drag_and_drop(row.format(second), row.format(first))
+        runs(second, first, third)
+        page.click(f"{row.format(second)} >> text=▼")
+        runs(first, second, third)
+        page.drag_and_drop(row.format(first), row.format(third))  # down: behind that one
+        runs(second, third, first)
+        assert page.is_disabled(f"{row.format(second)} >> text=▲")
+        assert page.is_disabled(f"{row.format(first)} >> text=▼")
+        assert not page.is_visible(f"{row.format(later)} >> text=▲")  # it waits for its time
+    assert [it.task(each)["priority"] for each in (first, second, third)] == [5, 4, 3]
+
+
+def test_a_waiting_task_is_changed(chromium: Any, it: Web, shots: Path) -> None:
+    it.post("/vehicles/1/pause", {})
+    first, second = move(it, 0.1)["id"], move(it, 0.2, every=60)["id"]
+    with opened(chromium, it) as page:
+        page.click(f"#panel-queue [data-task='{second}'] a")
+        page.click("#panel-task >> text=Change…")
+        for name, value in (("label", "night"), ("priority", "7"), ("after", str(first))):
+            page.fill(f".box [name={name}]", value)
+        page.fill(".box [name=every]", "")
+        page.fill(".box [name=deadline]", "7200")
+        page.screenshot(path=str(shots / "change a task.png"))
+        page.click(".box >> text='Change it'")
+        says(page, "#panel-task h2", "“night”: move 0.2 m")
+        says(page, "#panel-task .log li", "deadline")
+        task = it.task(second)
+        assert (task["priority"], task["after"], task["every"]) == (7, first, None)
+        page.click("text=Change…")
+        page.fill(".box [name=after]", "")
+        page.fill(".box [name=cron]", "30 7 * * 1-5 Europe/Berlin")
+        page.click(".box >> text='Change it'")
+        page.wait_for_selector(".box", state="detached")
+        task = it.task(second)
+        assert (task["after"], task["cron"]) == (None, "30 7 * * 1-5 Europe/Berlin")
+        page.click("#tab-queue")
+        says(page, f"#panel-queue [data-task='{second}']", "repeats at 30 7")
 
 
 ORDER = "[...document.querySelectorAll('#panel-queue [data-task]')].map((e) => e.dataset.task)"
@@ -267,11 +299,10 @@ def test_a_finger_drags_a_task_by_its_handle_and_else_scrolls(
         touch("touchStart", x, y)
         for part in (0.25, 0.5, 0.75, 1.0):
             touch("touchMove", x, y + (above - y) * part)
-        says(page, "#panel-queue .said", f"Task {third} gets priority 6: it then runs before task")
+        says(page, "#panel-queue .said", f"Task {third} will run before task {first}.")
         assert page.is_visible(f"{row.format(first)}.over-above")
         page.screenshot(path=str(shots / "finger.png"))
         touch("touchEnd")
-        says(page, row.format(third), "priority 6")
         page.wait_for_function(f"() => {ORDER}[0] === '{third}'")
         assert not page.query_selector(".over-above, .dragged")
 
@@ -282,9 +313,9 @@ def test_a_finger_drags_a_task_by_its_handle_and_else_scrolls(
         touch("touchStart", x, y)
         for part in (0.5, 1.0):
             touch("touchMove", x, y + (edge["y"] + edge["height"] - 10 - y) * part)
-        says(page, "#panel-queue .said", f"it then runs after task {last}.")
+        says(page, "#panel-queue .said", f"will run after task {last}.")
         touch("touchEnd")
-        says(page, row.format(first), "priority 4")
+        page.wait_for_function(f"() => {ORDER}.at(-1) === '{first}'")
 
         # a finger beside the handle scrolls, and moves no task
         order = page.evaluate(ORDER)

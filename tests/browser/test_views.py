@@ -74,21 +74,21 @@ def test_a_task_has_a_permalink_with_journal_and_timing(chromium: Any, it: Web) 
     task = move(it, 0.4)
     it.wait_for(task["id"], "completed")
     with opened(chromium, it, path=f"/tasks/{task['id']}") as page:
-        says(page, "#panel-past h2", f"Task {task['id']}: move 0.4 m")
-        says(page, "#panel-past dd", "intervals at 20 Hz")
-        says(page, "#panel-past .log li", "completed")
+        says(page, "#panel-task h2", f"Task {task['id']}: move 0.4 m")
+        says(page, "#panel-task dd", "intervals at 20 Hz")
+        says(page, "#panel-task .log li", "completed")
         judge(page, "one task")
         page.click("text=← Back to the list")
         assert page.url == f"{it.url}/"
         page.go_back()
-        says(page, "#panel-past h2", f"Task {task['id']}")
+        says(page, "#panel-task h2", f"Task {task['id']}")
         page.click("#tab-texts")
         page.fill("#panel-texts [type=search]", f"task {task['id']}")
         says(page, "#panel-texts .log li", f"Task {task['id']}")
         page.select_option("#panel-texts select >> nth=0", "journal")
         says(page, "#panel-texts .log li", "completed")
     with opened(chromium, it, path="/tasks/987654", may_fail=True) as page:
-        says(page, "#panel-past .failure", "No task 987654")
+        says(page, "#panel-task .failure", "No task 987654")
 
 
 def test_tabs_and_the_time_line_work_by_keyboard(chromium: Any, it: Web) -> None:
@@ -107,7 +107,7 @@ def test_tabs_and_the_time_line_work_by_keyboard(chromium: Any, it: Web) -> None
         page.keyboard.press("ArrowRight")  # from the buttons to the bars
         assert page.evaluate("document.activeElement.title").startswith(f"Task {task['id']}:")
         page.keyboard.press("Enter")
-        says(page, "#panel-past h2", f"Task {task['id']}")
+        says(page, "#panel-task h2", f"Task {task['id']}")
 
 
 def test_the_time_line_is_lengthened_and_moved(chromium: Any, it: Web, shots: Path) -> None:
@@ -170,7 +170,7 @@ def test_hostile_words_are_only_words(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     task = move(it, 0.1, label=HOSTILE)
     with opened(chromium, it, path=f"/tasks/{task['id']}") as page:
-        says(page, "#panel-past h2", HOSTILE)
+        says(page, "#panel-task h2", HOSTILE)
         page.click("#tab-queue")
         says(page, "#panel-queue .task", HOSTILE)
         assert page.query_selector("img[src=x]") is None
@@ -219,8 +219,8 @@ def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
     with web(tmp_path, both[0], name="first") as first:
         port = first.url.rpartition(":")[2]
         with opened(chromium, first, path=f"/tasks/{task}", may_fail=True) as page:
-            says(page, "#link", "you: local")
-            page.wait_for_selector("#panel-past >> text=Cancel…")
+            says(page, "#link", "you: a local user")
+            page.wait_for_selector("#panel-task >> text=Cancel…")
             first.process.end(signal.SIGKILL)
             says(page, "#banner", "The connection to the web process is lost")
             with pytest.MonkeyPatch.context() as patch:
@@ -229,7 +229,7 @@ def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
                 with web(tmp_path, both[0], "--listen", f"127.0.0.1:{port}", name="second"):
                     log_in(page, token)
                     says(page, "#link", "you: anna, observer")
-                    page.wait_for_selector("#panel-past >> text=Cancel…", state="hidden")
+                    page.wait_for_selector("#panel-task >> text=Cancel…", state="hidden")
                     page.click("#tab-queue")
                     page.wait_for_selector(f"#panel-queue [data-task='{task}']")
                     for button in ("Add a task…", "Cancel all…", "Resume…", "▲", "Cancel…"):
@@ -270,6 +270,8 @@ def test_a_token_opens_the_page_and_its_revocation_closes_it(
         web(tmp_path, both[0], name="closed") as it,
         opened(chromium, it, waits=False, may_fail=True) as page,
     ):
+        page.keyboard.press("Escape")  # there is no way around it
+        assert not page.is_visible(".box >> text=Back")
         page.fill(".box [name=token]", "wrong")
         page.click(".box [type=submit]")
         says(page, ".box .failure", "There is no such token")
@@ -279,8 +281,25 @@ def test_a_token_opens_the_page_and_its_revocation_closes_it(
         page.wait_for_selector(".card")
         says(page, "#link", "you: anna, observer")
         assert page.is_visible("#stop-all")
-        assert not page.is_visible("text=Add a task…")  # an observer's page
+        for offer in ("Add a task…", "Drop a .plan", "Click the map", "press Resume"):
+            assert not page.is_visible(f"text={offer}"), offer  # an observer's page
         assert called("keys", "revoke", "anna", "--keys", str(ring_of(tmp_path))).status == 0
         says(page, ".box", "This page needs a token.")  # the stream of events has ended
         page.click("#stop-all")
         says(page, "#stop-outcome", "STOP not acknowledged: a token is required")
+
+
+def test_the_api_is_tried_on_a_page_made_from_its_document(
+    chromium: Any, it: Web, shots: Path
+) -> None:
+    it.post("/vehicles/1/pause", {})
+    with opened(chromium, it, path="/api", waits=False) as page:
+        page.click("summary:has-text('POST /vehicles/{vehicle}/tasks')")
+        form = "details[open] form"
+        page.fill(f"{form} label:has-text('vehicle (path)') input", "1")
+        page.fill(f"{form} textarea", '{"goals": [{"kind": "move", "distance": 0.2}]}')
+        page.click(f"{form} >> text=Send")
+        says(page, f"{form} pre", '201 { "id":')
+        judge(page, "the API")
+        page.screenshot(path=str(shots / "api.png"))
+    assert it.get("/vehicles/1/queue")["waiting_count"] == 1

@@ -177,7 +177,10 @@ def test_why_a_task_waits_and_what_helps(page: Web) -> None:
     assert queue["paused_words"] == "somebody paused it"
     assert queue["waiting"][0]["id"] == task["id"]
     assert queue["waiting"][0]["why"] == "queue paused"
-    assert queue["waiting"][0]["remedy"] == {"action": "resume", "words": "Resume lets it run."}
+    assert queue["waiting"][0]["remedy"] == {
+        "action": "resume",
+        "words": "To let it run, press Resume.",
+    }
     rover = page.get("/vehicles/1")
     assert rover["control"] == "paused"
     page.resume()
@@ -232,6 +235,14 @@ def test_tasks_are_changed_and_cancelled(page: Web) -> None:
     changed = page.send("PATCH", f"/tasks/{first['id']}", {"priority": 9, "label": "neu: ä"})
     assert changed.json()["priority"] == 9
     assert page.task(first["id"])["label"] == "neu: ä"
+    third = move(page, 1.0, after=first["id"], every=60)
+    changed = page.send("PATCH", f"/tasks/{third['id']}", {"after": 0, "cron": "0 7 * * *"})
+    check("Task", changed.json())
+    assert (changed.json()["after"], changed.json()["cron"]) == (None, "0 7 * * *")
+    changed = page.send("PATCH", f"/tasks/{third['id']}", {"every": 0})
+    assert (changed.json()["every"], changed.json()["cron"]) == (None, None)
+    twice = page.send("PATCH", f"/tasks/{third['id']}", {"every": 60, "cron": "0 7 * * *"})
+    assert "choose one" in twice.json()["detail"]
     page.post(f"/tasks/{first['id']}/cancel", {})
     assert page.wait_for(first["id"], "cancelled")["reason"] is not None
     assert page.wait_for(second["id"], "failed")["reason"] == "dependency_failed"
@@ -241,6 +252,24 @@ def test_tasks_are_changed_and_cancelled(page: Web) -> None:
 
 
 ITEM = "{}\t{}\t{}\t16\t0\t0\t0\t0\t{}\t{}\t0\t1\n"
+
+
+def test_the_journal_is_read_on_from_an_event_and_skips_none(page: Web) -> None:
+    last = page.get("/journal?limit=1")["next"]
+    task = move(page, 0.1)
+    page.wait_for(task["id"], "completed")
+
+    def until_the_end() -> Any:
+        entries = page.get(f"/journal?after={last}")["entries"]
+        return entries if any("completed" in each["message"] for each in entries) else None
+
+    entries = wait_until(until_the_end, within=10, what="the end of the task")
+    read: list[Any] = []
+    number = last
+    while one := page.get(f"/journal?after={number}&limit=1")["entries"]:
+        read, number = read + one, one[0]["number"]
+    assert read[: len(entries)] == entries
+    assert page.get(f"/journal?after={number}")["next"] == number
 
 
 def test_a_plan_is_shown_and_then_queued(page: Web) -> None:

@@ -155,7 +155,7 @@ def open_page(rig: Rig, tmp_path_factory: pytest.TempPathFactory) -> Iterator[We
     ["x-forwarded-for", "x-forwarded-host", "x-real-ip", "forwarded", "via"],
 )
 def test_a_proxy_on_this_machine_lets_nobody_in(name: str, open_page: Web) -> None:
-    assert open_page.get("/session")["name"] == "local"
+    assert open_page.get("/session")["name"] == "a local user"
     headers = {name: "203.0.113.9"}
     refused = open_page.client.post("/api/v1/stop", json={}, headers=headers)
     assert refused.status_code == 401

@@ -43,7 +43,7 @@ from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL, CLEAR, MODIFY, RELEASE = 54010, 54011, 54012, 54013
-PRIORITY, PREEMPTIVE = 1, 6  # TASK_MODIFY, param2
+PRIORITY, PREEMPTIVE, RUN_BEFORE = 1, 6, 11  # TASK_MODIFY, param2
 CHANGE_SPEED, MISSION_START, SET_FENCE, REBOOT = 178, 300, 207, 246
 WAYPOINT, RELAY, FENCE_CIRCLE = 16, 181, 5003
 FENCE = 1  # MAV_MISSION_TYPE
@@ -290,8 +290,12 @@ def test_a_submitter_does_not_exceed_its_limits(with_roles: MakeRoles) -> None:
         "role submitter may have at most 2 waiting tasks",
     )
     assert [task.id for task in world.tasks()] == [first.task_id, second.task_id]
+    urgent = world.client.rotate(10.0, priority=9)
+    assert answer(world, urgent) == (ACCEPTED, urgent.task_id)
+    moved = submitter.command(MODIFY, first.task_id, RUN_BEFORE, urgent.task_id)
+    assert answer(world, moved) == NOT_ALLOWED
     reasons = [event.reason for event in world.events(SubmissionRefused)]
-    assert reasons.count(R.NOT_ALLOWED) == 4
+    assert reasons.count(R.NOT_ALLOWED) == 5
     assert answer(world, world.client.rotate(10.0, priority=10)), "nobody else is bound by it"
 
 

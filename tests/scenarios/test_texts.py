@@ -73,9 +73,9 @@ def test_what_went_as_asked_is_no_warning(world: World) -> None:
     world.run(0.2)
     said = severities(world)
     assert {
-        "Task 1 paused by 255/190",
-        "Queue paused by 255/190",
-        "Queue resumed by 255/190",
+        "Task 1 paused by a ground station",
+        "Queue paused by a ground station",
+        "Queue resumed by a ground station",
     } <= set(said)
     assert {"Task 1 cancelled", "Task 2 done", "Rover 1 found (ardupilot)"} <= set(said)
     assert set(said.values()) == {INFO}
@@ -94,7 +94,7 @@ def test_what_needs_a_hand_is_a_warning(world: World) -> None:
     assert (
         said["Task 1 paused: takeover"] == said["Queue paused: takeover. Press Continue"] == WARNING
     )
-    assert said["STOP by 255/190: press Continue to resume"] == WARNING
+    assert said["STOP by a ground station: press Continue to resume"] == WARNING
     assert said["cannot start: wrong mode, set HOLD first"] == WARNING
     assert said["Task 1 killed: STOP"] == INFO
     assert NOTICE not in said.values()

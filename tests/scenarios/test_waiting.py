@@ -209,3 +209,41 @@ def test_when_a_scheduled_task_begins_is_told_unasked(world: World) -> None:
     status = world.client.statuses(1)[-1]
     assert status.time_to_start == pytest.approx(60, abs=0.5)
     assert status.time_to_finish > status.time_to_start
+
+
+RUN_BEFORE = 11
+
+
+def test_a_task_is_put_between_two_others_and_keeps_its_priority(world: World) -> None:
+    world.client.pause()
+    first, second, third, urgent = (
+        submit(world, at / 10, priority=each) for at, each in enumerate((5, 5, 2, 9), 1)
+    )
+    for task, other, order in (
+        (third, second, [urgent, first, third, second]),
+        (second, third, [urgent, first, second, third]),
+        (first, urgent, [first, urgent, second, third]),
+        (urgent, third, [first, second, urgent, third]),
+        (first, 0, [second, urgent, third, first]),
+        (third, 0, [second, urgent, first, third]),
+    ):
+        sent = world.client.command(MODIFY, task, RUN_BEFORE, other)
+        world.run(0.1)
+        assert sent.answer == (ACCEPTED, task)
+        assert in_order(world, *sorted(order)) == order
+    assert [world.task(each).priority for each in (first, third, urgent)] == [5, 2, 9]
+    late = submit(world, 0.5)
+    world.client.command(MODIFY, urgent, PRIORITY, 4)
+    world.run(0.1)
+    order = [second, first, third, late, urgent]
+    assert in_order(world, *sorted(order)) == order
+    sent = world.client.command(MODIFY, urgent, RUN_BEFORE, 77)
+    world.run(0.1)
+    assert sent.answer == (DENIED, R.WRONG_STATE)
+
+
+def in_order(world: World, *tasks: int) -> list[int]:
+    for task in tasks:
+        world.client.request_status(task)
+    world.run(0.1)
+    return sorted(tasks, key=lambda task: world.client.statuses(task)[-1].queue_position)

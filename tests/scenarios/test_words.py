@@ -73,7 +73,7 @@ def test_who_called_a_task_off_is_said(world: World) -> None:
     world.run(0.2)
     world.client.command(CANCEL, 1)
     world.run(4)
-    assert {"Task 2 cancelled by 255/190", "Task 1 cancelled"} <= set(world.client.texts())
+    assert {"Task 2 cancelled by a ground station", "Task 1 cancelled"} <= set(world.client.texts())
 
 
 @pytest.mark.parametrize("mode", [RTL, AUTO])

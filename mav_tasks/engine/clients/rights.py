@@ -76,8 +76,8 @@ class Rights(NamedTuple):
     def check_terms(self, terms: Terms, before: Terms = UNASKED) -> None:
         """Raise Rejection if terms, of a new task or in place of others, are not allowed."""
         most = self.limits.max_priority
-        if terms.priority > max(most, before.priority):
-            raise self.refusal(f"may use priority {most} at most, not {terms.priority}")
+        if terms.standing > max(most, before.standing):
+            raise self.refusal(f"may use priority {most} at most, not {terms.standing}")
         if terms.is_preemptive > before.is_preemptive:
             self.require(OPERATOR, "make a task pre-emptive")
 

@@ -18,6 +18,7 @@ from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
+from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.repetition import MAX_PERIOD, MAX_REPEAT, canonical, repeating
 from mav_tasks.tasks.task import MAX_PRIORITY, Task, TaskId, Terms
@@ -141,11 +142,11 @@ class TaskControl:
     def _modify(self, asked: CommandRequest, *, now: float) -> int:
         task = self._find(asked, identifier(asked.command, 1, "task", low=1, default=None))
         asked.rights.require_own(task, asked.submitter, "modify")
-        times = asked.vehicle.tasks.room.times
+        room = asked.vehicle.tasks.room
         if asked.command.params[1] == P.REPEAT:
-            terms = self._with_piece(task, asked.command, times, now=now)
+            terms = self._with_piece(task, asked.command, room.times, now=now)
         else:
-            terms = _modified(task, asked.command, times, now=now)
+            terms = _modified(task, asked.command, room, now=now)
         asked.rights.check_terms(terms, before=task.terms)
         asked.vehicle.tasks.modify(task, terms, actor=asked.actor, now=now)
         return task.id
@@ -190,7 +191,7 @@ def _words(task: Task) -> str:
     return task.state.name.lower()
 
 
-def _modified(task: Task, command: Command, times: Times, *, now: float) -> Terms:
+def _modified(task: Task, command: Command, room: PendingTasks, *, now: float) -> Terms:
     """Return a task's terms with one property changed."""
     terms = task.terms
     wanted = whole(command, 2, "property", low=1, high=max(P), default=None)
@@ -200,9 +201,14 @@ def _modified(task: Task, command: Command, times: Times, *, now: float) -> Term
         raise Rejection(R.WRONG_STATE, words)
     match wanted:
         case P.PRIORITY:
-            return replace(
-                terms, priority=whole(command, 3, "priority", high=MAX_PRIORITY, default=None)
-            )
+            priority = whole(command, 3, "priority", high=MAX_PRIORITY, default=None)
+            return replace(terms, priority=priority, place=None)
+        case P.RUN_BEFORE:
+            other = identifier(command, 3, "run before", default=None)
+            place = room.queue(task.vehicle).place_before(other)
+            if place is None:
+                raise Rejection(R.WRONG_STATE, f"task {other} is not in this queue")
+            return replace(terms, place=place)
         case P.START_DELAY:
             delay = number(command, 3, "start delay", low=0.0, high=MAX_DELAY)
             return replace(terms, start_at=now + delay if delay else None, start_utc=None)
@@ -213,7 +219,7 @@ def _modified(task: Task, command: Command, times: Times, *, now: float) -> Term
             return replace(terms, deadline=now + deadline if deadline else None, start_within=None)
         case P.EVERY:
             period = whole(command, 3, "every", high=MAX_PERIOD, default=None)
-            return _repeating(task, str(period) if period else "", times, now=now)
+            return _repeating(task, str(period) if period else "", room.times, now=now)
         case P.RUN_AFTER:
             return replace(terms, after=identifier(command, 3, "run after", default=None))
         case P.PREEMPTIBLE:
@@ -226,7 +232,7 @@ def _modified(task: Task, command: Command, times: Times, *, now: float) -> Term
             return replace(terms, start_at=None, start_utc=_utc(command))
 
 
-_OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.START_UTC})
+_OF_WAITING = frozenset({P.START_DELAY, P.DEADLINE, P.RUN_AFTER, P.RUN_BEFORE, P.START_UTC})
 
 
 def _repeating(task: Task, text: str, times: Times, *, now: float) -> Terms:

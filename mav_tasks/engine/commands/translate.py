@@ -6,7 +6,7 @@
 from math import isfinite, nan
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.address import Address, who_is
 from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
@@ -263,8 +263,7 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
 
 
 def _by(actor: str) -> str:
-    """Return " by" and the actor without its endpoint, which says nothing to people."""
-    return "" if actor == SERVER else f" by {actor.partition('@')[0]}"
+    return "" if actor == SERVER else f" by {who_is(actor)}"
 
 
 def _severity(reason: TaskReason) -> MavSeverity:

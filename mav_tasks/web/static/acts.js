@@ -1,13 +1,16 @@
 // What a person can ask for, each with its consequence said before. Words that let a rover move carry the halt
 // epoch of the queue that was shown: a page that is behind cannot release a newer STOP.
 
-import { newKey, post, request } from "./api.js";
+import { newKey, post } from "./api.js";
 import { ask } from "./dialogs.js";
 import { h } from "./dom.js";
 import { state } from "./store.js";
 import { ACTIVE, taskName } from "./words.js";
 
 export const may = (what) => Boolean(state.session && state.session.may.includes(what));
+
+/** What helps, in words for who may not resume a rover. */
+export const forMe = (words) => (may("resume") ? words : words.replace("press Resume", "an operator must press Resume"));
 
 export function pause(vehicle) {
   return post(`/vehicles/${vehicle}/pause`, {});
@@ -77,10 +80,6 @@ function choice(ways, first) {
   const consequence = h("p", { "aria-live": "polite" }, ways[first]);
   select.addEventListener("change", () => (consequence.textContent = ways[select.value]));
   return { select, consequence, label: h("label", { class: "whole" }, "How: ", select) };
-}
-
-export function setPriority(task, priority) {
-  return request("PATCH", `/tasks/${task.id}`, { priority });
 }
 
 /** Submit goals, and say before what will happen. */

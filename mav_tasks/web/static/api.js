@@ -54,5 +54,6 @@ export function newKey() {
 export function failureWords(error) {
   if (!(error instanceof Problem)) throw error;
   if (error.reason === "stale") return "Something halted the rover after this page was drawn. Look at it again, then repeat this if you still mean it.";
-  return error.message.charAt(0).toUpperCase() + error.message.slice(1);
+  const words = error.message.replace("goals[0].", ""); // the page sends one goal
+  return words.charAt(0).toUpperCase() + words.slice(1);
 }

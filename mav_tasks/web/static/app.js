@@ -104,6 +104,7 @@ function tabs() {
       document.getElementById(each.getAttribute("aria-controls")).hidden = !isChosen;
     }
     if (!isBegun) return;
+    if (state.task !== null) routes.showTask(null);
     if (tab.id === "tab-texts") texts.shown();
     if (tab.id === "tab-records") records.shown();
     else records.left();

@@ -10,10 +10,10 @@ const below = () => [document.getElementById("main"), document.querySelector(".v
 
 /**
  * Open a dialogue. "act" does what it is for, and may throw a Problem; then it stays open and says why.
- * "isBeside": it leaves the map in sight. "onClose" is called once it is gone, whatever was chosen.
- * @param {{title: string, words?: (string|Node)[], word: string, act: (form: any) => Promise<any>, fields?: Node, isBeside?: boolean, onClose?: () => void}} what
+ * "isBeside": it leaves the map in sight. "isNeeded": there is no way around it. "onClose" is called once it is gone, whatever was chosen.
+ * @param {{title: string, words?: (string|Node)[], word: string, act: (form: any) => Promise<any>, fields?: Node, isBeside?: boolean, onClose?: () => void, isNeeded?: boolean}} what
  */
-export function ask({ title, words = [], word, act, fields, isBeside = false, onClose = () => {} }) {
+export function ask({ title, words = [], word, act, fields, isBeside = false, isNeeded = false, onClose = () => {} }) {
   close();
   const before = document.activeElement;
   const failure = h("p", { class: "failure", role: "alert", hidden: true });
@@ -23,10 +23,16 @@ export function ask({ title, words = [], word, act, fields, isBeside = false, on
     ...words.map((each) => (each instanceof Node ? each : h("p", {}, each))),
     fields,
     failure,
-    h("div", { class: "row" }, h("button", { class: "small", type: "button", onclick: () => close() }, "Back"), go));
+    h("div", { class: "row" }, !isNeeded && h("button", { class: "small", type: "button", onclick: () => close() }, "Back"), go));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     if (go.disabled) return;
+    const wrong = form.querySelector("input:invalid");
+    if (wrong) {
+      say(failure, `${wrong.labels[0].firstChild.textContent}: ${wrong.validationMessage}`);
+      show(failure, true);
+      return wrong.focus();
+    }
     go.disabled = true;
     show(failure, false);
     try {
@@ -40,8 +46,9 @@ export function ask({ title, words = [], word, act, fields, isBeside = false, on
   });
   const cover = h("div", { class: isBeside ? "cover beside" : "cover" }, form);
   document.addEventListener("keydown", onKey);
-  cover.addEventListener("pointerdown", (event) => event.target === cover && close());
+  cover.addEventListener("pointerdown", (event) => event.target === cover && !isNeeded && close());
   cover._before = before;
+  cover._isNeeded = isNeeded;
   cover._onClose = onClose;
   place().append(cover);
   for (const each of below()) each.inert = true;
@@ -51,7 +58,7 @@ export function ask({ title, words = [], word, act, fields, isBeside = false, on
 
 function onKey(event) {
   const form = place().querySelector("form");
-  if (event.key === "Escape") close();
+  if (event.key === "Escape" && form && !form.parentElement._isNeeded) close();
   if (event.key === "Tab" && form) keepFocus(event, form);
 }
 

@@ -11,6 +11,7 @@ import { taskColour } from "./words.js";
 /* global L: Leaflet, loaded before this module */
 
 const hint = document.getElementById("map-hint");
+const follow = document.querySelector("#map-follow input");
 const METRES = 111318.845; // of a degree of latitude, as the server converts
 const OLD = 3; // s
 const FENCE_RADIUS = 20; // m
@@ -49,6 +50,9 @@ export function begin() {
   map.setView([0, 0], hasTiles ? 3 : 3);
   [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer, runLayer] = Array.from({ length: 6 }, () => L.layerGroup().addTo(map));
   tracks.begin(trackLayer, goalLayer, { point, here, placed });
+  document.getElementById("map-fit").addEventListener("click", fit);
+  follow.addEventListener("change", centre);
+  map.on("dragstart", () => (follow.checked = false));
   map.on("click", (event) => clicked(event.latlng));
   map.getContainer().addEventListener("keydown", (event) => {
     if (event.key !== "Enter" || event.target !== map.getContainer()) return;
@@ -62,7 +66,7 @@ export function begin() {
   onChange((names) => {
     if (names.has("whole")) reset();
     if (names.has("vehicles") || names.has("clock")) drawRovers();
-    if (names.has("chosen")) centre();
+    if (names.has("chosen") || names.has("session")) centre();
     if (["vehicles", "chosen", "queues"].some((name) => names.has(name))) tracks.drawTracks();
     if (["vehicles", "queues", "chosen", "tasks"].some((name) => names.has(name))) tracks.drawGoals();
     if (names.has("chosen") || names.has("ground")) drawGround();
@@ -134,6 +138,7 @@ function drawRovers() {
     }
     if (mark._at !== `${at}`) {
       mark.setLatLng(at);
+      if (follow.checked && vehicle.vehicle === state.chosen) map.panTo(at, { animate: false });
       mark._at = `${at}`;
     }
     const turn = `rotate(${vehicle.heading ?? 0}deg)`;
@@ -171,9 +176,10 @@ function makeMark(id, at, layer = map) {
   return mark;
 }
 
+/** Look at all rovers. */
 function fit() {
-  isFitted = true;
-  lookAt(L.latLngBounds([...marks.values()].map((mark) => mark.getLatLng())).pad(0.4), { maxZoom: hasTiles ? 19 : 4 });
+  isFitted = marks.size > 0;
+  if (isFitted) lookAt(L.latLngBounds([...marks.values()].map((mark) => mark.getLatLng())).pad(0.4), { maxZoom: hasTiles ? 19 : 4 });
 }
 
 // on a phone the map may be hidden, and then has no size to fit anything into: it is done when it is shown
@@ -185,8 +191,8 @@ function lookAt(bounds, options) {
 function centre() {
   const mark = marks.get(state.chosen);
   if (mark && isFitted) map.panTo(mark.getLatLng());
-  const words = state.chosen === null ? "" : `Click the map, or press Enter on it, to send rover ${state.chosen} there or to turn it.${hasTiles ? "" : " Grid in metres, north is up."}`;
-  say(hint, words);
+  const way = may("submit") ? `Click the map, or press Enter on it, to send rover ${state.chosen} there or to turn it.` : "";
+  say(hint, state.chosen === null ? "" : `${way}${hasTiles ? "" : " Grid in metres, north is up."}`);
   loadGround();
 }
 
@@ -259,7 +265,13 @@ export function showTrack(track) {
   const vehicle = state.vehicles.get(track.vehicle);
   const places = track.points.map(([, north, east]) => point({ north, east }, vehicle)).filter(Boolean);
   if (places.length < 2) return;
-  L.polyline(places, { color: taskColour(track.id), weight: 7, opacity: 0.5, interactive: false }).addTo(taskTrackLayer);
+  const lines = [[]];
+  for (const [at, each] of track.points.entries()) {
+    if (at && tracks.isGap(track.points[at - 1], each)) lines.push([]);
+    const shown = point({ north: each[1], east: each[2] }, vehicle);
+    if (shown) lines.at(-1).push(shown);
+  }
+  L.polyline(lines, { color: taskColour(track.id), weight: 7, opacity: 0.5, interactive: false }).addTo(taskTrackLayer);
   lookAt(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 21 : 4 });
 }
 

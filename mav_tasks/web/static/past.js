@@ -1,4 +1,4 @@
-// Finished tasks of the chosen rover; and one task with its journal, track and set-point timing.
+// Finished tasks of the chosen rover; and one task, whatever its state, with its journal, track and set-point timing.
 
 import { failureWords, get } from "./api.js";
 import * as acts from "./acts.js";
@@ -6,13 +6,13 @@ import { h, reconcile, say, show } from "./dom.js";
 import { showTrack } from "./map.js";
 import { onChange, serverNow, state } from "./store.js";
 import { goTo, showTask } from "./routes.js";
-import { OVER, clock, duration, progressWords, quick, stateWords, taskName } from "./words.js";
+import { openChangeForm } from "./task_form.js";
+import { ACTIVE, OVER, WAITING, clock, duration, progressWords, quick, stateWords, taskName } from "./words.js";
 
 const panel = document.getElementById("panel-past");
 const list = h("ol", { "aria-label": "Finished tasks, the newest first" });
 const none = h("p", { class: "empty" });
-const detail = h("section", { hidden: true, "aria-label": "One task" });
-const past = h("div", {}, list, none);
+const detail = document.getElementById("panel-task");
 
 export let tasks = [];
 const LISTED = 100;
@@ -21,7 +21,7 @@ let loadedFor = "";
 let whole = { vehicle: 0, wanted: 0 }; // what "tasks" has
 
 export function begin() {
-  panel.append(detail, past);
+  panel.append(list, none);
   onChange((names) => {
     if (names.has("route")) open();
     if (names.has("tasks") && state.task !== null && state.tasks.has(state.task)) drawFacts(state.tasks.get(state.task));
@@ -102,7 +102,8 @@ let task = null; // the one that is shown; a snapshot of the stream may not have
 // made once: a button that is replaced between press and release is not clicked
 const release = h("button", { class: "small main-word", type: "button", hidden: true, onclick: () => acts.release(task, state.queues.get(task.vehicle)?.halt_epoch ?? task.halt_epoch) }, "Release…");
 const cancel = h("button", { class: "small", type: "button", hidden: true, onclick: () => acts.cancel(task) }, "Cancel…");
-const buttons = h("div", { class: "row" }, release, cancel);
+const modify = h("button", { class: "small", type: "button", hidden: true, onclick: () => openChangeForm(task) }, "Change…");
+const buttons = h("div", { class: "row" }, release, modify, cancel);
 const failure = h("p", { class: "failure", role: "alert", hidden: true });
 const log = h("ol", { class: "log", "aria-label": "Journal of the task" });
 const logNone = h("p", { class: "empty" });
@@ -111,14 +112,12 @@ detail.append(h("button", { class: "small", type: "button", onclick: () => showT
 async function open() {
   const id = state.task;
   show(detail, id !== null);
-  show(past, id === null);
+  detail.parentElement.classList.toggle("one", id !== null);
   if (id === null) return showTrack(null);
-  document.getElementById("tab-past").click();
   say(title, `Task ${id}`);
   facts.replaceChildren();
   log.replaceChildren();
-  show(release, false);
-  show(cancel, false);
+  for (const each of [release, modify, cancel]) show(each, false);
   say(logNone, "");
   show(failure, false);
   try {
@@ -157,16 +156,17 @@ function drawFacts(found) {
   say(title, taskName(task));
   const rows = [["State", stateWords(task)]];
   if (task.why) rows.push(["Why", task.why]);
-  if (task.remedy) rows.push(["What helps", task.remedy.words]);
+  if (task.remedy) rows.push(["What helps", acts.forMe(task.remedy.words)]);
   rows.push(["Rover", String(task.vehicle)], ["Priority", String(task.priority)]);
-  if (!OVER.has(task.state) && progressWords(task)) rows.push(["Progress", progressWords(task)]);
+  if (ACTIVE.has(task.state) && progressWords(task)) rows.push(["Progress", progressWords(task)]);
   if (task.after) rows.push(["After", `task ${task.after}`]);
   if (task.execution_time) rows.push(["Driven", duration(task.execution_time)]);
-  if (task.ended_at) rows.push(["Ended", new Date(task.ended_at).toLocaleString()]);
-  rows.push(["Submitted by", task.submitter]);
+  if (task.ended_at) rows.push(["Ended", clock(Date.parse(task.ended_at) / 1000)]);
+  rows.push(["Submitted by", task.submitted_by]);
   const kept = [...facts.children].filter((each) => each.dataset.kept);
   facts.replaceChildren(...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]), ...kept);
   show(release, task.state === "held" && acts.may("release"));
+  show(modify, WAITING.has(task.state) && acts.may("modify"));
   say(cancel, task.state === "cancelling" ? "Kill…" : "Cancel…");
   show(cancel, !OVER.has(task.state) && acts.may("cancel"));
 }

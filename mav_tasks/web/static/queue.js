@@ -1,6 +1,6 @@
 // The queue of the chosen rover: what runs, what waits and why, in order; and what a person can do about it.
 
-import { failureWords } from "./api.js";
+import { failureWords, request } from "./api.js";
 import * as acts from "./acts.js";
 import { makeDraggable } from "./dragging.js";
 import { h, reconcile, renew, say, show } from "./dom.js";
@@ -28,9 +28,10 @@ const SAID = 8000; // ms for which it stays
 const current = h("ol", { "aria-label": "The task that runs" });
 const list = h("ol", { "aria-label": "Waiting tasks, in the order in which they run" });
 const more = h("p", { class: "empty" });
+const drop = planDrop();
 
 export function begin() {
-  panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure, current, list, more, planDrop(), said);
+  panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure, current, list, more, drop, said);
   onChange((names) => {
     if (names.has("session")) for (const each of [current, list]) renew(each);
     if (["queues", "chosen", "tasks", "clock", "whole", "session"].some((name) => names.has(name))) draw();
@@ -40,6 +41,7 @@ export function begin() {
 function draw() {
   const queue = chosenQueue();
   show(add, Boolean(queue) && acts.may("submit"));
+  show(drop, acts.may("submit") || acts.may("fence"));
   show(clear, Boolean(queue && queue.waiting_count) && acts.may("clear"));
   if (!queue) {
     say(what, state.vehicles.size ? "Loading the queue…" : "No rover yet.");
@@ -53,13 +55,13 @@ function draw() {
   show(notice, Boolean(queue.paused));
   if (queue.paused) {
     say(why, `No task runs: ${queue.paused_words}.`);
-    say(remedy, queue.paused === "takeover" || queue.paused === "failsafe" ? "Set the rover to HOLD, then resume." : "Resume lets the tasks run.");
+    say(remedy, acts.forMe(queue.paused_remedy));
     show(go, acts.may("resume"));
   }
   reconcile(current, queue.current ? [queue.current] : [], (task) => task.id, (task) => make(task, true));
   reconcile(list, queue.waiting.slice(0, MOST), (task) => task.id, (task) => make(task, false));
   const hidden = queue.more + Math.max(0, queue.waiting.length - MOST);
-  say(more, hidden ? `and ${hidden} more` : count || queue.current ? "" : "Nothing waits. Add a task, drop a plan file here, or click on the map.");
+  say(more, hidden ? `and ${hidden} more` : count || queue.current ? "" : acts.may("submit") ? "Nothing waits. Add a task, drop a plan file here, or click on the map." : "Nothing waits.");
 }
 
 function make(task, isCurrent) {
@@ -71,15 +73,15 @@ function make(task, isCurrent) {
   const reason = h("p", { class: "why" });
   const button = (words, act, label) => h("button", { class: "small", type: "button", "aria-label": label, onclick: act }, words);
   const now = () => find(id);
-  const higher = button("▲", () => change(now(), +1), `Raise the priority of task ${id}`);
-  const lower = button("▼", () => change(now(), -1), `Lower the priority of task ${id}`);
+  const earlier = button("▲", () => step(id, -1), `Move task ${id} up`);
+  const later = button("▼", () => step(id, +1), `Move task ${id} down`);
   const release = h("button", { class: "small main-word", type: "button", onclick: () => acts.release(now(), chosenQueue().halt_epoch) }, "Release…");
   const cancel = button("Cancel…", () => acts.cancel(now()), `Cancel task ${id}`);
   const pause = button("Pause", async () => guarded(() => acts.pause(now().vehicle)), `Pause task ${id}`);
   // ▲ and ▼ do the same for a keyboard and a screen reader
   const grip = h("span", { class: "grip", "aria-hidden": "true", title: "Drag to another place" }, "⠿");
   const element = h("li", { class: isCurrent ? "task now" : "task", "data-task": String(id) },
-    h("div", { class: "line" }, grip, h("span", { class: "title" }, link), h("span", { class: "row" }, release, pause, higher, lower, cancel)),
+    h("div", { class: "line" }, grip, h("span", { class: "title" }, link), h("span", { class: "row" }, release, pause, earlier, later, cancel)),
     bar, h("div", { class: "whys" }, mark, info, reason));
   if (!isCurrent) makeMovable(element, grip, id);
   const update = (shown) => {
@@ -89,19 +91,20 @@ function make(task, isCurrent) {
     show(bar, isCurrent && shown.progress !== null);
     if (shown.progress !== null) bar.value = shown.progress;
     say(info, isCurrent ? progressWords(shown) : waitWords(shown));
-    say(reason, shown.why ? `${isCurrent ? "Reason" : "Waits"}: ${shown.why}${shown.remedy ? `. ${shown.remedy.words}` : ""}` : "");
+    say(reason, shown.why ? `${isCurrent ? "Reason" : "Waits"}: ${shown.why}${shown.remedy ? `. ${acts.forMe(shown.remedy.words)}` : ""}` : "");
     const mood = shown.remedy ? "why warn" : "why";
     if (reason.className !== mood) reason.className = mood;
     show(release, shown.state === "held" && Boolean(shown.remedy) && acts.may("release"));
     show(pause, isCurrent && ["starting", "executing"].includes(shown.state));
-    show(higher, !isCurrent && shown.priority < state.session.priority.most && acts.may("modify"));
-    show(lower, !isCurrent && shown.priority > state.session.priority.least && acts.may("modify"));
     const isCancelling = shown.state === "cancelling";
     say(cancel, isCancelling ? "Kill…" : "Cancel…");
     cancel.setAttribute("aria-label", `${isCancelling ? "Kill" : "Cancel"} task ${id}`);
     show(cancel, acts.may("cancel"));
-    const isMovable = !isCurrent && acts.may("modify");
-    show(grip, isMovable);
+    const isMovable = shown.state === "queued" && acts.may("modify");
+    for (const each of [grip, earlier, later]) show(each, isMovable);
+    const ids = isMovable ? line().map((task) => task.id) : [];
+    earlier.disabled = ids[0] === id;
+    later.disabled = ids.at(-1) === id;
     element.classList.toggle("movable", isMovable);
   };
   return { element, update };
@@ -140,58 +143,47 @@ async function guarded(act) {
   }
 }
 
-async function change(task, by) {
-  await rank(task, task.priority + by);
+/** The tasks that stand in line, in order; those behind them wait for something else. */
+const line = () => chosenQueue().waiting.filter((task) => task.state === "queued");
+
+/** The task before which one runs that is moved to a place; 0: it is the last; null: what follows is not here. */
+function follower(id, place) {
+  const others = line().filter((task) => task.id !== id);
+  return others[place]?.id ?? (chosenQueue().more ? null : 0);
 }
 
-async function rank(task, priority) {
-  await guarded(async () => {
-    await acts.setPriority(task, priority);
-    tell(`Task ${task.id} has priority ${priority} now.`);
+function move(id, place) {
+  return guarded(async () => {
+    const before = follower(id, place);
+    await request("PATCH", `/tasks/${id}`, { before });
+    tell(before ? `Task ${id} runs before task ${before} now.` : `Task ${id} runs last now.`);
   });
 }
 
-/**
- * What dragging a task onto another one does: upwards it gets before it, downwards behind it. Equal priorities run
- * in the order of their ids. A priority beyond the limits is null.
- */
-export function placeAt(task, other, order) {
-  const isUp = order.indexOf(task.id) > order.indexOf(other.id);
-  const isEarlier = task.id < other.id;
-  const wanted = isUp ? other.priority + (isEarlier ? 0 : 1) : other.priority - (isEarlier ? 1 : 0);
-  const { least, most } = state.session.priority;
-  return { priority: wanted < least || wanted > most ? null : wanted, where: isUp ? "before" : "after" };
-}
-
-const order = () => chosenQueue().waiting.map((task) => task.id);
+const step = (id, by) => move(id, line().findIndex((task) => task.id === id) + by);
 
 function makeMovable(element, grip, id) {
-  let other = null;
-  const places = () => placeAt(find(id), find(other), order());
+  let place = 0;
   const mark = () => {
     for (const each of list.querySelectorAll(".over-above, .over-below")) each.classList.remove("over-above", "over-below");
   };
   makeDraggable(element, {
     grip,
-    may: () => acts.may("modify"),
+    may: () => element.classList.contains("movable"),
     rowAt: (below) => {
-      const row = below.closest("[data-task]");
+      const row = below.closest("li.movable");
       return row && list.contains(row) ? row : null;
     },
     over: (row) => {
       mark();
       if (!row) return;
-      other = Number(row.dataset.task);
-      const { priority, where } = places();
-      row.classList.add(where === "before" ? "over-above" : "over-below");
-      tell(priority === null ? `No priority puts task ${id} ${where} task ${other}.` : `Task ${id} gets priority ${priority}: it then runs ${where} task ${other}.`);
+      const ids = line().map((task) => task.id);
+      const other = Number(row.dataset.task);
+      place = ids.indexOf(other);
+      const isUp = ids.indexOf(id) > place;
+      row.classList.add(isUp ? "over-above" : "over-below");
+      tell(`Task ${id} will run ${isUp ? "before" : "after"} task ${other}.`);
     },
-    drop: () => {
-      const { priority, where } = places();
-      if (priority !== null) return rank(find(id), priority);
-      tell("");
-      say(failure, `No priority puts task ${id} ${where} task ${other}: change that one first.`);
-      show(failure, true);
-    },
+    drop: () => move(id, place),
   });
 }

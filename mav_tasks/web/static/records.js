@@ -64,7 +64,7 @@ function make(record) {
     element,
     update: (each) => {
       const parts = each.files.length === 2 ? "packets and decisions" : each.files[0].endsWith(".tlog") ? "packets" : "decisions";
-      say(info, `${new Date(each.changed * 1000).toLocaleString()} · ${(each.bytes / 1e6).toFixed(1)} MB · ${parts}`);
+      say(info, `${clock(each.changed)} · ${(each.bytes / 1e6).toFixed(1)} MB · ${parts}`);
     },
   };
 }

@@ -61,7 +61,7 @@ function make({ rover }) {
     const isTrouble = shown.control !== "tasks" || (queue && queue.current && queue.current.state === "held");
     const mood = isCutOff() ? "says" : shown.control === "silent" || shown.control === "stopped" ? "says bad" : isTrouble ? "says warn" : "says";
     if (says.className !== mood) says.className = mood;
-    say(says, isCutOff() ? lastWords(shown, queue) : doesWords(shown, queue));
+    say(says, acts.forMe(isCutOff() ? lastWords(shown, queue) : doesWords(shown, queue)));
     const checks = shown.prearm.length ? shown.prearm : shown.ready === false && !shown.armed ? ["Its checks before arming fail."] : [];
     reconcile(prearm, checks, (text) => text, (text) => ({ element: h("li", {}, text), update() {} }));
     show(prearm, checks.length > 0);

@@ -9,6 +9,7 @@ const all = document.getElementById("stop-all");
 const one = document.getElementById("stop-one");
 const outcome = document.getElementById("stop-outcome");
 const SHOWN = 30; // s
+const FRESH = 3; // s until the queues show a STOP
 
 // the same request would get the same answer; but a rover that is silent or unknown may soon be heard
 const FINAL = new Set([400, 401, 403, 415, 422]);
@@ -35,7 +36,7 @@ export function begin() {
   });
   onChange((names) => {
     if (names.has("chosen") || names.has("vehicles")) drawOne();
-    if (names.has("stops") || names.has("clock")) draw();
+    if (["stops", "clock", "queues", "vehicles"].some((name) => names.has(name))) draw();
   });
 }
 
@@ -97,7 +98,7 @@ function draw() {
   for (const [vehicle, each] of tries) if (each.isFailure && wasStoppedSince(vehicle, each)) tries.delete(vehicle);
   const lines = [...tries].map(([vehicle, each]) => ({ key: `of ${vehicle}`, words: each.words, isFailure: each.isFailure }));
   // what this page tries is told above, until it is acknowledged
-  const recent = state.stops.filter((each) => now() - each.takenAt < SHOWN && (each.acknowledged_after !== null || !tries.has(each.vehicle)));
+  const recent = state.stops.filter((each) => now() - each.takenAt < SHOWN && holds(each) && (each.acknowledged_after !== null || !tries.has(each.vehicle)));
   for (const each of recent.slice(-LINES)) lines.push({ key: each.number, words: outcomeWords(each), isFailure: ["refused", "unanswered"].includes(each.phase) });
   reconcile(outcome, lines.slice(-LINES - 1), (line) => line.key, () => {
     const element = h("span", {});
@@ -109,6 +110,13 @@ function draw() {
       },
     };
   });
+}
+
+// a result is told as long as it is true: not after a resume, nor is a rover known to stand that is lost
+function holds(stop) {
+  if (["refused", "unanswered"].includes(stop.phase) || now() - stop.takenAt < FRESH) return true;
+  return [...state.vehicles.values()].some((each) => [null, each.vehicle].includes(stop.vehicle) && (each.heard || stop.standing_after === null)
+    && state.queues.get(each.vehicle)?.paused === "stopped");
 }
 
 // a later STOP that was acknowledged, of this page or another one, makes a failure history

@@ -1,10 +1,11 @@
 // A form for a new task, made from what the API says of goals and their limits.
 
-import { newKey, post } from "./api.js";
+import { newKey, post, request } from "./api.js";
 import { consequenceOf } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { h } from "./dom.js";
-import { choose, state } from "./store.js";
+import { change, choose, state } from "./store.js";
+import { taskName } from "./words.js";
 
 const NAMES = {
   move: "Move straight", rotate: "Turn by an angle", drive: "Drive at a velocity", goto: "Go to (metres)",
@@ -27,13 +28,6 @@ export function openTaskForm(vehicle, goal = {}) {
   };
   select.addEventListener("change", draw);
   draw();
-  const { least, most, default: usual } = state.session.priority;
-  const terms = h("div", { class: "fields" },
-    labelled("Name of the task", h("input", { name: "label", maxLength: state.session.label_bytes, autocomplete: "off" }), `at most ${state.session.label_bytes} bytes`),
-    labelled("Priority", h("input", { name: "priority", type: "number", min: least, max: most, step: 1, value: usual }), `${most} runs first`),
-    labelled("Start in (s)", h("input", { name: "delay", type: "number", min: 0, step: "any" }), "empty: when it is its turn"),
-    labelled("Repeat every (s)", h("input", { name: "every", type: "number", min: 10, step: 1 }), "empty: once"),
-    labelled("After task", h("input", { name: "after", type: "number", min: 1, step: 1 }), "empty: none"));
   const consequence = h("p", { class: "empty", "aria-live": "polite" }, consequenceOf(vehicle));
   const who = h("select", { name: "rover" }, h("option", { value: vehicle }, `Rover ${vehicle}`), h("option", { value: ANY }, "Any rover"));
   const isAny = () => who.value === ANY;
@@ -43,7 +37,7 @@ export function openTaskForm(vehicle, goal = {}) {
   ask({
     title: isOne ? `Add a task for rover ${vehicle}` : "Add a task",
     words: [...(isOne ? [] : [h("label", { class: "fields" }, "Who ", who)]), h("label", { class: "fields" }, "What ", select), meaning],
-    fields: h("div", {}, numbers, terms, consequence),
+    fields: h("div", {}, numbers, termFields({}), consequence),
     word: "Add the task",
     act: async (form) => {
       const body = bodyOf(form, kinds.find((each) => each.kind === select.value));
@@ -53,15 +47,50 @@ export function openTaskForm(vehicle, goal = {}) {
   });
 }
 
+/** Open the form that changes the terms of a task that waits. */
+export function openChangeForm(task) {
+  ask({
+    title: `Change task ${task.id}?`, words: [taskName(task)], fields: termFields(task), word: "Change it",
+    act: async (form) => {
+      const terms = termsOf(form);
+      if (!terms.cron && terms.every === null) terms.every = task.every || task.cron ? 0 : null;
+      const after = terms.after ?? 0;
+      await request("PATCH", `/tasks/${task.id}`, { ...terms, after: after === (task.after ?? 0) ? null : after });
+      change("route"); // its journal has grown
+    },
+  });
+}
+
+/** Fields for when and how often a task runs, with what a task has. */
+function termFields(task) {
+  const { label_bytes: bytes, priority: { least, most, default: usual } } = state.session;
+  const number = (name, words, hint, value = null, limits = {}) => labelled(words, h("input", { name, type: "number", min: 0, step: 1, value: value ?? "", ...limits }), hint);
+  const isNew = !task.id;
+  return h("div", { class: "fields" },
+    labelled("Name of the task", h("input", { name: "label", maxLength: bytes, autocomplete: "off", value: task.label ?? "" }), `at most ${bytes} bytes`),
+    number("priority", "Priority", `${least} to ${most}; ${most} runs first`, task.priority ?? usual, { min: least, max: most }),
+    labelled("Start at", h("input", { name: "at", type: "datetime-local", step: 1 }), isNew ? "your local time; empty: when it is its turn" : "your local time; empty: as it is"),
+    number("delay", "Start in (s)", isNew ? "empty: when it is its turn" : "empty: as it is; 0: when it is its turn", null, { step: "any" }),
+    number("deadline", "Must start within (s)", isNew ? "or it expires; empty: it may wait for ever" : "or it expires; empty: as it is; 0: it may wait for ever", null, { step: "any" }),
+    number("after", "After task", "runs once that is completed; empty: after no other", task.after, { min: 1 }),
+    number("every", "Repeat every (s)", "empty: once", task.every, { min: 10 }),
+    labelled("Repeat at", h("input", { name: "cron", placeholder: "30 7 * * 1-5 Europe/Berlin", autocomplete: "off", value: task.cron ?? "" }), "minute, hour, day, month, weekday, zone (else UTC)"));
+}
+
+const numberOf = (data, name) => (String(data.get(name) ?? "").trim() === "" ? null : Number(data.get(name)));
+
+function termsOf(form) {
+  const data = new FormData(form);
+  const terms = { label: String(data.get("label")), cron: String(data.get("cron")).trim() || null };
+  for (const name of ["priority", "delay", "deadline", "after", "every"]) terms[name] = numberOf(data, name);
+  return { ...terms, at: data.get("at") ? new Date(String(data.get("at"))).toISOString() : null };
+}
+
 function bodyOf(form, kind) {
   const data = new FormData(form);
-  const number = (name) => {
-    const text = String(data.get(name) ?? "").trim();
-    return text === "" ? null : Number(text);
-  };
   const goal = { kind: kind.kind };
-  for (const each of kind.numbers) if (number(each.name) !== null) goal[each.name] = number(each.name);
-  return { goals: [goal], label: String(data.get("label") ?? ""), priority: number("priority"), delay: number("delay"), every: number("every"), after: number("after") };
+  for (const { name } of kind.numbers) if (numberOf(data, name) !== null) goal[name] = numberOf(data, name);
+  return { goals: [goal], ...termsOf(form) };
 }
 
 function field(number, value) {
@@ -70,9 +99,9 @@ function field(number, value) {
   if (number.most !== null) hint.push(`at most ${number.most}`);
   const input = h("input", {
     name: number.name, type: "number", step: "any", required: number.required, value: value ?? "",
-    min: number.least ?? undefined, max: number.most ?? undefined,
+    min: number.least ?? undefined, max: number.most ?? undefined, placeholder: number.required ? "" : "default",
   });
-  return labelled(`${number.name.replace("_", " ")}${number.unit ? ` (${number.unit})` : ""}${number.required ? "" : ", optional"}`, input, hint.join("; "));
+  return labelled(`${number.name.charAt(0).toUpperCase()}${number.name.slice(1).replace("_", " ")}${number.unit ? ` (${number.unit})` : ""}`, input, hint.join("; "));
 }
 
 function labelled(name, input, hint) {

@@ -65,6 +65,9 @@ function removeOthers(drawn) {
   }
 }
 
+/** Whether nobody saw the rover on its way between two points: it was silent, or began to count anew. */
+export const isGap = ([at, north, east], [later, ...to]) => Math.hypot(to[0] - north, to[1] - east) > (later - at > 2 ? 1 : 20);
+
 // Only what is new is drawn: a track has thousands of points and grows ten times a second. Short pieces, because
 // Leaflet projects all points of a line again when one is added; the oldest piece goes once there are too many points.
 function extend(drawn, track, vehicle, most) {
@@ -79,7 +82,9 @@ function extend(drawn, track, vehicle, most) {
     const at = place.point({ north, east }, vehicle);
     if (!at) continue;
     let piece = drawn.pieces[drawn.pieces.length - 1];
-    if (!piece || piece.task !== task || piece.places.length >= PIECE) {
+    const isCut = drawn.count > 0 && isGap(points[drawn.count - 1], points[drawn.count]);
+    if (isCut) drawn.last = null;
+    if (!piece || isCut || piece.task !== task || piece.places.length >= PIECE) {
       finish(piece);
       const line = L.polyline([], { color: taskColour(task), weight: task === null ? 2 : 3, opacity: 0.85, interactive: false, smoothFactor: 1.5 }).addTo(drawn.layer);
       piece = { task, line, places: drawn.last ? [drawn.last] : [], finished: 0 };
@@ -151,13 +156,26 @@ function goalsOf(task) {
   return known.goals;
 }
 
+/** The pose of a rover after a task that is driven from where it stands then; null: not known. */
+function poseAfter(task, pose, isNow) {
+  const [, kind, said] = task.what.match(/^(move|rotate|face) (-?[\d.]+)/) ?? [];
+  if (!kind || !pose || pose.north === null || pose.heading === null) return null;
+  const amount = isNow && task.left !== null ? Math.sign(said) * task.left : Number(said);
+  if (kind !== "move") return { ...pose, heading: kind === "face" ? Number(said) : pose.heading + amount };
+  const turn = (pose.heading * Math.PI) / 180;
+  return { ...pose, north: pose.north + amount * Math.cos(turn), east: pose.east + amount * Math.sin(turn) };
+}
+
 function drawQueue(layer, queue, vehicle, most) {
   const from = place.here(vehicle);
   let left = most;
+  let pose = { north: vehicle.north, east: vehicle.east, heading: vehicle.heading };
   for (const task of [queue.current, ...queue.waiting.slice(0, MOST_TASKS)]) {
-    const of = task && goalsOf(task);
-    if (!of) continue;
+    if (!task) continue;
     const isNow = task === queue.current;
+    pose = poseAfter(task, pose, isNow);
+    const of = goalsOf(task) ?? (pose && task.what.startsWith("move") ? [pose] : null);
+    if (!of) continue;
     const places = of.slice(0, left).map((each) => place.point(each, vehicle)).filter(Boolean);
     left -= places.length;
     const colour = taskColour(task.id);

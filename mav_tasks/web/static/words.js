@@ -6,8 +6,9 @@ export function duration(seconds) {
   const whole = Math.max(0, Math.round(seconds));
   if (whole < 60) return `${whole} s`;
   if (whole < 3600) return `${Math.floor(whole / 60)} min${whole % 60 && whole < 600 ? ` ${whole % 60} s` : ""}`;
-  if (whole < 86400) return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
-  return `${Math.floor(whole / 86400)} d ${Math.floor((whole % 86400) / 3600)} h`;
+  const [unit, rest, [large, small]] = whole < 86400 ? [3600, 60, ["h", "min"]] : [86400, 3600, ["d", "h"]];
+  const left = Math.floor((whole % unit) / rest);
+  return `${Math.floor(whole / unit)} ${large}${left ? ` ${left} ${small}` : ""}`;
 }
 
 /** Milliseconds below a second, else seconds with a decimal. */
@@ -16,9 +17,11 @@ export function quick(seconds) {
   return seconds < 1 ? `${Math.round(seconds * 1000)}\u00a0ms` : `${seconds.toFixed(1)}\u00a0s`;
 }
 
-/** The local time of seconds since 1970. */
+/** The local time of seconds since 1970; of another day with its date. */
 export function clock(seconds) {
-  return new Date(seconds * 1000).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+  const at = new Date(seconds * 1000);
+  const time = at.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", second: "2-digit" });
+  return at.toDateString() === new Date().toDateString() ? time : `${at.toLocaleDateString([], { day: "numeric", month: "short" })} ${time}`;
 }
 
 /** A mark beside the word of a state, so that colour is not needed to tell them apart. */
@@ -48,6 +51,7 @@ export function taskName(task) {
 }
 
 export const ACTIVE = new Set(["starting", "executing", "paused", "cancelling", "held"]);
+export const WAITING = new Set(["scheduled", "blocked", "queued"]);
 export const OVER = new Set(["completed", "failed", "cancelled", "killed", "expired"]);
 
 /** One of a fixed set of colours for each task. */

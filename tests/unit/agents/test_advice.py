@@ -2,8 +2,9 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.agents.advice import advice_of, advice_on_queue, needs_decision
+from mav_tasks.agents.advice import advice_of, advice_on_queue
 from mav_tasks.agents.forms import TASK, queue_form, refusal, result, task_form
+from mav_tasks.client.descriptions import needs_decision
 from mav_tasks.client.values import QueueStatus, TaskStatus, Unit
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
@@ -46,11 +47,15 @@ def queue(current: TaskStatus | None, paused: TaskReason | None = None) -> Queue
         (task(S.QUEUED, R.BEHIND_OTHERS), "call wait"),
         (task(S.QUEUED, R.QUEUE_PAUSED), "call resume with epoch: 12"),
         (task(S.PAUSED, R.TAKEOVER), "call resume with epoch: 12"),
-        (task(S.QUEUED, R.HELD_AHEAD), "release that task"),
-        (task(S.QUEUED, R.DISARMED), "A person must arm the rover"),
+        (task(S.QUEUED, R.HELD_AHEAD), "release the held task"),
+        (task(S.QUEUED, R.DISARMED), "Arm the rover in HOLD; or, if the server may arm it, call"),
+        (task(S.QUEUED, R.VEHICLE_SILENT), "tell a person to do it: Check the rover's radio"),
+        (task(S.PAUSED, R.LINK_LOST), "Check the rover's radio and power."),
+        (task(S.QUEUED, R.NO_POSITION), "check its GPS"),
+        (task(S.QUEUED, R.OTHER_CONTROLLER), "End the other program"),
         (task(S.HELD, R.OFF_TRACK), "is held (off track)"),
         (task(S.HELD, R.OFF_TRACK), "epoch: 12"),
-        (task(S.HELD, R.NO_POSITION), "call wait"),
+        (task(S.HELD, R.NO_POSITION), "It waits: no position."),  # released
         (task(S.FAILED, R.STUCK), "new idempotency_key"),
     ],
 )

@@ -166,7 +166,7 @@ def test_the_table_has_a_row_of_each(event: Event, values: dict[str, object]) ->
 
 def test_the_figures_of_a_drive_are_in_its_line_and_in_cells_of_their_own() -> None:
     words = (
-        "rover 1: task 17 paused: link lost; "
+        "rover 1: task 17 paused: rover silent; "
         "136 setpoints at 20 Hz: p50 50.0, p99 51.2, max 150.0 ms, "
     )
     assert str(DRIVEN) == f"{words}1 late"

@@ -106,6 +106,12 @@ def test_some_of_it(store: DurableStore, place: str) -> None:
     late = read(place, Which(since=OFFSET + 13.5))  # the third is submitted before, ends after it
     assert [event for _, event in late] == [*ours[5:], theirs]
     assert read(place, Which(task=3, vehicle=2)) == []
+    numbered = list(enumerate([*ours, theirs], 1))
+    assert [read(place, Which(after=number)) for number in (4, 9, 0)] == [
+        numbered[4:],
+        numbered[9:],
+        numbered,
+    ]
 
 
 def test_a_reader_that_stays_keeps_nothing_from_the_writer(path: Path) -> None:

@@ -17,7 +17,7 @@ def rank(priority: int, came_at: float, task_id: int = 1, *, aging: float = AGIN
 
 
 def entry(each: Rank, *, priority: int = 5, is_preemptive: bool = False) -> Entry:
-    return Entry(TaskId(each.task_id), each, priority, is_preemptive)
+    return Entry(TaskId(int(each.task_id)), each, priority, is_preemptive)
 
 
 def queue_of(*ranks: Rank) -> TaskQueue:
@@ -105,7 +105,9 @@ def test_many_at_once_are_the_same_as_one_by_one() -> None:
     ranks = [rank(n % 11, n % 7, n) for n in range(1, 200)]
     at_once = TaskQueue()
     one_by_one = TaskQueue()
-    entries = [entry(r, priority=r.task_id % 11, is_preemptive=r.task_id % 3 == 0) for r in ranks]
+    entries = [
+        entry(r, priority=int(r.task_id) % 11, is_preemptive=r.task_id % 3 == 0) for r in ranks
+    ]
     at_once.put_all(entries)
     for each in entries:
         one_by_one.put(each)

@@ -113,7 +113,7 @@ async def test_our_own_page_and_programs_pass(tmp_path: Path) -> None:
     ours = {"origin": f"http://{HOST}", "sec-fetch-site": "same-origin"}
     for headers in (JSON, JSON | ours, {"content-type": "application/json; charset=utf-8"}):
         answer = await rig.client.post("/api/v1/stop", headers=headers, content="{}")
-        assert answer.json() == {"who": "local None", "bytes": 2}
+        assert answer.json() == {"who": "a local user None", "bytes": 2}
 
 
 @awaited
