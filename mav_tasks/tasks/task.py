@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NewType
 
-from mav_tasks.tasks.goal import Goal, LocalPlace
+from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.timing import Timing
 
@@ -243,6 +243,12 @@ class Task:
     timing: Timing | None = None
     changed_at: float | None = None
     choice: str = ""
+
+    @property
+    def is_click(self) -> bool:
+        """Whether it is a place at the autopilot's address: an autopilot keeps only the last."""
+        is_place = isinstance(self.goal, GoTo) and self.goal.place is not None
+        return is_place and self.terms.is_cruising
 
     @property
     def priority(self) -> int:

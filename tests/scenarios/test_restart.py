@@ -172,7 +172,7 @@ def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> No
     sent = world.client.proceed()
     world.run(0.1)
     assert sent.answer == (ACCEPTED, 0), "the queue goes on when that is decided"
-    assert any("waits for held task 1: press" in text for text in world.client.texts())
+    assert any("keeps task 1 on hold: press" in text for text in world.client.texts())
     world.run(3)
     assert (world.state(1)[0], world.stands()) == (S.HELD, True)
     again = world.client.proceed()

@@ -80,6 +80,8 @@ CALM = frozenset(
         R.NO_POSITION,
         R.NOT_READY,
         R.QUEUE_PAUSED,
+        R.TAKEOVER,  # a warning was sent already
+        R.FAILSAFE,
         R.OPERATOR,
         R.PREEMPTED,
         R.CANCELLED,
