@@ -201,7 +201,8 @@ class Progress:
     ``jumps`` are pairs of a jump's step and how often it was taken. ``pending`` are the steps on
     the way that are still to be done; the first of them has waited for ``pending_for`` seconds.
     ``speed`` is the last one set by the plan or a client, m/s. ``driven`` is the metres that were
-    commanded so far, over all legs.
+    commanded so far, over all legs. ``share`` is the part of it that is done, 0 to 1, by time;
+    it never falls.
     """
 
     anchor: Pose | None = None
@@ -217,6 +218,7 @@ class Progress:
     speed: float | None = None
     path: tuple[Bend, ...] = ()
     driven: float = 0.0
+    share: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
