@@ -44,6 +44,7 @@ MISSES = 3
 #: how much farther than its way may be a task may drive to correct it: as a factor, and m
 CORRECTIONS, SLACK = 1.05, 0.2
 KEEP_EACH = 1.0  # s between two writes of a driven task's progress
+SHARE_EACH = 0.5  # s between two estimates of how much of it is done; of a long plan they cost
 
 
 class Becomes(NamedTuple):
@@ -74,6 +75,7 @@ class Drive:
         self._astray = AstrayWatch()
         self._arrival = Arrival()
         self._is_coming_back = False  # from outside into the fence
+        self._shared_at = 0.0  # when the share that is done was last computed
         self._kept_at = 0.0  # when progress was last recorded for the store
         self._kept_as = 0  # the number of that event
         self._driven = 0.0  # m commanded so far for the active task
@@ -154,8 +156,8 @@ class Drive:
         if here.target is not None and distance(motion.pose, here.target) > longest:
             return Becomes(S.FAILED, R.BAD_PARAMETER)
         if task.terms.max_distance is not None:
-            known = Known(self._settings.driving, motion.pose, seen.home, seen.origin)
-            if end := self._end_of_way(task, time_left(task.goal, here, known).metres, now=now):
+            left = time_left(task.goal, here, self._known(task, seen, motion))
+            if end := self._end_of_way(task, left.metres, now=now):
                 return end
         if not self._bounds.allows_stage(single, here, motion.pose, seen.origin):
             return _refused(task)
@@ -228,7 +230,7 @@ class Drive:
                 self._registry.note_progress(task.id, after)
                 self._course = None
                 return Demand(DemandKind.DRIVE, self._last_velocity)
-        self._note_progress(task, executed, now=now)
+        self._note_progress(task, seen, motion, executed=executed, now=now)
         # zeros were commanded for long enough to call slowness a standstill
         stands = seen.still and now - self._moved_at >= self._settings.watch.still_time
         if self._arrival.stands_here(
@@ -359,12 +361,23 @@ class Drive:
         self._registry.advance(task.id, here, now=now)
         return None
 
-    def _note_progress(self, task: Task, executed: float, *, now: float) -> None:
+    def _known(self, task: Task, seen: VehicleView, motion: Motion) -> Known:
+        return Known(self._driving_of(task), motion.pose, seen.home, seen.origin)
+
+    def _note_progress(
+        self, task: Task, seen: VehicleView, motion: Motion, *, executed: float, now: float
+    ) -> None:
         assert self._course is not None
-        self._course.progress = replace(
-            self._course.progress, execution_time=executed, driven=self._driven
-        )
-        self._registry.note_progress(task.id, self._course.progress)
+        progress = self._course.progress
+        if now - self._shared_at >= SHARE_EACH:
+            self._shared_at = now
+            left = time_left(task.goal, progress, self._known(task, seen, motion)).seconds
+            if not isnan(left):
+                share = max(progress.share, executed / max(executed + left, SHARE_EACH))
+                progress = replace(progress, share=share)
+        progress = replace(progress, execution_time=executed, driven=self._driven)
+        self._course.progress = progress
+        self._registry.note_progress(task.id, progress)
         is_written = self._registry.durable >= self._kept_as  # no backlog for a store that is away
         if now - self._kept_at >= KEEP_EACH and is_written:
             self._registry.keep_progress(task.id, now=now)

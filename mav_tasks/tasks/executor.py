@@ -252,9 +252,12 @@ class Executor:
 
     def _start(self, task: Task, seen: VehicleView, now: float) -> Demand:
         is_waited_for = now - self._since < self._settings.watch.ready_timeout
+        blocker = start_blocker(seen, watch=self._settings.watch, now=now)
         is_not_ready = self.waits_for[0] is R.NOT_READY and is_waited_for and not has_moved(task)
-        if is_not_ready and start_blocker(seen, watch=self._settings.watch, now=now):
+        if is_not_ready and blocker:
             self._taking_since = now
+            return view.HOLD
+        if blocker is R.WRONG_MODE and is_waited_for:  # it resumes out of somebody's mode
             return view.HOLD
         if self._pause_if_lost(seen, now):
             return view.HOLD

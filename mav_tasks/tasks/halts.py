@@ -8,11 +8,10 @@ from math import inf
 from typing import NamedTuple
 
 from mav_tasks.tasks.events import SERVER
-from mav_tasks.tasks.lifecycle import TAKEN, TaskReason, words_of
+from mav_tasks.tasks.lifecycle import TaskReason, words_of
 
 SAME = 0.2  # s, in which equal halts of one actor count once: a flood counts five a second
 SENDERS = 32  # whose last halts are remembered
-SHOWN = 2.0  # s after a disarm command for the vehicle to show that it is disarmed, at 1 Hz
 
 _WORDS = {
     TaskReason.OPERATOR: "a pause",
@@ -79,7 +78,6 @@ class Halts:
         self.restored_at = -inf  #: s, when this run loaded an earlier one
         self._reason, self._actor = TaskReason.NONE, ""
         self._was_asked = False  # to resume, since the last halt
-        self._shown_at = -inf  # s, when the vehicle last showed a commanded disarming
         self._counted_at = -inf  # s, when the last halt came that counted
 
     def __repr__(self) -> str:
@@ -103,8 +101,6 @@ class Halts:
             is_word = self.by_somebody.reason in WORDS and reason not in WORDS
             self.by_somebody = LastHalt(self.by_somebody.reason if is_word else reason, now)
         self.at = now  # a repeated halt, too, makes older commands stale
-        if self._reason is TaskReason.DISARMED and reason in TAKEN and now <= self._shown_at:
-            return False  # the vehicle shows the commanded disarming
         is_same = (reason, actor) == (self._reason, self._actor)
         if is_same and now - self._counted_at < SAME and not self._was_asked:
             return False
@@ -114,11 +110,6 @@ class Halts:
         self._reason, self._actor, self._was_asked = reason, actor, False
         self.is_undone = False
         return True
-
-    def shows_disarmed(self, *, now: float) -> None:
-        """Note that the vehicle shows it is disarmed, which may be due to the last command."""
-        if self._reason is TaskReason.DISARMED and now - self.at <= SHOWN:
-            self._shown_at = now
 
     def lets_go(self) -> None:
         """Note that the queue was resumed; that does not undo a disarming."""

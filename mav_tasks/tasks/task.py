@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NewType
 
-from mav_tasks.tasks.goal import Goal, LocalPlace
+from mav_tasks.tasks.goal import Goal, GoTo, LocalPlace
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.timing import Timing
 
@@ -217,7 +217,8 @@ class Progress:
     ``jumps`` are pairs of a jump's step and how often it was taken. ``pending`` are the steps on
     the way that are still to be done; the first of them has waited for ``pending_for`` seconds.
     ``speed`` is the last one set by the plan or a client, m/s; ``backwards`` says whether the plan
-    drives backwards. ``driven`` is the metres that were commanded so far, over all legs.
+    drives backwards. ``driven`` is the metres that were commanded so far, over all legs. ``share``
+    is the part of it that is done, 0 to 1, by time; it never falls.
     """
 
     anchor: Pose | None = None
@@ -234,6 +235,7 @@ class Progress:
     path: tuple[Bend, ...] = ()
     driven: float = 0.0
     backwards: bool = False
+    share: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +262,12 @@ class Task:
     timing: Timing | None = None
     changed_at: float | None = None
     choice: str = ""
+
+    @property
+    def is_click(self) -> bool:
+        """Whether it is a place at the autopilot's address: an autopilot keeps only the last."""
+        is_place = isinstance(self.goal, GoTo) and self.goal.place is not None
+        return is_place and self.terms.is_cruising
 
     @property
     def priority(self) -> int:

@@ -1,5 +1,7 @@
 """Selects which task of a vehicle starts next, what blocks it, and which one may interrupt."""
 
+from math import inf
+
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
@@ -10,6 +12,8 @@ from mav_tasks.tasks.view import VehicleView
 
 R, S = TaskReason, TaskState
 
+LEAVES_MODE = 1.5  # s in which a heartbeat shows the mode that was asked for with a task
+
 
 class Turns:
     """Selector of one vehicle's next task."""
@@ -18,6 +22,7 @@ class Turns:
         self._lineup = lineup
         self._blocker = R.NONE  # why the next task does not start
         self._blocked: TaskId | None = None  # which task that was
+        self._told_at = inf  # s, when that is recorded
 
     def __repr__(self) -> str:
         return f"Turns({self._blocked}, {self._blocker.name})"
@@ -25,7 +30,7 @@ class Turns:
     @property
     def awaits_commit(self) -> bool:
         """Whether there is a next task whose submission is not durable yet."""
-        first = None if self._lineup.executor.task_id is not None else self._next()
+        first = None if self._lineup.executor.task_id is not None else self.next_id
         return first is not None and not self._lineup.registry.is_durable(first)
 
     def blocker_of(self, task_id: TaskId) -> TaskReason:
@@ -65,7 +70,7 @@ class Turns:
 
     def begin_next(self, seen: VehicleView, *, now: float) -> None:
         """Start the next task, if it can start."""
-        first = None if self._lineup.active is not None else self._next()
+        first = None if self._lineup.active is not None else self.next_id
         if first is None:
             return
         task = self._lineup.registry[first]
@@ -79,13 +84,15 @@ class Turns:
         if not blocker and self._lineup.registry.is_durable(first):
             self._begin(task, seen, now=now)
 
-    def _next(self) -> TaskId | None:
-        """Return the next task: the immediate one, a pre-empted one, or a waiting one."""
-        if self._lineup.is_held_ahead:
-            return None
-        if self._lineup.immediate is not None and self._lineup.immediate in self._lineup.queue:
-            return self._lineup.immediate
-        if self._lineup.paused:
+    @property
+    def next_id(self) -> TaskId | None:
+        """The next task to start: the immediate one, a pre-empted one, or a waiting one."""
+        immediate = self._lineup.immediate
+        if immediate is not None and (
+            immediate in self._lineup.queue or immediate in self._lineup.suspended_ids
+        ):
+            return immediate
+        if self._lineup.paused or self._lineup.is_held_ahead:
             return None
         first = self._lineup.queue.first()
         if not self._lineup.suspended_ids:
@@ -116,6 +123,9 @@ class Turns:
 
     def _note_blocker(self, first: TaskId, blocker: TaskReason, *, now: float) -> None:
         """Note why the next task does not start, and record it each time that it changes."""
-        if blocker and (first, blocker) != (self._blocked, self._blocker):
-            self._lineup.registry.record(TaskWaits(first, self._lineup.vehicle, blocker, now))
+        if (first, blocker) != (self._blocked, self._blocker):
+            self._told_at = now + (LEAVES_MODE if blocker is R.WRONG_MODE else 0.0)
         self._blocked, self._blocker = first, blocker
+        if blocker and now >= self._told_at:
+            self._told_at = inf
+            self._lineup.registry.record(TaskWaits(first, self._lineup.vehicle, blocker, now))

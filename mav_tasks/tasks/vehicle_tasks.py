@@ -118,33 +118,56 @@ class VehicleTasks(Lineup):
         """
         if self.is_stopped:
             raise Rejection(R.STOPPED, CONTINUE_FIRST)
-        if self.is_held_ahead:
-            raise Rejection(R.HELD_AHEAD, "release the held task first")
         self.check_start(seen, present_goal(draft.goal, Progress()), now=now)
         task = self.room.submit(draft, now=now)
         self.give_way_to(task, actor=actor, now=now)
         return task
 
     def give_way_to(self, task: Task, *, actor: str, now: float) -> None:
-        """Run a waiting task at once; all others wait until the queue is resumed."""
+        """Run a waiting task at once; all others, if any, wait until the queue is resumed.
+
+        It replaces the clicks of its submitter: nobody sees them any more.
+        """
+        for click in self.unfinished:
+            if click.is_click and click.id != task.id and click.submitter == task.submitter:
+                self._end(click, S.CANCELLED, R.REPLACED, actor=actor, now=now)
         active = self.active
         if active is not None and active.id == self.immediate:
             self.executor.cancel(R.REPLACED, actor=actor, now=now)
-        elif active is not None and active.state in (S.STARTING, S.EXECUTING, S.PAUSED):
+        elif active is not None and active.state is not S.CANCELLING:
             self.executor.pause(R.OPERATOR, actor=actor, now=now)
             self.set_aside(active.id)
         before = None if self.immediate is None else self.registry.get(self.immediate)
         if before is not None and before.state in WAITING:
             self.room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
         self.immediate = task.id
-        self.pause_queue(R.OPERATOR, actor=actor, now=now)
+        if self.has_others:
+            self.pause_queue(R.OPERATOR, actor=actor, now=now)
+
+    @property
+    def has_others(self) -> bool:
+        """Whether any task could start beside the immediate one."""
+        return any(
+            each.id != self.immediate
+            and each.state is not S.CANCELLING
+            and not each.terms.is_staged
+            for each in self.unfinished
+        )
 
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
         """Cancel a task, or end it at once (``kill``); the vehicle stands before anything starts.
 
         A vehicle that somebody else has is not made to stand: STOP does that.
         """
+        if task.state not in WAITING and task.id not in self.suspended_ids:
+            self.halt(reason, actor=actor, now=now)
         state = S.KILLED if kill else S.CANCELLED
+        self._end(task, state, reason, actor=actor, now=now)
+
+    def _end(
+        self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
+    ) -> None:
+        kill = state is S.KILLED
         if task.state in WAITING:
             self.room.end(task, state, reason, actor=actor, now=now)
         elif task.id in self.suspended_ids:
@@ -154,12 +177,10 @@ class VehicleTasks(Lineup):
             self.registry.change(task.id, state, reason=reason, actor=actor, now=now)
             self.room.ended(task.id, now=now)
         elif kill:
-            self.halt(reason, actor=actor, now=now)
             self.stopping_after_kill |= not self._is_of_another_driver(task)
             self.executor.kill(reason, actor=actor, now=now)
             self._ended(task.id, now=now)
         else:
-            self.halt(reason, actor=actor, now=now)
             self.executor.cancel(reason, actor=actor, now=now)
             if self.active is None:
                 self._ended(task.id, now=now)
@@ -300,6 +321,7 @@ class VehicleTasks(Lineup):
         """
         self.halt(R.STOPPED, actor=actor, now=now)
         killed = self.executor.kill(R.STOP, actor=actor, now=now)
+        self._end_clicks(actor=actor, now=now)
         self.immediate = None
         self.pause_queue(R.STOPPED, actor=actor, now=now)
         if clear:
@@ -308,6 +330,26 @@ class VehicleTasks(Lineup):
         if killed is not None:
             self.room.ended(killed, now=now)
         return killed
+
+    def end_what_drives(self, *, actor: str, now: float) -> None:
+        """End the active task and the clicks: a ground station has made an emergency stop.
+
+        A mission at the autopilot's address stays, for ground stations show it. What stays waits.
+        """
+        active = self.active
+        if active is not None and not (isinstance(active.goal, Plan) and active.terms.is_cruising):
+            self.executor.kill(R.STOP, actor=actor, now=now)
+            self._ended(active.id, now=now)
+        self._end_clicks(actor=actor, now=now)
+        self.immediate = None
+        if self.has_others:
+            self.pause_queue(R.OPERATOR, actor=actor, now=now)
+
+    def _end_clicks(self, *, actor: str, now: float) -> None:
+        """End all clicks: nobody who has stopped the vehicle sees where they would lead."""
+        for task in self.unfinished:
+            if task.is_click:
+                self._end(task, S.KILLED, R.STOP, actor=actor, now=now)
 
     def was_stopped(self, *, at: float, now: float) -> None:
         """End each series that was there at a STOP of an earlier run.

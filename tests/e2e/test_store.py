@@ -168,7 +168,7 @@ def test_after_a_kill_the_acknowledged_task_is_held_and_can_be_finished(
             )
             after_a_restart()
             submit(link, CONTINUE, 1)  # the queue; what is held stays so
-            wait_for(link, "STATUSTEXT", "'waits for held task 1' in STATUSTEXT.text")
+            wait_for(link, "STATUSTEXT", "'keeps task 1 on hold' in STATUSTEXT.text")
             another = 0, 0, 0, 0, 0, 2  # in param7: no repeat of the first
             assert command_long(link, CONTINUE, 1, *another).result != 0  # release it first
             continued = running.truth()[-1]

@@ -62,6 +62,7 @@ BY_HAND = ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE")
 MOVING_COMMANDS = (16, 17, 18, 19, 20, 21, 22, 34, 115, 192, 209, 213, 300)
 STOP, PAUSE_CONTINUE, SET_MODE, ARM, REQUEST = 54003, 193, 176, 400, 512
 RELEASE, SKIP = 54013, 2
+MISSION_START = 300
 REPOSITION = 192
 ACK, ACCEPTED = 77, 0
 NO_PLACE = 0x7FFFFFFF
@@ -331,6 +332,8 @@ class Observer:
             self._ask(now, Wish(PAUSE_CONTINUE, is_continue, is_continue))
         elif message.command == RELEASE:
             self._ask(now, Wish(RELEASE, ends_stop=False, ends_takeover=message.param2 != SKIP))
+        elif message.command == MISSION_START:
+            self._ask(now, Wish(MISSION_START, ends_stop=False, ends_takeover=True))
         elif message.command == SET_MODE:
             self._see_wish_of_client(now, self.ways.mode_of(message))
         elif message.command == ARM and message.param1:

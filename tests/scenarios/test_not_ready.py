@@ -99,7 +99,7 @@ def test_after_a_time_it_fails_as_refused(make_world: MakeWorld, persona: Person
 
 HALTS: dict[str, tuple[Callable[[World], object], tuple[S, R]]] = {
     "another mode": (lambda w: w.operator_mode(Mode.MANUAL), (S.PAUSED, R.TAKEOVER)),
-    "disarm": (lambda w: w.client.arm(False), (S.PAUSED, R.TAKEOVER)),
+    "disarm": (lambda w: w.client.arm(False), (S.PAUSED, R.OPERATOR)),
     "pause": (lambda w: w.client.pause(), (S.PAUSED, R.OPERATOR)),
     "STOP": (lambda w: w.client.stop(), (S.KILLED, R.STOP)),
     "cancel": (lambda w: w.client.command(CANCEL, 1), (S.CANCELLED, R.CANCELLED)),

@@ -126,7 +126,7 @@ def test_a_rover_disarmed_while_driving_does_not_drive_off_when_armed_again(
     world.operator_arm(True)
     world.run(4.0)
     assert near_pose(world.pose(), where)
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR if who == "client" else R.TAKEOVER)
 
 
 def test_a_rover_armed_by_hand_while_its_mode_is_asked_for_is_not_driven(world: World) -> None:

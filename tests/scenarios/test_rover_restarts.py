@@ -88,7 +88,7 @@ def test_continue_and_release(driving: World, how: int) -> None:
     restart(world)
     where = world.pose()
     assert proceed(world).result == ACCEPTED
-    assert any("waits for held task 1: press" in text for text in world.client.texts())
+    assert any("keeps task 1 on hold: press" in text for text in world.client.texts())
     world.run(5)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     assert near_pose(world.pose(), where), "what is held moves nothing"

@@ -42,7 +42,6 @@ WAYS: dict[str, Callable[[World], object]] = {
     "a client asked for AUTO": lambda w: w.client.mode(AUTO),
     "a client asked for MANUAL": lambda w: w.client.mode(MANUAL),
     "disarm at the rover": lambda w: w.operator_arm(False),
-    "disarm by a client": lambda w: w.client.arm(False),
     "sticks": lambda w: w.client.send(sticks(x=300)),
     "throttle stick": lambda w: w.client.send(sticks(z=300)),
     "RC override": lambda w: w.client.send(rc_override(1500, 1500, 1700, 1500)),
@@ -237,8 +236,19 @@ def test_a_client_that_disarms_while_we_arm_is_obeyed(world: World) -> None:
     world.run(0.02)
     world.fault(Faults())
     world.run(3)
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
     assert not world.rover.autopilot.armed
+
+
+def test_a_client_that_disarms_pauses_as_by_hold(driving: World) -> None:
+    world, at = driving, driving.now
+    world.client.arm(False)
+    world.run(5)
+    assert (world.state(1), world.state(2)) == ((S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE))
+    assert world.paused() is R.OPERATOR
+    assert world.observer.sent_since(at)[:2] == ["zero", "HOLD"]
+    assert "arm" not in world.observer.sent_since(at)
+    assert world.rover.autopilot.mode is Mode.HOLD
 
 
 def test_an_operator_who_switches_to_hold_right_after_our_hold_is_obeyed(world: World) -> None:

@@ -75,7 +75,7 @@ def test_what_went_as_asked_is_no_warning(world: World) -> None:
     assert {
         "Task 1 paused by a ground station",
         "Queue paused by a ground station",
-        "Queue resumed by a ground station",
+        "Queue resumed by a ground station: task 1 is next, move 2 m",
     } <= set(said)
     assert {"Task 1 cancelled", "Task 2 done", "Rover 1 found (ardupilot)"} <= set(said)
     assert set(said.values()) == {INFO}
@@ -91,9 +91,9 @@ def test_what_needs_a_hand_is_a_warning(world: World) -> None:
     world.client.stop()
     world.run(1)
     said = severities(world)
-    assert (
-        said["Task 1 paused: takeover"] == said["Queue paused: takeover. Press Continue"] == WARNING
-    )
+    assert said["Rover 1 taken over: mode is MANUAL"] == WARNING
+    told_with_it = "Task 1 paused: takeover", "Queue paused: takeover. Press Continue"
+    assert {said[each] for each in told_with_it} == {INFO}, "one warning for one event"
     assert said["STOP by a ground station: press Continue to resume"] == WARNING
     assert said["cannot start: wrong mode, set HOLD first"] == WARNING
     assert said["Task 1 killed: STOP"] == INFO

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
-from mav_tasks.engine.clients.summary import summary_of
+from mav_tasks.engine.clients.summary import next_words, summary_of
 from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.submissions import Submissions
@@ -21,6 +21,7 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import INTERVAL, component_heartbeat
 from mav_tasks.tasks.events import (
     Event,
+    QueueContinued,
     TaskAdvanced,
     TaskAssigned,
     TaskChanged,
@@ -96,6 +97,8 @@ class Publisher:
             if spoken is not None:
                 system_id, severity, text = spoken
                 if vehicle := self._vehicles.get(system_id):
+                    if isinstance(event, QueueContinued):
+                        text += next_words(vehicle.tasks)
                     self._gcs.tell(text, severity, vehicle.server_address, now=now)
             if isinstance(
                 event, TaskChanged | TaskModified | TaskAssigned | TaskAdvanced | TaskWaits

@@ -5,11 +5,11 @@ the first 50 characters only.
 """
 
 from mav_tasks.engine.commands.submissions import PAUSED
+from mav_tasks.engine.vehicles.hands import BUTTONS
+from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
-
-BUTTONS = "Held: remainder, again or skip"  # of the actions file for QGroundControl
 
 
 def summary_of(tasks: VehicleTasks) -> str:
@@ -28,6 +28,13 @@ def summary_of(tasks: VehicleTasks) -> str:
     if tasks.paused and waiting:
         return f"{_waiting(waiting)}, press Continue ({why})"
     return ""
+
+
+def next_words(tasks: VehicleTasks) -> str:
+    """Return which task drives next, to end a text; "" if none does."""
+    task_id = None if tasks.held else tasks.executor.task_id or tasks.turns.next_id
+    task = None if task_id is None else tasks.registry[task_id]
+    return "" if task is None else f": task {task.id} is next, {describe(task.goal)}"
 
 
 def _waiting(count: int) -> str:

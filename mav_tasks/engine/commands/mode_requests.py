@@ -12,7 +12,7 @@ from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.commands.command_request import CommandRequest, MessageRequest
 from mav_tasks.engine.commands.ordering import note_halt, require_newer
-from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.commands.submissions import Submissions, give_back
 from mav_tasks.engine.missions.plans import MISSION, Plans
 from mav_tasks.engine.policy import Kind, row_of_command
 from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
@@ -117,9 +117,9 @@ class ModeRequests:
         if isinstance(started, Draft):
             task = self._submissions.submit_draft(asked, started, now=now)
             self._plans.restarted(vehicle, task, now=now)
-            return
-
-        self._submissions.gate.hold(_Started(asked, started), now=now)
+        else:
+            self._submissions.gate.hold(_Started(asked, started), now=now)
+        give_back(asked, now=now)
 
     def _accept(self, started: _Started, *, now: float) -> None:
         del now

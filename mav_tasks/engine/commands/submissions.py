@@ -31,7 +31,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, describe
-from mav_tasks.tasks.lifecycle import WAITING, TaskReason, words_of
+from mav_tasks.tasks.lifecycle import TAKEN, WAITING, TaskReason, words_of
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import DEFAULT_PRIORITY, Draft, Submitter, Task, TaskId
 
@@ -130,7 +130,9 @@ class Submissions:
         draft = Draft(
             vehicle.system_id, command.command, goal, asked.submitter, wish.terms, wish.marks
         )
-        runs_now = settings.guided == "now" and asked.is_go_to
+        runs_now = asked.is_go_to and (
+            settings.guided == "now" or self._is_next_word(asked, now=now)
+        )
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
@@ -151,8 +153,25 @@ class Submissions:
             now=now,
         )
         self.await_commit(asked, task, now=now)
+        if runs_now:
+            give_back(asked, now=now)
         if words:
             asked.tell(words, MavSeverity.INFO, now=now)
+
+    def _is_next_word(self, asked: CommandRequest, *, now: float) -> bool:
+        """Return whether an operator's click drives at once, as on an autopilot.
+
+        It does after a halt by the same station, which so gives the vehicle back, and out of a mode
+        in which no task starts. A halt of somebody else it does not end.
+        """
+        vehicle, tasks = asked.vehicle, asked.vehicle.tasks
+        if tasks.is_stopped or vehicle.hold_before.is_open(now=now):
+            return False
+        if not asked.rights.reach(OPERATOR):
+            return False
+        if tasks.paused:
+            return tasks.halts.by is asked.sender
+        return vehicle.joint.state(now=now).is_led and vehicle.armed
 
     def _submit_late(self, asked: CommandRequest, *, now: float) -> None:
         """Submit what was held back, by the state of the vehicle now."""
@@ -174,6 +193,7 @@ class Submissions:
         if not self._is_repeat(asked, draft, confirmation=0, now=now):
             task = self.take_in(asked.rights, asked.vehicle, draft, runs_now=True, now=now)
             self.await_commit(asked, task, now=now)
+            give_back(asked, now=now)
 
     def submit_draft(self, asked: CommandRequest, draft: Draft, *, now: float) -> Task:
         """Submit a task that a command implies. Raise Rejection if it is refused."""
@@ -279,13 +299,16 @@ class Submissions:
         if tasks.immediate == task.id:
             words, is_blocked = f"Task {task.id} starts now: {goal}", False
         elif paused:  # somebody else may have paused
-            words = f"Task {task.id} waits, press Continue ({PAUSED.get(paused, words_of(paused))})"
-            words += f": {goal}"
+            again = ", or set Hold and click again" if asked.is_go_to else ""
+            why = PAUSED.get(paused, words_of(paused))
+            words = f"Task {task.id} waits, press Continue{again} ({why}): {goal}"
         elif tasks.is_held_ahead:
             held = "a task" if tasks.held is None else f"task {tasks.held.id}"
             words = f"Task {task.id} waits, press a Held button: {held} is held. {goal}"
         else:
-            words, is_blocked = f"Task {task.id} queued: {goal}{chosen_words(task)}", False
+            ahead = "" if tasks.active is None else f" behind task {tasks.active.id}"
+            words = f"Task {task.id} queued{ahead}: {goal}{chosen_words(task)}"
+            is_blocked = False
         for client in self._gcs.clients:
             is_told_otherwise = client is not asked.client or client.uses_dialect
             is_calm = is_told_otherwise or not is_blocked
@@ -362,6 +385,17 @@ class Submissions:
             state = "" if task is None else f", {task.state.name.lower()}"
             words = f"repeated {what}, no new task: see task {known.task_id}{state}"
             asked.tell(words, MavSeverity.INFO, now=now)
+
+
+def give_back(asked: CommandRequest, *, now: float) -> None:
+    """End a takeover, or the pause by a halt of the same client, if nothing else waits for that.
+
+    Call this for a request that drives the vehicle at once.
+    """
+    tasks = asked.vehicle.tasks
+    is_over = tasks.paused in TAKEN or tasks.halts.by is asked.sender
+    if is_over and not tasks.has_others:
+        asked.vehicle.joint.go_on(actor=asked.actor, now=now)
 
 
 def _answer(halted: _Halted, *, now: float) -> None:

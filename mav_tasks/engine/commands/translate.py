@@ -11,6 +11,7 @@ from mav_tasks.mavlink.enums import MavResult, MavSeverity
 from mav_tasks.mavlink.float_param import EXACT, large_number
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.settings import SET_FAILSAFE
+from mav_tasks.tasks.driving.estimate import time_left
 from mav_tasks.tasks.driving.guidance import Leg
 from mav_tasks.tasks.driving.legs import first_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
@@ -26,9 +27,9 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
     VehicleSeen,
 )
-from mav_tasks.tasks.forecast import Forecast
-from mav_tasks.tasks.goal import Goal, Move, Plan, Rotate, describe
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
+from mav_tasks.tasks.forecast import Forecast, known_of
+from mav_tasks.tasks.goal import Goal, GoTo, Move, Plan, Rotate, describe
+from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason, TaskState, words_of
 from mav_tasks.tasks.outlook import estimate, position, wait_reason
 from mav_tasks.tasks.task import Progress, Task
 from mav_tasks.tasks.timing import Timing
@@ -80,6 +81,8 @@ CALM = frozenset(
         R.NO_POSITION,
         R.NOT_READY,
         R.QUEUE_PAUSED,
+        R.TAKEOVER,  # a warning was sent already
+        R.FAILSAFE,
         R.OPERATOR,
         R.PREEMPTED,
         R.CANCELLED,
@@ -127,8 +130,7 @@ def task_status(
     ahead = position(tasks, task) if forecast is not None else None
     to_start, to_finish = map(_float32, estimate(tasks, task, forecast=forecast, now=now))
     progress, submitter = task.progress, task.submitter
-    leg = _leg(task)
-    unit, length = _size_of(leg)
+    unit, left = _left(task, tasks)
     step, step_count = _steps(task.goal, progress)
     return m.TaskStatus(
         time_boot_ms=round(now * 1000) & 0xFFFFFFFF,
@@ -136,7 +138,7 @@ def task_status(
         version=task.version,
         nonce=task.marks.nonce,
         after_task_id=task.terms.after,
-        remaining=nan if leg is None else max(0.0, length - progress.done),
+        remaining=left,
         time_to_start=to_start,
         time_to_finish=to_finish,
         execution_time=nan if progress.anchor is None else progress.execution_time,
@@ -149,7 +151,7 @@ def task_status(
         state=task.state,
         reason=reason,
         priority=task.terms.priority,
-        progress=_percentage(task, step, step_count, length),
+        progress=100 if task.state is TaskState.COMPLETED else round(100 * progress.share),
         remaining_unit=unit,
         submitter_system=submitter.system_id,
         submitter_component=submitter.component_id,
@@ -311,6 +313,17 @@ def _leg(task: Task) -> Leg | None:
     return first_leg(goal) if task.progress.anchor is None else leg_of(goal, task.progress)
 
 
+def _left(task: Task, tasks: VehicleTasks) -> tuple[int, float]:
+    """Return how much is left, and its TASK_UNIT: the way to a place or of a plan, else the leg."""
+    if isinstance(task.goal, GoTo | Plan) and task.progress.anchor and task.state not in TERMINAL:
+        way = time_left(task.goal, task.progress, known_of(tasks)).metres
+        if way > 0.0:
+            return UNIT_METRES, _float32(way)
+    leg = _leg(task)
+    unit, length = _size_of(leg)
+    return unit, nan if leg is None else max(0.0, length - task.progress.done)
+
+
 def _size_of(leg: Leg | None) -> tuple[int, float]:
     """Return the TASK_UNIT of a leg, and its whole length in that unit."""
     match leg:
@@ -322,16 +335,6 @@ def _size_of(leg: Leg | None) -> tuple[int, float]:
             return UNIT_RADIANS, length_of(leg)
         case _:
             return UNIT_SECONDS, length_of(leg)
-
-
-def _percentage(task: Task, step: int, step_count: int, length: float) -> int:
-    """Return how much of a task is done, in percent; ``length`` is that of its present leg."""
-    if task.state is TaskState.COMPLETED:
-        return 100
-    if task.progress.anchor is None:
-        return 0
-    share = min(1.0, max(0.0, task.progress.done / length)) if length else 0.0
-    return round(100 * (step + share) / max(step_count, 1))
 
 
 def _steps(goal: Goal, progress: Progress) -> tuple[int, int]:

@@ -11,6 +11,7 @@ from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.missions.fence_items import fence_of, rally_of
 from mav_tasks.engine.missions.plan_items import plan_of, steps_of
 from mav_tasks.engine.missions.plan_table import MissionParseOptions
+from mav_tasks.engine.vehicles.hands import BUTTONS
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -20,13 +21,11 @@ from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of
 from mav_tasks.tasks.lifecycle import (
-    ACTIVE,
     CONTINUE_FIRST,
     TERMINAL,
     WAITING,
     TaskReason,
     TaskState,
-    words_of,
 )
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import StoredPlans
@@ -169,7 +168,6 @@ class Plans:
         """
         if vehicle.tasks.is_stopped:
             raise Rejection(R.STOPPED, CONTINUE_FIRST)
-        self._check_queue(vehicle)
         vehicle.parts.check_not_manual(now=now)
         stored = self.stored(vehicle.system_id, MISSION)
         active, task = vehicle.tasks.active, self.task(vehicle)
@@ -178,6 +176,7 @@ class Plans:
         if active and is_other and not is_fresh:
             self._set_going(vehicle, active, actor=str(submitter), now=now)
             return active
+        _check_state(task)
         if not stored.items:
             raise Rejection(R.NOT_FOUND, "no plan is uploaded")
         if first >= len(stored.items):
@@ -195,32 +194,20 @@ class Plans:
         self._started[vehicle.system_id] = _Started(submitter, task.id, now)
         return task
 
-    def _check_queue(self, vehicle: Vehicle) -> None:
-        """Raise Rejection if the queue is paused for another reason than an operator's pause."""
-        paused = vehicle.tasks.paused
-        if paused and paused is not R.OPERATOR:
-            words = f"queue paused ({words_of(paused)}): press Continue first"
-            raise Rejection(R.QUEUE_PAUSED, words)
-        task = self.task(vehicle)
-        if task is not None and task.state is S.HELD:
-            raise Rejection(R.HELD_AHEAD, f"task {task.id} is held: release it first")
-        if task is not None and task.state is S.CANCELLING:
-            raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
-
     def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
         """Resume an active mission and its queue; start a waiting one, even in a paused queue."""
-        vehicle.joint.leave_manual(now=now)
-        if task.state in ACTIVE:
-            if vehicle.tasks.paused:
-                vehicle.joint.go_on(actor=actor, now=now)
+        joint, tasks = vehicle.joint, vehicle.tasks
+        _check_state(task)
+        if task == tasks.active:
+            joint.go_on(actor=actor, now=now)
             return
         if is_of_autopilot(task):
             self.end_replaced(vehicle, is_started=True, actor=actor, now=now)
         if task.terms.is_staged:
-            vehicle.tasks.modify(task, replace(task.terms, is_staged=False), actor=actor, now=now)
-        if vehicle.tasks.paused:
-            vehicle.tasks.give_way_to(task, actor=actor, now=now)
-        vehicle.joint.wake(now=now)
+            tasks.modify(task, replace(task.terms, is_staged=False), actor=actor, now=now)
+        if tasks.paused or tasks.is_held_ahead or joint.state(now=now).is_led:
+            joint.give_way_to(task, actor=actor, now=now)
+        joint.wake(now=now)
 
     def stage_again(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """Undo a start that was not stored in time."""
@@ -329,6 +316,14 @@ class Plans:
 def is_of_autopilot(task: Task) -> bool:
     """Return whether a task is a mission of the autopilot's address, which has one at a time."""
     return isinstance(task.goal, Plan) and task.terms.is_cruising
+
+
+def _check_state(task: Task | None) -> None:
+    """Raise Rejection if a mission is held, or is being cancelled."""
+    if task is not None and task.state is S.HELD:
+        raise Rejection(R.HELD_AHEAD, f"task {task.id} is held: press {BUTTONS}")
+    if task is not None and task.state is S.CANCELLING:
+        raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
 
 
 def _mission_state(task: Task | None, *, has_plan: bool) -> int:

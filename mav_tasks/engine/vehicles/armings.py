@@ -75,6 +75,11 @@ class Armings:
         """Note an acknowledged disarming; the acknowledgement may belong to an older one."""
         self._was_disarmed = True
 
+    @property
+    def expects_disarmed(self) -> bool:
+        """Whether a client asked for its disarming, and no heartbeat has shown that yet."""
+        return self._is_to_be_disarmed
+
     def are_older(self, *, ours: float, now: float) -> bool:
         """Return whether, if it shows armed, that is by an outdated request."""
         return self._may_be_older(ours, now) and now >= self._outdated_at + UNSHOWN

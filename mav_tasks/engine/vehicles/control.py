@@ -24,6 +24,7 @@ class Event(Enum):
     PAUSE = auto()
     PAUSE_TASKS = auto()  # a key was revoked: pause the queue with its tasks
     DISARM = auto()  # a client asks for it
+    EMERGENCY_STOP = auto()  # a client asks for it by force: what drives it ends
     CANCEL = auto()  # of the active task
     CLEAR = auto()  # cancel everything, also the active task
     OPERATOR_LOST = auto()
@@ -51,7 +52,7 @@ class Event(Enum):
     HEARD_AGAIN = auto()
     # requests that let it go
     CONTINUE = auto()
-    GO_ON = auto()  # a "go to" revokes the HOLD just before it, or a mission is started
+    GO_ON = auto()  # a "go to" revokes the HOLD just before it, or a mission is resumed
     RELEASE = auto()  # of a held task
     RESTORE = auto()  # of a held task, by somebody who may also allow arming again
     RUN_NOW = auto()
@@ -66,7 +67,7 @@ class Event(Enum):
     DRIVING_ENDS = auto()  # a client that drove asks for something else
     GONE = auto()  # a client that drove has disconnected
     LANDED = auto()  # a client has landed it: disarm it once no task is left
-    LEAVE_MANUAL = auto()  # a client starts a mission while nobody uses the sticks
+    LEAVE_MODE = auto()  # a client wants it driven while nobody uses the sticks
     COME_BACK = auto()  # a vehicle of an earlier run is found; that run left it standing
     COME_BACK_DRIVING = auto()  # the same, left driving; by all that is seen it drives on
     COME_BACK_DRIVEN = auto()  # the same, left driving, and it may still follow set-points
@@ -178,10 +179,12 @@ TABLE = (
     _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _E.HOLD, work=STANDS, grip=Grip.FREE, may_be_armed=True),
     _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _F.STEP),
     _row(_E.PAUSE_TASKS, *FORGETS, _F.PAUSE, _F.STEP),
-    _row(_E.DISARM, *UNARMS, _F.ZERO_KEPT, _E.TAKEN, grip=ENGAGED),
+    _row(_E.DISARM, _F.PAUSE, *UNARMS, *TAKE_BACK, _F.LET_GO, grip=ENGAGED, work=HAS_IT),
+    _row(_E.DISARM, *UNARMS, *TAKE_BACK, _F.LET_GO, grip=ENGAGED),
     # a stream that ends here would leave a velocity behind
     _row(_E.DISARM, *UNARMS, *TAKE_BACK, _F.ZERO, driver=Driver.CLIENT, has_failsafe=False),
     _row(_E.DISARM, *UNARMS, *TAKE_BACK),
+    _row(_E.EMERGENCY_STOP, _F.DO, _E.DISARM),
     _row(_E.CANCEL, *FORGETS, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
     # its late set-point would drive it on
     _row(
@@ -280,11 +283,11 @@ TABLE = (
     # requests that let it go
     _row(_E.CONTINUE, _F.FORGET_GO_TO, _F.DO, _F.RESTORE_ARMING, _F.TELL_HELD, _F.WAKE),
     # ends a pause; nobody has said that it may be armed again
-    _row(_E.GO_ON, _F.DO, _F.WAKE, queue=Queue.PAUSED),
+    _row(_E.GO_ON, _F.DO, _E.LEAVE_MODE, _F.WAKE, queue=(Queue.PAUSED, Queue.TAKEN)),
     _row(_E.GO_ON),
     _row(_E.RELEASE, _F.DO, _F.WAKE),
     _row(_E.RESTORE, _F.DO, _F.RESTORE_ARMING, _F.WAKE),
-    _row(_E.RUN_NOW, _F.FORGET_GO_TO, _F.DO, _F.STEP),
+    _row(_E.RUN_NOW, _F.FORGET_GO_TO, _F.DO, _F.TELL_HELD, _E.LEAVE_MODE, _F.STEP),
     _row(_E.ASK_OUR_MODE, *HANDS_OVER),
     _row(
         _E.ASK_OUR_MODE_STREAMING,
@@ -315,8 +318,8 @@ TABLE = (
     _row(_E.GONE),
     _row(_E.LANDED, _F.DISARM_AT_END, _F.LET_GO, armed=True, is_idle=True, grip=Grip.FREE),
     _row(_E.LANDED, _F.DISARM_AT_END),
-    _row(_E.LEAVE_MANUAL, _F.LET_GO, armed=True, grip=Grip.FREE),
-    _row(_E.LEAVE_MANUAL),
+    _row(_E.LEAVE_MODE, _F.LET_GO, is_led=True, grip=Grip.FREE),
+    _row(_E.LEAVE_MODE),
     _row(_E.COME_BACK, _F.BRAKE, queue=Queue.STOPPED),
     _row(_E.COME_BACK),
     # in HOLD a car rolls on or drives a loop; set-points brake it, and it gets HOLD when it stands

@@ -135,7 +135,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             parts.note("has a stick off centre: HOLD is set. Centre it", now=now)
         case Effect.TELL_HELD:
             if held := tasks.held:
-                parts.note(f"waits for held task {held.id}: press {BUTTONS}", now=now)
+                parts.note(f"keeps task {held.id} on hold: press {BUTTONS}", now=now)
         case _:
             assert_never(effect)
     return None

@@ -21,7 +21,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import Address
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, RUNNING, TaskReason
 from mav_tasks.tasks.task import Draft, Task, TaskId
-from mav_tasks.tasks.view import VehicleView
+from mav_tasks.tasks.view import ModeKind, VehicleView
 
 R = TaskReason
 
@@ -96,9 +96,14 @@ class JointControl:
         paused: TaskId | None = self.on(Event.PAUSE, Word(actor=actor), now=now)
         return paused
 
-    def disarm(self, *, actor: str, now: float) -> None:
-        """Handle a client's disarming: only a newer request arms the vehicle again."""
-        self.on(Event.DISARM, Word(R.DISARMED, actor, "disarmed by a client"), now=now)
+    def disarm(self, *, by_force: bool, actor: str, now: float) -> None:
+        """Handle a client's disarming: only a newer request arms the vehicle again.
+
+        ``by_force``: it is the emergency stop of a ground station.
+        """
+        do = partial(self._parts.tasks.end_what_drives, actor=actor, now=now)
+        event = Event.EMERGENCY_STOP if by_force else Event.DISARM
+        self.on(event, Word(R.DISARMED, actor, do=do), now=now)
 
     def second_controller(self, who: Address, *, now: float) -> None:
         """Send HOLD once and let go: setpoints, or our own address, come from elsewhere."""
@@ -188,10 +193,13 @@ class JointControl:
         return going
 
     def go_on(self, *, actor: str, now: float) -> None:
-        """End a pause like ``proceed``, but do not allow arming again: nobody asked for that."""
+        """End a pause like ``proceed``, but do not allow arming again: nobody asked for that.
+
+        A vehicle in somebody's mode goes to HOLD, as an autopilot would end that mode.
+        """
 
         def go_on() -> None:
-            self._parts.tasks.proceed(self._view(now), actor=actor, now=now)
+            self._parts.tasks.proceed(self._as_in_hold(now), actor=actor, now=now)
 
         self.on(Event.GO_ON, Word(R.NONE, actor, do=go_on), now=now)
 
@@ -225,13 +233,22 @@ class JointControl:
         self.on(Event.RESTORE if restores else Event.RELEASE, Word(R.NONE, actor, do=do), now=now)
 
     def run_now(self, draft: Draft, *, actor: str, now: float) -> Task:
-        """Submit a task that runs before all others, at once. Raise Rejection if refused."""
+        """Submit a task that runs before all others, at once, from whatever mode.
+
+        Raise Rejection if refused, also while a person drives.
+        """
+        self._parts.check_not_manual(now=now)
 
         def take_in() -> Task:
-            return self._parts.tasks.run_now(draft, self._view(now), actor=actor, now=now)
+            return self._parts.tasks.run_now(draft, self._as_in_hold(now), actor=actor, now=now)
 
         task: Task = self.on(Event.RUN_NOW, Word(R.NONE, actor, do=take_in), now=now)
         return task
+
+    def give_way_to(self, task: Task, *, actor: str, now: float) -> None:
+        """Run a mission at once, from whatever mode; all others wait until the queue resumes."""
+        do = partial(self._parts.tasks.give_way_to, task, actor=actor, now=now)
+        self.on(Event.RUN_NOW, Word(R.NONE, actor, do=do), now=now)
 
     def client_asks_mode(self, mode: int, client: Hashable, *, now: float) -> None:
         """Note that a client's mode request goes to the vehicle through us.
@@ -284,10 +301,7 @@ class JointControl:
         self.end_driving_of(client, now=now)
         self.on(Event.LANDED, Word(), now=now)
 
-    def leave_manual(self, *, now: float) -> None:
-        """End manual control, as an autopilot would: a client starts a mission.
-
-        The vehicle goes to HOLD, from which tasks take it.
-        """
-        if self._parts.is_manual:
-            self.on(Event.LEAVE_MANUAL, Word(), now=now)
+    def _as_in_hold(self, now: float) -> VehicleView:
+        """Return the vehicle as it will be when it has left somebody's mode."""
+        seen = self._view(now)
+        return seen if seen.mode is ModeKind.OURS else replace(seen, mode=ModeKind.HOLD)

@@ -270,12 +270,11 @@ class Takeovers:
 
     def _disarmed(self, before: Before, *, now: float) -> None:
         parts = self._parts
-        if parts.control.may_have_disarmed(now=now):
+        if parts.control.may_have_disarmed(now=now) or parts.armings.expects_disarmed:
             return
         if self._shows_restart:  # this heartbeat, or the clock before it, has shown it
             self._disarmed_by_restart(before.may_arm)
             return
-        parts.tasks.halts.shows_disarmed(now=now)
         self._taken(Event.DISARMED, "disarmed", now=now)
         parts.authority.note_disarmed(before)  # it may turn out that a restart did it
 

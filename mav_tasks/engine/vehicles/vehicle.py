@@ -44,6 +44,7 @@ REORDERED = 127  # packets by which a network may reorder one, as far as numbers
 SILENT = 0.5  # s without any packet of the autopilot
 REORDERED_WITHIN = 3.5  # s; after a longer silence a smaller number means a restart
 MOVING = frozenset({Kind.GO, Kind.MOTION, Kind.ACTION})
+FORCED = 21196.0  # COMPONENT_ARM_DISARM, param2: an emergency stop
 
 
 class Vehicle:
@@ -312,7 +313,8 @@ class Vehicle:
         target = asked if asked in self.components else AUTOPILOT
         disarms = command == MavCmd.COMPONENT_ARM_DISARM and getattr(message, "param1", 1.0) == 0.0
         if disarms:
-            self.joint.disarm(actor=actor, now=now)
+            by_force = getattr(message, "param2", 0.0) == FORCED
+            self.joint.disarm(by_force=by_force, actor=actor, now=now)
         elif command == MavCmd.COMPONENT_ARM_DISARM:
             self.joint.arm(now=now)
         elif command != MavCmd.DO_SET_MODE and row_of_command(command).passed_on.kind in MOVING:

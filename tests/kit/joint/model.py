@@ -23,7 +23,7 @@ NO_TASK = (Work.NONE, Work.WAITS)
 
 #: requests and events after which nothing moves or arms until a newer request releases it
 HALTS = (
-    *(E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.CLEAR, E.CLOSE),
+    *(E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.EMERGENCY_STOP, E.CLEAR, E.CLOSE),
     *(E.TAKEN, E.MODE, E.LAPSED, E.DISARMED, E.STICK, E.DRIVEN_BY_HAND),
     *(E.LATE, E.TOO_FAST, E.NOT_STANDING),
 )
@@ -294,7 +294,7 @@ def _goes_on(state: State) -> Iterator[State]:
         yield going
         return
     yield going._replace(work=Work.STANDS)  # it is held, or its position reference changed
-    if is_free(state):
+    if state.driver is Driver.NOBODY:  # a mission goes on out of any mode
         yield going._replace(work=Work.RUNS)
 
 
@@ -310,8 +310,8 @@ def _released(state: State) -> Iterator[State]:
 
 
 def _run_now(state: State) -> Iterator[State]:
-    if not is_free(state):
-        yield state  # refused
+    yield state  # refused
+    if state.driver is not Driver.NOBODY:
         return
     immediate = state._replace(is_urgent=True)
     paused = (
@@ -331,6 +331,14 @@ def _called_off(state: State) -> Iterator[State]:
             yield from _over(each)
             yield from _over(each._replace(grip=Grip.STOPPING))  # killed
             yield each._replace(work=Work.ENDS)
+
+
+def _ended_by_force(state: State) -> Iterator[State]:
+    """Yield the states in which a mission stays, or nothing does; what stays waits."""
+    for each in (state, *(() if state.work in NO_TASK else _over(state)), *_unqueued(state)):
+        yield each
+        if each.work is not Work.NONE and each.queue is Queue.RUNS:
+            yield each._replace(queue=Queue.PAUSED)
 
 
 def _unqueued(state: State) -> Iterator[State]:
@@ -394,6 +402,7 @@ RESULTS: dict[Effect, Callable[[State], Iterator[State]]] = {
 }
 DO: dict[Event, Callable[[State], Iterator[State]]] = {
     E.CANCEL: _called_off,
+    E.EMERGENCY_STOP: _ended_by_force,
     E.CLEAR: _cleared,
     E.SKIP: _skipped,
     E.UNQUEUE: _unqueued,

@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # every reachable sta
 
 E, F = Event, Effect
 #: words after which nothing moves it, whatever is so
-WORDS = (E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.CLEAR)
+WORDS = (E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.EMERGENCY_STOP, E.CLEAR)
 #: what is seen, after which no task that had it moves it
 SEEN = (
     *(E.TAKEN, E.MODE, E.LAPSED, E.DISARMED, E.PARKED, E.STICK, E.DRIVEN_BY_HAND),
@@ -75,7 +75,7 @@ def test_after_a_word_that_lets_it_stand_nothing_moves_or_arms_it(graph: Graph) 
     for state, ways in graph.leads.items():
         for event in WORDS:
             for there in ways[event.name]:
-                if event is E.DISARM:
+                if event in (E.DISARM, E.EMERGENCY_STOP):
                     there = there._replace(armed=False)  # as the vehicle does
                 if event is E.CLEAR and there.work is Work.WAITS:
                     there = there._replace(work=Work.NONE)

@@ -1,0 +1,295 @@
+"""After each halt a person at QGroundControl finds the way on; what drives is on the screen."""
+
+from math import hypot
+
+import pytest
+
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Mode, Persona
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.qgc.joined import degrees, join, place
+from tests.kit.qgc.party import QgcParty
+from tests.kit.qgc.plan_master import Plan
+from tests.kit.qgc.profile import V4
+from tests.kit.qgc.vehicle import APM
+from tests.kit.world import PROMPT, World, is_at
+from tests.scenarios.conftest import MakeWorld
+
+PAUSE_CONTINUE, MOVE, STOP = 193, 54000, 54003
+WARNING = 4  # this severity and smaller ones are red
+FAR = degrees(20, 0)
+ROUND = Plan(place(0, 0), [place(3, 0), place(3, 1)])
+
+one = pytest.mark.parametrize("persona", [PROMPT], ids=lambda each: each.name)
+both = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda each: each.name)
+
+
+def texts(party: QgcParty, *, since: float, worst: int = WARNING) -> list[str]:
+    """Return the texts that were shown in red since then, also those of the autopilot."""
+    shown = party.qgc.screen.texts
+    return [each.text for each, severity in shown if each.at >= since and severity <= worst]
+
+
+def arm(world: World, party: QgcParty) -> None:
+    party.operator.arm()
+    world.until(lambda: "go to" in party.operator.offers, within=3)
+
+
+def choose(world: World, party: QgcParty, mode: Mode) -> None:
+    """Choose a mode in the menu."""
+    numbers = (PROMPT if party.vehicle.state.firmware == APM else PROMPT_PX4).modes.numbers
+    party.operator.set_mode(numbers[mode])
+    world.run(1.5)
+
+
+def driving_far(make_world: MakeWorld, persona: Persona) -> tuple[World, QgcParty]:
+    """Have the rover on its way to a place that the person has clicked."""
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    arm(world, party)
+    party.operator.go_to(*FAR)
+    world.until(lambda: world.truth.north > 0.5, within=20)
+    return world, party
+
+
+def driving_plan(make_world: MakeWorld, persona: Persona) -> tuple[World, QgcParty]:
+    """Have the rover on its way in a plan."""
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    party.plans.upload(ROUND)
+    world.until(lambda: party.plans.is_done, within=5)
+    party.operator.start()
+    world.until(lambda: world.truth.north > 0.5, within=25)
+    return world, party
+
+
+@both
+def test_an_emergency_stop_ends_a_go_to_and_the_next_click_drives(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world, party = driving_far(make_world, persona)
+    at = world.now
+    party.operator.emergency_stop()
+    world.run(5)
+    assert world.state(1) == (S.KILLED, R.STOP)
+    assert world.rover.autopilot.mode is Mode.HOLD
+    assert texts(party, since=at) == []
+    assert [text for text in texts(party, since=at, worst=6) if "Task" in text] == [
+        "Task 1 killed: STOP"
+    ]
+    arm(world, party)
+    stood = world.truth.north
+    world.run(4)
+    assert world.truth.north == pytest.approx(stood, abs=0.05), "arming alone moves nothing"
+    party.operator.go_to(*degrees(0, 1))
+    party.operator.action(PAUSE_CONTINUE, 1)
+    world.until_state(2, S.COMPLETED, within=40)
+    assert is_at(world, 0.0, 1.0)
+    party.check()
+
+
+@both
+@pytest.mark.parametrize("button", ["emergency stop", "disarm"])
+def test_a_plan_goes_on_by_the_station_own_button(
+    make_world: MakeWorld, persona: Persona, button: str
+) -> None:
+    world, party = driving_plan(make_world, persona)
+    at = world.now
+    party.operator.emergency_stop() if button == "emergency stop" else party.operator.disarm()
+    world.run(4)
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+    assert texts(party, since=at) == []
+    arm(world, party)
+    party.operator.go_on()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert len(world.tasks()) == 1
+    party.check()
+
+
+@both
+def test_return_drives_after_an_emergency_stop_in_a_plan(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world, party = driving_plan(make_world, persona)
+    party.operator.emergency_stop()
+    world.run(4)
+    arm(world, party)
+    party.operator.return_home()
+    world.until_state(2, S.COMPLETED, within=40)
+    assert hypot(world.truth.north, world.truth.east) < 0.15, "a PX4 one slides a little"
+    assert world.state(1) == (S.PAUSED, R.OPERATOR)
+    party.check()
+
+
+@both
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO, Mode.HOLD], ids=lambda mode: mode.name)
+def test_return_drives_from_any_mode_and_leaves_the_queue_running(
+    make_world: MakeWorld, persona: Persona, mode: Mode
+) -> None:
+    if mode not in persona.modes.numbers:
+        pytest.skip("its autopilot has no such mode")
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    choose(world, party, Mode.HOLD)
+    arm(world, party)
+    party.operator.action(MOVE, 1.0, component=191)
+    world.until_idle(tasks=1)
+    world.run(3)
+    choose(world, party, mode)
+    at = world.now
+    party.operator.return_home()
+    world.until_state(2, S.COMPLETED, within=40)
+    assert is_at(world, 0.0, 0.0)
+    assert texts(party, since=at) == []
+    assert world.paused() is R.NONE
+    party.operator.action(MOVE, 0.5, component=191)
+    world.until_state(3, S.COMPLETED, within=20)
+    party.check()
+
+
+@one
+def test_start_drives_from_manual_before_what_waits_there(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    party.plans.upload(ROUND)
+    world.until(lambda: party.plans.is_done, within=5)
+    choose(world, party, Mode.MANUAL)
+    arm(world, party)
+    party.operator.action(MOVE, -2.0, component=191)
+    world.run(2)
+    party.operator.go_on()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert is_at(world, 3.0, 1.0)
+    assert world.state(2)[0] is S.QUEUED
+    party.check()
+
+
+@both
+def test_a_click_in_manual_drives_without_a_warning(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    choose(world, party, Mode.MANUAL)
+    arm(world, party)
+    at = world.now
+    party.operator.go_to(*degrees(1, 0))
+    world.until_state(1, S.COMPLETED, within=30)
+    assert texts(party, since=at) == []
+    assert len(world.tasks()) == 1
+    party.check()
+
+
+@both
+@pytest.mark.parametrize("taken", ["hold", "manual at the rover"])
+def test_hold_and_a_click_replace_the_click_before(
+    make_world: MakeWorld, persona: Persona, taken: str
+) -> None:
+    """Also without the actions for tasks: two things that every station has."""
+    world, party = driving_far(make_world, persona)
+    if taken == "manual at the rover":
+        world.operator_mode(Mode.MANUAL)
+        world.run(4)
+        party.operator.go_to(*degrees(0, 3))
+        world.run(2)
+        assert world.state(2)[0] is S.QUEUED, "the person at the rover has it"
+        assert any("press Continue, or set Hold and click again" in t for t in party_texts(party))
+    choose(world, party, Mode.HOLD)
+    world.run(2)
+    party.operator.go_to(*degrees(0, 1))
+    task = len(world.tasks()) + 1
+    world.until_state(task, S.COMPLETED, within=40)
+    assert is_at(world, 0.0, 1.0)
+    assert {world.state(each) for each in range(1, task)} == {(S.CANCELLED, R.REPLACED)}
+    assert world.paused() is R.NONE
+    party.check()
+
+
+def party_texts(party: QgcParty) -> list[str]:
+    return [each.text for each, _ in party.qgc.screen.texts]
+
+
+@one
+def test_a_click_does_not_end_the_pause_of_somebody_else(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world, party = driving_far(make_world, persona)
+    world.client.pause()
+    world.run(3)
+    party.operator.go_to(*degrees(0, 1))
+    world.run(3)
+    assert world.stands()
+    assert world.state(2)[0] is S.QUEUED
+
+
+@one
+def test_what_an_emergency_stop_leaves_waits_and_continue_names_it(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world, party = driving_far(make_world, persona)
+    world.client.move(-1.0)
+    world.run(0.5)
+    party.operator.emergency_stop()
+    world.run(4)
+    arm(world, party)
+    world.run(4)
+    assert world.state(2)[0] is S.QUEUED, "nothing of it is on the screen"
+    party.operator.go_to(*degrees(0, 1))
+    world.until_state(3, S.COMPLETED, within=40)
+    party.operator.action(PAUSE_CONTINUE, 1)
+    world.until_state(2, S.COMPLETED, within=30)
+    assert "Queue resumed by 255/190: task 2 is next, move -1 m" in party_texts(party)
+    party.check()
+
+
+@one
+def test_stop_ends_clicks_and_is_left_by_continue_only(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world, party = driving_far(make_world, persona)
+    party.operator.go_to(*degrees(0, 5))
+    world.run(0.5)
+    party.operator.action(STOP, component=191)
+    world.run(4)
+    assert [world.state(each) for each in (1, 2)] == [(S.KILLED, R.STOP)] * 2
+    party.operator.return_home()
+    world.run(4)
+    assert world.stands()
+    assert len(world.tasks()) == 2
+    party.operator.action(PAUSE_CONTINUE, 1)
+    world.run(4)
+    assert world.stands()
+
+
+@one
+def test_start_and_return_drive_beside_a_held_task_and_one_warning_names_it(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
+    party = join(world, V4)
+    party.plans.upload(ROUND)
+    world.until(lambda: party.plans.is_done, within=5)
+    world.client.move(5.0)
+    world.until(lambda: world.truth.north > 0.5, within=20)
+    world.observer.expects_gaps = True
+    world.suspend_server(3.0)
+    world.until(lambda: world.state(2) == (S.HELD, R.LATE), within=10)
+    world.run(4)
+    at = world.now
+    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert world.state(2)[0] is S.HELD
+    assert [text for text in texts(party, since=at) if "task 2" in text] == [
+        'Rover 1 keeps task 2 on hold: press "Held: remainder", "Held: again" or "Held: skip"'
+    ]
+    assert texts(party, since=at, worst=3) == []
+
+
+def test_a_click_behind_a_driven_task_says_so(make_world: MakeWorld) -> None:
+    world, party = driving_far(make_world, PROMPT)
+    party.operator.go_to(*degrees(0, 5))
+    world.run(1)
+    assert any(text.startswith("Task 2 queued behind task 1: go to") for text in party_texts(party))
