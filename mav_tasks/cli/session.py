@@ -8,7 +8,7 @@ from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import News, Text
-from mav_tasks.errors import NoAnswer, UsageError
+from mav_tasks.errors import LinkDown, NoAnswer, UsageError
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.tasks.task import ANY
 
@@ -52,7 +52,8 @@ async def unfound(common: Reach) -> AsyncIterator[Client]:
     try:
         yield client
     except NoAnswer as error:
-        if common.sign or client.vehicles():  # else the server may answer only signed packets
+        # else the server may answer only signed packets
+        if common.sign or client.vehicles() or isinstance(error, LinkDown):
             raise
         raise NoAnswer(
             f"{error} (if the server requires signatures, use --sign NAME)", nonce=error.nonce

@@ -1,7 +1,6 @@
 """``mav-tasks web``: serve the web page and the HTTP API."""
 
 import os
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -9,7 +8,8 @@ import typer
 from mav_tasks.cli import output
 from mav_tasks.cli.options import DEFAULT_SERVER, RingFile, Server, SignWith
 from mav_tasks.cli.ring import key_to_sign_with, ring_path
-from mav_tasks.errors import UsageError
+from mav_tasks.errors import UsageError, missing
+from mav_tasks.folders import at_home
 from mav_tasks.key_ring.ring_file import load
 from mav_tasks.key_ring.watch import RingWatch
 
@@ -49,8 +49,8 @@ def web(
         str | None,
         typer.Option(
             metavar="PATH|URL",
-            help="Store whose journal the page shows; default: the store of the server that was "
-            'started last on this machine; "": none.',
+            help="Store whose journal the page shows; default: the store of the server that runs, "
+            'or ran last, on this machine; "": none.',
         ),
     ] = None,
     records: Annotated[
@@ -101,7 +101,7 @@ def web(
         key=key_to_sign_with(sign, keys) if sign else None,
         journal=_journal(store),
         tiles=tiles_of(tiles) if tiles else None,
-        records=Records(Path(records).expanduser()) if records else None,
+        records=Records(at_home(records, what="--records")) if records else None,
     )
     bound = serving.listening(options)
     serving.run(options, bound, started=lambda address: output.say(f"web page: {address}"))
@@ -119,7 +119,7 @@ def _loaded() -> Any:
     try:
         from mav_tasks.web import serving  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        raise UsageError(f"the web page needs {error.name}: install mav-tasks[web]") from error
+        raise UsageError(f"the web page {missing(str(error.name), 'web')}") from error
     return serving
 
 

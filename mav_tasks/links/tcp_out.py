@@ -4,12 +4,12 @@ import selectors
 import socket
 from time import monotonic
 
-from mav_tasks.errors import LinkOpenError
+from mav_tasks.errors import LinkOpenError, reason_of
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Link, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
-from mav_tasks.links.tcp import Connection, TcpLink, reason_of, resolve
+from mav_tasks.links.tcp import Connection, TcpLink, resolve
 from mav_tasks.links.url import UrlOptions
 
 CONNECT_LIMIT = 3.0  # s for the other end to answer

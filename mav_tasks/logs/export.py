@@ -62,7 +62,7 @@ def csv_row(cells: Sequence[Any]) -> str:
     return row.getvalue()
 
 
-def parse_since(text: str, *, now: float) -> float:
+def parse_moment(name: str, text: str, *, now: float) -> float:
     """Return UTC seconds from a duration before ``now`` or an ISO 8601 time; raise UsageError."""
     ago = re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", text)
     if ago is not None:
@@ -72,5 +72,5 @@ def parse_since(text: str, *, now: float) -> float:
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     except (ValueError, OverflowError):
         raise UsageError(
-            f"--since {text}: expected 30m, 2h, 7d, or a time in UTC as 2026-11-20T10:00"
+            f"{name} {text}: expected 30m, 2h, 7d, or a time in UTC as 2026-11-20T10:00"
         ) from None

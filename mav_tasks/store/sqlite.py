@@ -10,7 +10,7 @@ from secrets import token_hex
 from platformdirs import user_data_path
 
 from mav_tasks.errors import StoreError
-from mav_tasks.folders import make_private
+from mav_tasks.folders import at_home, make_private
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import Which
@@ -74,7 +74,7 @@ def open_store(place: str, wall_offset: Callable[[], float], retention: Retentio
 
 def open_journal(place: str, which: Which) -> Journal:
     """Open the journal of a file; raise StoreError if it does not exist."""
-    path = _path_of(place).expanduser().absolute()
+    path = at_home(str(_path_of(place)), what="store").absolute()
     if not path.is_file():
         raise StoreError(f"store {_path_of(place)} does not exist; choose another with --store")
     reader = SqliteReader(path)

@@ -514,9 +514,8 @@ def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(
     ]
     away = tmp_path / "away.plan"
     for kind in ("fence", "rally"):
-        assert_one_line(called(kind, "upload", str(none), server=server), 2, "--empty")
-        taken = called(kind, "upload", str(none), "--empty", server=server)
-        assert taken.lines == [f"{kind}: 0 items"]
+        assert_one_line(called(kind, "upload", str(none), server=server), 2, f"{kind} clear")
+        assert called(kind, "clear", server=server).status == 0
     assert_one_line(called("fence", "download", str(away), server=server), 1, "no fence")
     assert not away.exists()
 

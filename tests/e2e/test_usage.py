@@ -37,7 +37,7 @@ def test_a_port_in_use_is_named() -> None:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         result = run("serve", "--client", f"udpin:127.0.0.1:{port}", "--no-push")
-        assert_one_clear_line(result, f"127.0.0.1:{port}", "in use")
+        assert_one_clear_line(result, f"127.0.0.1:{port}", "in use", "ss -lntup")
         assert_one_clear_line(
             run("sim", "--port", str(port), "--body", "kinematic"), str(port), "in use"
         )
@@ -165,3 +165,31 @@ def test_the_rovers_own_help_is_shown() -> None:
     code, output, _ = run("sim", "--help")
     assert code == 0
     assert "--count" in output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("log", "--store", "~nosuchuser/x"),
+        ("web", "--records", "~nosuchuser/x"),
+        ("web", "--tiles", "~nosuchuser/x"),
+    ],
+)
+def test_the_home_of_nobody_is_named(words: tuple[str, ...]) -> None:
+    assert_one_clear_line(run(*words), "~nosuchuser/x")
+
+
+@pytest.mark.parametrize("words", [("--sign", "anna", "queue"), ("submit", "--sign", "anna")])
+def test_an_option_before_the_command_is_told_where_it_goes(words: tuple[str, ...]) -> None:
+    code, _, error = run(*words)
+    assert code == 2
+    assert "--sign stands before the command" in error
+
+
+@pytest.mark.parametrize("words", [("probe",), ("queue", "--server")])
+def test_a_missing_device_is_named(words: tuple[str, ...]) -> None:
+    code, _, error = run(*words, "serial:/dev/ttyUSB99:57600", "--timeout", "1")
+    assert code == 3
+    assert "/dev/ttyUSB99" in error
+    assert "No such file" in error
+    assert "--sign" not in error
