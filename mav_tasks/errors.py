@@ -25,7 +25,6 @@
 Received bytes never raise: they are parsed to a value, or counted (see ``mavlink``).
 """
 
-import os
 from errno import EADDRINUSE
 
 
@@ -106,8 +105,7 @@ class Rejection(MavTasksError):
 
 def reason_of(error: OSError) -> str:
     """Return the system's words for an error, and what helps if an address is in use."""
-    is_number = error.errno is not None and error.errno > 0
-    words = os.strerror(error.errno) if is_number else error.strerror or str(error)
+    words = error.strerror or str(error)
     if error.errno == EADDRINUSE:
         words += ": end the program that has it (ss -lntup names it), or choose another"
     return words

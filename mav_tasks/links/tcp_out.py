@@ -1,5 +1,6 @@
 """A TCP link that dials: one peer; while it is down, an attempt each second."""
 
+import os
 import selectors
 import socket
 from time import monotonic
@@ -88,7 +89,7 @@ class TcpOutLink(TcpLink):
         failed = sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         try:
             if failed:
-                raise OSError(failed, "")
+                raise OSError(failed, os.strerror(failed))
             if sock.getsockname() == sock.getpeername():  # TCP simultaneous open with itself
                 raise ConnectionRefusedError("nobody but this end")
             self._selector.unregister(sock)
