@@ -90,9 +90,13 @@ def line_of(status: TaskStatus, *, is_alone: bool = True) -> str:
     took = f", in {took_of(status)}" if status.is_over and took_of(status) else ""
     way_on = way_on_of(status, is_alone=is_alone)
     way_on = f"; {way_on}" if way_on else ""
-    label = f" '{status.label}'" if status.label else ""
-    what = f"{name_of(status)}: {what_of(status)}{label}"
+    what = f"{name_of(status)}: {described(status)}"
     return f"{what}: {state_of(status)}{why}{took}{way_on}"
+
+
+def described(status: TaskStatus) -> str:
+    """Return what a task does, with its label: "move 5 m 'patrol'"."""
+    return f"{what_of(status)} '{status.label}'" if status.label else what_of(status)
 
 
 def name_of(status: TaskStatus) -> str:
