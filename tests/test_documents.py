@@ -132,9 +132,8 @@ def has_command(source: str, command: str) -> bool:
             values = [each.value for each in parts if isinstance(each, ast.Constant)]
             if any(values[at : at + len(words)] == words for at in range(len(values))):
                 return True
-        elif isinstance(node, ast.BinOp) and isinstance(node.right, ast.Constant):
-            if node.right.value == own:
-                return True
+        elif isinstance(node, ast.BinOp) and getattr(node.right, "value", "") == own:
+            return True
     return False
 
 

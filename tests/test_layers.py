@@ -274,6 +274,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.cli": frozenset(
         {
             "mav_tasks.folders",
+            "mav_tasks.links",
+            "mav_tasks.link_keys",
             "mav_tasks.config",
             "mav_tasks.key_ring",
             "mav_tasks.logs",

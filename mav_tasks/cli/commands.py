@@ -24,6 +24,11 @@ COMMANDS = (
     Lazy("release", "control:release", "Restart, finish or skip a held task."),
     Lazy("vehicles", "vehicles:vehicles", "Show the rovers of the server."),
     Lazy("ready", "ready:ready", "Check that the server answers and that it hears its rovers."),
+    Lazy(
+        "doctor",
+        "doctor:doctor",
+        "Look for what is wrong in settings, keys, store, links and rovers.",
+    ),
     Lazy("probe", "probe:probe", "Test what a rover can do, without a server."),
     Lazy("mission", "plans:mission", "Upload, start and download missions."),
     Lazy("fence", "plans:fence", "Upload, download and clear the fence."),

@@ -6,14 +6,13 @@ from typing import Annotated, Any
 import typer
 
 from mav_tasks.cli import output
-from mav_tasks.cli.options import DEFAULT_SERVER, RingFile, Server, SignWith
+from mav_tasks.cli.options import DEFAULT_LISTEN, DEFAULT_SERVER, RingFile, Server, SignWith
+from mav_tasks.cli.page_beside import end_with_input
 from mav_tasks.cli.ring import key_to_sign_with, ring_path
 from mav_tasks.errors import UsageError, missing
 from mav_tasks.folders import at_home
 from mav_tasks.key_ring.ring_file import load
 from mav_tasks.key_ring.watch import RingWatch
-
-DEFAULT_LISTEN = "127.0.0.1:8560"
 
 app = typer.Typer(rich_markup_mode=None)  # without a command it serves
 KEYS = "mav-tasks keys add NAME --role operator prints a token; keys list and revoke manage them"
@@ -62,6 +61,7 @@ def web(
     ] = "",
     sign: SignWith = "",
     keys: RingFile = "",
+    beside_server: Annotated[bool, typer.Option(hidden=True)] = False,
     role: Gone = None,
     tokens: Gone = None,
 ) -> None:
@@ -104,6 +104,8 @@ def web(
         records=Records(at_home(records, what="--records")) if records else None,
     )
     bound = serving.listening(options)
+    if beside_server:
+        end_with_input()
     serving.run(options, bound, started=lambda address: output.say(f"web page: {address}"))
 
 

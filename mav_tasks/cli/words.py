@@ -166,11 +166,11 @@ def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
         does = f"task {queue.running}"
     else:
         does = "no task runs"
-    blocked = _blocked(queue)
-    if blocked is not None and blocked is not queue.current:
-        does += f"; task {blocked.id} waits: {why_of(blocked)}"
-    if blocked is not None:
-        does += f"; {way_on_of(blocked, is_alone=is_alone)}"
+    stuck = blocked(queue)
+    if stuck is not None and stuck is not queue.current:
+        does += f"; task {stuck.id} waits: {why_of(stuck)}"
+    if stuck is not None:
+        does += f"; {way_on_of(stuck, is_alone=is_alone)}"
     if queue.paused is not None:
         does += f"; queue paused ({words_of(queue.paused)})"
         does += f"; to resume: {resume_command(queue.vehicle, is_alone=is_alone)}"
@@ -180,7 +180,7 @@ def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
     return f"{rover}: {does}; {queue.waiting_count} waiting"
 
 
-def _blocked(queue: QueueStatus) -> TaskStatus | None:
+def blocked(queue: QueueStatus) -> TaskStatus | None:
     """Return the held task, else a task with a reason of REMEDIES, unless the queue is paused."""
     current = queue.current
     if current is not None and current.state is TaskState.HELD and way_on_of(current):

@@ -44,8 +44,8 @@ class Releases:
 
         Raise Rejection, and change nothing, if the task could not take the vehicle now. If the
         queue is paused, or the vehicle or the server has restarted and the vehicle is not ready,
-        the task waits for that, for ``ready_timeout`` at most, or until something halts it. It does not wait for
-        a queue that is paused for a restart if the client ``may_continue`` it.
+        the task waits for that, for ``ready_timeout`` at most, or until something halts it. It does
+        not wait for a queue that is paused for a restart if the client ``may_continue`` it.
         """
         if self._lineup.is_stopped:
             raise Rejection(R.STOPPED, CONTINUE_FIRST)

@@ -193,3 +193,28 @@ def test_a_missing_device_is_named(words: tuple[str, ...]) -> None:
     assert "/dev/ttyUSB99" in error
     assert "No such file" in error
     assert "--sign" not in error
+
+
+def test_the_doctor_says_what_is_wrong_and_what_helps(tmp_path: Path) -> None:
+    store = tmp_path / "tasks.sqlite3"
+    store.touch(mode=0o644)
+    configuration = tmp_path / "config.toml"
+    (port,) = free_udp_ports(1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        in_use = f"udpin:127.0.0.1:{taken.getsockname()[1]}"
+        configuration.write_text(
+            f'[links]\nclients = ["{in_use}"]\nvehicles = ["serial:/dev/ttyUSB99:57600"]\n'
+        )
+        code, said, error = run(
+            *("doctor", "--server", f"udpout:127.0.0.1:{port}", "--timeout", "0.3"),
+            *("--config", str(configuration)),
+            environment={"MAV_TASKS_STORE": str(store)},
+        )
+    assert (code, error) == (1, "")
+    wrong = {line.split()[1]: line for line in said.splitlines() if line.startswith("WRONG")}
+    assert "chmod 600" in wrong["store"]
+    assert in_use in wrong["clients"]
+    assert "no such device" in wrong["vehicles"]
+    assert "mav-tasks serve" in wrong["server"]
+    assert "ok     settings  valid" in said.splitlines()
