@@ -27,7 +27,7 @@ COMMANDS = (
     Lazy(
         "doctor",
         "doctor:doctor",
-        "Look for what is wrong in settings, keys, store, links and rovers.",
+        "Look for what is wrong, from the settings to the rovers.",
     ),
     Lazy("probe", "probe:probe", "Test what a rover can do, without a server."),
     Lazy("mission", "plans:mission", "Upload, start and download missions."),

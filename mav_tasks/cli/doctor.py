@@ -55,7 +55,7 @@ async def doctor(
         ),
     ] = None,
 ) -> None:
-    """Look for what is wrong in settings, keys, store, links and rovers.
+    """Look for what is wrong, from the settings to the rovers.
 
     Changes nothing, and sends rovers nothing. Exit status 0: nothing is wrong; 1: something is.
     """
