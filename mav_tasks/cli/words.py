@@ -24,6 +24,10 @@ REMEDIES = {
     TaskReason.LOSS_FAILSAFE: (
         "to make it stop without setpoints: mav-tasks probe --set-failsafe{rover}"
     ),
+    TaskReason.HELD_AHEAD: "release the held task: mav-tasks release again|remainder|skip{rover}",
+    TaskReason.VEHICLE_SILENT: "check its power and radio",
+    TaskReason.NO_POSITION: "wait for its position, or check its GPS",
+    TaskReason.OTHER_CONTROLLER: "end the other program that drives it",
     TaskReason.OUTSIDE_OWN_FENCE: "drive it back manually, or switch that fence off",
 }
 

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from mav_tasks.errors import UsageError
-from mav_tasks.logs.rendering import clean, event_values, utc_text
+from mav_tasks.logs.rendering import event_values, in_commands, utc_text
 from mav_tasks.tasks.events import Event
 
 #: event number over the life of the store, event with times in UTC -> a line
@@ -40,7 +40,7 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 
 def text_entry(_number: int, event: Event) -> str:
     """Return a line of text: time and message."""
-    return f"{utc_text(event.at)} {clean(str(event))}\n"
+    return f"{utc_text(event.at)} {in_commands(str(event))}\n"
 
 
 def json_entry(number: int, event: Event) -> str:

@@ -247,7 +247,7 @@ def test_why_it_waits_has_the_rovers_own_words() -> None:
 def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
     assert "release it: mav-tasks release 12" in words.line_of(HELD)
     released = replace(HELD, reason=TaskReason.NO_POSITION)
-    assert words.way_on_of(released) == ""
+    assert words.way_on_of(released) == "wait for its position, or check its GPS"
 
 
 @pytest.mark.parametrize(
@@ -387,7 +387,7 @@ DISARMED = replace(WAITING, reason=TaskReason.DISARMED, words="move 2 m: queued 
         ),
         (TaskReason.OUTSIDE_OWN_FENCE, "drive it back manually, or switch that fence off"),
         (TaskReason.BEHIND_OTHERS, ""),
-        (TaskReason.OTHER_CONTROLLER, ""),
+        (TaskReason.OTHER_CONTROLLER, "end the other program that drives it"),
     ],
 )
 def test_one_of_several_rovers_is_named_in_the_command(reason: TaskReason, said: str) -> None:
