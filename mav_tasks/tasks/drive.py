@@ -147,6 +147,11 @@ class Drive:
         if not self._bounds.allows_stage(
             present_goal(task.goal, here), here, motion.pose, seen.origin
         ):
+            if way_out := self._bounds.way_out(
+                present_goal(task.goal, here), here, motion.pose, seen.origin
+            ):
+                words = f"would leave the fence in task {task.id}, {way_out}"
+                self._registry.record(VehicleNoted(task.vehicle, words, now))
             return _refused(task)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         driving = self._settings.driving

@@ -1,7 +1,8 @@
 """Where one vehicle may drive, and where it returns to: fence, rally points and home."""
 
 from collections.abc import Sequence
-from math import cos, sin
+from dataclasses import replace
+from math import atan2, cos, sin
 
 from mav_tasks.tasks.driving.fence import Fence, LocalFence
 from mav_tasks.tasks.driving.legs import WAY, distance
@@ -79,6 +80,18 @@ class Bounds:
             left = rest_of(progress.path, progress.done)
             return is_allowed(pose_on(progress.anchor, progress.path, progress.done), left, fence)
         return fence.allows_way(start, end) or fence.escapes(start, end)
+
+    def way_out(
+        self, goal: SingleGoal, progress: Progress, pose: Pose, origin: GlobalPlace | None
+    ) -> str:
+        """Return in words where the straight way of a goal leaves the fence; "" if it does not."""
+        fence, end = self.local(origin), _end_of(goal, progress)
+        if fence is None or end is None or progress.path:
+            return ""
+        yaw, way = atan2(end.east - pose.east, end.north - pose.north), distance(pose, end)
+        along = fence.room(replace(pose, yaw=yaw), forward=True, limit=way)
+        north, east = pose.north + along * cos(yaw), pose.east + along * sin(yaw)
+        return f"after {along:.1f} m, at {north:.1f} m N, {east:.1f} m E"
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:
         """Return a step to which the straight way from the place before crosses the fence, or None.
