@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any, Literal
 
+from mav_tasks.cli import output
 from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
@@ -30,6 +31,9 @@ async def opened(common: Reach) -> AsyncIterator[Client]:
     """Yield a client that has found the server and the rovers."""
     async with unfound(common) as client:
         await client.found()
+        for number in client.shared_ids():
+            words = f"two rovers have the id {number}: one is driven, the other one ignored"
+            output.warn(f"{words}; give one of them another id (SYSID_THISMAV, MAV_SYS_ID)")
         yield client
 
 

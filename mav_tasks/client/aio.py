@@ -451,6 +451,12 @@ class Client:
         """
         return self._which(None)
 
+    def shared_ids(self) -> list[int]:
+        """Return the system ids that two rovers have: the server ignores the second of each."""
+        return [
+            number for number, is_shared in self._open.session.fleet.shared.items() if is_shared
+        ]
+
     def vehicles(self) -> tuple[VehicleStatus, ...]:
         """Return the last known state of the server's rovers."""
         return self._open.session.vehicles(now=self._now)

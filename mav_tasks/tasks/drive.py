@@ -144,14 +144,11 @@ class Drive:
             known = Known(self._settings.driving, motion.pose, seen.home, seen.origin)
             if end := self._end_of_way(task, time_left(task.goal, here, known).metres, now=now):
                 return end
-        if not self._bounds.allows_stage(
-            present_goal(task.goal, here), here, motion.pose, seen.origin
-        ):
-            if way_out := self._bounds.way_out(
-                present_goal(task.goal, here), here, motion.pose, seen.origin
-            ):
-                words = f"would leave the fence in task {task.id}, {way_out}"
-                self._registry.record(VehicleNoted(task.vehicle, words, now))
+        goal = present_goal(task.goal, here)
+        metres = self._bounds.metres_to_leave(goal, here, motion.pose, seen.origin)
+        if metres is not None:
+            words = f"would leave the fence in task {task.id} after {metres:.1f} m"
+            self._registry.record(VehicleNoted(task.vehicle, words, now))
             return _refused(task)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         driving = self._settings.driving

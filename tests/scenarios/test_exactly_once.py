@@ -71,7 +71,7 @@ def test_10000_submissions_with_nonces_are_10000_tasks(make_world: MakeWorld) ->
     tasks = world.tasks()
     assert len(tasks) == CLIENTS * EACH == len(world.events(TaskSubmitted))
     assert {(t.submitter.system_id, t.marks.nonce) for t in tasks} == sent
-    nonce_of = {task.id: task.marks.nonce for task in tasks}
+    nonce_of: dict[int, int] = {task.id: task.marks.nonce for task in tasks}
     for submitter in submitters:
         assert len(submitter.known) == EACH
         for nonce, task_id in submitter.known.items():

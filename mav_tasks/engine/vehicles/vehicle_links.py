@@ -183,6 +183,7 @@ class VehicleLinks:
                 f"shares its id with a rover at {_named(peer)}: ignored. Give that one another id"
             )
             self._note_once(vehicle.system_id, words, now=now)
+            vehicle.tasks.twin_heard_at = now
             return False
         outlets, may_arm = self._links[link].outlets, self.may_arm(link)
         if peer not in outlets and len(outlets) >= MAX_PEERS:

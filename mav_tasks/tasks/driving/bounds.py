@@ -1,8 +1,7 @@
 """Where one vehicle may drive, and where it returns to: fence, rally points and home."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from math import atan2, cos, sin
+from math import cos, sin
 
 from mav_tasks.tasks.driving.fence import Fence, LocalFence
 from mav_tasks.tasks.driving.legs import WAY, distance
@@ -63,10 +62,11 @@ class Bounds:
         fence = self.local(origin)
         return fence is None or fence.allows(LocalPlace(pose.north, pose.east))
 
-    def allows_stage(
+    def metres_to_leave(
         self, goal: SingleGoal, progress: Progress, pose: Pose, origin: GlobalPlace | None
-    ) -> bool:
-        """Return whether the way of a goal that starts or resumes here stays within the fence.
+    ) -> float | None:
+        """Return after how many metres the way of a goal that starts or resumes here leaves the
+        fence; None: it stays inside, 0.0: at once, or somewhere in its bends.
 
         From outside, the way may lead back in. A goal without a place to end at is allowed, and
         watched while it drives.
@@ -74,24 +74,13 @@ class Bounds:
         fence = self.local(origin)
         end = _end_of(goal, progress)
         if fence is None or end is None:
-            return True
+            return None
         start = LocalPlace(pose.north, pose.east)
         if progress.path and progress.anchor is not None:
             left = rest_of(progress.path, progress.done)
-            return is_allowed(pose_on(progress.anchor, progress.path, progress.done), left, fence)
-        return fence.allows_way(start, end) or fence.escapes(start, end)
-
-    def way_out(
-        self, goal: SingleGoal, progress: Progress, pose: Pose, origin: GlobalPlace | None
-    ) -> str:
-        """Return in words where the straight way of a goal leaves the fence; "" if it does not."""
-        fence, end = self.local(origin), _end_of(goal, progress)
-        if fence is None or end is None or progress.path:
-            return ""
-        yaw, way = atan2(end.east - pose.east, end.north - pose.north), distance(pose, end)
-        along = fence.room(replace(pose, yaw=yaw), forward=True, limit=way)
-        north, east = pose.north + along * cos(yaw), pose.east + along * sin(yaw)
-        return f"after {along:.1f} m, at {north:.1f} m N, {east:.1f} m E"
+            there = pose_on(progress.anchor, progress.path, progress.done)
+            return None if is_allowed(there, left, fence) else 0.0
+        return None if fence.escapes(start, end) else fence.first_forbidden(start, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:
         """Return a step to which the straight way from the place before crosses the fence, or None.
