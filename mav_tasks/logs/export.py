@@ -10,6 +10,7 @@ from typing import Any
 
 from mav_tasks.errors import UsageError
 from mav_tasks.logs.rendering import event_values, in_commands, utc_text
+from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.events import Event
 
 #: event number over the life of the store, event with times in UTC -> a line
@@ -33,6 +34,9 @@ COLUMNS = (
     *TIMING,
 )
 
+#: an actor in the text of an event, and its endpoint
+BY = re.compile(r"by (\d+/\d+@(\S+?)(?: signed \S+?)?)(?=[:;,]?(?:\s|$))")
+
 _SECONDS = {"s": 1, "m": 60, "h": 3_600, "d": 86_400}
 
 _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
@@ -40,7 +44,12 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 
 def text_entry(_number: int, event: Event) -> str:
     """Return a line of text: time and message."""
-    return f"{utc_text(event.at)} {in_commands(str(event))}\n"
+    words = BY.sub(_by, in_commands(str(event)))
+    return f"{utc_text(event.at)} {words}\n"
+
+
+def _by(found: re.Match[str]) -> str:
+    return f"by {who_is(found[1])} at {found[2]}"
 
 
 def json_entry(number: int, event: Event) -> str:

@@ -31,3 +31,19 @@ class Address(NamedTuple):
 def address_of(system_id: int, component_id: int) -> Address:
     """Return an address as it comes from the wire."""
     return Address(system_id, component_id)
+
+
+#: who uses an address, in words
+_PEOPLE = {
+    "243/190": "the web page",
+    "244/190": "the command line or a script",
+    "245/190": "a MAVSDK script",
+    "255/190": "a ground station",
+}
+
+
+def who_is(actor: str) -> str:
+    """Return a submitter's text in words: the name of its key, else what uses such an address."""
+    place, _, key = actor.partition(" signed ")
+    address = place.partition("@")[0]
+    return key or _PEOPLE.get(address, address)

@@ -4,6 +4,7 @@ import io
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from math import inf, pi
+from pathlib import Path
 
 import pytest
 from rich.cells import cell_len
@@ -175,10 +176,10 @@ def test_finished_tasks_say_how_and_when_they_ended() -> None:
     with console.capture() as captured:
         console.print(history_table([DONE, CANCELLED, STUCK], now=NOW, width=80))
     assert [line.rstrip() for line in captured.get().splitlines()] == [
-        "id  state      goal           reason       ended (CET)  run time   done       by",
-        "12  completed  rotate 90 deg                  14:02:00     12.3s  100 %  244/190",
-        " 9  cancelled  move 2 m               2026-11-23 14:03              0 %  244/190",
-        " 8  failed     rotate 90 deg  stuck                        12.3s  100 %  244/190",
+        "id  state      goal           reason       ended (CET)  run time   done",
+        "12  completed  rotate 90 deg                  14:02:00     12.3s  100 %",
+        " 9  cancelled  move 2 m               2026-11-23 14:03              0 %",
+        " 8  failed     rotate 90 deg  stuck                        12.3s  100 %",
     ]
 
 
@@ -460,3 +461,11 @@ def test_no_heading_is_360(yaw: float, shown: str) -> None:
         console.print(vehicle_table([rover], width=120))
     assert f" {shown}" in captured.get()
     assert vehicle_json(replace(rover, yaw=-1e-9))["heading"] == 0.0
+
+
+def test_the_guide_names_each_field_of_json() -> None:
+    guide = (Path(__file__).parents[3] / "mav_tasks/GUIDE.md").read_text(encoding="utf-8")
+    part = guide[guide.index("### The fields of --json") : guide.index("### Any rover")]
+    queue = queue_json(QUEUE)
+    for name in (*task_json(WAITING), *history_json(DONE, now=NOW), *queue):
+        assert f"`{name}`" in part, name
