@@ -16,6 +16,7 @@
     ├── Rejection             a refused request: reason code, and text for the client
     ├── ClientError           a request to a task server failed
     │   ├── NoAnswer          no answer in time
+    │   │   └── LinkDown      the link is down: a device or a host is missing
     │   ├── Refused           the server refused, with its reason
     │   ├── NoSuchVehicle     no such rover, or several and none was named
     │   └── TaskFailed        a task ended in another state than completed
@@ -23,6 +24,8 @@
 
 Received bytes never raise: they are parsed to a value, or counted (see ``mavlink``).
 """
+
+from errno import EADDRINUSE
 
 
 class MavTasksError(Exception):
@@ -100,6 +103,19 @@ class Rejection(MavTasksError):
         self.param = param
 
 
+def reason_of(error: OSError) -> str:
+    """Return the system's words for an error, and what helps if an address is in use."""
+    words = error.strerror or str(error)
+    if error.errno == EADDRINUSE:
+        words += ": end the program that has it (ss -lntup names it), or choose another"
+    return words
+
+
+def missing(package: str, extra: str) -> str:
+    """Return the words for a package that is not installed, with the command that installs it."""
+    return f"needs the package {package}: run pip install '.[{extra}]' in the folder of mav-tasks"
+
+
 class ClientError(MavTasksError):
     """A client's request to a task server failed."""
 
@@ -114,6 +130,10 @@ class NoAnswer(ClientError):
     def __init__(self, text: str, *, nonce: int = 0) -> None:
         super().__init__(text)
         self.nonce = nonce
+
+
+class LinkDown(NoAnswer):
+    """No answer came, because the link is down: no device, or nobody listens; the text says why."""
 
 
 class Refused(ClientError):

@@ -2,6 +2,16 @@
 
 from pathlib import Path
 
+from mav_tasks.errors import UsageError
+
+
+def at_home(text: str, *, what: str) -> Path:
+    """Return a typed path with its ~ replaced. Raise UsageError if there is no such user."""
+    try:
+        return Path(text).expanduser()
+    except RuntimeError as error:
+        raise UsageError(f"{what} {text}: {error}") from None
+
 
 def make_private(folder: Path) -> None:
     """Create a folder and its missing parents with mode 0700; raise OSError if that fails.

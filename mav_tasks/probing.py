@@ -10,12 +10,13 @@ from collections.abc import Callable
 
 from mav_tasks.client.link_driver import LinkDriver
 from mav_tasks.client.signatures import ClientSignatures
+from mav_tasks.errors import LinkDown
 from mav_tasks.links.base import Link
 from mav_tasks.links.link_limits import TO_VEHICLES
 from mav_tasks.links.policy import unsigned_beyond
 from mav_tasks.links.url import parse_url
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.probe.probe import Options, Probe
+from mav_tasks.probe.probe import NothingHeard, Options, Probe
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 LAST_WORDS = 3  # times that the emergency stop packets are sent: a datagram may be lost
@@ -33,7 +34,7 @@ async def run_probe(
 
     With a ``key`` the probe signs its packets and drops packets that are not signed with the key.
     ``on_stage`` is called with a text for each stage. Raise LinkUrlError, LinkOpenError or
-    InsecureLinkError if the link cannot be used.
+    InsecureLinkError if the link cannot be used, LinkDown if it never was up.
     """
     parsed = parse_url(url)
     if not (insecure or key is not None or parsed.is_nearby):
@@ -46,6 +47,8 @@ async def run_probe(
         await face.over
     finally:
         face.close()
+    if isinstance(face.probe.error, NothingHeard) and face.is_down:
+        raise LinkDown(f"{parsed} {face.is_down}")
     return face.probe, face.signal
 
 

@@ -13,6 +13,7 @@ from tests.kit.places import place as place
 from tests.kit.postgres import postgres as postgres
 from tests.kit.postgres import postgres_server as postgres_server
 from tests.kit.run_again import RunAgain
+from tests.kit.skips import Skips
 
 for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
     del os.environ[name]
@@ -39,8 +40,9 @@ def closed_stores() -> Iterator[None]:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Rerun tests that failed while the machine stalled."""
+    """Rerun tests that failed while the machine stalled; fail for unexpected skips."""
     config.pluginmanager.register(RunAgain())
+    config.pluginmanager.register(Skips())
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

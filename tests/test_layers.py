@@ -28,7 +28,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "mav_tasks.settings": frozenset({"mav_tasks.setting_keys", "mav_tasks.errors"}),
     "mav_tasks.mavlink": frozenset({"mav_tasks.errors"}),
     "mav_tasks.whole_file": frozenset(),
-    "mav_tasks.folders": frozenset(),
+    "mav_tasks.folders": frozenset({"mav_tasks.errors"}),
     "mav_tasks.plan_files": frozenset(
         {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
     ),
@@ -233,6 +233,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.web": frozenset(
         {
+            "mav_tasks.folders",
             "mav_tasks.histogram",
             "mav_tasks.crowd",
             "mav_tasks.http_connections",
@@ -272,6 +273,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.cli": frozenset(
         {
+            "mav_tasks.folders",
+            "mav_tasks.links",
+            "mav_tasks.link_keys",
             "mav_tasks.config",
             "mav_tasks.key_ring",
             "mav_tasks.logs",

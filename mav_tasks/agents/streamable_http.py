@@ -14,7 +14,7 @@ from mcp.server.lowlevel import Server
 from mcp.server.transport_security import TransportSecuritySettings
 
 from mav_tasks.agents.http_sessions import HttpSessions
-from mav_tasks.errors import LinkOpenError, UsageError
+from mav_tasks.errors import LinkOpenError, UsageError, reason_of
 from mav_tasks.http_connections import (
     HttpLimits,
     HttpServer,
@@ -74,7 +74,7 @@ async def serve_http(server: Server[Any], place: Place, tell: Callable[[str], No
     try:
         bound = listening(place.host, place.port)
     except OSError as error:
-        raise LinkOpenError(f"--http {place.authority}: {error.strerror}") from error
+        raise LinkOpenError(f"--http {place.authority}: {reason_of(error)}") from error
     place = place._replace(port=bound.getsockname()[1])
     hosts = {place.authority, *(f"{name}:{place.port}" for name in ("127.0.0.1", LOCALHOST))}
     protection = TransportSecuritySettings(

@@ -7,13 +7,13 @@ from io import TextIOWrapper
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
 from mav_tasks.cli import exit_codes
 from mav_tasks.cli.commands import COMMANDS
+from mav_tasks.cli.lazy import Commands
 
 
-class Root(TyperGroup):
+class Root(Commands):
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
         for each in COMMANDS:

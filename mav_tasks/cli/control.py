@@ -21,6 +21,7 @@ from mav_tasks.cli.options import (
 from mav_tasks.cli.session import find_task, opened, values_checked
 from mav_tasks.cli.typed_words import in_typed_words
 from mav_tasks.client.aio import Client
+from mav_tasks.client.descriptions import state_of
 from mav_tasks.client.handle import Release
 from mav_tasks.errors import UsageError
 
@@ -85,19 +86,30 @@ async def _rover_of(client: Client, common: Common, task_id: int | None) -> int:
 async def clear(
     common: Common,
     everything: Annotated[
-        bool, typer.Option("--all", help="Also cancel the running task.")
+        bool,
+        typer.Option("--all", help="Also cancel the tasks that have begun: running, paused, held."),
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
 ) -> None:
     """Cancel all waiting tasks of a rover."""
     if everything and not yes:
-        _confirm("Cancel all tasks, including the running one?")
+        _confirm("Cancel all tasks, also those that have begun?")
     async with opened(common) as client:
         rover = client.vehicle
         await client.clear(running_too=everything)
+        left = None if everything else (await client.queue(limit=0)).current
     which = "all tasks" if everything else "all waiting tasks"
     words = f"rover {rover}: {which} cancelled"
-    output.say_done(common.json, "clear", words, running_too=everything, vehicle=rover)
+    if left is not None:
+        words += f"; task {left.id} stays ({state_of(left)}); to cancel it: mav-tasks clear --all"
+    output.say_done(
+        common.json,
+        "clear",
+        words,
+        running_too=everything,
+        vehicle=rover,
+        left=None if left is None else left.id,
+    )
 
 
 @command
@@ -202,6 +214,6 @@ async def release(
 
 def _confirm(question: str) -> None:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise UsageError("--all also cancels the running task: add --yes")
+        raise UsageError("--all also cancels tasks that have begun: add --yes")
     if not typer.confirm(question):
         raise UsageError("nothing was cancelled")

@@ -48,6 +48,10 @@ def tell(error: BaseException) -> int:
             _say(f"{error}. The task may exist: {again}")
         case NoSuchVehicle():
             _say(f"{error} (--vehicle N)")
+        case Refused() | TaskFailed():
+            from mav_tasks.logs.rendering import in_commands  # noqa: PLC0415  # takes long
+
+            _say("\n".join(map(in_commands, str(error).splitlines())))
         case _:
             _say(f"{error}")
     match error:

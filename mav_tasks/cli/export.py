@@ -10,7 +10,7 @@ import typer
 
 from mav_tasks.cli import output
 from mav_tasks.cli.options import Json
-from mav_tasks.errors import RecordError, UsageError
+from mav_tasks.errors import RecordError, UsageError, missing
 from mav_tasks.mcap_export.convention import RAW
 from mav_tasks.whole_file import replacing
 
@@ -40,7 +40,7 @@ def export(
 ) -> None:
     """Convert recordings to MCAP, for Foxglove and Lichtblick, or back.
 
-    Reads what serve --tlog and serve --record write. Needs pip install 'mav-tasks[mcap]'.
+    Reads what serve --tlog and serve --record write. Needs the extra mcap.
     """
     if (mcap is None) == (tlog is None):
         raise UsageError("choose one of --mcap OUT and --tlog OUT")
@@ -130,4 +130,4 @@ def _checked(name: str, source: Path) -> str:
 def _without(error: ModuleNotFoundError) -> UsageError:
     if error.name is None or error.name.partition(".")[0] != "mcap":
         raise error
-    return UsageError("needs the package mcap: pip install 'mav-tasks[mcap]'")
+    return UsageError(f"export {missing('mcap', 'mcap')}")

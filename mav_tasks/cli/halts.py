@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
+from itertools import takewhile
 from typing import Annotated
 
 import typer
@@ -11,10 +12,14 @@ from mav_tasks.cli import output
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Common
 from mav_tasks.cli.session import is_alone, opened, unfound
-from mav_tasks.cli.words import line_of, resume_command
+from mav_tasks.cli.words import described, every_of, line_of, resume_command
 from mav_tasks.client.aio import Client
+from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import ClientError, NoAnswer, Refused, UsageError
-from mav_tasks.tasks.lifecycle import TaskState
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+
+LOOKED_AT = 32  # finished tasks of a rover
+AT_ONCE = 2.0  # s between two tasks that one STOP has ended
 
 Everywhere = Annotated[bool, typer.Option("--all", help="Apply to every rover of the server.")]
 
@@ -32,18 +37,20 @@ async def stop(
     Stops every rover unless you give --vehicle. Here --timeout limits the wait for confirmation.
     """
     _require_one_choice(common, everywhere=everywhere)
-    async with unfound(common) as client:  # do not wait for discovery
-        await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
     which, way_on = "every rover", "mav-tasks resume --all"
     if common.vehicle is not None:
         which, way_on = f"rover {common.vehicle}", f"mav-tasks resume --vehicle {common.vehicle}"
-    output.say_done(
-        common.json,
-        "stop",
-        f"STOP is in force for {which}: no task runs until '{way_on}'",
-        vehicle=common.vehicle,
-        cleared=clear,
-    )
+    async with unfound(common) as client:  # do not wait for discovery
+        await client.stop(clear=clear, vehicle=common.vehicle, within=common.timeout)
+        if not common.json:  # at once
+            output.say(f"STOP is in force for {which}: no task runs until '{way_on}'")
+        ended = await _ended_series(client, common.vehicle)
+    if common.json:
+        series = [each.series for each in ended]
+        done = {"done": "stop", "vehicle": common.vehicle, "cleared": clear}
+        output.say_json(done | {"ended_series": series})
+    elif ended:
+        output.say(_told(ended))
 
 
 @command
@@ -81,7 +88,11 @@ async def resume(
         alone = is_alone(client, common)
 
         async def resume_one(rover: int) -> str:
+            paused = (await client.queue(limit=0, vehicle=rover)).paused
             await client.resume(epoch=epoch, vehicle=rover)
+            if paused is TaskReason.STOPPED:
+                ended = await _ended_series(client, rover)
+                return f"resumed; {_told(ended)}" if ended else "resumed"
             with suppress(ClientError):  # the resume has been accepted
                 first = (await client.queue(limit=0, vehicle=rover)).current
                 if first is not None and first.state is TaskState.HELD:
@@ -90,6 +101,30 @@ async def resume(
             return "resumed"
 
         await _each(rovers, resume_one, common, "resume")
+
+
+async def _ended_series(client: Client, rover: int | None) -> list[TaskStatus]:
+    """Return the last runs of the series that the last STOP has ended; of all rovers for None."""
+    ended: list[TaskStatus] = []
+    with suppress(ClientError):  # the STOP, or the resume, has been accepted
+        await client.found()
+        for each in client.vehicles() if rover is None else [rover]:
+            number = each if isinstance(each, int) else each.id
+            past = await client.history(vehicle=number, limit=LOOKED_AT)
+            killed = list(takewhile(lambda task: task.reason is TaskReason.STOP, past))
+            ended += [
+                task
+                for task in killed
+                if task.every is not None
+                and (task.ended_ago or 0.0) - (killed[0].ended_ago or 0.0) < AT_ONCE
+            ]
+    return ended
+
+
+def _told(ended: Sequence[TaskStatus]) -> str:
+    """Return which series a STOP has ended, and what helps."""
+    named = ", ".join(f"{each.series} ({described(each)}, {every_of(each)})" for each in ended)
+    return f"STOP has ended the series {named}: submit again what must repeat"
 
 
 def _require_one_choice(common: Common, *, everywhere: bool) -> None:

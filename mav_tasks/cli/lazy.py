@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command, get_group
 
 
@@ -33,9 +33,24 @@ def beginning_with(typed: str, words: Any) -> list[str]:
     return [word for word in words if word.startswith(typed)]
 
 
+class Commands(TyperGroup):
+    """A group whose commands take the options: one before the command gets a message."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments. Fail if an option stands before the command that it is for."""
+        name = args[0].partition("=")[0] if args else ""
+        known = [each for option in self.get_params(ctx) for each in option.opts]
+        if name.startswith("-") and name not in known:
+            where = f"{ctx.command_path} COMMAND … {name}"
+            ctx.fail(f"{name} stands before the command; options go behind it: {where}")
+        return list(super().parse_args(ctx, args))
+
+
 def group(summary: str, *, epilog: str | None = None) -> typer.Typer:
     """Return a group of commands, which shows its plain help if none is named."""
-    return typer.Typer(no_args_is_help=True, rich_markup_mode=None, help=summary, epilog=epilog)
+    return typer.Typer(
+        cls=Commands, no_args_is_help=True, rich_markup_mode=None, help=summary, epilog=epilog
+    )
 
 
 class LazyCommand(TyperCommand):

@@ -5,6 +5,7 @@ import select
 import sys
 import time
 from contextlib import closing
+from math import inf
 from typing import Annotated
 
 import typer
@@ -18,6 +19,7 @@ from mav_tasks.logs.export import EntryOf
 from mav_tasks.store.base import JournalReader, Which
 from mav_tasks.store.latest import latest_store
 from mav_tasks.store.opening import kind_of
+from mav_tasks.store.place import without_password
 
 MOST = 1 << 63  # the first number beyond SQLite's integers
 LOOK = 0.5  # s between two checks for new events
@@ -29,7 +31,7 @@ def log(
         typer.Option(
             metavar="PATH|URL",
             help="Store; default: store.path of the configuration, else the store of the "
-            "server that was started last.",
+            "server that runs, or ran last, on this machine.",
         ),
     ] = None,
     task: Annotated[
@@ -44,6 +46,10 @@ def log(
             metavar="2h|2026-11-20T10:00",
             help="Print only events of the last 30m, 2h or 7d, or since a time (UTC).",
         ),
+    ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(metavar="2h|2026-11-20T10:00", help="Print only events before that."),
     ] = None,
     as_json: Json = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print CSV.")] = False,
@@ -60,7 +66,11 @@ def log(
     for flag, number in (("--task", task), ("--vehicle", vehicle)):
         if number is not None and not 0 <= number < MOST:
             raise UsageError(f"{flag} {number}: not a valid id")
-    begin = None if since is None else export.parse_since(since, now=time.time())
+    if until is not None and follow:
+        raise UsageError("--until and --follow: choose one of them")
+    now = time.time()
+    begin = None if since is None else export.parse_moment("--since", since, now=now)
+    end = inf if until is None else export.parse_moment("--until", until, now=now)
     if store == "":
         raise StoreError("--store: expected the path or the URL of a store")
     if store is None:
@@ -74,10 +84,12 @@ def log(
             if as_csv:
                 sys.stdout.write(export.csv_row(export.COLUMNS))
             seen = journal.version()
-            _print(journal, entry_of, columns)
+            count = _print(journal, entry_of, columns, end=end)
+            if not count and not follow:
+                output.warn(f"no such event in {without_password(store) or 'the default store'}")
             while follow and _is_written_to(journal, seen):
                 seen = journal.version()
-                _print(journal, entry_of, columns)
+                _print(journal, entry_of, columns, end=end)
         except BrokenPipeError:  # the reader has ended, as ``head`` does
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         except KeyboardInterrupt:
@@ -86,11 +98,15 @@ def log(
             raise UsageError(f"standard output: {error.strerror}") from error
 
 
-def _print(journal: JournalReader, entry_of: EntryOf, columns: int | None) -> None:
+def _print(journal: JournalReader, entry_of: EntryOf, columns: int | None, *, end: float) -> int:
+    """Print the new events before ``end``, UTC; return how many."""
+    count = 0
     for number, event in journal.take(offset=0.0):
-        entry = entry_of(number, event)
-        sys.stdout.write(output.wrapped(entry, columns) if columns else entry)
+        if event.at < end:
+            entry, count = entry_of(number, event), count + 1
+            sys.stdout.write(output.wrapped(entry, columns) if columns else entry)
     sys.stdout.flush()
+    return count
 
 
 def _is_written_to(journal: JournalReader, seen: int) -> bool:

@@ -10,7 +10,7 @@ import typer
 from mav_tasks.cli.command import command
 from mav_tasks.cli.options import Reach
 from mav_tasks.cli.session import signing_key, unfound
-from mav_tasks.errors import UsageError
+from mav_tasks.errors import UsageError, missing
 
 
 def _gone(name: str) -> Any:
@@ -56,7 +56,7 @@ async def mcp(reach: Reach, options: AgentOptions) -> None:
     agents have the role and the limits of that key. With --vehicle only that rover is offered.
     """
     if find_spec("mcp") is None:
-        raise UsageError("mcp needs the MCP SDK: pip install 'mav-tasks[mcp]'")
+        raise UsageError(f"mcp {missing('mcp', 'mcp')}")
     from mav_tasks.agents.rovers import Rovers  # noqa: PLC0415  # they need the SDK
     from mav_tasks.agents.server import server_of  # noqa: PLC0415
     from mav_tasks.agents.stdio import serve_stdio  # noqa: PLC0415

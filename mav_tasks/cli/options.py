@@ -12,6 +12,7 @@ from mav_tasks.errors import UsageError
 from mav_tasks.tasks.task import ANY
 
 DEFAULT_SERVER = "udpout:127.0.0.1:14560"
+DEFAULT_LISTEN = "127.0.0.1:8560"  # of the web page
 PRIORITY = 5
 NEVER = "never"  # of --every
 MOST_ROVERS = 255  # system ids

@@ -18,6 +18,7 @@ from mav_tasks.plan_files import PlanFile, format_plan, read_plan, write_plan
 from mav_tasks.tasks.task import ANY
 
 STANDARD_OUTPUT = "-"
+NOTHING = PlanFile((), None, (), ())
 
 FileIn = Annotated[
     Path, typer.Argument(metavar="FILE", help="Mission file: .plan or QGC WPL 110 (.waypoints).")
@@ -34,16 +35,9 @@ PlanOut = Annotated[
     str, typer.Argument(metavar="FILE", help="Output file: .plan; '-': standard output.")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
-EmptyFence = Annotated[
-    bool, typer.Option("--empty", help="Delete the rover's fence if the file has none.")
-]
-EmptyRally = Annotated[
-    bool, typer.Option("--empty", help="Delete the rover's rally points if the file has none.")
-]
-
 mission = group("Upload, start and download missions.")
-fence = group("Upload and download the fence.")
-rally = group("Upload rally points.")
+fence = group("Upload, download and clear the fence.")
+rally = group("Upload and clear rally points.")
 
 
 @mission.command("upload")
@@ -104,14 +98,23 @@ async def download_mission(file: FileOut, common: Common, force: Force = False) 
 
 @fence.command("upload")
 @command
-async def upload_fence(file: PlanIn, common: Common, empty: EmptyFence = False) -> None:
+async def upload_fence(file: PlanIn, common: Common) -> None:
     """Upload the fence from a file to the rover."""
     plan = read_plan(file)
-    if not plan.fence and not empty:
-        raise UsageError(f"{file} has no fence; the rover's stays (--empty removes it)")
+    if not plan.fence:
+        raise UsageError(f"{file} has no fence; the rover's stays (mav-tasks fence clear removes it)")
     async with opened(common) as client:
         count = await client.set_fence(plan)
     output.say_done(common.json, "fence upload", f"fence: {count} items", items=count)
+
+
+@fence.command("clear")
+@command
+async def clear_fence(common: Common) -> None:
+    """Remove the rover's fence."""
+    async with opened(common) as client:
+        await client.set_fence(NOTHING)
+    output.say_done(common.json, "fence clear", "the rover has no fence now")
 
 
 @fence.command("download")
@@ -127,14 +130,24 @@ async def download_fence(file: PlanOut, common: Common, force: Force = False) ->
 
 @rally.command("upload")
 @command
-async def upload_rally_points(file: PlanIn, common: Common, empty: EmptyRally = False) -> None:
+async def upload_rally_points(file: PlanIn, common: Common) -> None:
     """Upload the rally points from a file to the rover."""
     plan = read_plan(file)
-    if not plan.rally and not empty:
-        raise UsageError(f"{file} has no rally points; the rover's stay (--empty removes them)")
+    if not plan.rally:
+        words = "the rover's stay (mav-tasks rally clear removes them)"
+        raise UsageError(f"{file} has no rally points; {words}")
     async with opened(common) as client:
         count = await client.set_rally_points(plan)
     output.say_done(common.json, "rally upload", f"rally: {count} items", items=count)
+
+
+@rally.command("clear")
+@command
+async def clear_rally_points(common: Common) -> None:
+    """Remove the rover's rally points."""
+    async with opened(common) as client:
+        await client.set_rally_points(NOTHING)
+    output.say_done(common.json, "rally clear", "the rover has no rally points now")
 
 
 def _check_place(file: str, *, force: bool) -> None:

@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from mav_tasks.cli.lazy import beginning_with, completing
+from mav_tasks.cli.options import DEFAULT_LISTEN
 from mav_tasks.config.words import Flag
 from mav_tasks.setting_keys.key import Key, Option
 from mav_tasks.setting_keys.literals import literal
@@ -43,6 +44,7 @@ class ServeCommand(TyperCommand):
     def _with_values(self, args: list[str]) -> list[str]:
         """Return the arguments with a value for each option that may be given without one."""
         bare = {option.name: option.bare for _, option, _ in self._options if option.bare}
+        bare["--web"] = DEFAULT_LISTEN
         filled = []
         for argument, following in zip(args, [*args[1:], "-"], strict=False):
             filled.append(argument)
@@ -98,6 +100,14 @@ def serve(
             help="Set any key of the configuration; repeatable.",
         ),
     ] = None,
+    web: Annotated[
+        str,
+        typer.Option(
+            metavar="[HOST:PORT]",
+            help=f"Also run 'mav-tasks web' as long as the server runs, at {DEFAULT_LISTEN} unless "
+            "you name another address.",
+        ),
+    ] = "",
 ) -> None:
     """Run the task server.
 
@@ -107,4 +117,4 @@ def serve(
     signal.signal(signal.SIGHUP, lambda _number, _frame: None)
     from mav_tasks.cli.serving import serve_with  # noqa: PLC0415  # takes long: after that
 
-    raise typer.Exit(serve_with(ctx.obj, set_=set_ or (), config=config))
+    raise typer.Exit(serve_with(ctx.obj, set_=set_ or (), config=config, web=web))

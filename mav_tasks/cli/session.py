@@ -4,14 +4,16 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Any, Literal
 
+from mav_tasks.cli import output
 from mav_tasks.cli.options import Common, Reach, TaskOptions, every_of, seconds_of, start_of
 from mav_tasks.client.aio import Client
 from mav_tasks.client.handle import Task
 from mav_tasks.client.values import News, Text
-from mav_tasks.errors import NoAnswer, UsageError
+from mav_tasks.errors import LinkDown, NoAnswer, UsageError
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.tasks.task import ANY
 
+NO_ROVER = "has heard no rover"  # of an answer (``client/fleet_view.py``)
 CHOSEN = " chosen: "  # in the text of a new task (``engine/commands/submissions.py``)
 
 
@@ -29,6 +31,9 @@ async def opened(common: Reach) -> AsyncIterator[Client]:
     """Yield a client that has found the server and the rovers."""
     async with unfound(common) as client:
         await client.found()
+        for number in client.shared_ids():
+            words = f"two rovers have the id {number}: one is driven, the other one ignored"
+            output.warn(f"{words}; give one of them another id (SYSID_THISMAV, MAV_SYS_ID)")
         yield client
 
 
@@ -52,7 +57,9 @@ async def unfound(common: Reach) -> AsyncIterator[Client]:
     try:
         yield client
     except NoAnswer as error:
-        if common.sign or client.vehicles():  # else the server may answer only signed packets
+        # else the server may answer only signed packets
+        is_clear = isinstance(error, LinkDown) or NO_ROVER in str(error)
+        if common.sign or client.vehicles() or is_clear:
             raise
         raise NoAnswer(
             f"{error} (if the server requires signatures, use --sign NAME)", nonce=error.nonce

@@ -13,6 +13,7 @@ from mav_tasks.client.handle import Task
 from mav_tasks.client.json_form import task_json, timing_json
 from mav_tasks.client.values import TaskStatus, TaskTiming
 from mav_tasks.errors import Refused
+from mav_tasks.mavlink.address import who_is
 
 
 @command
@@ -78,7 +79,7 @@ def _fields(
         ("run time", words.took_of(status)),
         ("ended", _ended(status)),
         ("setpoints", words.timing_of(timing)),
-        ("submitted by", status.submitter),
+        ("submitted by", f"{who_is(status.submitter)} ({status.submitter})"),
     ]
 
 

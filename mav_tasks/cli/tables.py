@@ -14,6 +14,7 @@ from mav_tasks.cli import words
 from mav_tasks.cli.times import format_duration, moment_ago
 from mav_tasks.client.descriptions import end_of, state_of, waits_of, what_of, why_of
 from mav_tasks.client.values import QueueStatus, TaskStatus, VehicleStatus
+from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.lifecycle import TaskState
 
 GAP = 2  # blanks between two columns
@@ -63,7 +64,7 @@ TASK_COLUMNS: tuple[Column[Row], ...] = (
     Column("ends in", lambda row: words.ends_of(row.status), worth=4, is_right=True),
     Column("done", lambda row: words.percent_of(row.status), worth=5, is_right=True),
     Column("left", lambda row: words.left_of(row.status), worth=6, is_right=True),
-    Column("by", lambda row: row.status.submitter, worth=7, is_right=True),
+    Column("by", lambda row: who_is(row.status.submitter), worth=7),
 )
 
 
@@ -112,7 +113,7 @@ def history_table(tasks: Sequence[TaskStatus], *, now: datetime, width: int) -> 
         Column(f"ended ({now:%Z})", ended, worth=2, is_right=True),
         Column("run time", words.took_of, worth=3, is_right=True),
         Column("done", words.percent_of, worth=4, is_right=True),
-        Column("by", lambda status: status.submitter, worth=5, is_right=True),
+        Column("by", lambda status: who_is(status.submitter), worth=5),
     )
     return _table(columns, tasks, width, styles={"state": lambda s: STYLES.get(s.state, "")})
 

@@ -1,19 +1,18 @@
 """``mav-tasks web``: serve the web page and the HTTP API."""
 
 import os
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from mav_tasks.cli import output
-from mav_tasks.cli.options import DEFAULT_SERVER, RingFile, Server, SignWith
+from mav_tasks.cli.options import DEFAULT_LISTEN, DEFAULT_SERVER, RingFile, Server, SignWith
+from mav_tasks.cli.page_beside import end_with_input
 from mav_tasks.cli.ring import key_to_sign_with, ring_path
-from mav_tasks.errors import UsageError
+from mav_tasks.errors import UsageError, missing
+from mav_tasks.folders import at_home
 from mav_tasks.key_ring.ring_file import load
 from mav_tasks.key_ring.watch import RingWatch
-
-DEFAULT_LISTEN = "127.0.0.1:8560"
 
 app = typer.Typer(rich_markup_mode=None)  # without a command it serves
 KEYS = "mav-tasks keys add NAME --role operator prints a token; keys list and revoke manage them"
@@ -49,8 +48,8 @@ def web(
         str | None,
         typer.Option(
             metavar="PATH|URL",
-            help="Store whose journal the page shows; default: the store of the server that was "
-            'started last on this machine; "": none.',
+            help="Store whose journal the page shows; default: the store of the server that runs, "
+            'or ran last, on this machine; "": none.',
         ),
     ] = None,
     records: Annotated[
@@ -62,6 +61,7 @@ def web(
     ] = "",
     sign: SignWith = "",
     keys: RingFile = "",
+    beside_server: Annotated[bool, typer.Option(hidden=True)] = False,
     role: Gone = None,
     tokens: Gone = None,
 ) -> None:
@@ -101,9 +101,11 @@ def web(
         key=key_to_sign_with(sign, keys) if sign else None,
         journal=_journal(store),
         tiles=tiles_of(tiles) if tiles else None,
-        records=Records(Path(records).expanduser()) if records else None,
+        records=Records(at_home(records, what="--records")) if records else None,
     )
     bound = serving.listening(options)
+    if beside_server:
+        end_with_input()
     serving.run(options, bound, started=lambda address: output.say(f"web page: {address}"))
 
 
@@ -119,7 +121,7 @@ def _loaded() -> Any:
     try:
         from mav_tasks.web import serving  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        raise UsageError(f"the web page needs {error.name}: install mav-tasks[web]") from error
+        raise UsageError(f"the web page {missing(str(error.name), 'web')}") from error
     return serving
 
 

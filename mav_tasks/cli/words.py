@@ -24,6 +24,10 @@ REMEDIES = {
     TaskReason.LOSS_FAILSAFE: (
         "to make it stop without setpoints: mav-tasks probe --set-failsafe{rover}"
     ),
+    TaskReason.HELD_AHEAD: "release the held task: mav-tasks release again|remainder|skip{rover}",
+    TaskReason.VEHICLE_SILENT: "check its power and radio",
+    TaskReason.NO_POSITION: "wait for its position, or check its GPS",
+    TaskReason.OTHER_CONTROLLER: "end the other program that drives it",
     TaskReason.OUTSIDE_OWN_FENCE: "drive it back manually, or switch that fence off",
 }
 
@@ -90,9 +94,13 @@ def line_of(status: TaskStatus, *, is_alone: bool = True) -> str:
     took = f", in {took_of(status)}" if status.is_over and took_of(status) else ""
     way_on = way_on_of(status, is_alone=is_alone)
     way_on = f"; {way_on}" if way_on else ""
-    label = f" '{status.label}'" if status.label else ""
-    what = f"{name_of(status)}: {what_of(status)}{label}"
+    what = f"{name_of(status)}: {described(status)}"
     return f"{what}: {state_of(status)}{why}{took}{way_on}"
+
+
+def described(status: TaskStatus) -> str:
+    """Return what a task does, with its label: "move 5 m 'patrol'"."""
+    return f"{what_of(status)} '{status.label}'" if status.label else what_of(status)
 
 
 def name_of(status: TaskStatus) -> str:
@@ -162,11 +170,11 @@ def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
         does = f"task {queue.running}"
     else:
         does = "no task runs"
-    blocked = _blocked(queue)
-    if blocked is not None and blocked is not queue.current:
-        does += f"; task {blocked.id} waits: {why_of(blocked)}"
-    if blocked is not None:
-        does += f"; {way_on_of(blocked, is_alone=is_alone)}"
+    stuck = blocked(queue)
+    if stuck is not None and stuck is not queue.current:
+        does += f"; task {stuck.id} waits: {why_of(stuck)}"
+    if stuck is not None:
+        does += f"; {way_on_of(stuck, is_alone=is_alone)}"
     if queue.paused is not None:
         does += f"; queue paused ({words_of(queue.paused)})"
         does += f"; to resume: {resume_command(queue.vehicle, is_alone=is_alone)}"
@@ -176,7 +184,7 @@ def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
     return f"{rover}: {does}; {queue.waiting_count} waiting"
 
 
-def _blocked(queue: QueueStatus) -> TaskStatus | None:
+def blocked(queue: QueueStatus) -> TaskStatus | None:
     """Return the held task, else a task with a reason of REMEDIES, unless the queue is paused."""
     current = queue.current
     if current is not None and current.state is TaskState.HELD and way_on_of(current):

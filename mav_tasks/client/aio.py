@@ -30,7 +30,7 @@ from mav_tasks.client.values import (
 )
 from mav_tasks.client.watch import Followed
 from mav_tasks.client.wire import SERVER, Goal, TaskOptions
-from mav_tasks.errors import ClientError, MavTasksError, NoAnswer, Refused
+from mav_tasks.errors import ClientError, LinkDown, MavTasksError, NoAnswer, Refused
 from mav_tasks.links.base import Link
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -41,7 +41,7 @@ from mav_tasks.mavlink.enums import (
     TaskProperty,
 )
 from mav_tasks.mavlink.float_param import to_param
-from mav_tasks.mavlink.label import check_label, pieces_of, text_pieces
+from mav_tasks.mavlink.label import check_label, text_pieces
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.plan_files import (
     PlanFile,
@@ -164,6 +164,9 @@ class Client:
             words = session.fleet.why_not_found(self._vehicle)
             where = f"on {self._open.link.name} within {self._timeout:g} s"
             words = words.format(where=where)
+            if self._open.is_down:
+                words = f"{self._open.link.name} {self._open.is_down}"
+                raise LinkDown(words) from None
             if self._signatures is not None and not session.fleet.served():
                 words = f"{words} And: {self._signatures.why_silent()}"
             raise NoAnswer(words) from None
@@ -313,9 +316,10 @@ class Client:
             await self._modify_exactly(
                 task_id, TaskProperty.START_UTC, round(utc_of(at)), 0, nan, vehicle=vehicle
             )
-        for piece in pieces_of(label) if label is not None else ():
-            await self._modify_exactly(
-                task_id, TaskProperty.LABEL, piece.x, piece.y, float(piece.offset), vehicle=vehicle
+        if label is not None:
+            check_label(label)
+            await self._write(
+                task_id, TaskProperty.LABEL, label, lambda status: status.label, vehicle=vehicle
             )
 
     async def release(
@@ -401,6 +405,12 @@ class Client:
         command = self._stop_command(vehicle, clear=clear)
         try:
             await self._ask.ask(command, "STOP", within=within, again=STOP_AGAIN, is_urgent=True)
+        except NoAnswer as error:
+            fleet = self._open.session.fleet
+            if fleet.served() or not fleet.is_listed:
+                raise
+            words = "the task server has heard no rover, so there is none that it could stop"
+            raise NoAnswer(words) from error
         except Refused as error:
             words = STOP_IN_FORCE.get(error.reason, str(error))
             raise Refused(words, result=error.result, reason=error.reason) from error
@@ -444,6 +454,12 @@ class Client:
         default and not exactly one rover.
         """
         return self._which(None)
+
+    def shared_ids(self) -> list[int]:
+        """Return the system ids that two rovers have: the server ignores the second of each."""
+        return [
+            number for number, is_shared in self._open.session.fleet.shared.items() if is_shared
+        ]
 
     def vehicles(self) -> tuple[VehicleStatus, ...]:
         """Return the last known state of the server's rovers."""
@@ -674,16 +690,40 @@ class Client:
             params = to_param(task_id), float(TaskProperty.EVERY), float(repeat or 0)
             await self._control(vehicle, MavCmd.TASK_MODIFY, *params)
             return
-        for piece in text_pieces(repeat):
-            await self._modify_exactly(
-                task_id,
-                TaskProperty.REPEAT,
-                piece.x,
-                piece.y,
-                float(piece.offset),
-                size=len(repeat),
-                vehicle=vehicle,
-            )
+        await self._write(
+            task_id, TaskProperty.REPEAT, repeat, lambda status: status.every, vehicle=vehicle
+        )
+
+    async def _write(
+        self,
+        task_id: int,
+        name: TaskProperty,
+        text: str,
+        shown: Callable[[TaskStatus], object],
+        *,
+        vehicle: int | None,
+    ) -> None:
+        """Send a text of a task, piece after piece.
+
+        The acks of two pieces look the same. So look at the task afterwards, and if its text is
+        another one, send them again with a rest after each, in which late acks run out.
+        """
+        size = float(len(text)) if name is TaskProperty.REPEAT else nan
+        for is_told_apart in (True, False):
+            try:
+                for piece in text_pieces(text):
+                    await self._modify_exactly(
+                        *(task_id, name, piece.x, piece.y, float(piece.offset)),
+                        size=size,
+                        is_told_apart=is_told_apart,
+                        vehicle=vehicle,
+                    )
+            except Refused as refused:  # perhaps because a piece before this one was lost
+                if refused.reason != TaskReason.BAD_PARAMETER or not is_told_apart:
+                    raise
+            else:
+                if shown(await self.status(task_id, vehicle=vehicle)) == text:
+                    return
 
     async def _modify_exactly(
         self,
@@ -694,6 +734,7 @@ class Client:
         value: float,
         *,
         size: float = nan,
+        is_told_apart: bool = False,
         vehicle: int | None,
     ) -> None:
         """Change a property whose value a float32 cannot hold exactly."""
@@ -702,7 +743,7 @@ class Client:
         command = m.CommandInt(
             system_id, AUTOPILOT, 0, MavCmd.TASK_MODIFY, 0, 0, *first, x, y, mark
         )
-        await self._ask.ask(command, "TASK_MODIFY")
+        await self._ask.ask(command, "TASK_MODIFY", is_told_apart=is_told_apart)
 
     # submitting
 

@@ -125,6 +125,8 @@ class FleetView:
         self._views: dict[int, VehicleView] = {}
         #: whether a server has listed its rovers
         self.is_listed = False
+        #: whether another rover with the same system id is heard, by system id
+        self.shared: dict[int, bool] = {}
 
     def __repr__(self) -> str:
         return f"FleetView({list(self._views.values())})"

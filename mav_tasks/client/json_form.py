@@ -63,6 +63,7 @@ def queue_json(queue: QueueStatus) -> dict[str, Any]:
         "halt_epoch": queue.halt_epoch,
         "heartbeat_age": _age(queue.heartbeat_age),
         "gateway": queue.gateway or None,
+        "shares_id": queue.shares_id,
         "waiting_count": queue.waiting_count,
         "capacity": queue.capacity,
         "counts": {state.name.lower(): count for state, count in queue.counts.items()},

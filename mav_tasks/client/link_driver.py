@@ -47,6 +47,8 @@ class LinkDriver:
         self._timer: asyncio.TimerHandle | None = None
         self._tending: asyncio.TimerHandle | None = None
         self._is_closed = False
+        #: why the link is down, in words; "" while it is up
+        self.is_down = ""
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.link.name}, {self._talk!r})"
@@ -126,10 +128,12 @@ class LinkDriver:
         for change in self.link.take_changes():
             if change.state is PeerState.UP:
                 self._peers.setdefault(change.peer)
+                self.is_down = ""
                 self._on_up()
             elif change.state is PeerState.DOWN:
                 self._peers.pop(change.peer, None)
                 self._streams.forget(change.peer)
+                self.is_down = change.words.partition(";")[0] or self.is_down
 
     def _tend(self, link: StreamLink) -> None:
         self._tending = self._loop.call_later(TEND_PERIOD, self._tend, link)

@@ -20,6 +20,7 @@ from mav_tasks.client.values import (
     VehicleStatus,
     heartbeat_age_of,
     member_of,
+    shares_id,
     task_status_of,
     task_timing_of,
 )
@@ -135,6 +136,7 @@ class Session:
                 self._task_status(task_status_of(message, packet.system_id), now=now)
             case m.TaskQueueStatus():
                 self.fleet.served_by(packet.source, heartbeat_age_of(message), now=now)
+                self.fleet.shared[packet.system_id] = shares_id(message)
                 self.on_served()
                 self.on_vehicle(packet.system_id)
                 self.on_answer(message, packet.system_id)

@@ -341,6 +341,10 @@ class SyncClient(BlockingClient):
         """
         self._call(self._aio.resume(epoch=epoch, vehicle=vehicle))
 
+    def shared_ids(self) -> list[int]:
+        """Return the system ids that two rovers have: the server ignores the second of each."""
+        return self._call(called(self._aio.shared_ids))
+
     def vehicles(self) -> tuple[VehicleStatus, ...]:
         """Return the last known state of the server's rovers."""
         return self._call(called(self._aio.vehicles))

@@ -13,6 +13,7 @@ E = TypeVar("E", bound=IntEnum)
 
 UNKNOWN_POSITION = 65535
 UNKNOWN_PROGRESS = 255
+SHARES_ID = 1  # TASK_QUEUE_STATUS.flags
 NO_HEARTBEAT = 0xFFFFFFFF
 
 
@@ -91,6 +92,7 @@ class QueueStatus:
     each event that halts the rover. ``heartbeat_age``: seconds since the rover's last heartbeat
     reached the server; inf: none since the server started; None: the server does not say.
     ``gateway`` is the one of a fleet that has the rover, "" if the server is alone.
+    ``shares_id``: another rover with the same system id is heard, which the server ignores.
     """
 
     vehicle: int
@@ -105,6 +107,7 @@ class QueueStatus:
     halt_epoch: int = 0
     heartbeat_age: float | None = None
     gateway: str = ""
+    shares_id: bool = False
 
     @property
     def waiting_count(self) -> int:
@@ -258,7 +261,13 @@ def queue_status_of(
         halt_epoch=message.halt_epoch,
         heartbeat_age=heartbeat_age_of(message),
         gateway=_text(message._gateway_raw),
+        shares_id=shares_id(message),
     )
+
+
+def shares_id(message: m.TaskQueueStatus) -> bool:
+    """Return whether another rover with the same system id is heard."""
+    return bool(message.flags & SHARES_ID)
 
 
 def heartbeat_age_of(message: m.TaskQueueStatus) -> float | None:

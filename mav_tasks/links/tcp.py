@@ -4,11 +4,11 @@ No call blocks. Each link has one descriptor, its selector's, which stays the sa
 come and go.
 """
 
-import os
 import selectors
 import socket
 
 from mav_tasks.clock import boot_time
+from mav_tasks.errors import reason_of
 from mav_tasks.links.base import Peer, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl
 from mav_tasks.links.link_limits import LinkLimits
@@ -189,12 +189,6 @@ def resolve(host: str, port: int) -> list[tuple[socket.AddressFamily, tuple[str,
     """Return the addresses of a host; raise OSError if it has none."""
     found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     return [(family, (str(at[0]), int(at[1]))) for family, _, _, _, at in found]
-
-
-def reason_of(error: OSError) -> str:
-    if error.errno is not None and error.errno > 0:
-        return os.strerror(error.errno)
-    return error.strerror or str(error)
 
 
 def _say_farewell(sock: socket.socket) -> None:

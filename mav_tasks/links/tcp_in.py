@@ -14,11 +14,11 @@ from collections.abc import Callable
 
 from mav_tasks.clock import boot_time
 from mav_tasks.crowd import first_of_crowd
-from mav_tasks.errors import LinkOpenError
+from mav_tasks.errors import LinkOpenError, reason_of
 from mav_tasks.links.base import Link, Peer, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
-from mav_tasks.links.tcp import Connection, TcpLink, reason_of, resolve
+from mav_tasks.links.tcp import Connection, TcpLink, resolve
 from mav_tasks.links.url import UrlOptions
 
 BACKLOG = 1024  # connections that the system queues until they are accepted

@@ -1,15 +1,16 @@
 """A TCP link that dials: one peer; while it is down, an attempt each second."""
 
+import os
 import selectors
 import socket
 from time import monotonic
 
-from mav_tasks.errors import LinkOpenError
+from mav_tasks.errors import LinkOpenError, reason_of
 from mav_tasks.links.attempts import Attempts
 from mav_tasks.links.base import Link, PeerChange, PeerState
 from mav_tasks.links.endpoint import HostUrl, parse_endpoint
 from mav_tasks.links.link_limits import LinkLimits
-from mav_tasks.links.tcp import Connection, TcpLink, reason_of, resolve
+from mav_tasks.links.tcp import Connection, TcpLink, resolve
 from mav_tasks.links.url import UrlOptions
 
 CONNECT_LIMIT = 3.0  # s for the other end to answer
@@ -88,7 +89,7 @@ class TcpOutLink(TcpLink):
         failed = sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         try:
             if failed:
-                raise OSError(failed, "")
+                raise OSError(failed, os.strerror(failed))
             if sock.getsockname() == sock.getpeername():  # TCP simultaneous open with itself
                 raise ConnectionRefusedError("nobody but this end")
             self._selector.unregister(sock)

@@ -3,7 +3,7 @@
 import socket
 from zlib import crc32
 
-from mav_tasks.errors import LinkOpenError, LinkUrlError
+from mav_tasks.errors import LinkOpenError, LinkUrlError, reason_of
 from mav_tasks.links.base import Link, Peer
 from mav_tasks.links.endpoint import PORTS, HostUrl, is_loopback, number_in, parse_endpoint
 from mav_tasks.links.link_limits import TO_VEHICLES, LinkLimits
@@ -73,8 +73,7 @@ class UdpLink:
             else:
                 self._socket = self._dial(family, url, local_port)
         except OSError as error:
-            reason = error.strerror or str(error)
-            raise LinkOpenError(f"link {url} cannot be opened: {reason}") from error
+            raise LinkOpenError(f"link {url} cannot be opened: {reason_of(error)}") from error
         dialled: tuple[tuple[str, int], ...] = (address,) if url.kind == "udpout" else ()
         self.peers: tuple[Peer, ...] = dialled + pushed
 

@@ -9,7 +9,8 @@ from datetime import UTC, datetime
 from typing import Any
 
 from mav_tasks.errors import UsageError
-from mav_tasks.logs.rendering import clean, event_values, utc_text
+from mav_tasks.logs.rendering import event_values, in_commands, utc_text
+from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.events import Event
 
 #: event number over the life of the store, event with times in UTC -> a line
@@ -33,6 +34,9 @@ COLUMNS = (
     *TIMING,
 )
 
+#: an actor in the text of an event, and its endpoint
+BY = re.compile(r"by (\d+/\d+@(\S+?)(?: signed \S+?)?)(?=[:;,]?(?:\s|$))")
+
 _SECONDS = {"s": 1, "m": 60, "h": 3_600, "d": 86_400}
 
 _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
@@ -40,7 +44,12 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 
 def text_entry(_number: int, event: Event) -> str:
     """Return a line of text: time and message."""
-    return f"{utc_text(event.at)} {clean(str(event))}\n"
+    words = BY.sub(_by, in_commands(str(event)))
+    return f"{utc_text(event.at)} {words}\n"
+
+
+def _by(found: re.Match[str]) -> str:
+    return f"by {who_is(found[1])} at {found[2]}"
 
 
 def json_entry(number: int, event: Event) -> str:
@@ -62,7 +71,7 @@ def csv_row(cells: Sequence[Any]) -> str:
     return row.getvalue()
 
 
-def parse_since(text: str, *, now: float) -> float:
+def parse_moment(name: str, text: str, *, now: float) -> float:
     """Return UTC seconds from a duration before ``now`` or an ISO 8601 time; raise UsageError."""
     ago = re.fullmatch(r"(\d+(?:\.\d+)?)([smhd])", text)
     if ago is not None:
@@ -72,5 +81,5 @@ def parse_since(text: str, *, now: float) -> float:
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     except (ValueError, OverflowError):
         raise UsageError(
-            f"--since {text}: expected 30m, 2h, 7d, or a time in UTC as 2026-11-20T10:00"
+            f"{name} {text}: expected 30m, 2h, 7d, or a time in UTC as 2026-11-20T10:00"
         ) from None

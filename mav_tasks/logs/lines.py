@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from mav_tasks.clock import boot_time
-from mav_tasks.logs.rendering import clean, utc_text, values_of
+from mav_tasks.logs.rendering import in_commands, utc_text, values_of
 from mav_tasks.logs.repeats import Repeats, Said
 from mav_tasks.tasks.events import Event, SubmissionRefused
 
@@ -44,7 +44,7 @@ class TextLines:
         if repeated:
             line += _count(repeated)
         if record.exc_info:
-            line = "\n".join([line, *map(clean, _traceback(record.exc_info).splitlines())])
+            line = "\n".join([line, *map(in_commands, _traceback(record.exc_info).splitlines())])
         return line
 
 
@@ -82,7 +82,7 @@ class Lines:
 
     def of(self, record: logging.LogRecord, *, now: float) -> str | None:
         """Return the line of a record; None if it repeats a recent message, and is counted."""
-        words = clean(record.getMessage())
+        words = in_commands(record.getMessage())
         if not _is_change(record.msg) and not self._repeats.is_new(
             (record.levelno, words), (record, words), now=now
         ):
@@ -91,7 +91,7 @@ class Lines:
 
     def line(self, record: logging.LogRecord) -> str:
         """Return the line of a record, also if it repeats a message."""
-        return self._line_of(record, clean(record.getMessage()), None)
+        return self._line_of(record, in_commands(record.getMessage()), None)
 
     def due(self, *, now: float) -> Iterator[str]:
         """Return a line for each repeated message whose window is over."""

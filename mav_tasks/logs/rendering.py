@@ -5,6 +5,7 @@ UTC, NaN and infinity as null. Fields for internal use are left out.
 """
 
 import logging
+import re
 from collections.abc import Hashable
 from dataclasses import fields, is_dataclass
 from datetime import UTC, datetime
@@ -37,6 +38,16 @@ _NAMES = {"task_id": "task", "submitter": "actor"}
 #: a field may hold one of several of these classes: their values tell which
 _CHOICES = frozenset((*Goal.__args__, *Place.__args__))
 
+#: what texts for ground stations tell people to press, and the command for it
+_BUTTONS = (
+    (re.compile(r"[Pp]ress Continue"), "run 'mav-tasks resume'"),
+    (
+        re.compile(r'[Pp]ress (a Held button( for each held task)?|"?Held: [\w:", ]*skip"?)'),
+        "run 'mav-tasks release again|remainder|skip'",
+    ),
+    (re.compile(r"then Continue"), "then 'mav-tasks resume'"),
+)
+
 #: of the events that are not logged as information
 _LEVELS: dict[type, int] = {
     **dict.fromkeys((SignaturesSeen, TaskProgressed, VehicleHalted), logging.DEBUG),
@@ -62,7 +73,7 @@ def event_values(event: Event, *, offset: float) -> dict[str, Any]:
     line = {
         "time": utc_text(event.at + offset),
         "level": logging.getLevelName(level_of(event)).lower(),
-        "message": clean(str(event)),
+        "message": in_commands(str(event)),
     }
     return line | values_of(event, offset=offset)
 
@@ -84,6 +95,16 @@ def utc_text(utc: float) -> str | None:
     second, rest = divmod(round(utc * 1e6), 1_000_000)
     text = _utc_second(second)
     return text and f"{text}.{rest // 1000:03}Z"
+
+
+def in_commands(words: str) -> str:
+    """Return a text on one line with the commands that do what a ground station's buttons do."""
+    words = clean(words)
+    if "ress " not in words:  # nearly always
+        return words
+    for button, done in _BUTTONS:
+        words = button.sub(done, words)
+    return words
 
 
 def clean(words: str) -> str:

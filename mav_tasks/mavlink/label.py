@@ -27,12 +27,6 @@ def check_label(label: str) -> None:
         raise ValueError(f"label {label!r}: printable characters, no space at either end")
 
 
-def pieces_of(label: str) -> list[Piece]:
-    """Return the pieces of a label, in order; an empty label is one empty piece. ValueError."""
-    check_label(label)
-    return text_pieces(label)
-
-
 def text_pieces(text: str) -> list[Piece]:
     """Return the pieces of a text to be sent, in order; an empty text is one empty piece."""
     pieces, offset, data = [], 0, b""

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from threading import Thread
 
-from mav_tasks.errors import UsageError
+from mav_tasks.errors import UsageError, reason_of
 from mav_tasks.links.endpoint import is_loopback, parse_endpoint
 
 log = logging.getLogger("mav_tasks")
@@ -71,8 +71,7 @@ def listening(address: str, *, what: str) -> socket.socket:
         listener.listen(BACKLOG)
     except OSError as error:
         listener.close()
-        why = f"{what}: {address} cannot be opened: {error.strerror}"
-        raise UsageError(f"{why}; choose another address") from error
+        raise UsageError(f"{what}: {address} cannot be opened: {reason_of(error)}") from error
     return listener
 
 

@@ -10,7 +10,7 @@ from secrets import token_hex
 from platformdirs import user_data_path
 
 from mav_tasks.errors import StoreError
-from mav_tasks.folders import make_private
+from mav_tasks.folders import at_home, make_private
 from mav_tasks.settings import Retention
 from mav_tasks.store import reading
 from mav_tasks.store.base import Which
@@ -69,14 +69,14 @@ class SqliteStore(DurableStore):
 
 def open_store(place: str, wall_offset: Callable[[], float], retention: Retention) -> SqliteStore:
     """Open a file; create it if it does not exist."""
-    return SqliteStore(_path_of(place), wall_offset=wall_offset, retention=retention)
+    return SqliteStore(path_of(place), wall_offset=wall_offset, retention=retention)
 
 
 def open_journal(place: str, which: Which) -> Journal:
     """Open the journal of a file; raise StoreError if it does not exist."""
-    path = _path_of(place).expanduser().absolute()
+    path = at_home(str(path_of(place)), what="store").absolute()
     if not path.is_file():
-        raise StoreError(f"store {_path_of(place)} does not exist; choose another with --store")
+        raise StoreError(f"store {path_of(place)} does not exist; choose another with --store")
     reader = SqliteReader(path)
     if reader.is_empty():
         reader.close()
@@ -90,7 +90,7 @@ def read_parameters(place: str) -> dict[str, float]:
     A file of an older version, which may lack the table, is not migrated.
     """
     try:
-        path = _path_of(place).expanduser().absolute()
+        path = path_of(place).expanduser().absolute()
         if not path.exists():
             return {}
         with closing(SqliteReader(path)) as reader:
@@ -99,7 +99,8 @@ def read_parameters(place: str) -> dict[str, float]:
         raise StoreError(f"store {place}: {error}") from error
 
 
-def _path_of(place: str) -> Path:
+def path_of(place: str) -> Path:
+    """Return the file of a store; for "" the one in the user's data folder."""
     return Path(place or user_data_path("mav-tasks", appauthor=False) / DEFAULT_STORE)
 
 

@@ -159,7 +159,10 @@ class Drive:
             left = time_left(task.goal, here, self._known(task, seen, motion))
             if end := self._end_of_way(task, left.metres, now=now):
                 return end
-        if not self._bounds.allows_stage(single, here, motion.pose, seen.origin):
+        metres = self._bounds.metres_to_leave(single, here, motion.pose, seen.origin)
+        if metres is not None:
+            words = f"would leave the fence in task {task.id} after {metres:.1f} m"
+            self._registry.record(VehicleNoted(task.vehicle, words, now))
             return _refused(task)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         driving = self._settings.driving

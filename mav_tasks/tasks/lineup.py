@@ -73,6 +73,8 @@ class Lineup:
         self.displaced = LedAway()
         #: why the queue is paused, or NONE
         self.paused = R.NONE
+        #: when another vehicle with its id was heard last
+        self.twin_heard_at = -inf
         #: the halts of the vehicle
         self.halts = Halts()
         #: the task that runs although the queue is paused

@@ -15,7 +15,9 @@ from mav_tasks.tasks.view import VehicleView
 
 R, S = TaskReason, TaskState
 
-#: what a release waits for while a vehicle reboots
+#: the vehicle, or the server, has restarted in the middle of the task
+AFTER_RESTART = frozenset({R.FRAME_RESET, R.OUTCOME_UNKNOWN})
+#: what a release waits for then
 OF_RESTART = frozenset({R.VEHICLE_SILENT, R.NO_POSITION})
 
 
@@ -41,9 +43,9 @@ class Releases:
         """Resume a held task from here: all of it (``again``), or its remainder.
 
         Raise Rejection, and change nothing, if the task could not take the vehicle now. If the
-        queue is paused, or the vehicle has rebooted and is not ready, the task waits for that, for
-        ``ready_timeout`` at most for the reboot, or until something halts it. It does not wait for
-        a queue that is paused for a restart if the client ``may_continue`` it.
+        queue is paused, or the vehicle or the server has restarted and the vehicle is not ready,
+        the task waits for that, for ``ready_timeout`` at most, or until something halts it. It does
+        not wait for a queue that is paused for a restart if the client ``may_continue`` it.
         """
         if self._lineup.is_stopped:
             raise Rejection(R.STOPPED, CONTINUE_FIRST)
@@ -102,10 +104,12 @@ class Releases:
         """Return what a released task waits for: the queue, or a reboot; NONE if it can start."""
         if self._lineup.paused and not (self._lineup.paused is R.RESTARTED and may_continue):
             return R.QUEUE_PAUSED
-        if task.reason is not R.FRAME_RESET:
+        if task.reason not in AFTER_RESTART:
             return R.NONE
         if seen.heard and seen.is_booting:  # it shows another mode for a moment
             return R.NO_POSITION
+        if seen.is_engaged:  # it is still being put in HOLD
+            return R.NOT_READY
         blocker = self._lineup.blocker(seen, goal_of(task), now=now)
         return blocker if blocker in OF_RESTART else R.NONE
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from mav_tasks.tasks.cron import utc_text
 from mav_tasks.tasks.repetition import repeat_words
 from mav_tasks.tasks.task import Terms
 
@@ -42,7 +43,7 @@ def _start_of(terms: Terms, at: float) -> str:
     if terms.start_at is not None:
         starts.append(f"start in {_seconds(terms.start_at, at)}")
     if terms.start_utc is not None:
-        starts.append(f"start at {terms.start_utc} s UTC")  # since 1970
+        starts.append(f"start at {utc_text(terms.start_utc)}")
     return " and ".join(starts) or "no start time"
 
 

@@ -51,6 +51,7 @@ class VehicleView:
     is_untouched: bool = False  # it is being taken, but no request was sent yet
     is_booting: bool = False  # it shows a booting mode, and accepts no other yet
     drives_on: bool = False  # it must stop without setpoints (a setting), but may not
+    is_engaged: bool = False  # the server is doing something to it
     is_ours: bool = True  # False: the gateway's lease is not renewed, another one may get it
 
     @property

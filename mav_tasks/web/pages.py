@@ -10,7 +10,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from mav_tasks.errors import UsageError
+from mav_tasks.errors import UsageError, missing
 from mav_tasks.web.tiles import Tiles
 
 STATIC = Path(__file__).parent / "static"
@@ -64,5 +64,5 @@ def _leaflet() -> Path:
     except ModuleNotFoundError:
         found = None
     if found is None or found.origin is None:
-        raise UsageError("the web page needs the package XStatic-Leaflet: install mav-tasks[web]")
+        raise UsageError(f"the web page {missing('XStatic-Leaflet', 'web')}")
     return Path(found.origin).parent / "data"

@@ -9,7 +9,7 @@ from ipaddress import ip_address
 
 from mav_tasks import http_connections
 from mav_tasks.client.aio import Client
-from mav_tasks.errors import UsageError
+from mav_tasks.errors import UsageError, reason_of
 from mav_tasks.http_connections import HttpLimits, HttpServer, allow_files, under_load
 from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.mavlink.address import Address
@@ -49,7 +49,7 @@ def listening(options: WebOptions) -> socket.socket:
         return http_connections.listening(options.host, options.port)
     except OSError as error:
         where = f"{options.host}:{options.port}"
-        raise UsageError(f"--listen {where}: {error.strerror or error}") from error
+        raise UsageError(f"--listen {where}: {reason_of(error)}") from error
 
 
 def is_loopback(host: str) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from mav_tasks.errors import UsageError
+from mav_tasks.folders import at_home
 
 KINDS = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}
 DEEPEST = 22
@@ -73,7 +74,7 @@ def tiles_of(text: str) -> Tiles:
         if not all(part in text for part in ("{z}", "{x}", "{y}")) or '"' in text or ";" in text:
             raise UsageError(f"--tiles {text}: expected a URL with {{z}}, {{x}} and {{y}}")
         return Tiles(text, "", 0, 19, None)
-    path = Path(text).expanduser()
+    path = at_home(text, what="--tiles")
     if not path.is_file():
         raise UsageError(f"--tiles {text}: no such file; expected an MBTiles file or a URL")
     try:

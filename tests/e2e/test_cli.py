@@ -435,10 +435,31 @@ def test_a_rover_is_paused_stopped_and_goes_on(server: str, client: SyncClient) 
     assert "mav-tasks resume" in line
     assert client.queue().paused is not None
     assert called("stop", "--vehicle", "1", "--json", server=server).objects == [
-        {"done": "stop", "vehicle": 1, "cleared": False}
+        {"done": "stop", "vehicle": 1, "cleared": False, "ended_series": []}
     ]
     assert called("resume", "--json", server=server).objects == [{"done": "resume", "vehicle": 1}]
     assert client.queue().paused is None
+
+
+def test_stop_and_resume_name_the_series_that_have_ended(server: str) -> None:
+    patrol = ("submit", "wait", "9", "--every", "1h", "--label", "patrol", "--json")
+    (task,) = called(*patrol, server=server).objects
+    _, ended = called("stop", server=server).lines
+    named = f"STOP has ended the series {task['id']} (wait 9 s 'patrol', every 1h)"
+    assert ended.startswith(named)
+    (resumed,) = called("resume", server=server).lines
+    assert named in resumed
+
+
+def test_clear_names_the_task_that_it_leaves(server: str, client: SyncClient) -> None:
+    begun = client.submit(Wait(60.0))
+    wait_until(lambda: begun.refresh().is_active, within=10, what="a task that runs")
+    client.pause()
+    (line,) = called("clear", server=server).lines
+    assert f"task {begun.id} stays (paused); to cancel it: mav-tasks clear --all" in line
+    assert called("clear", "--all", "--yes", server=server).lines == [
+        "rover 1: all tasks cancelled"
+    ]
 
 
 def test_rovers_are_shown(server: str) -> None:
@@ -535,9 +556,8 @@ def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(
     ]
     away = tmp_path / "away.plan"
     for kind in ("fence", "rally"):
-        assert_one_line(called(kind, "upload", str(none), server=server), 2, "--empty")
-        taken = called(kind, "upload", str(none), "--empty", server=server)
-        assert taken.lines == [f"{kind}: 0 items"]
+        assert_one_line(called(kind, "upload", str(none), server=server), 2, f"{kind} clear")
+        assert called(kind, "clear", server=server).status == 0
     assert_one_line(called("fence", "download", str(away), server=server), 1, "no fence")
     assert not away.exists()
 

@@ -28,14 +28,17 @@ DOCKERFILE = (DEPLOY / "Dockerfile").read_text(encoding="utf-8")
 PROGRAM = str(Path(sys.executable).with_name("mav-tasks"))
 
 
-def test_systemd_takes_the_unit(tmp_path: Path) -> None:
+def test_systemd_takes_the_units(tmp_path: Path) -> None:
     if shutil.which("systemd-analyze") is None:
         pytest.skip("no systemd-analyze here")
-    unit = UNIT.replace("/opt/mav-tasks/bin/mav-tasks", PROGRAM)
-    unit = unit.replace("/opt/mav-tasks/README.md", str(ROOT / "README.md"))
-    path = tmp_path / "mav-tasks.service"
-    path.write_text(unit, encoding="utf-8")
-    command = ["systemd-analyze", "verify", "--recursive-errors=no", "--man=no", str(path)]
+    paths = []
+    for source in DEPLOY.glob("*.service"):
+        unit = source.read_text(encoding="utf-8").replace("/opt/mav-tasks/bin/mav-tasks", PROGRAM)
+        unit = unit.replace("/opt/mav-tasks/README.md", str(ROOT / "README.md"))
+        paths.append(str(tmp_path / source.name))
+        Path(paths[-1]).write_text(unit, encoding="utf-8")
+    assert len(paths) == 2
+    command = ["systemd-analyze", "verify", "--recursive-errors=no", "--man=no", *paths]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -271,4 +271,7 @@ def test_a_missing_package_is_named_with_what_installs_it(run: Run, tmp_path: Pa
     for way in ("--mcap", "--tlog"):
         done = mav_tasks("export", way, out, str(run.log), PYTHONPATH=str(tmp_path))
         assert done.status == 2
-        assert done.error == ("mav-tasks: needs the package mcap: pip install 'mav-tasks[mcap]'\n")
+        assert done.error == (
+            "mav-tasks: export needs the package mcap: run pip install '.[mcap]' in the folder of"
+            " mav-tasks\n"
+        )

@@ -189,7 +189,9 @@ def test_the_table_of_a_store_that_no_server_has(full: Path) -> None:
     assert {(row["event"], row["vehicle"], row["task"]) for row in rows} == {
         ("VehicleSeen", "1", "")
     }
-    assert export("--store", str(full), "--vehicle", "7") == (0, "", "")
+    status, printed, told = export("--store", str(full), "--vehicle", "7")
+    assert (status, printed) == (0, "")  # nothing to print: it says where it has looked
+    assert told == f"mav-tasks: no such event in {full}\n"
 
 
 def lines_until(follower: "subprocess.Popen[bytes]", words: str) -> Iterator[str]:

@@ -37,7 +37,7 @@ def test_a_port_in_use_is_named() -> None:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         result = run("serve", "--client", f"udpin:127.0.0.1:{port}", "--no-push")
-        assert_one_clear_line(result, f"127.0.0.1:{port}", "in use")
+        assert_one_clear_line(result, f"127.0.0.1:{port}", "in use", "ss -lntup")
         assert_one_clear_line(
             run("sim", "--port", str(port), "--body", "kinematic"), str(port), "in use"
         )
@@ -165,3 +165,56 @@ def test_the_rovers_own_help_is_shown() -> None:
     code, output, _ = run("sim", "--help")
     assert code == 0
     assert "--count" in output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("log", "--store", "~nosuchuser/x"),
+        ("web", "--records", "~nosuchuser/x"),
+        ("web", "--tiles", "~nosuchuser/x"),
+    ],
+)
+def test_the_home_of_nobody_is_named(words: tuple[str, ...]) -> None:
+    assert_one_clear_line(run(*words), "~nosuchuser/x")
+
+
+@pytest.mark.parametrize("words", [("--sign", "anna", "queue"), ("submit", "--sign", "anna")])
+def test_an_option_before_the_command_is_told_where_it_goes(words: tuple[str, ...]) -> None:
+    code, _, error = run(*words)
+    assert code == 2
+    assert "--sign stands before the command" in error
+
+
+@pytest.mark.parametrize("words", [("probe",), ("queue", "--server")])
+def test_a_missing_device_is_named(words: tuple[str, ...]) -> None:
+    code, _, error = run(*words, "serial:/dev/ttyUSB99:57600", "--timeout", "1")
+    assert code == 3
+    assert "/dev/ttyUSB99" in error
+    assert "No such file" in error
+    assert "--sign" not in error
+
+
+def test_the_doctor_says_what_is_wrong_and_what_helps(tmp_path: Path) -> None:
+    store = tmp_path / "tasks.sqlite3"
+    store.touch(mode=0o644)
+    configuration = tmp_path / "config.toml"
+    (port,) = free_udp_ports(1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        in_use = f"udpin:127.0.0.1:{taken.getsockname()[1]}"
+        configuration.write_text(
+            f'[links]\nclients = ["{in_use}"]\nvehicles = ["serial:/dev/ttyUSB99:57600"]\n'
+        )
+        code, said, error = run(
+            *("doctor", "--server", f"udpout:127.0.0.1:{port}", "--timeout", "0.3"),
+            *("--config", str(configuration)),
+            environment={"MAV_TASKS_STORE": str(store)},
+        )
+    assert (code, error) == (1, "")
+    wrong = {line.split()[1]: line for line in said.splitlines() if line.startswith("WRONG")}
+    assert "chmod 600" in wrong["store"]
+    assert in_use in wrong["clients"]
+    assert "no such device" in wrong["vehicles"]
+    assert "mav-tasks serve" in wrong["server"]
+    assert "ok     settings  valid" in said.splitlines()

@@ -19,7 +19,7 @@ from aiopenapi3 import OpenAPI
 from prometheus_client.parser import text_string_to_metric_families
 
 from mav_tasks import GoTo, LocalPlace, SyncClient, Wait
-from mav_tasks.cli.web import DEFAULT_LISTEN
+from mav_tasks.cli.options import DEFAULT_LISTEN
 from mav_tasks.client.wire import Goal
 from mav_tasks.web.events import EVENTS
 from mav_tasks.web.schemas import SCHEMAS

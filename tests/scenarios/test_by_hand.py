@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Settings, Watch
+from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -304,3 +305,13 @@ def test_what_was_set_aside_is_held_when_somebody_led_the_rover_away(world: Worl
     world.client.proceed()
     world.run(3)
     assert (world.state(1), world.stands()) == ((S.HELD, R.OFF_TRACK), True)
+
+
+def test_a_takeover_by_a_stations_sticks_names_the_station(world: World) -> None:
+    world.client.move(20)
+    world.run(0.1)
+    world.client.send(common.MAVLink_manual_control_message(1, 1000, 0, 500, 0, 0))
+    world.run(0.1)
+    (pause,) = world.events(QueuePaused)
+    assert pause.reason is R.TAKEOVER
+    assert pause.actor.startswith("255/190@")

@@ -145,6 +145,9 @@ def test_a_move_that_would_leave_it_fails_before_it_begins(world: World) -> None
     world.client.move(1)
     world.until_idle(tasks=2)
     assert world.state(1) == (S.FAILED, R.OUTSIDE_FENCE)
+    assert any(
+        "would leave the fence in task 1 after 3.0 m" in text for text in world.client.texts()
+    )
     assert world.state(2)[0] is S.COMPLETED
 
 

@@ -49,6 +49,7 @@ from tests.scenarios.conftest import MakeFleet
 CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
 PRIORITY = 1
 HEARTBEAT, COMMAND, TIMESYNC = 0, 76, 111
+QUEUE_STATUS, FLAGS = 54001, 77  # TASK_QUEUE_STATUS, and the byte of its flags
 OFF = Faults(silent=True, deaf=True)
 GOOD = Conditions()
 BRAKING = 3.5  # s, from the speeds driven here to a stand
@@ -610,6 +611,10 @@ def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes
     notes = [e.text for e in fleet.events(VehicleNoted)]
     assert notes == ["shares its id with a rover at twin: ignored. Give that one another id"]
     assert any("shares its id with a rover" in text for text in fleet.client.texts())
+    fleet.client.command(512, QUEUE_STATUS, target=(1, 191))
+    fleet.run(0.2)
+    *_, status = fleet.client.of_id(QUEUE_STATUS)
+    assert status.payload[FLAGS] == 1  # each client that asks later is told, too
     assert (twin.truth.north, twin.truth.east) == (50.0, 5.0)
     asked = {HEARTBEAT, TIMESYNC, COMMAND}  # which vehicle it is
     assert {data[7] for _, data in fleet.watched.towards["twin"]} == asked

@@ -508,3 +508,22 @@ def test_the_remainder_after_an_orderly_end_is_right_within_5_cm(
         world.client.proceed()
     world.until_idle(tasks=1)
     assert world.truth.north == pytest.approx(8.0, abs=0.05)
+
+
+@pytest.mark.parametrize("after", [0.7, 1.5])
+def test_a_release_just_after_a_crash_waits_for_the_rover(
+    world: World, path: Path, after: float
+) -> None:
+    """The rover may not have been heard yet, or still show the mode in which it was left."""
+    world.client.move(5.0)
+    world.run(3)
+    restart(world, path, away=0.3, settles=after)
+    seen = world.client.request_status(1)
+    world.until(lambda: seen.answer is not None, within=2)
+    world.run(0.05)
+    sent = world.client.command(RELEASE, 1, REMAINDER, world.client.statuses(1)[-1].halt_epoch)
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, 1)
+    world.until_idle(tasks=1)
+    assert world.state(1) == (S.COMPLETED, R.NONE)
+    assert near_pose(world.pose(), (5.0, 0.0, 0.0), metres=0.04)

@@ -70,7 +70,7 @@ class Forwarder:
                 continue
             if not refusing:
                 for vehicle in vehicles:
-                    passed(vehicle, client.key, row, message, now=now)
+                    passed(vehicle, client, row, message, now=now)
                 vehicles[0].requests.forward(packet)
                 continue
             for vehicle in vehicles if row.needs_grant else ():

@@ -84,13 +84,13 @@ def may_pass(
 
 
 def passed(
-    vehicle: Vehicle, client: Hashable, row: Row, message: m.Message | None, *, now: float
+    vehicle: Vehicle, client: GcsClient, row: Row, message: m.Message | None, *, now: float
 ) -> None:
     """Note the effect on the tasks of a packet that is forwarded to the vehicle."""
     if row.needs_grant:
-        vehicle.parts.authority.note_client(client, now=now)
+        vehicle.parts.authority.note_client(client.key, now=now)
     elif isinstance(message, m.ManualControl | m.RcChannelsOverride) and _off_centre(message):
-        vehicle.joint.sticks_moved(now=now)
+        vehicle.joint.sticks_moved(actor=str(client.who), now=now)
 
 
 def _asks_to_stand(message: m.Message | None) -> bool:

@@ -39,6 +39,9 @@ R = TaskReason
 
 NEVER = 0xFFFFFFFF  # TASK_QUEUE_STATUS.heartbeat_age: no heartbeat came
 
+SHARES_ID = 1  # TASK_QUEUE_STATUS.flags
+TWIN_FOR = 10.0  # s for which the other one is told of after its last heartbeat
+
 #: results of a command that has halted a vehicle; FAILED: it is silent, or the halt is not kept
 IN_FORCE = (MavResult.ACCEPTED, MavResult.FAILED)
 #: MAV_RESULT of each refusal reason; DENIED for all others
@@ -206,7 +209,7 @@ def queue_status(
         capacity=tasks.settings.queueing.capacity,
         counts=counts,
         paused_reason=tasks.paused,
-        flags=0,
+        flags=SHARES_ID * (now - tasks.twin_heard_at < TWIN_FOR),
         halt_epoch=tasks.halts.epoch & 0xFFFFFFFF,
         heartbeat_age=age,
         gateway=gateway,

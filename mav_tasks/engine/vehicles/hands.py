@@ -87,7 +87,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             return tasks.pause(TaskReason.OPERATOR, actor=word.actor, now=now)
         case Effect.PAUSE_TAKEN:
             reason = word.reason if word.reason in TAKEN else TaskReason.TAKEOVER
-            return tasks.pause(reason, actor=parts.actor, now=now)
+            return tasks.pause(reason, actor=word.actor, now=now)
         case Effect.LATCH:
             return tasks.stop(clear=word.clear, actor=word.actor, now=now)
         case Effect.HOLD_TASK:

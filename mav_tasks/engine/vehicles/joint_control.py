@@ -110,9 +110,9 @@ class JointControl:
         word = Word(R.OTHER_CONTROLLER, str(who), f"also controlled by {who}")
         self.on(Event.SECOND, word, now=now)
 
-    def sticks_moved(self, *, now: float) -> None:
+    def sticks_moved(self, *, actor: str, now: float) -> None:
         """Let go: a client sends manual control input."""
-        word = Word(R.TAKEOVER, self._parts.actor, "manual control")
+        word = Word(R.TAKEOVER, actor, "manual control")
         self.on(Event.DRIVEN_BY_HAND, word, now=now)
 
     def check_late(self, *, now: float) -> None:

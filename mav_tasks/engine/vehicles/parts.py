@@ -169,5 +169,6 @@ class Parts:
             turning_radius=persona.turning_radius or self.settings.driving.turning_radius,
             is_unknown=self._is_unknown(now=now),
             drives_on=drives_on,
+            is_engaged=control.is_engaged,
             is_ours=self.lease.is_trusted,
         )

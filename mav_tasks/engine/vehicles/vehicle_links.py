@@ -215,6 +215,7 @@ class VehicleLinks:
         if why:
             words = f"shares its id with a rover at {_named(peer)}: ignored{why}"
             self._note_once(number, words, now=now)
+            vehicle.tasks.twin_heard_at = now
         elif len(outlets) < MAX_PEERS or peer in outlets:
             if is_gone or is_better if way.is_same else is_gone and is_beat and not is_another:
                 outlets[peer] = outlet

@@ -3,9 +3,9 @@
 ``session`` sends SQL, ``ownership`` decides which server may write, ``database`` writes batches.
 """
 
-from mav_tasks.errors import StoreError
+from mav_tasks.errors import StoreError, missing
 
 try:
     import psycopg as psycopg
 except ImportError as error:  # it, or its compiled part
-    raise StoreError("needs the package psycopg: pip install 'mav-tasks[fleet]'") from error
+    raise StoreError(missing("psycopg", "fleet")) from error

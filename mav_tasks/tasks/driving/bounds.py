@@ -52,10 +52,11 @@ class Bounds:
         fence = self.local(origin)
         return fence is None or fence.allows(LocalPlace(pose.north, pose.east))
 
-    def allows_stage(
+    def metres_to_leave(
         self, goal: SingleGoal, progress: Progress, pose: Pose, origin: GlobalPlace | None
-    ) -> bool:
-        """Return whether the way of a goal that starts or resumes here stays within the fence.
+    ) -> float | None:
+        """Return after how many metres the way of a goal that starts or resumes here leaves the
+        fence; None: it stays inside, 0.0: at once, or somewhere in its bends.
 
         From outside, the way may lead back in. A goal without a place to end at is allowed, and
         watched while it drives.
@@ -63,12 +64,13 @@ class Bounds:
         fence = self.local(origin)
         end = _end_of(goal, progress)
         if fence is None or end is None:
-            return True
+            return None
         start = LocalPlace(pose.north, pose.east)
         if progress.path and progress.anchor is not None:
             left = rest_of(progress.path, progress.done)
-            return is_allowed(pose_on(progress.anchor, progress.path, progress.done), left, fence)
-        return fence.allows_way(start, end) or fence.escapes(start, end)
+            there = pose_on(progress.anchor, progress.path, progress.done)
+            return None if is_allowed(there, left, fence) else 0.0
+        return None if fence.escapes(start, end) else fence.first_forbidden(start, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:
         """Return a step to which the straight way from the place before crosses the fence, or None.

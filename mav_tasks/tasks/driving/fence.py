@@ -105,7 +105,12 @@ class LocalFence:
 
     def allows_way(self, start: LocalPlace, end: LocalPlace) -> bool:
         """Return whether every place of the straight way is allowed, including both ends."""
-        return all(is_allowed for _, is_allowed in self._walk(_Way(start, end)))
+        return self.first_forbidden(start, end) is None
+
+    def first_forbidden(self, start: LocalPlace, end: LocalPlace) -> float | None:
+        """Return how far along a straight way its first forbidden place is, in m, or None."""
+        walk = self._walk(_Way(start, end))
+        return next((along for along, is_allowed in walk if not is_allowed), None)
 
     def escapes(self, start: LocalPlace, end: LocalPlace) -> bool:
         """Return whether the straight way leads back from a forbidden place.
@@ -124,10 +129,8 @@ class LocalFence:
         reach = limit if forward else -limit
         start = LocalPlace(pose.north, pose.east)
         end = LocalPlace(pose.north + reach * cos(pose.yaw), pose.east + reach * sin(pose.yaw))
-        for along, is_allowed in self._walk(_Way(start, end)):
-            if not is_allowed:
-                return min(along, limit)
-        return limit
+        along = self.first_forbidden(start, end)
+        return limit if along is None else min(along, limit)
 
     def _walk(self, way: "_Way") -> Iterator[tuple[float, bool]]:
         """Yield (metres along a way, whether its places are allowed from there on), in order.

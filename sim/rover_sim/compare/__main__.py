@@ -3,7 +3,7 @@
 import sys
 from importlib.util import find_spec
 
-NO_PYMAVLINK = "compare_rovers: pymavlink is not installed: pip install 'mav-tasks[demo]'"
+NO_PYMAVLINK = "compare_rovers: pymavlink is not installed: run tools/setup"
 USAGE_ERROR = 2
 INTERRUPTED = 130  # the shell's status for SIGINT
 

@@ -160,7 +160,8 @@ class ThirdParty:
         )
 
     def _take_status(self, message: Any) -> None:
-        payload = bytes(message.get_msgbuf()[10:-2]).ljust(108, b"\0")[:108]
+        packet = bytes(message.get_msgbuf())  # a signature may follow the payload
+        payload = packet[10 : 10 + packet[1]].ljust(108, b"\0")[:108]
         fields = struct.unpack("<5I4f4H10B50sI", payload)
         task_id, execution_time, position = fields[1], fields[8], fields[10]
         state, progress = fields[15], fields[18]

@@ -203,7 +203,10 @@ def test_a_rover_that_is_silent_before_its_task_has_moved_it_ends_no_server(
     world.run(6)
     mend(world)
     world.run(8)
-    assert world.client.pause().result in (None, ACCEPTED)
+    paused = world.client.pause()
+    world.run(0.3)
+    assert paused.result == ACCEPTED
+    assert world.state(1)[0] is S.PAUSED
 
 
 @pytest.mark.parametrize("word", [command_long(CANCEL, 0), command_long(CLEAR, 1)])

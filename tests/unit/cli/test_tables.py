@@ -4,6 +4,7 @@ import io
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from math import inf, pi
+from pathlib import Path
 
 import pytest
 from rich.cells import cell_len
@@ -175,10 +176,10 @@ def test_finished_tasks_say_how_and_when_they_ended() -> None:
     with console.capture() as captured:
         console.print(history_table([DONE, CANCELLED, STUCK], now=NOW, width=80))
     assert [line.rstrip() for line in captured.get().splitlines()] == [
-        "id  state      goal           reason       ended (CET)  run time   done       by",
-        "12  completed  rotate 90 deg                  14:02:00     12.3s  100 %  244/190",
-        " 9  cancelled  move 2 m               2026-11-23 14:03              0 %  244/190",
-        " 8  failed     rotate 90 deg  stuck                        12.3s  100 %  244/190",
+        "id  state      goal           reason       ended (CET)  run time   done",
+        "12  completed  rotate 90 deg                  14:02:00     12.3s  100 %",
+        " 9  cancelled  move 2 m               2026-11-23 14:03              0 %",
+        " 8  failed     rotate 90 deg  stuck                        12.3s  100 %",
     ]
 
 
@@ -247,7 +248,7 @@ def test_why_it_waits_has_the_rovers_own_words() -> None:
 def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
     assert "release it: mav-tasks release 12" in words.line_of(HELD)
     released = replace(HELD, reason=TaskReason.NO_POSITION)
-    assert words.way_on_of(released) == ""
+    assert words.way_on_of(released) == "wait for its position, or check its GPS"
 
 
 @pytest.mark.parametrize(
@@ -387,7 +388,7 @@ DISARMED = replace(WAITING, reason=TaskReason.DISARMED, words="move 2 m: queued 
         ),
         (TaskReason.OUTSIDE_OWN_FENCE, "drive it back manually, or switch that fence off"),
         (TaskReason.BEHIND_OTHERS, ""),
-        (TaskReason.OTHER_CONTROLLER, ""),
+        (TaskReason.OTHER_CONTROLLER, "end the other program that drives it"),
     ],
 )
 def test_one_of_several_rovers_is_named_in_the_command(reason: TaskReason, said: str) -> None:
@@ -460,3 +461,11 @@ def test_no_heading_is_360(yaw: float, shown: str) -> None:
         console.print(vehicle_table([rover], width=120))
     assert f" {shown}" in captured.get()
     assert vehicle_json(replace(rover, yaw=-1e-9))["heading"] == 0.0
+
+
+def test_the_guide_names_each_field_of_json() -> None:
+    guide = (Path(__file__).parents[3] / "mav_tasks/GUIDE.md").read_text(encoding="utf-8")
+    part = guide[guide.index("### The fields of --json") : guide.index("### Any rover")]
+    queue = queue_json(QUEUE)
+    for name in (*task_json(WAITING), *history_json(DONE, now=NOW), *queue):
+        assert f"`{name}`" in part, name

@@ -11,9 +11,9 @@ from math import inf, nan
 import pytest
 
 from mav_tasks.errors import UsageError
-from mav_tasks.logs.export import COLUMNS, csv_entry, json_entry, parse_since, text_entry
+from mav_tasks.logs.export import COLUMNS, csv_entry, json_entry, parse_moment, text_entry
 from mav_tasks.logs.lines import json_line
-from mav_tasks.logs.rendering import clean, level_of, utc_text
+from mav_tasks.logs.rendering import clean, in_commands, level_of, utc_text
 from mav_tasks.tasks.events import (
     Event,
     PlanStored,
@@ -250,13 +250,13 @@ def test_what_came_from_the_wire_gives_no_orders_to_a_terminal() -> None:
     ],
 )
 def test_since_when(text: str, utc: float) -> None:
-    assert parse_since(text, now=10_000.0) == utc
+    assert parse_moment("--since", text, now=10_000.0) == utc
 
 
 @pytest.mark.parametrize("text", ["", "2", "2x", "-2h", "yesterday", "2026-13-01"])
 def test_since_when_is_not_understood(text: str) -> None:
     with pytest.raises(UsageError, match="--since"):
-        parse_since(text, now=0.0)
+        parse_moment("--since", text, now=0.0)
 
 
 @pytest.mark.parametrize(
@@ -275,3 +275,18 @@ def test_since_when_is_not_understood(text: str) -> None:
 )
 def test_what_needs_a_hand_is_a_warning(event: Event, level: int) -> None:
     assert level_of(event) == level
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("STOP in force: press Continue first", "STOP in force: run 'mav-tasks resume' first"),
+        (
+            'task 3 is held. Press "Held: remainder", "Held: again" or "Held: skip", then Continue',
+            "task 3 is held. run 'mav-tasks release again|remainder|skip', then 'mav-tasks resume'",
+        ),
+        ("task 3 moved on", "task 3 moved on"),
+    ],
+)
+def test_people_at_a_command_line_read_commands_not_buttons(text: str, shown: str) -> None:
+    assert in_commands(text) == shown

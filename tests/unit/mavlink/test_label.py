@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mav_tasks.mavlink.label import MAX_LABEL, PIECE, Piece, check_label, pieces_of, with_piece
+from mav_tasks.mavlink.label import MAX_LABEL, PIECE, Piece, check_label, text_pieces, with_piece
 
 INT32 = range(-(2**31), 2**31 - 1)  # the largest of them means "not given" in some clients
 
@@ -16,7 +16,7 @@ LABELS = st.text(max_size=MAX_LABEL).filter(
 @given(LABELS, LABELS)
 def test_pieces_make_the_label_in_place_of_any_other(label: str, before: str) -> None:
     known = before
-    for piece in pieces_of(label):
+    for piece in text_pieces(label):
         assert piece.x in INT32
         assert piece.y in INT32
         known = with_piece(known, piece)
@@ -26,9 +26,9 @@ def test_pieces_make_the_label_in_place_of_any_other(label: str, before: str) ->
 
 
 def test_a_label_of_plain_letters_takes_three_pieces_at_the_most() -> None:
-    assert [piece.offset for piece in pieces_of("x" * MAX_LABEL)] == [0, PIECE, 2 * PIECE]
-    assert pieces_of("") == [Piece(0, 0, 0)]
-    assert pieces_of("ABCDEFGH") == [Piece(0, 0x44434241, 0x48474645)]
+    assert [piece.offset for piece in text_pieces("x" * MAX_LABEL)] == [0, PIECE, 2 * PIECE]
+    assert text_pieces("") == [Piece(0, 0, 0)]
+    assert text_pieces("ABCDEFGH") == [Piece(0, 0x44434241, 0x48474645)]
 
 
 @pytest.mark.parametrize("label", ["x" * 25, "ä" * 13, "two\nlines", " gap", "gap ", "\x07"])

@@ -23,7 +23,7 @@ AT = 100.0
         (replace(BEFORE, after=0), "runs after no other task"),
         (replace(BEFORE, start_at=160.04), "start in 60 s"),
         (replace(BEFORE, start_at=None), "no start time"),
-        (replace(BEFORE, start_at=None, start_utc=1_795_255_200), "start at 1795255200 s UTC"),
+        (replace(BEFORE, start_at=None, start_utc=1_795_255_200), "start at 2026-11-21 10:00 UTC"),
         (replace(BEFORE, deadline=190.5), "deadline in 90.5 s"),
         (replace(BEFORE, deadline=None), "no deadline"),
         (replace(BEFORE, is_preemptible=False), "not pre-emptible"),
