@@ -37,21 +37,22 @@ def _task(label: str, description: str, command: MavCmd, *params: float) -> Acti
     return Action(label, description, command, (*first, 0.0, 0.0, 0.0, PRIORITY))
 
 
-#: QGroundControl shows three in a row, and inserts one of its own in front while a rover is armed:
-#: the buttons that stop a rover come first, and the order must not change
+#: QGroundControl shows three in a row, the others after dragging it. In front it puts up to two of
+#: its own while a rover is armed, one without an unfinished mission: STOP is always visible, and
+#: the buttons for which it has none of its own come next (its mode menu has Hold)
 ACTIONS = (
     Action("STOP", "Stop at once; Continue ends it", MavCmd.TASK_STOP, (0.0,)),
-    Action("Pause", "Pause task and queue", MavCmd.DO_PAUSE_CONTINUE, (0.0,)),
     Action("Continue", "Resume task and queue; ends a STOP", MavCmd.DO_PAUSE_CONTINUE, (1.0,)),
+    Action("Held: remainder", "Finish the held task", MavCmd.TASK_RELEASE, (0.0, 1.0)),
+    Action("Held: skip", "Skip the held task", MavCmd.TASK_RELEASE, (0.0, 2.0)),
+    Action("Held: again", "Restart the held task here", MavCmd.TASK_RELEASE, (0.0, 0.0)),
+    Action("Pause", "Pause task and queue", MavCmd.DO_PAUSE_CONTINUE, (0.0,)),
+    Action("Cancel task", "Cancel the running task", MavCmd.TASK_CANCEL, (0.0,)),
+    Action("Clear queue", "Cancel all waiting tasks", MavCmd.TASK_CLEAR, (0.0,)),
     _task("Forward 1 m", "Queue: drive 1 m ahead", MavCmd.TASK_MOVE, 1.0),
     _task("Back 1 m", "Queue: drive 1 m backwards", MavCmd.TASK_MOVE, -1.0),
     _task("Right 90", "Queue: turn 90 degrees clockwise on the spot", MavCmd.TASK_ROTATE, 90.0),
     _task("Left 90", "Queue: turn 90 degrees anticlockwise", MavCmd.TASK_ROTATE, -90.0),
-    Action("Cancel task", "Cancel the running task", MavCmd.TASK_CANCEL, (0.0,)),
-    Action("Clear queue", "Cancel all waiting tasks", MavCmd.TASK_CLEAR, (0.0,)),
-    Action("Held: again", "Restart the held task here", MavCmd.TASK_RELEASE, (0.0, 0.0)),
-    Action("Held: remainder", "Finish the held task", MavCmd.TASK_RELEASE, (0.0, 1.0)),
-    Action("Held: skip", "Skip the held task", MavCmd.TASK_RELEASE, (0.0, 2.0)),
 )
 
 

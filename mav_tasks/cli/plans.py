@@ -102,7 +102,8 @@ async def upload_fence(file: PlanIn, common: Common) -> None:
     """Upload the fence from a file to the rover."""
     plan = read_plan(file)
     if not plan.fence:
-        raise UsageError(f"{file} has no fence; the rover's stays (mav-tasks fence clear removes it)")
+        words = "the rover's stays (mav-tasks fence clear removes it)"
+        raise UsageError(f"{file} has no fence; {words}")
     async with opened(common) as client:
         count = await client.set_fence(plan)
     output.say_done(common.json, "fence upload", f"fence: {count} items", items=count)

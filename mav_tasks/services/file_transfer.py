@@ -2,6 +2,7 @@
 
 MAVLink guide, "File Transfer Protocol". There are no files here. MAVProxy looks for a
 component's parameters in a file first, and waits 11 s for an answer before it asks in another way.
+Who reads an ArduPilot's parameters from its file asks nobody for a list.
 """
 
 from collections.abc import Hashable
@@ -12,14 +13,15 @@ from mav_tasks.mavlink.address import Address
 NETWORK = 0
 ACK, NAK = 128, 129
 FILE_NOT_FOUND = 10
-TERMINATE_SESSION = 1
+TERMINATE_SESSION, OPEN_TO_READ = 1, 4
 GIVEN_UP = 10.0  # s without a request, after which an autopilot itself may end a session
 #: opcodes that change no file, nor end all sessions, in one of which somebody may write: none,
 #: TerminateSession, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and BurstReadFile
 READING = frozenset({0, 1, 3, 4, 5, 14, 15})
 #: offsets in the payload: session after a 16-bit sequence number, then the opcode
-SESSION, OPCODE = 2, 3
+SESSION, OPCODE, DATA = 2, 3, 12
 BURST_READ = 15  # a whole file, unasked for each piece
+PARAMETERS = list(b"@PARAM/param.pck")  # ArduPilot's file of all parameters; options may follow
 
 
 def reads(request: m.FileTransferProtocol) -> bool:
@@ -30,6 +32,12 @@ def reads(request: m.FileTransferProtocol) -> bool:
 def is_burst(request: m.FileTransferProtocol) -> bool:
     """Whether one request is answered by many packets."""
     return bool(request.payload[OPCODE] == BURST_READ)
+
+
+def opens_parameters(request: m.FileTransferProtocol) -> bool:
+    """Whether a request opens the file of all parameters."""
+    payload = request.payload
+    return payload[OPCODE] == OPEN_TO_READ and payload[DATA:][: len(PARAMETERS)] == PARAMETERS
 
 
 class Writers:

@@ -537,9 +537,6 @@ def test_files_as_people_have_them_go_up_or_are_refused_in_words(
                 assert_one_line(done, 2, "there is no mission in it")
             else:
                 assert done.status == 0, (found.name, done.output)
-    file.write_bytes(FILES[0].data)
-    for kind in ("fence", "rally"):
-        assert called(kind, "upload", str(file), "--empty", server=server).status == 0
 
 
 def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(

@@ -29,6 +29,7 @@ def box(command: int, south: float, west: float, north: float, east: float) -> l
     return corners(command, (south, west), (north, west), (north, east), (south, east))
 
 
+ERROR = 3  # MAV_SEVERITY
 YARD = box(INCLUSION, -3, -3, 3, 3)
 SILENT_AT = 1.0  # m north, where it still drives fast
 LOCAL_POSITION_NED = 32
@@ -57,6 +58,17 @@ def test_a_place_outside_is_denied_and_one_inside_is_driven_to(world: World) -> 
     assert go_to(world, 2, 1) == (ACCEPTED, 1)
     world.until_state(1, S.COMPLETED)
     assert is_at(world, 2, 1)
+
+
+def test_a_click_outside_is_refused_in_a_box_on_the_map(world: World) -> None:
+    """QGroundControl's own popup has no reason, and a warning stands in a list only."""
+    fenced(world, *YARD)
+    station = world.add_client("station", reads_dialect=False)
+    for _ in range(2):  # a second click soon after gets no second box
+        station.command_int(REPOSITION, -1, 0, 0, 0, **at(4, 0), frame=GLOBAL)
+        world.run(1)
+    said = [m for m in station.of_type("STATUSTEXT") if "fence" in m.text]
+    assert [(m.text, m.severity) for m in said] == [("the place is outside the fence", ERROR)]
 
 
 def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:

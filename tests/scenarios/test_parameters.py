@@ -21,6 +21,7 @@ from tests.scenarios.conftest import MakeWorld
 
 ROVER, SERVER = (1, 1), (1, 191)
 REAL32, INT32 = 9, 6
+OPEN_FILE = 4  # opcode of FILE_TRANSFER_PROTOCOL
 NOT_THERE, OUT_OF_RANGE, NOT_ALLOWED = 1, 2, 3  # MAV_PARAM_ERROR
 
 
@@ -34,6 +35,12 @@ def ask(component: int, name: str = "", index: int = -1) -> Any:
 
 def put(name: str, value: float, *, component: int = 191, type_: int = REAL32) -> Any:
     return common.MAVLink_param_set_message(1, component, name.encode(), value, type_)
+
+
+def open_file(client: FakeClient, path: bytes) -> None:
+    payload = [0, 0, 0, OPEN_FILE, len(path), *[0] * 7, *path]
+    payload += [0] * (251 - len(payload))
+    client.send(common.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
 
 
 def told(client: FakeClient, source: tuple[int, int] = SERVER) -> list[tuple[str, float]]:
@@ -116,6 +123,23 @@ def test_who_begins_with_a_digest_gets_the_list(make_world: MakeWorld) -> None:
     world.client.send(ask(0, "_HASH_CHECK"))
     world.run(0.2)
     assert len(told(world.client)) == len(PARAMETERS)
+
+
+def test_who_reads_the_rovers_from_a_file_gets_the_list(make_world: MakeWorld) -> None:
+    """QGroundControl 4.4 asks an ArduPilot for a file, and then for no list."""
+    world = make_world()
+    open_file(world.client, b"@PARAM/param.pck?withdefaults=1")
+    world.run(0.1)
+    assert len(told(world.client)) == len(PARAMETERS)
+    world.client.send(ask_all(0))  # there is no such file, as on the simulated rover
+    world.run(0.1)
+    assert len(told(world.client)) == 2 * len(PARAMETERS)
+
+
+def test_who_reads_another_file_gets_no_list(world: World) -> None:
+    open_file(world.client, b"@SYS/threads.txt")
+    world.run(0.2)
+    assert told(world.client) == []
 
 
 def test_a_change_has_effect_and_everybody_is_told(world: World) -> None:

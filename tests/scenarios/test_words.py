@@ -34,8 +34,10 @@ def said(client: FakeClient) -> dict[str, int]:
     return {m.text: m.severity for m in client.of_type("STATUSTEXT") if not m.chunk_seq}
 
 
-def test_stop_pause_and_continue_are_the_first_buttons_and_stay_there() -> None:
-    assert [action.label for action in ACTIONS[:3]] == ["STOP", "Pause", "Continue"]
+def test_the_first_buttons_are_those_that_a_person_needs_at_a_halt() -> None:
+    """QGroundControl shows one to three of them; for a pause it has a mode, Hold."""
+    first = ["STOP", "Continue", "Held: remainder", "Held: skip"]
+    assert [action.label for action in ACTIONS[:4]] == first
 
 
 @pytest.mark.parametrize(("how", "why"), [("pause", "queue paused"), ("stop", "STOP in force")])

@@ -268,7 +268,10 @@ class GcsClient:
         self._say(text, severity, source)
 
     def tell_refusal(self, text: str, source: Address, *, now: float) -> None:
-        """Send the reason of a refusal; to a ground station that keeps trying, only once."""
+        """Send the reason of a refusal; to a ground station that keeps trying, only once.
+
+        There it is an ERROR: QGroundControl shows that in a box, anything less in a list only.
+        """
         if self.uses_dialect:  # a script gets the text of each refusal
             self.tell(text, MavSeverity.WARNING, source, now=now)
             return
@@ -278,7 +281,7 @@ class GcsClient:
         if len(self._refusals_told) >= MAX_REFUSALS_TOLD:
             self._refusals_told.clear()
         self._refusals_told[source, text] = now
-        self.tell(text, MavSeverity.WARNING, source, now=now)
+        self.tell(text, MavSeverity.ERROR, source, now=now)
 
     def answer_in_words(self, text: str, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT of an address that the client has just named, within the rate limit."""

@@ -18,7 +18,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import param_receiver
+from mav_tasks.services import file_transfer, param_receiver
 from mav_tasks.services.param_receiver import HASH_CHECK
 from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
 from mav_tasks.settings import Settings
@@ -27,7 +27,7 @@ from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Submitter
 
 LIST_EACH = 0.2  # s between lists: one packet asks for many, no client asks again so soon
-ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet
+ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet | m.FileTransferProtocol
 
 
 class _Wish(NamedTuple):
@@ -119,6 +119,7 @@ class ParameterServer:
                 self._answer(client, vehicle, packet, message, now=now)
             elif component == AUTOPILOT and _begins(message):
                 self._list(client, vehicle, now=now)
+                client.listed_at.clear()  # where there is no such file, it asks for a list at once
 
     def _answer(
         self,
@@ -237,5 +238,7 @@ class ParameterServer:
 
 
 def _begins(message: ParamMessage) -> bool:
-    """Whether a client with cached parameters asks for their hash; it may then skip the list."""
+    """Whether a client begins with the hash of all, or with the file; it may then skip the list."""
+    if isinstance(message, m.FileTransferProtocol):
+        return file_transfer.opens_parameters(message)
     return isinstance(message, m.ParamRequestRead) and message.param_id == HASH_CHECK

@@ -131,13 +131,8 @@ class ModeRequests:
         self._registry.record(started.asked.refuse(refusal, now=now))
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
-        """Start the mission of a vehicle that was to be armed first and is armed now.
-
-        If a client armed it in a manual mode and started the mission meanwhile, leave that mode.
-        """
+        """Start the mission of a vehicle that was to be armed first and is armed now."""
         armings = vehicle.parts.armings
-        if self._plans.is_starting(vehicle, now=now) and armings.are_by_client(now=now):
-            vehicle.joint.leave_manual(now=now)
         mark = vehicle.start_mark
         if mark.marker is None or not mark.is_put(now=now) or not vehicle.parts.is_armed(now=now):
             return

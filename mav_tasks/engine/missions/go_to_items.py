@@ -44,7 +44,7 @@ class GuidedItemRequest(CommandRequest):
         """Answer with the result and a text; return the event for the audit log."""
         del result
         self._ack(result_of(refusal))
-        self.tell(refusal.text, MavSeverity.WARNING, now=now)
+        self.tell(refusal.text, MavSeverity.ERROR, now=now)
         reason, number = TaskReason(refusal.reason), self.command.command
         return SubmissionRefused(
             self.vehicle.system_id, number, reason, refusal.text, self.actor, now

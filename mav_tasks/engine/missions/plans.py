@@ -36,7 +36,6 @@ R, S = TaskReason, TaskState
 MISSION = MavMissionType.MISSION
 STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
 NOT_STARTED = 2  # MISSION_STATE
-STARTS_WITHIN = 10.0  # s in which an arming under way, and its effect, may show
 STARTED_TWICE = 2.5  # s in which a second start counts as the first: MAVSDK sends two
 
 
@@ -223,13 +222,6 @@ class Plans:
         self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
         self._set_going(vehicle, task, actor=str(task.submitter), now=now)
         self._started[vehicle.system_id] = _Started(task.submitter, task.id, now)
-
-    def is_starting(self, vehicle: Vehicle, *, now: float) -> bool:
-        """Return whether a client has just started a mission that does not drive yet."""
-        started = self._started.get(vehicle.system_id)
-        if started is None or now - started.at > STARTS_WITHIN or vehicle.tasks.paused:
-            return False
-        return started.task_id in vehicle.tasks.waiting
 
     def _is_started_again(
         self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float

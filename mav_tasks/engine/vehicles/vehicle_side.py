@@ -485,7 +485,7 @@ class VehicleSide:
         for vehicle in self.all:
             there = vehicle.requests.place
             if sent_to == {place} and there == place:
-                self._note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
+                self.note_once(vehicle.system_id, ECHO.format(place[0]), now=now)
             elif not sent_to and target in (0, vehicle.system_id) and there[0] == place[0]:
                 self.deadline_heap.mark_dirty(vehicle)
                 vehicle.joint.second_controller(packet.source, now=now)
