@@ -85,14 +85,3 @@ def test_a_mission_that_was_accepted_starts(
     assert asked.answer is not None
     assert asked.answer[0] == ACCEPTED
     world.until_state(1, S.EXECUTING, within=8)
-
-
-def test_it_does_not_start_if_a_person_arms_in_manual(make_world: MakeWorld) -> None:
-    """Who arms at the rover itself means to drive: nobody takes it out of the manual mode."""
-    world = ready(make_world, ARDUPILOT, SHOWN_LATE)
-    asked = ask_for_mission(world, ARDUPILOT)
-    world.operator_arm(True)
-    world.run(5)
-    assert asked.answer is not None
-    assert world.rover.autopilot.mode is Mode.MANUAL
-    assert world.stands()
