@@ -23,13 +23,6 @@ CASES = (
     ("px4", "sync", 0.0),
     ("generic", "asyncio", LOSS),
 )
-#: each make on each net, and each face on each net; the full product would take ten minutes more
-VOLUME = (
-    ("ardupilot", "asyncio", 0.0),
-    ("px4", "asyncio", 0.0),
-    ("px4", "sync", LOSS),
-    ("generic", "sync", 0.0),
-)
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 150.0  # s for a script
 SEED = 20
@@ -40,9 +33,8 @@ TRIES = 8
 each_case = pytest.mark.parametrize(
     ("persona", "face", "loss"),
     [
-        pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}", marks=marks)
-        for cases, marks in ((CASES, ()), (VOLUME, (pytest.mark.volume,)))
-        for make, face, loss in cases
+        pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}")
+        for make, face, loss in CASES
     ],
 )
 each_net = pytest.mark.parametrize("loss", list(NETS), ids=list(NETS.values()))
