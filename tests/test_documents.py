@@ -190,8 +190,8 @@ def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
             rover.wait_for("rover 1")
             it.server.wait_for("rover 1: restarted")
             ended = [run(*shlex.split(command)[1:]) for command in told]
-    assert [done.status for done in ended] == [1, 0, 0]
-    moved, queue, resumed = ended
+    assert [done.status for done in ended] == [0, 1, 0, 0]
+    _, moved, queue, resumed = ended
     assert "failed (stuck)" in moved.output
     assert "queue paused (stuck); to resume: mav-tasks resume" in queue.output
     assert resumed.output == "rover 1: resumed\n"

@@ -10,6 +10,7 @@ from mav_tasks.client.calls import AGAIN, Call, Command
 from mav_tasks.client.connection import Connection
 from mav_tasks.client.session import WORDS_WITHIN, Answer, Reply, request_message
 from mav_tasks.client.values import (
+    REFUSES,
     News,
     TaskStatus,
     TaskTiming,
@@ -20,7 +21,7 @@ from mav_tasks.client.values import (
 from mav_tasks.errors import ClientError, NoAnswer, Refused
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType, MavSeverity
+from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.services.mission_item import Item, message_of
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
@@ -371,7 +372,7 @@ async def _words(heard: asyncio.Queue[Text | None], vehicle: int, *, otherwise: 
                 text = await heard.get()
                 if text is None:
                     return otherwise
-                if text.vehicle == vehicle and text.severity == MavSeverity.WARNING:
+                if text.vehicle == vehicle and text.severity in REFUSES:
                     return text.words
     except TimeoutError:
         return otherwise.lower().replace("_", " ")

@@ -14,6 +14,7 @@ from mav_tasks.client.fleet_view import KEPT, FleetView
 from mav_tasks.client.transfers import MESSAGES as TRANSFER_MESSAGES
 from mav_tasks.client.transfers import Transfers
 from mav_tasks.client.values import (
+    REFUSES,
     TaskStatus,
     TaskTiming,
     Text,
@@ -29,7 +30,7 @@ from mav_tasks.client.wire import SERVER
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.codec import Decoder, Encoder, Packer, target_of
-from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, MavState
+from mav_tasks.mavlink.enums import MavCmd, MavResult, MavState
 from mav_tasks.mavlink.float_param import to_param
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import text_receiver
@@ -325,7 +326,7 @@ class Session:
         view = self.fleet.get(vehicle)
         is_ours = view is not None and view.server_component in (None, component)
         is_ours |= text.sender == SERVER
-        if is_ours and text.severity == MavSeverity.WARNING:
+        if is_ours and text.severity in REFUSES:
             for refused in self._refused:
                 if refused.vehicle in (0, vehicle):
                     self._refused.remove(refused)

@@ -7,6 +7,7 @@ from math import inf, isfinite
 from typing import TypeVar
 
 from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, WAITING, TaskReason, TaskState, words_of
 
 E = TypeVar("E", bound=IntEnum)
@@ -162,6 +163,10 @@ class VehicleStatus:
     battery: float | None = None
     voltage: float | None = None
     is_ready: bool | None = None
+
+
+#: severities of the text that says why a request was refused
+REFUSES = (MavSeverity.ERROR, MavSeverity.WARNING)
 
 
 @dataclass(frozen=True, slots=True)

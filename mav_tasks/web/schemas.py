@@ -140,6 +140,7 @@ QUEUE = whole(
         "paused_remedy": or_null(TEXT, "what a person can do about it"),
         "halt_epoch": said(INTEGER, "grows with each event that halts the rover"),
         "heartbeat_age": or_null(NUMBER, "s since the rover's heartbeat"),
+        "shares_id": said(FLAG, "another rover has the same system id; it is ignored"),
         "gateway": or_null(TEXT, "gateway of a fleet that has the rover"),
         "waiting_count": said(INTEGER, "number of waiting tasks"),
         "capacity": said(INTEGER, "number of waiting tasks that there may be"),

@@ -66,7 +66,7 @@ def test_all_of_them_are_shown_and_one_is_stopped(chromium: Any, many: Web, shot
         page.click(".card >> nth=6 >> .pick")
         says(page, "#panel-queue .what", "Rover 7: no task runs, 50 wait")
         assert page.evaluate("document.querySelectorAll('#panel-queue .task').length") == EACH
-        assert page.evaluate(IN_SIGHT, "#panel-queue .task") >= 10
+        assert page.evaluate(IN_SIGHT, "#panel-queue .task") >= 8
         assert page.evaluate(CUT) == []
         judge(page, "twenty rovers")
         page.screenshot(path=str(shots / "twenty rovers.png"))
@@ -114,6 +114,7 @@ def test_tracks_and_goals_of_all_are_shown_if_they_are_wanted(
 ) -> None:
     goal = {"kind": "goto_global"}
     driven = []
+    many.post("/vehicles/1/clear", {})  # the goals of the rover that is shown are drawn, too
     for rover in range(2, 10):
         there = many.get(f"/vehicles/{rover}")
         place = {"latitude": there["latitude"] + 1e-5, "longitude": there["longitude"]}

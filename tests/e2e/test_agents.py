@@ -516,7 +516,10 @@ def test_other_machines_are_refused_and_a_port_in_use_is_named(over_http: str) -
     in_use = called("mcp", "--http", place)
     assert (in_use.status, in_use.error) == (
         2,
-        f"mav-tasks: --http {place}: Address already in use\n",
+        (
+            f"mav-tasks: --http {place}: Address already in use: end the program that has it"
+            " (ss -lntup names it), or choose another\n"
+        ),
     )
 
 

@@ -163,7 +163,7 @@ def test_who_waits_is_told_of_a_silence(there: Stand, client: SyncClient) -> Non
 def test_to_call_off_everything_is_asked_about(there: Stand, client: SyncClient) -> None:
     task = client.submit(Wait(60.0))
     with at(there, "clear", "--all") as screen:
-        screen.wait_for(lambda text: "including the running one? [y/N]:" in text)
+        screen.wait_for(lambda text: "also those that have begun? [y/N]:" in text)
         screen.type(b"n\n")
         assert screen.end() == 2
     assert screen.lines[-1].strip() == "mav-tasks: nothing was cancelled"

@@ -133,11 +133,11 @@ def test_streams_that_nobody_reads_and_requests_without_end_leave_room(page: Web
 
 
 def mission_of(items: int, rover: Any) -> str:
-    """Return a mission that begins near a rover."""
+    """Return a mission that begins near a rover, after a line for home."""
     latitude, longitude = rover["latitude"], rover["longitude"]
     lines = (
         f"{at}\t0\t3\t16\t0\t0\t0\t0\t{latitude + at * 1e-7:.8f}\t{longitude}\t0\t1\n"
-        for at in range(items)
+        for at in range(items + 1)
     )
     return "QGC WPL 110\n" + "".join(lines)
 

@@ -163,7 +163,7 @@ def test_a_task_of_any_rover_names_the_chosen_one(page: Web) -> None:
     again = page.post("/vehicles/any/tasks", move, idempotency_key="of any")
     assert first["vehicle"] == 1
     assert again["id"] == first["id"]
-    waypoint = "QGC WPL 110\n0\t1\t0\t93\t0.1\t0\t0\t0\t0\t0\t0\t1\n"
+    waypoint = "QGC WPL 110\n1\t1\t0\t93\t0.1\t0\t0\t0\t0\t0\t0\t1\n"
     mission = {"name": "x.waypoints", "text": waypoint}
     assert page.post("/vehicles/any/missions", mission)["vehicle"] == 1
 

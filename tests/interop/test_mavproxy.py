@@ -82,7 +82,7 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
 
 
 def connect(it: MavProxy) -> None:
-    it.wait_for(r"Received \d+ parameters", within=15)
+    it.wait_for(rf"Received (?!{len(PARAMETERS)} )\d+ parameters", within=15)  # the rover's
     it.wait_for("Detected vehicle 1:1 on")
     it.wait_for("Detected vehicle 1:191 on")
 

@@ -18,6 +18,10 @@ from mav_tasks.links.tcp_out import TcpOutLink, TcpOutUrl
 from mav_tasks.links.url import parse_url
 from tests.kit.clock import Clock
 
+#: what a person reads, and what helps
+IN_USE = (
+    "Address already in use: end the program that has it (ss -lntup names it), or choose another"
+)
 HOST = "127.0.0.1"
 LIMIT = 10.0  # s
 
@@ -323,7 +327,7 @@ def test_without_descriptors_it_waits_for_some(
 def test_a_port_in_use_is_one_clear_error(listening: TcpInLink) -> None:
     with pytest.raises(LinkOpenError) as error:
         TcpInLink(TcpInUrl("tcpin", HOST, listening.port), limits=TO_CLIENTS)
-    words = f"link tcpin:{HOST}:{listening.port} cannot be opened: Address already in use"
+    words = f"link tcpin:{HOST}:{listening.port} cannot be opened: {IN_USE}"
     assert str(error.value) == words
 
 

@@ -15,6 +15,10 @@ from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
 from mav_tasks.links.udp import COUNT, FIRST, UdpLink, UdpUrl, port_for
 from mav_tasks.links.url import parse_url
 
+#: what a person reads, and what helps
+IN_USE = (
+    "Address already in use: end the program that has it (ss -lntup names it), or choose another"
+)
 HOST = "127.0.0.1"
 
 
@@ -116,7 +120,7 @@ def test_a_port_in_use_is_one_clear_error(other: socket.socket) -> None:
     port = other.getsockname()[1]
     with pytest.raises(LinkOpenError) as error:
         UdpLink(UdpUrl("udpin", HOST, port))
-    assert str(error.value) == f"link udpin:{HOST}:{port} cannot be opened: Address already in use"
+    assert str(error.value) == f"link udpin:{HOST}:{port} cannot be opened: {IN_USE}"
 
 
 def test_a_host_that_is_none_is_one_clear_error() -> None:

@@ -60,7 +60,7 @@ def test_a_kind_whose_package_is_missing_says_what_to_install(
         open_store("postgresql://anna:secret@host/fleet")
     assert str(told.value) == (
         "store postgresql://anna@host/fleet: needs the package psycopg:"
-        " pip install 'mav-tasks[fleet]'"
+        " run pip install '.[fleet]' in the folder of mav-tasks"
     )
 
 
