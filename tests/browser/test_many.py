@@ -106,7 +106,7 @@ DRAWN = """() => { const canvas = document.querySelector('#map .leaflet-overlay-
   const data = pen.getImageData(0, 0, width, height).data;
   const alpha = data.filter((_, at) => at % 4 === 3);
   return [alpha.filter((each) => each > 200).length, alpha.filter((each) => each > 0).length]; }"""
-BOTH = f"() => {{ const [strong, all] = ({DRAWN})(); return strong > 20 && all > 2 * strong; }}"
+BOTH = f"() => {{ const [strong, all] = ({DRAWN})(); return strong > 20 && all > strong + 100; }}"
 
 
 def test_tracks_and_goals_of_all_are_shown_if_they_are_wanted(

@@ -213,8 +213,8 @@ def test_a_port_in_use_ends_the_start_before_a_rover_hears_anything(
         with process(*serve(tmp_path, *options), folder=tmp_path, name="server") as server:
             assert server.popen.wait(LIMIT) == 2
             assert server.text == (
-                f"mav-tasks: metrics: 127.0.0.1:{port} cannot be opened: Address already in use: end"
-                " the program that has it (ss -lntup names it), or choose another\n"
+                f"mav-tasks: metrics: 127.0.0.1:{port} cannot be opened: Address already in use:"
+                " end the program that has it (ss -lntup names it), or choose another\n"
             )
         with pytest.raises(BlockingIOError):
             rover.recv(1)
