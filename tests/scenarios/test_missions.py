@@ -294,7 +294,7 @@ def test_an_item_that_is_not_there_is_not_answered_as_by_an_ardupilot(world: Wor
 def test_without_a_mission_no_item_is_chosen(world: World) -> None:
     world.client.send(set_current(1))
     world.run(0.1)
-    assert "no plan is uploaded" in world.client.texts()
+    assert "there is no mission: upload one first" in world.client.texts()
 
 
 def test_an_upload_ends_with_the_connection_of_its_client(world: World) -> None:

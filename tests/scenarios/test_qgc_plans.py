@@ -155,7 +155,8 @@ def test_a_bad_item_is_named(make_world: MakeWorld, persona: Persona) -> None:
     party.plans.upload(FIRST._replace(waypoints=[place(1, 0), place(30_000, 0), place(1, 1)]))
     world.until(lambda: party.plans.is_done, within=5)
     number = 2 if persona is PROMPT else 1
-    (popup,) = party.popups
+    popup, box = party.popups  # its own, and the reason
+    assert box == "item 2 is 30.0 km away, more than 10 km"
     assert popup.startswith("Mission transfer failed. Error: ")
     assert popup.endswith(f"Item #{number} Command: 16")
     assert party.plans.outcome == {0: False, 1: True, 2: True}

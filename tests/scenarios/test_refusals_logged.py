@@ -61,7 +61,7 @@ def test_what_has_no_acknowledgement_has_its_line_too(world: World) -> None:
     world.run(0.1)
     first, second = refusals(world)
     assert f"message {SET_CURRENT} by" in first
-    assert "no plan is uploaded" in first
+    assert "there is no mission: upload one first" in first
     assert f"message {SET_MODE} by" in second
     assert "STOP" in second
 

@@ -40,7 +40,10 @@ def test_the_first_buttons_are_those_that_a_person_needs_at_a_halt() -> None:
     assert [action.label for action in ACTIONS[:4]] == first
 
 
-@pytest.mark.parametrize(("how", "why"), [("pause", "queue paused"), ("stop", "STOP in force")])
+@pytest.mark.parametrize(
+    ("how", "why"),
+    [("pause", ", or set Hold and click again (queue paused)"), ("stop", " (STOP in force)")],
+)
 def test_a_go_to_that_waits_for_a_button_is_a_warning_that_names_it(
     world: World, how: str, why: str
 ) -> None:
@@ -53,7 +56,7 @@ def test_a_go_to_that_waits_for_a_button_is_a_warning_that_names_it(
     screen.command_int(REPOSITION, -1, 1, 0, nan, **at(3, 0), frame=0, target=(1, 1))
     world.run(0.3)
     (text,) = (t for t in said(screen) if t.startswith("Task 2"))
-    assert text.startswith(f"Task 2 waits, press Continue ({why})"[:FIRST_PIECE])
+    assert text.startswith(f"Task 2 waits, press Continue{why}"[:FIRST_PIECE])
     assert said(screen)[text] == WARNING
 
 

@@ -72,16 +72,17 @@ class Sender:
         within = DOUBLED if is_counted or packet.raw in said.packets else COPIED
         return said.epoch if now - said.at <= within else None
 
-    def counts_on(self, content: Hashable, packet: Packet, copies: int, *, since: float) -> bool:
+    def counts_on(self, content: Hashable, packet: Packet, copies: int, *, within: float) -> bool:
         """Return whether a command's ``confirmation``, ``copies``, makes it a copy of another.
 
-        It has counted on since the last copy that came. Without one the first may be lost, unless
-        each of the sender's packets came ``since`` then: mavros always says 1.
+        It is one if the last copy that came says another number: it may be late. Otherwise the
+        first may be lost, unless each of the sender's packets ``within`` so many seconds came:
+        mavros always says 1.
         """
         said = self._said.get((self, content))
-        if said is not None and said.life == self.line.lives:
-            return copies > said.copies
-        return copies > 0 and not self.line.has_all(packet.seq, since=since)
+        if said is not None and said.life == self.line.lives and copies != said.copies:
+            return copies > 0
+        return copies > 0 and not self.line.has_all(packet.seq, within=within)
 
     def has_said(self, content: Hashable, packet: Packet) -> bool:
         """Return whether this very packet came before, since the sender last restarted."""

@@ -52,7 +52,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     content = (asked.command.target, asked.command.command, repr(asked.command.params))
     copies = asked.command.confirmation
     window = min(copies * COPIED, DOUBLED)
-    is_counted = sender.counts_on(content, packet, copies, since=asked.arrived - window)
+    is_counted = sender.counts_on(content, packet, copies, within=window)
     first = sender.first_epoch(
         content,
         packet,

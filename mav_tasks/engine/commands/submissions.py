@@ -299,7 +299,8 @@ class Submissions:
         if tasks.immediate == task.id:
             words, is_blocked = f"Task {task.id} starts now: {goal}", False
         elif paused:  # somebody else may have paused
-            again = ", or set Hold and click again" if asked.is_go_to else ""
+            is_click = asked.is_go_to and not tasks.is_stopped
+            again = ", or set Hold and click again" if is_click else ""
             why = PAUSED.get(paused, words_of(paused))
             words = f"Task {task.id} waits, press Continue{again} ({why}): {goal}"
         elif tasks.is_held_ahead:

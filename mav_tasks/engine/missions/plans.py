@@ -36,6 +36,7 @@ R, S = TaskReason, TaskState
 MISSION = MavMissionType.MISSION
 STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
 NOT_STARTED = 2  # MISSION_STATE
+NO_PLAN = "there is no mission: upload one first"
 STARTED_TWICE = 2.5  # s in which a second start counts as the first: MAVSDK sends two
 
 
@@ -177,7 +178,7 @@ class Plans:
             return active
         _check_state(task)
         if not stored.items:
-            raise Rejection(R.NOT_FOUND, "no plan is uploaded")
+            raise Rejection(R.NOT_FOUND, NO_PLAN)
         if first >= len(stored.items):
             words = f"param1 first item {first}: the plan has {len(stored.items)} items"
             raise Rejection(R.BAD_PARAMETER, words, param=1)
@@ -255,12 +256,12 @@ class Plans:
         if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
             count = len(task.goal.steps)
         if not count:
-            raise Rejection(R.NOT_FOUND, "no plan is uploaded")
+            raise Rejection(R.NOT_FOUND, NO_PLAN)
         if seq >= count:
             has_home = self._has_home(vehicle)
             number, last = (number_of(n, has_home=has_home) for n in (seq, count - 1))
             if last < 1:
-                raise Rejection(R.BAD_PARAMETER, "there is no mission: upload one first", param=1)
+                raise Rejection(R.BAD_PARAMETER, NO_PLAN, param=1)
             raise Rejection(R.BAD_PARAMETER, f"item {number}: the last item is {last}", param=1)
         if task is None or task.state in TERMINAL:
             self.begin_at(vehicle, seq)

@@ -7,6 +7,7 @@ from typing import Any
 
 from mav_tasks.engine.clients.sender import Memory, Sender
 from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -33,6 +34,8 @@ def objects(root: object) -> Iterator[tuple[str, Any]]:
     left: list[tuple[str, Any]] = [("", root)]
     while left:
         path, thing = left.pop()
+        if isinstance(thing, Outgoing):  # one of the last packets, by which echoes are known
+            continue
         yield path, thing
         if isinstance(thing, (*PLAIN, int)) or thing is None or id(thing) in seen:
             continue

@@ -13,6 +13,7 @@ LARGER = {
     "_last_event": 12_000,
     "_next": 1_100,  # sources of packets, see SequenceKeeper
     "_offset": 1_100,
+    "_sent": 1_024,  # packets to vehicles, by which their echoes are known
     "_last": 8_000,  # streams: about 30 messages for each possible component of a vehicle
 }
 LEAVES = (str, bytes, int, float, bool, type(None))

@@ -160,7 +160,7 @@ def test_disarming_ends_what_waits_for_a_silent_rover(world: World, hears: bool)
     world.run(1)
     world.operator_arm(True)
     assert stays(world, 10)
-    assert world.paused() is R.TAKEOVER
+    assert world.paused() is R.OPERATOR
 
 
 @pytest.mark.parametrize("halt", ["disarm", "pause", "switch"])

@@ -7,7 +7,7 @@ import pytest
 from mav_tasks.settings import Settings
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.client import ACCEPTED, HOLD, RTL, command_long
-from tests.kit.world import PROMPT, World
+from tests.kit.world import PROMPT, World, put_home
 from tests.scenarios.attacks.test_late_arming import mode_of
 from tests.scenarios.attacks.test_late_to_the_rover import mend
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home
@@ -52,6 +52,8 @@ def test_one_that_drives_home_during_a_gap_is_stopped_after_it(
     world.run(40)
     world.client.arm()
     world.run(2)
+    put_home(world, 0, 0)
+    world.run(1)
     world.client.send(command_long(RETURN, target=ELSEWHERE))
     world.run(1.5)
     cut(world)

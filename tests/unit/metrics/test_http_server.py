@@ -174,8 +174,8 @@ def test_an_address_that_cannot_be_opened_is_named() -> None:
     with listening(f"127.0.0.1:{number}", what="metrics"), pytest.raises(UsageError) as refused:
         listening(f"127.0.0.1:{number}", what="metrics")
     assert str(refused.value) == (
-        f"metrics: 127.0.0.1:{number} cannot be opened: Address already in use;"
-        " choose another address"
+        f"metrics: 127.0.0.1:{number} cannot be opened: Address already in use:"
+        " end the program that has it (ss -lntup names it), or choose another"
     )
     with pytest.raises(UsageError, match=r"192\.0\.2\.1:80 cannot be opened"):
         listening("192.0.2.1:80", what="metrics")
