@@ -16,7 +16,7 @@ from tests.kit.tcp_proxy import TcpProxy
 from tests.unit.store.test_failures import child, line
 
 #: more, half a minute each: POSTGRES_SEEDS=10 ./tools/test tests/unit/store/postgres
-SEEDS = int(os.environ.get("POSTGRES_SEEDS", "2"))
+SEEDS = int(os.environ.get("POSTGRES_SEEDS", "1"))
 LIVES = 4
 MOST_FAULTS = 5  # in a life
 MOST_LINES = 60  # that a server says between two faults
