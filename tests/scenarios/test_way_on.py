@@ -128,8 +128,6 @@ def test_return_drives_after_an_emergency_stop_in_a_plan(
 def test_return_drives_from_any_mode_and_leaves_the_queue_running(
     make_world: MakeWorld, persona: Persona, mode: Mode
 ) -> None:
-    if mode not in persona.modes.numbers:
-        pytest.skip("its autopilot has no such mode")
     world = make_world(persona=persona)
     party = join(world, V4)
     choose(world, party, Mode.HOLD)
