@@ -1,6 +1,5 @@
 """Real gateways on a real PostgreSQL, with faults at random: never two that move one vehicle."""
 
-import os
 import random
 import time
 from pathlib import Path
@@ -10,12 +9,12 @@ import pytest
 from tests.kit.gateways.faults import Faults
 from tests.kit.gateways.real import Motion, fleet, overlaps
 from tests.kit.postgres import PostgresServer
+from tests.kit.volume import tries
 
 pytestmark = pytest.mark.slow
 
-#: 1,000 take half an hour: FLEET_FAULTS=1000 ./tools/test tests/e2e/test_fleet_leases.py
-FAULTS = int(os.environ.get("FLEET_FAULTS", "8"))
-SEED = int(os.environ.get("FLEET_SEED", "20261125"))
+FAULTS = tries(6, long=1000)  # 2 s each
+SEED = 20261125
 VEHICLES = range(1, 7)
 
 

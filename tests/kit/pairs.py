@@ -1,14 +1,15 @@
 """Of the product of several parameters, those combinations in which every two values meet.
 
-``WHOLE_PRODUCTS=1`` adds the rest of each product.
+A long run (``kit/volume.py``) adds the rest of each product.
 """
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, product
 from typing import Any
 
 import pytest
+
+from tests.kit.volume import LONG
 
 Chosen = tuple[int, ...]  # the index of a value for each parameter
 
@@ -22,7 +23,7 @@ def every_pair(**values: Sequence[Any] | Mapping[str, Any]) -> pytest.MarkDecora
     sizes = [len(axis) for axis in axes]
     everything = product(*map(range, sizes))
     cases = []
-    for chosen in everything if "WHOLE_PRODUCTS" in os.environ else sorted(covering(sizes)):
+    for chosen in everything if LONG else sorted(covering(sizes)):
         names, picked = zip(*(axis[i] for axis, i in zip(axes, chosen, strict=True)), strict=True)
         cases.append(pytest.param(*picked, id="-".join(names)))
     return pytest.mark.parametrize(tuple(values), cases)

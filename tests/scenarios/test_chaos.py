@@ -13,6 +13,7 @@ from rover_sim.personas import PX4, Mode
 from tests.kit import px4
 from tests.kit.soak.deeds import Stage, deeds, px4_deeds
 from tests.kit.store import LateStore
+from tests.kit.volume import tries
 from tests.kit.world import PROMPT
 from tests.scenarios.conftest import MakeWorld
 
@@ -22,9 +23,7 @@ MAKES = {
     "px4 at 1 Hz": (PX4, px4_deeds),
     "generic": (px4.PROMPT_GENERIC, px4_deeds),
 }
-LIVES = [("ardupilot", seed) for seed in range(8)] + [
-    (make, seed) for make in MAKES for seed in range(4) if make != "ardupilot"
-]
+LIVES = [(make, seed) for make in MAKES for seed in range(tries(3, long=20))]
 
 
 @pytest.mark.parametrize(("make", "seed"), LIVES)

@@ -15,6 +15,7 @@ from rover_sim.field_trial.rows_run import run_rows
 from rover_sim.field_trial.session import Session
 from rover_sim.frames import Frame
 from tests.kit.trial_ground import MAKES, Make, TrialGround
+from tests.kit.volume import some
 
 #: by default, and what each kind of rover can do
 LIMITS = {
@@ -50,6 +51,8 @@ def cases() -> list[Any]:
     for make in MAKES:
         names = (*NAMES, "stick") if make.startswith("ardupilot") else NAMES
         for name in names:
+            if name == "tasks" and make not in some(list(MAKES), 0, 3):  # 10 s each
+                continue
             why = KNOWN.get((make, name))
             marks = () if why is None else pytest.mark.xfail(strict=True, reason=why)
             found.append(pytest.param(make, name, marks=marks, id=f"{make} {name}"))

@@ -19,6 +19,7 @@ from mav_tasks.tasks.task import Task
 from tests.kit.client import FakeClient
 from tests.kit.mission import TIMEOUT, Download, Item, Upload
 from tests.kit.quiet import QuietWorld
+from tests.kit.volume import some
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -109,7 +110,7 @@ def places(task: Task) -> list[int]:
 @pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("first", range(0, 200, 50))
+@pytest.mark.parametrize("first", some(range(0, 200, 25), 6))
 def test_500_items_arrive_at_5_percent_loss(first: int) -> None:
     """Now and then a client gives up and tries again: it missed the last ack, or it was asked late
     for an item long sent, after which MAVSDK answers no more. A download fails when five exchanges
@@ -117,7 +118,7 @@ def test_500_items_arrive_at_5_percent_loss(first: int) -> None:
     """
     tries: Counter[int] = Counter()
     downloads_again = 0
-    for seed in range(first, first + 50):
+    for seed in range(first, first + 25):
         random = Random(seed)
         plan, world = survey(random, 500), QuietWorld(seed=seed)
         target = random.choice([AUTOPILOT, SERVER])
@@ -137,13 +138,13 @@ def test_500_items_arrive_at_5_percent_loss(first: int) -> None:
                 downloads_again += 1
                 download = ended_download(world, source)
             assert received(download) == payloads(plan), f"seed {seed}"
-    print(f"seeds {first} to {first + 49}: uploads after so many tries: {dict(tries)}")
-    assert tries[1] > 35
+    print(f"seeds {first} to {first + 24}: uploads after so many tries: {dict(tries)}")
+    assert tries[1] > 15
     assert downloads_again <= 2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", some(range(4), 0, 3))
 def test_500_items_come_back_also_from_the_task_server_that_drives_them(
     make_world: MakeWorld, seed: int
 ) -> None:

@@ -11,6 +11,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import MOVE, ROTATE
+from tests.kit.volume import tries
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -82,7 +83,7 @@ def test_a_stop_kills_the_one_that_runs_and_keeps_the_interrupted_one(
 
 
 @pytest.mark.parametrize("goal", ["move", "back", "rotate", "turns"])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(tries(2, long=20)))
 def test_whatever_interrupts_it_ends_where_it_would_have_ended(
     make_world: MakeWorld, goal: str, seed: int
 ) -> None:

@@ -22,6 +22,7 @@ from tests.kit.client import ACCEPTED, TEMPORARILY_REJECTED, setpoint
 from tests.kit.soak.ledger import Ledger
 from tests.kit.soak.life import Life, live
 from tests.kit.soak.world import SoakWorld, Violation
+from tests.kit.volume import tries
 from tests.kit.world import PROMPT, World
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +33,7 @@ VIRTUAL_MINUTE = 60.0
 @pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(240)  # it takes some three seconds, of a processor of its own
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(tries(8, long=100)))
 def test_a_life_of_a_minute_breaks_no_rule(seed: int) -> None:
     print("seed", seed)
     figures = live(seed, seconds=VIRTUAL_MINUTE)

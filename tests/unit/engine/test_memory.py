@@ -90,7 +90,7 @@ def command(number: int, *params: float, target: int = 191) -> m.CommandLong:
 def test_words_that_a_stranger_may_not_say_are_not_remembered(
     growth: Callable[[], int], number: int
 ) -> None:
-    endpoints, addresses, words = 4, 16, 40
+    endpoints, addresses, words = 4, 16, 12
     rig = Rig(Settings(roles=Roles(unsigned="observer")))
     encoders = [Encoder(Address(1 + each, 1)) for each in range(1, 1 + addresses)]
     for port in range(endpoints):
@@ -132,7 +132,7 @@ def test_times_that_are_moved_for_ever_take_no_memory(growth: Callable[[], int],
     ((_, ack),) = rig.acks
     assert ack.result == 0, ack
     task = ack.result_param2
-    for change in range(1200):
+    for change in range(700):
         if change == 300:  # the lists that have an upper limit are full
             growth()
         message = command(MODIFY, task, what, 5000.0 + change % 1000 + change / 3000)

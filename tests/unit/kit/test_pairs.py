@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from tests.kit import pairs
 from tests.kit.pairs import covering, every_pair
 
 BOTH = [False, True]
@@ -27,7 +28,7 @@ def test_the_rest_of_the_product_is_there_on_request(monkeypatch: pytest.MonkeyP
     few = cases()
     assert few[0].id == "a-one-False-False"
     assert 4 <= len(few) < 16
-    monkeypatch.setenv("WHOLE_PRODUCTS", "1")
+    monkeypatch.setattr(pairs, "LONG", True)
     every = {case.values for case in cases()}
     assert every == set(product("ab", (1, 2), BOTH, BOTH))
     assert {case.values for case in few} < every

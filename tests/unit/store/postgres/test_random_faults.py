@@ -1,6 +1,5 @@
 """Servers that are killed, and a database that fails in every way, at random; seeds are printed."""
 
-import os
 import random
 import signal
 from collections.abc import Callable, Iterator
@@ -13,11 +12,11 @@ import pytest
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import wait_until
 from tests.kit.tcp_proxy import TcpProxy
+from tests.kit.volume import tries
 from tests.unit.store.test_failures import child, line
 
-#: more, half a minute each: POSTGRES_SEEDS=10 ./tools/test tests/unit/store/postgres
-SEEDS = int(os.environ.get("POSTGRES_SEEDS", "1"))
-LIVES = 4
+SEEDS = tries(1, long=10)  # half a minute each
+LIVES = tries(2, long=4)
 MOST_FAULTS = 5  # in a life
 MOST_LINES = 60  # that a server says between two faults
 AT_LEAST = 20  # events kept after the last fault
