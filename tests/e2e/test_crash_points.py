@@ -24,6 +24,7 @@ from tests.kit.processes import (
     process,
     wait_until,
 )
+from tests.kit.volume import some
 
 MOVE, ROTATE, STOP, CANCEL, MODIFY = 54000, 54001, 54003, 54010, 54012
 CONTINUE, SPEED, REQUEST, WAYPOINT = 193, 178, 512, 16
@@ -229,7 +230,13 @@ def test_there_are_enough_points() -> None:
     assert len(POINTS) >= 30
 
 
-@pytest.mark.parametrize("point", POINTS)
+#: in each run before one write, after the next; and all states
+SOME = [
+    number for number in range(len(POINTS)) if number >= 2 * len(WRITES) or number % 4 in (0, 3)
+]
+
+
+@pytest.mark.parametrize("point", some(POINTS, *SOME))
 @pytest.mark.timeout(90)
 def test_killed_at_any_point(
     tmp_path: Path, point: str, record_property: Callable[[str, object], None]

@@ -11,6 +11,7 @@ import httpx
 import pytest
 
 from tests.kit.processes import wait_until
+from tests.kit.volume import some
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -31,7 +32,9 @@ def demo(
 
 @pytest.mark.slow
 @pytest.mark.timeout(150)
-@pytest.mark.parametrize("options", [(), ("--fast",), ("--fast", "--body", "kinematic")])
+@pytest.mark.parametrize(
+    "options", some([(), ("--fast",), ("--fast", "--body", "kinematic")], 0, 2)
+)
 def test_the_demo_shows_three_tasks_and_finds_all_as_it_should_be(options: tuple[str, ...]) -> None:
     done = demo(*options)
 

@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.links.memory import Conditions
 from tests.kit.lossy_udp import LossyUdp
 from tests.kit.processes import command_long, stand, wait_for, wait_until
+from tests.kit.volume import some
 
 STOPPED = 5.0  # s
 TIMEOUT = 3.0  # s, the rover's own, of setpoints
@@ -57,8 +59,10 @@ def stop_before_a_setpoint_leaves(server: int, flag: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("persona", ["ardupilot", "px4"])
-@pytest.mark.parametrize("stop", [stop_anywhere, stop_before_a_setpoint_leaves])
+@pytest.mark.parametrize(
+    ("stop", "persona"),
+    some([*product([stop_anywhere, stop_before_a_setpoint_leaves], ["ardupilot", "px4"])], 0, 3),
+)
 def test_a_server_that_stood_still_for_5_s_sends_no_old_setpoint_and_holds_the_task(
     tmp_path: Path, persona: str, stop: Callable[[int, Path], None]
 ) -> None:

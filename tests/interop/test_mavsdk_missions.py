@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from tests.kit.processes import stand
-from tests.kit.scripts import each_case, run_script
+from tests.kit.scripts import run_script, some_cases
 
 pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(200)]
 
 
-@each_case
+@some_cases
 def test_missions_are_driven_as_tasks(persona: str, face: str, loss: float, tmp_path: Path) -> None:
     with stand(tmp_path, persona=persona) as running:
         said = run_script(f"{face}missions", running, persona=persona, loss=loss)

@@ -12,6 +12,7 @@ import pytest
 from mav_tasks.links.memory import Conditions
 from tests.kit.lossy_udp import lossy_udp
 from tests.kit.processes import STOP_LIMIT, Stand
+from tests.kit.volume import some
 
 FACES = {"sync": "", "asyncio": "asyncio_"}
 LOSS = 0.2  # of the datagrams, each way
@@ -30,13 +31,13 @@ SEED = 20
 #: it gives up.
 TRIES = 8
 
-each_case = pytest.mark.parametrize(
-    ("persona", "face", "loss"),
-    [
-        pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}")
-        for make, face, loss in CASES
-    ],
-)
+_PARAMS = [
+    pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}")
+    for make, face, loss in CASES
+]
+each_case = pytest.mark.parametrize(("persona", "face", "loss"), _PARAMS)
+#: of tests of half a minute
+some_cases = pytest.mark.parametrize(("persona", "face", "loss"), some(_PARAMS, 1, 2))
 each_net = pytest.mark.parametrize("loss", list(NETS), ids=list(NETS.values()))
 
 

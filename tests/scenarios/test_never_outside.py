@@ -17,6 +17,7 @@ from rover_sim.personas import Persona
 from tests.kit.client import DRIVE, MOVE
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
+from tests.kit.volume import tries
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -90,7 +91,7 @@ def tasks(world: World, random: Random) -> list[Callable[[], object]]:
     ]
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(tries(3, long=30)))
 @pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
 def test_no_rover_is_ever_outside(make_world: MakeWorld, persona: Persona, seed: int) -> None:
     random = Random(seed)

@@ -15,6 +15,7 @@ import pytest
 from rover_sim.check_vehicle.__main__ import main
 from rover_sim.check_vehicle.wire import BadUrl, Url, read_url
 from tests.kit.processes import free_udp_ports, process, wait_until
+from tests.kit.volume import some
 
 SPEED = "4"  # simulated seconds per second: answers may still take a quarter of a second
 SLOWER = "2"
@@ -50,7 +51,7 @@ def check(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(120)
-@pytest.mark.parametrize("persona", ["ardupilot", "px4", "generic"])
+@pytest.mark.parametrize("persona", some(["ardupilot", "px4", "generic"], 0, 1))
 def test_it_passes_the_simulated_rover_with_everything_on(persona: str, tmp_path: Path) -> None:
     truth = tmp_path / "truth.csv"
     for speed in (SPEED, SLOWER):  # at the first a busy machine makes gaps in its stream

@@ -22,6 +22,7 @@ from tests.kit.client import (
     command_long,
     heartbeat,
 )
+from tests.kit.volume import some
 from tests.kit.world import World
 from tests.scenarios.attacks.test_left_waiting import stays
 
@@ -51,7 +52,7 @@ def paused_while_driving(world: World) -> None:
 
 
 @pytest.mark.parametrize("late", [2.0, 6.0, 15.0])
-@pytest.mark.parametrize("before", [0.1, 0.5, 0.8])
+@pytest.mark.parametrize("before", some([0.1, 0.5, 0.8], 0, 2))
 @pytest.mark.parametrize("halt", HALTS)
 def test_what_left_within_the_second_before_a_halt(
     world: World, other: FakeClient, halt: str, before: float, late: float
