@@ -15,6 +15,7 @@ from tests.kit.client import ACCEPTED, FakeClient
 from tests.kit.gateways.engines import FleetWorld, Gateway
 from tests.kit.gateways.traces import count, traces
 from tests.kit.mission import Item, Upload
+from tests.kit.volume import some
 from tests.kit.world import at
 
 MOVE, RELEASE, REMAINDER = 54000, 54013, 1
@@ -169,7 +170,7 @@ def test_what_is_not_stored_keeps_the_rover(reach: Reach) -> None:
     reach.world.until(lambda: reach.is_at(reach.other), within=5)
 
 
-@pytest.mark.parametrize("silent", [1, 2])
+@pytest.mark.parametrize("silent", some([1, 2], 1))
 def test_rovers_whose_tasks_wait_for_each_other_can_part(tmp_path: Path, *, silent: int) -> None:
     reach = Reach(tmp_path, rovers=2)
     assert reach.world.holder(2) is reach.first
