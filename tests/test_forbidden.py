@@ -48,6 +48,8 @@ PROCESSES = frozenset(
 
 #: (file, what it may do all the same) -> why
 ALLOWED = {
+    ("tools/mutants.py", "random"): "a sample of all faults, by a seed",
+    ("tools/mutants.py", "compile"): "code of this repository, with a fault in it",
     ("sim/rover_sim/ackermann.py", "random"): "a linkage that is off centre, by a seed",
     ("mav_tasks/links/memory.py", "random"): "the virtual net loses packets by a seed",
     ("tools/bench/client_flood.py", "random"): "noise of a flood, the same in every run",
