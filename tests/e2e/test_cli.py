@@ -328,7 +328,7 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
     why = {"pause": "operator", "stop": "STOP"}[halt]
     assert done.error == (
         f"mav-tasks: rover 1: task {number} waits: the queue is paused ({why});"
-        " to resume: mav-tasks resume\n"
+        " to let it run, use: mav-tasks resume\n"
     )
     assert called("submit", "move", "1", "--json", server=server).error == ""
     assert called("clear", server=server).status == 0
@@ -410,7 +410,7 @@ def test_a_task_that_fails_is_status_1(server: str, client: SyncClient) -> None:
     assert waiting.stdout is not None
     assert waiting.stdout.readline() == (
         f"rover 1: task {first.id}: plan of 2 items: queued (queue paused);"
-        " to resume: mav-tasks resume\n"
+        " to let it run, use: mav-tasks resume\n"
     )
     client.cancel(first.id)
     output, error = waiting.communicate(timeout=20)
