@@ -254,6 +254,13 @@ class Client:
         """
         return await self._ask.timing(task_id or 0, self._which(vehicle))
 
+    async def parameter(self, name: str, *, vehicle: int | None = None) -> float:
+        """Return a parameter of the server, such as TSK_SPEED.
+
+        Raise NoAnswer if there is none of this name.
+        """
+        return await self._ask.parameter(name, self._task_server(vehicle))
+
     async def cancel(
         self, task_id: int | None = None, *, series: bool = False, vehicle: int | None = None
     ) -> int:

@@ -203,6 +203,10 @@ def test_tasks_of_every_kind_are_added_with_the_form(chromium: Any, it: Web) -> 
 def test_the_form_says_what_is_wrong(chromium: Any, it: Web) -> None:
     with opened(chromium, it, may_fail=True) as page:
         page.click("text=Add a task…")
+        page.wait_for_selector(".box [name=speed][placeholder='0.5 m/s by default']")
+        page.select_option(".box [name=kind]", "face")
+        page.wait_for_selector(".box [name=rate][placeholder='40 deg/s by default']")
+        page.select_option(".box [name=kind]", "move")
         page.click(".box >> text='Add the task'")
         says(page, ".box .failure", "Distance (m): Please fill out this field.")
         page.fill(".box [name=distance]", "1000000")
@@ -248,19 +252,19 @@ def test_a_waiting_task_is_changed(chromium: Any, it: Web, shots: Path) -> None:
     it.post("/vehicles/1/pause", {})
     first, second = move(it, 0.1)["id"], move(it, 0.2, every=60)["id"]
     with opened(chromium, it) as page:
-        page.click(f"#panel-queue [data-task='{second}'] a")
-        page.click("#panel-task >> text=Change…")
+        page.click(f"#panel-queue [data-task='{second}'] >> text=Change…")
         for name, value in (("label", "night"), ("priority", "7"), ("after", str(first))):
             page.fill(f".box [name={name}]", value)
         page.fill(".box [name=every]", "")
         page.fill(".box [name=deadline]", "7200")
         page.screenshot(path=str(shots / "change a task.png"))
         page.click(".box >> text='Change it'")
+        page.click(f"#panel-queue [data-task='{second}'] a")
         says(page, "#panel-task h2", "“night”: move 0.2 m")
         says(page, "#panel-task .log li", "deadline")
         task = it.task(second)
         assert (task["priority"], task["after"], task["every"]) == (7, first, None)
-        page.click("text=Change…")
+        page.click("#panel-task >> text=Change…")
         page.fill(".box [name=after]", "")
         page.fill(".box [name=cron]", "30 7 * * 1-5 Europe/Berlin")
         page.click(".box >> text='Change it'")
