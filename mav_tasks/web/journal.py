@@ -7,7 +7,8 @@ from itertools import islice
 from typing import Any
 
 from mav_tasks.errors import StoreError
-from mav_tasks.logs.rendering import event_values
+from mav_tasks.logs.joined import joined
+from mav_tasks.logs.rendering import event_values, in_commands
 from mav_tasks.store.base import Which
 from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks.events import TaskSubmitted
@@ -40,11 +41,13 @@ class Journal:
         since = time.time() - DAY if task is None and after is None else None
         which = Which(task=task, vehicle=vehicle, since=since, after=after)
         with closing(kind_of(self._place).open_journal(self._place, which)) as reader:
-            events = reader.take(offset=0.0)
+            events = joined(reader.take(offset=0.0))
             found = deque(events if after is None else islice(events, limit), maxlen=limit)
         return [
-            {"number": number, "at": round(event.at, 3)} | event_values(event, offset=0.0)
-            for number, event in found
+            {"number": number, "at": round(event.at, 3)}
+            | event_values(event, offset=0.0)
+            | {"message": in_commands(words)}
+            for number, event, words in found
         ]
 
     def goal_of(self, task: int) -> Goal | None:

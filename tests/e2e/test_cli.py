@@ -196,6 +196,14 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert (queue["current"]["priority"], queue["current"]["left_unit"]) == (8, "s")
     assert [(task["id"], task["priority"]) for task in queue["waiting"]] == [(waiting["id"], 9)]
 
+    (later,) = called("submit", "move", "1", "--json", server=server).objects
+    (last,) = called("submit", "move", "1", "--json", server=server).objects
+    called("modify", str(last["id"]), "--before", str(later["id"]), server=server)
+    (queue,) = called("queue", "--json", server=server).objects
+    assert [task["id"] for task in queue["waiting"]][:2] == [last["id"], later["id"]]
+    for each in (last, later):
+        assert called("cancel", str(each["id"]), server=server).status == 0
+
     table = mav_tasks("queue", server=server)
     assert table.lines[0].startswith(f"rover 1: task {first} ")
     assert "\x1b" not in table.output
