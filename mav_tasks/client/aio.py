@@ -416,7 +416,7 @@ class Client:
             fleet = self._open.session.fleet
             if fleet.served() or not fleet.is_listed:
                 raise
-            words = "the task server has heard no rover, so there is none that it could stop"
+            words = "the task server has heard no rover: there is nothing to stop"
             raise NoAnswer(words) from error
         except Refused as error:
             words = STOP_IN_FORCE.get(error.reason, str(error))
