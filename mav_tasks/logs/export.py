@@ -47,7 +47,12 @@ _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circula
 def text_entries(entries: Iterable[Entry]) -> Iterator[str]:
     """Yield a line of text for each change: time and message."""
     for _, event, words in joined(entries):
-        yield f"{utc_text(event.at)} {BY.sub(_by, in_commands(words))}\n"
+        yield f"{utc_text(event.at)} {for_people(words)}\n"
+
+
+def for_people(words: str) -> str:
+    """Return the text of an event with commands for buttons, and names for addresses."""
+    return BY.sub(_by, in_commands(words))
 
 
 def _by(found: re.Match[str]) -> str:
