@@ -57,9 +57,10 @@ def log(
         bool, typer.Option("--follow", "-f", help="Keep printing new events until Ctrl-C.")
     ] = False,
 ) -> None:
-    """Print the journal, one change per line; --json and --csv: one event. Times are UTC.
+    """Print the journal, one change per line; times are UTC.
 
-    Reads the store; the server need not run. On a terminal, long lines wrap at words.
+    Reads the store; the server need not run. --json and --csv print each event by itself. On a
+    terminal, long lines wrap at words.
     """
     if as_json and as_csv:
         raise UsageError("--json and --csv: choose one of them")
