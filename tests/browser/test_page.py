@@ -252,14 +252,14 @@ def test_a_waiting_task_is_changed(chromium: Any, it: Web, shots: Path) -> None:
     it.post("/vehicles/1/pause", {})
     first, second = move(it, 0.1)["id"], move(it, 0.2, every=60)["id"]
     with opened(chromium, it) as page:
-        page.click(f"#panel-queue [data-task='{second}'] >> text=Change…")
+        page.click(f"#panel-queue [data-task='{second}'] a")
+        page.click("#panel-task >> text=Change…")
         for name, value in (("label", "night"), ("priority", "7"), ("after", str(first))):
             page.fill(f".box [name={name}]", value)
         page.fill(".box [name=every]", "")
         page.fill(".box [name=deadline]", "7200")
         page.screenshot(path=str(shots / "change a task.png"))
         page.click(".box >> text='Change it'")
-        page.click(f"#panel-queue [data-task='{second}'] a")
         says(page, "#panel-task h2", "“night”: move 0.2 m")
         says(page, "#panel-task .log li", "deadline")
         task = it.task(second)

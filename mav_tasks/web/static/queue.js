@@ -4,7 +4,7 @@ import { request } from "./api.js";
 import * as acts from "./acts.js";
 import { makeDraggable } from "./dragging.js";
 import { failureLine, h, reconcile, renew, say, show } from "./dom.js";
-import { openChangeForm, openTaskForm } from "./task_form.js";
+import { openTaskForm } from "./task_form.js";
 import { planDrop } from "./plans.js";
 import { chosenQueue, onChange, state } from "./store.js";
 import { goTo } from "./routes.js";
@@ -74,14 +74,12 @@ function make(task, isCurrent) {
   const earlier = button("▲", () => step(id, -1), `Move task ${id} up`);
   const later = button("▼", () => step(id, +1), `Move task ${id} down`);
   const release = h("button", { class: "small main-word", type: "button", onclick: () => acts.release(now(), chosenQueue().halt_epoch) }, "Release…");
-  const modify = button("Change…", () => openChangeForm(now()), `Change task ${id}`);
-  modify.classList.add("if-wide"); // else its own view has it
   const cancel = button("Cancel…", () => acts.cancel(now()), `Cancel task ${id}`);
   const pause = button("Pause", () => failure.trying(() => acts.pause(now().vehicle)), `Pause task ${id}`);
   // ▲ and ▼ do the same for a keyboard and a screen reader
   const grip = h("span", { class: "grip", "aria-hidden": "true", title: "Drag to another place" }, "⠿");
   const element = h("li", { class: isCurrent ? "task now" : "task", "data-task": String(id) },
-    h("div", { class: "line" }, grip, h("span", { class: "title" }, link), h("span", { class: "row" }, release, pause, earlier, later, modify, cancel)),
+    h("div", { class: "line" }, grip, h("span", { class: "title" }, link), h("span", { class: "row" }, release, pause, earlier, later, cancel)),
     bar, h("div", { class: "whys" }, mark, info, reason));
   if (!isCurrent) makeMovable(element, grip, id);
   const update = (shown) => {
@@ -100,7 +98,6 @@ function make(task, isCurrent) {
     say(cancel, isCancelling ? "Kill…" : "Cancel…");
     cancel.setAttribute("aria-label", `${isCancelling ? "Kill" : "Cancel"} task ${id}`);
     show(cancel, acts.may("cancel"));
-    show(modify, !isCurrent && acts.may("modify"));
     const isMovable = shown.state === "queued" && acts.may("modify");
     for (const each of [grip, earlier, later]) show(each, isMovable);
     const ids = isMovable ? line().map((task) => task.id) : [];
