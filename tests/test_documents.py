@@ -193,7 +193,7 @@ def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
     assert [done.status for done in ended] == [0, 1, 0, 0]
     _, moved, queue, resumed = ended
     assert "failed (stuck)" in moved.output
-    assert "queue paused (stuck); to resume: mav-tasks resume" in queue.output
+    assert "queue paused (stuck); to let it run, use: mav-tasks resume" in queue.output
     assert resumed.output == "rover 1: resumed\n"
 
 

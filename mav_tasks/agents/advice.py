@@ -1,6 +1,12 @@
 """Advice to an agent about a task, which names the tools to call. Pure."""
 
-from mav_tasks.client.descriptions import UNTIL_RESUMED, needs_decision, remedy_for, why_of
+from mav_tasks.client.descriptions import (
+    UNTIL_RESUMED,
+    needs_decision,
+    remedy_for,
+    remedy_for_pause,
+    why_of,
+)
 from mav_tasks.client.values import QueueStatus, TaskStatus
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
 
@@ -42,5 +48,5 @@ def _resume(reason: TaskReason, why: str, epoch: int) -> str:
     return (
         f"The queue is paused ({why}): no task runs. If the rover may drive again, and a person "
         "agrees if a person has stopped it: "
-        + remedy_for(reason, resume=f"call resume with epoch: {epoch}")
+        + remedy_for_pause(reason, resume=f"call resume with epoch: {epoch}")
     )

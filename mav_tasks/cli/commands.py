@@ -34,7 +34,7 @@ COMMANDS = (
     Lazy("fence", "plans:fence", "Upload, download and clear the fence."),
     Lazy("rally", "plans:rally", "Upload and clear rally points."),
     Lazy("web", "web:app", "Show and steer the rovers in a browser."),
-    Lazy("log", "log:log", "Print the journal, one event per line; times are UTC."),
+    Lazy("log", "log:log", "Print the journal, one change per line; times are UTC."),
     Lazy("replay", "replay:replay", "Replay a record and compare the results."),
     Lazy(
         "export",

@@ -132,6 +132,10 @@ async def modify(
     after: Annotated[
         int | None, typer.Option(metavar="ID", help="Run after this task has completed; 0: none.")
     ] = None,
+    before: Annotated[
+        int | None,
+        typer.Option(metavar="ID", help="Place just before this task in the queue; 0: last."),
+    ] = None,
     preemptible: Annotated[
         bool | None,
         typer.Option(
@@ -156,7 +160,7 @@ async def modify(
     delay, at = start_of(start_in, start_at)
     until = seconds_of("--deadline", deadline)
     repeats = every_of(every) if every else None
-    wishes = (priority, delay, at, until, after, preemptible, preemptive, label, repeats)
+    wishes = (priority, delay, at, until, after, before, preemptible, preemptive, label, repeats)
     if all(wish is None for wish in wishes):
         raise UsageError(f"modify {task_id}: nothing to change; give --priority or another option")
     async with opened(common) as client:
@@ -167,6 +171,7 @@ async def modify(
                 delay=delay,
                 deadline=until,
                 after=after,
+                before=before,
                 preemptible=preemptible,
                 preemptive=preemptive,
                 at=at,

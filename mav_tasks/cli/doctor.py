@@ -171,7 +171,7 @@ async def _rover(client: Client, rover: int, *, is_heard: bool) -> Finding:
             return Finding(about, silence or "silent", helps)
         alone = len(client.vehicles()) == 1
         if queue.paused is not None:
-            helps = words.resume_command(rover, is_alone=alone)
+            helps = words.way_to_resume(queue, queue.paused, is_alone=alone)
             return Finding(about, f"queue paused ({words_of(queue.paused)})", helps)
         if (stuck := words.blocked(queue)) is not None:
             helps = words.way_on_of(stuck, is_alone=alone)

@@ -15,7 +15,7 @@ from mav_tasks.cli.options import Json
 from mav_tasks.config.configuration import Sources
 from mav_tasks.errors import StoreError, UsageError
 from mav_tasks.logs import export
-from mav_tasks.logs.export import EntryOf
+from mav_tasks.logs.export import LinesOf
 from mav_tasks.store.base import JournalReader, Which
 from mav_tasks.store.latest import latest_store
 from mav_tasks.store.opening import kind_of
@@ -57,9 +57,10 @@ def log(
         bool, typer.Option("--follow", "-f", help="Keep printing new events until Ctrl-C.")
     ] = False,
 ) -> None:
-    """Print the journal, one event per line; times are UTC.
+    """Print the journal, one change per line; times are UTC.
 
-    Reads the store; the server need not run. On a terminal, long lines wrap at words.
+    Reads the store; the server need not run. --json and --csv print each event by itself. On a
+    terminal, long lines wrap at words.
     """
     if as_json and as_csv:
         raise UsageError("--json and --csv: choose one of them")
@@ -76,7 +77,9 @@ def log(
     if store is None:
         store = Sources(None, dict(os.environ)).load().settings.store or latest_store() or ""
     which = Which(task=task, vehicle=vehicle, since=begin)
-    entry_of = export.json_entry if as_json else export.csv_entry if as_csv else export.text_entry
+    lines_of = export.text_entries
+    if as_json or as_csv:
+        lines_of = export.json_entries if as_json else export.csv_entries
     # a program gets whole lines
     columns = output.columns() if not as_json and not as_csv and sys.stdout.isatty() else None
     with closing(kind_of(store).open_journal(store, which)) as journal:
@@ -84,12 +87,12 @@ def log(
             if as_csv:
                 sys.stdout.write(export.csv_row(export.COLUMNS))
             seen = journal.version()
-            count = _print(journal, entry_of, columns, end=end)
+            count = _print(journal, lines_of, columns, end=end)
             if not count and not follow:
                 output.warn(f"no such event in {without_password(store) or 'the default store'}")
             while follow and _is_written_to(journal, seen):
                 seen = journal.version()
-                _print(journal, entry_of, columns, end=end)
+                _print(journal, lines_of, columns, end=end)
         except BrokenPipeError:  # the reader has ended, as ``head`` does
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         except KeyboardInterrupt:
@@ -98,13 +101,12 @@ def log(
             raise UsageError(f"standard output: {error.strerror}") from error
 
 
-def _print(journal: JournalReader, entry_of: EntryOf, columns: int | None, *, end: float) -> int:
-    """Print the new events before ``end``, UTC; return how many."""
+def _print(journal: JournalReader, lines_of: LinesOf, columns: int | None, *, end: float) -> int:
+    """Print the new events before ``end``, UTC; return how many lines."""
     count = 0
-    for number, event in journal.take(offset=0.0):
-        if event.at < end:
-            entry, count = entry_of(number, event), count + 1
-            sys.stdout.write(output.wrapped(entry, columns) if columns else entry)
+    for line in lines_of(entry for entry in journal.take(offset=0.0) if entry[1].at < end):
+        count += 1
+        sys.stdout.write(output.wrapped(line, columns) if columns else line)
     sys.stdout.flush()
     return count
 

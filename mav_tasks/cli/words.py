@@ -4,10 +4,11 @@ from math import inf
 
 from mav_tasks.cli.times import format_duration, spoken_duration
 from mav_tasks.client.descriptions import (
-    UNTIL_RESUMED,
     end_of,
     is_of_last_save,
     left,
+    remedy_for,
+    remedy_for_pause,
     state_of,
     what_of,
     why_of,
@@ -15,21 +16,6 @@ from mav_tasks.client.descriptions import (
 from mav_tasks.client.fleet_view import SILENT_AFTER
 from mav_tasks.client.values import QueueStatus, TaskStatus, TaskTiming
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState, words_of
-
-#: reasons that block one task, and what a person can do; "{rover}": the option that names the rover
-REMEDIES = {
-    TaskReason.DISARMED: "arm it in HOLD (or mav-tasks resume{rover}, if the server may arm)",
-    TaskReason.WRONG_MODE: "set HOLD, then: mav-tasks resume{rover}",
-    TaskReason.NOT_READY: "wait, or fix what the rover reports",
-    TaskReason.LOSS_FAILSAFE: (
-        "to make it stop without setpoints: mav-tasks probe --set-failsafe{rover}"
-    ),
-    TaskReason.HELD_AHEAD: "release the held task: mav-tasks release again|remainder|skip{rover}",
-    TaskReason.VEHICLE_SILENT: "check its power and radio",
-    TaskReason.NO_POSITION: "wait for its position, or check its GPS",
-    TaskReason.OTHER_CONTROLLER: "end the other program that drives it",
-    TaskReason.OUTSIDE_OWN_FENCE: "drive it back manually, or switch that fence off",
-}
 
 #: reasons of waiting tasks that start without an operator's action
 COMES_BY_ITSELF = (
@@ -83,10 +69,14 @@ def way_on_of(status: TaskStatus, *, is_alone: bool = True) -> str:
         return f"release it: mav-tasks release {status.id} again|remainder|skip"
     if status.is_over:
         return ""
-    if status.reason in UNTIL_RESUMED:
-        return f"to resume: {resume_command(status.vehicle, is_alone=is_alone)}"
     option = _option_of(status.vehicle, is_alone=is_alone)
-    return REMEDIES.get(status.reason, "").format(rover=option)
+    remedy = remedy_for(
+        status.reason,
+        resume=_use(status.vehicle, is_alone=is_alone),
+        release=f": mav-tasks release again|remainder|skip{option}",
+        rover=option,
+    )
+    return _clause(remedy)
 
 
 def line_of(status: TaskStatus, *, is_alone: bool = True) -> str:
@@ -129,8 +119,8 @@ def obstacle_of(status: TaskStatus, queue: QueueStatus, *, is_alone: bool) -> tu
         way_on = way_on_of(current, is_alone=is_alone)
         return f"task {current.id} is held ({why_of(current)})", way_on
     if queue.paused is not None:
-        resume = resume_command(queue.vehicle, is_alone=is_alone)
-        return f"the queue is paused ({words_of(queue.paused)})", f"to resume: {resume}"
+        way_on = way_to_resume(queue, queue.paused, is_alone=is_alone)
+        return f"the queue is paused ({words_of(queue.paused)})", way_on
     return why_of(status), way_on_of(status, is_alone=is_alone)
 
 
@@ -177,7 +167,7 @@ def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
         does += f"; {way_on_of(stuck, is_alone=is_alone)}"
     if queue.paused is not None:
         does += f"; queue paused ({words_of(queue.paused)})"
-        does += f"; to resume: {resume_command(queue.vehicle, is_alone=is_alone)}"
+        does += f"; {way_to_resume(queue, queue.paused, is_alone=is_alone)}"
     gateway = f"gateway {queue.gateway}" if queue.gateway else ""
     about = ", ".join(filter(None, (gateway, silence_of(queue.heartbeat_age))))
     rover = f"rover {queue.vehicle} ({about})" if about else f"rover {queue.vehicle}"
@@ -185,14 +175,27 @@ def headline_of(queue: QueueStatus, *, is_alone: bool = True) -> str:
 
 
 def blocked(queue: QueueStatus) -> TaskStatus | None:
-    """Return the held task, else a task with a reason of REMEDIES, unless the queue is paused."""
+    """Return the held task, else a task that a person can help, unless the queue is paused."""
     current = queue.current
     if current is not None and current.state is TaskState.HELD and way_on_of(current):
         return current
     if queue.paused is not None:
         return None
     first = queue.waiting[:1] if current is None else (current,)
-    return next((each for each in first if each.reason in REMEDIES), None)
+    return next((e for e in first if e.reason not in COMES_BY_ITSELF and way_on_of(e)), None)
+
+
+def way_to_resume(queue: QueueStatus, reason: TaskReason, *, is_alone: bool = True) -> str:
+    """Return what a person can do about a queue that is paused for a reason."""
+    return _clause(remedy_for_pause(reason, resume=_use(queue.vehicle, is_alone=is_alone)))
+
+
+def _use(rover: int, *, is_alone: bool) -> str:
+    return f"use: {resume_command(rover, is_alone=is_alone)}"
+
+
+def _clause(sentence: str) -> str:
+    return sentence[:1].lower() + sentence[1:].removesuffix(".")
 
 
 def _option_of(rover: int, *, is_alone: bool) -> str:

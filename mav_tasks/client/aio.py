@@ -254,6 +254,13 @@ class Client:
         """
         return await self._ask.timing(task_id or 0, self._which(vehicle))
 
+    async def parameter(self, name: str, *, vehicle: int | None = None) -> float:
+        """Return a parameter of the server, such as TSK_SPEED.
+
+        Raise NoAnswer if there is none of this name.
+        """
+        return await self._ask.parameter(name, self._task_server(vehicle))
+
     async def cancel(
         self, task_id: int | None = None, *, series: bool = False, vehicle: int | None = None
     ) -> int:
@@ -409,7 +416,7 @@ class Client:
             fleet = self._open.session.fleet
             if fleet.served() or not fleet.is_listed:
                 raise
-            words = "the task server has heard no rover, so there is none that it could stop"
+            words = "the task server has heard no rover: there is nothing to stop"
             raise NoAnswer(words) from error
         except Refused as error:
             words = STOP_IN_FORCE.get(error.reason, str(error))

@@ -30,6 +30,8 @@ T = TypeVar("T")
 
 ANSWER_WITHIN = 10.0  # s
 PAGE_TRIES = 6
+PARAMETER_TRIES = 4
+BY_NAME = -1  # param_index of a request
 PAGE_WITHIN = 0.3  # s to wait for the rest of a page after its ack
 FINISHED = 1.0  # param4 of REQUEST_MESSAGE: finished tasks
 LATER = 1.0  # s until a rate-limited request is sent again
@@ -125,6 +127,26 @@ class Asker:
 
         what = f"the timing of task {task_id or 'that runs'}"
         return await self._shown(request, what, TaskTiming, is_meant)
+
+    async def parameter(self, name: str, target: Address) -> float:
+        """Return a parameter of a task server. Raise NoAnswer if there is none of this name."""
+        session = self._connection.session
+        with self._future(float) as future:
+
+            def take(message: Answer, source: int) -> None:
+                if not isinstance(message, m.ParamValue) or future.done():
+                    return
+                if message.param_id == name and source == target.system_id:
+                    future.set_result(message.param_value)
+
+            with _added(self._takers, take):
+                for _ in range(PARAMETER_TRIES):
+                    session.send(m.ParamRequestRead(*target, name.encode(), BY_NAME))
+                    self._connection.turn()
+                    await asyncio.wait((future,), timeout=AGAIN)
+                    if future.done():
+                        return future.result()
+        raise NoAnswer(f"{target}: no parameter {name} was answered")
 
     async def overview(self, vehicle: int) -> m.TaskQueueStatus:
         request = request_message(vehicle, m.TaskQueueStatus.id)

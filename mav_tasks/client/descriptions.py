@@ -16,7 +16,8 @@ UNTIL_RESUMED = (
     TaskReason.RESTARTED,
 )
 
-#: what a person can do about a task that waits or is paused; ``{resume}``: how one resumes here
+#: what a person can do about a task that waits or is paused; each surface adds how one resumes
+#: there, and the command that releases a held task, with the option that names the rover
 REMEDIES: dict[TaskReason, str] = {
     **dict.fromkeys((*UNTIL_RESUMED, TaskReason.STOPPED), "To let it run, {resume}."),
     TaskReason.TAKEOVER: (
@@ -32,11 +33,11 @@ REMEDIES: dict[TaskReason, str] = {
     TaskReason.LINK_LOST: "Check the rover's radio and power.",
     TaskReason.LEASE_LOST: "Check the database and the network to it.",
     TaskReason.LOSS_FAILSAFE: (
-        "Let the rover stop when setpoints end: run 'mav-tasks probe --set-failsafe'."
+        "Let the rover stop when setpoints end: run 'mav-tasks probe --set-failsafe{rover}'."
     ),
     TaskReason.OUTSIDE_OWN_FENCE: "Drive the rover back manually, or switch that fence off.",
     TaskReason.OTHER_CONTROLLER: "End the other program that drives the rover.",
-    TaskReason.HELD_AHEAD: "Look at the queue, and release the held task before it.",
+    TaskReason.HELD_AHEAD: "Look at the queue, and release the held task before it{release}.",
     TaskReason.WAITING_FOR_START: "Start this mission.",
 }
 
@@ -82,9 +83,17 @@ def needs_decision(status: TaskStatus) -> bool:
     return status.state is TaskState.HELD and status.reason >= TaskReason.OUTCOME_UNKNOWN
 
 
-def remedy_for(reason: TaskReason, *, resume: str) -> str:
-    """Return what a person can do about a reason to wait; "" if nothing. ``resume``: how."""
-    return REMEDIES.get(reason, "").format(resume=resume)
+def remedy_for(reason: TaskReason, *, resume: str, release: str = "", rover: str = "") -> str:
+    """Return what a person can do about a reason to wait; "" if nothing.
+
+    ``resume``: how; ``release``: ": " and the command; ``rover``: the option that names the rover.
+    """
+    return REMEDIES.get(reason, "").format(resume=resume, release=release, rover=rover)
+
+
+def remedy_for_pause(reason: TaskReason, *, resume: str) -> str:
+    """Return what a person can do about a paused queue. ``resume``: how."""
+    return remedy_for(reason if reason in UNTIL_RESUMED else TaskReason.STOPPED, resume=resume)
 
 
 def with_resume(text: str, resume: str) -> str:

@@ -67,7 +67,7 @@ HEADING = "heading, clockwise from north"
 ON_ARRIVAL = (
     Number("radius", "m", "acceptance radius; as close as possible if not given", least=0.0),
     Number("heading", "deg", f"final {HEADING}; any if not given"),
-    Number("wait", "s", "how long to stand there", least=0.0),
+    Number("wait", "s", "how long to stand there; 0 if not given", least=0.0),
 )
 
 KINDS = (
@@ -116,7 +116,12 @@ KINDS = (
         (
             Number("heading", "deg", HEADING, True),
             Number(
-                "direction", "", "1 clockwise, -1 counter-clockwise, 0 the shorter", False, -1, 1
+                "direction",
+                "",
+                "1 clockwise, -1 counter-clockwise, 0 or not given: the shorter",
+                False,
+                -1,
+                1,
             ),
             RATE,
         ),

@@ -51,6 +51,7 @@ DECODED = frozenset(
     for kind in (
         m.Heartbeat,
         m.CommandAck,
+        m.ParamValue,
         m.Statustext,
         m.TaskStatus,
         m.TaskQueueStatus,
@@ -75,7 +76,7 @@ class Reply:
 
 Done = Callable[[Reply | None], None]
 #: the messages that answer requests; ``on_answer`` gets each with its vehicle
-Answer = TaskStatus | TaskTiming | m.TaskQueueStatus
+Answer = TaskStatus | TaskTiming | m.TaskQueueStatus | m.ParamValue
 
 
 @dataclass(slots=True)
@@ -140,6 +141,8 @@ class Session:
                 self.fleet.shared[packet.system_id] = shares_id(message)
                 self.on_served()
                 self.on_vehicle(packet.system_id)
+                self.on_answer(message, packet.system_id)
+            case m.ParamValue() if packet.component_id != AUTOPILOT:
                 self.on_answer(message, packet.system_id)
             case m.TaskTiming():
                 self.on_answer(task_timing_of(message, packet.system_id), packet.system_id)

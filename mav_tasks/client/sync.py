@@ -228,6 +228,13 @@ class SyncClient(BlockingClient):
         """
         return self._call(self._aio.timing(task_id, vehicle=vehicle))
 
+    def parameter(self, name: str, *, vehicle: int | None = None) -> float:
+        """Return a parameter of the server, such as TSK_SPEED.
+
+        Raise NoAnswer if there is none of this name.
+        """
+        return self._call(self._aio.parameter(name, vehicle=vehicle))
+
     def cancel(
         self, task_id: int | None = None, *, series: bool = False, vehicle: int | None = None
     ) -> int:

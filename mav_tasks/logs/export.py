@@ -4,17 +4,19 @@ import csv
 import io
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import UTC, datetime
+from itertools import starmap
 from typing import Any
 
 from mav_tasks.errors import UsageError
+from mav_tasks.logs.joined import Entry, joined
 from mav_tasks.logs.rendering import event_values, in_commands, utc_text
 from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.events import Event
 
-#: event number over the life of the store, event with times in UTC -> a line
-EntryOf = Callable[[int, Event], str]
+#: events with times in UTC -> lines
+LinesOf = Callable[[Iterable[Entry]], Iterator[str]]
 
 TIMING = ("period", "count", "p50", "p99", "longest", "late")
 
@@ -42,14 +44,27 @@ _SECONDS = {"s": 1, "m": 60, "h": 3_600, "d": 86_400}
 _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False, check_circular=False).encode
 
 
-def text_entry(_number: int, event: Event) -> str:
-    """Return a line of text: time and message."""
-    words = BY.sub(_by, in_commands(str(event)))
-    return f"{utc_text(event.at)} {words}\n"
+def text_entries(entries: Iterable[Entry]) -> Iterator[str]:
+    """Yield a line of text for each change: time and message."""
+    for _, event, words in joined(entries):
+        yield f"{utc_text(event.at)} {for_people(words)}\n"
+
+
+def for_people(words: str) -> str:
+    """Return the text of an event with commands for buttons, and names for addresses."""
+    return BY.sub(_by, in_commands(words))
 
 
 def _by(found: re.Match[str]) -> str:
     return f"by {who_is(found[1])} at {found[2]}"
+
+
+def json_entries(entries: Iterable[Entry]) -> Iterator[str]:
+    return starmap(json_entry, entries)
+
+
+def csv_entries(entries: Iterable[Entry]) -> Iterator[str]:
+    return starmap(csv_entry, entries)
 
 
 def json_entry(number: int, event: Event) -> str:

@@ -4,21 +4,19 @@ An observer, for ``--verbose`` only: its messages are not events, and trigger no
 """
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import inf
 
 from mav_tasks.engine.inputs import (
-    AtOnce,
     Congestion,
     Input,
     LinkChanged,
     LinkSide,
-    Outgoing,
     Packets,
     Peer,
     PeerChanged,
 )
-from mav_tasks.tasks.events import Event
+from mav_tasks.logs.link_observer import LinkObserver
 
 PERIOD = 60.0  # s between two logs of the counts
 MOST_PEERS = 256  # remembered; one more clears the set, and peers are logged again
@@ -26,10 +24,11 @@ MOST_PEERS = 256  # remembered; one more clears the set, and peers are logged ag
 log = logging.getLogger("mav_tasks")
 
 
-class FieldNotes:
+class FieldNotes(LinkObserver):
     """Implements ``EngineObserver``. ``counts`` returns the counts of received packets as text."""
 
     def __init__(self, counts: Callable[[], str]) -> None:
+        super().__init__()
         self._counts = counts
         self._count_at = -inf
         self._sides: dict[str, LinkSide] = {}
@@ -38,12 +37,9 @@ class FieldNotes:
     def __repr__(self) -> str:
         return f"FieldNotes({len(self._heard)} heard)"
 
-    def on_input(self, item: Input | None, *, now: float) -> None:
+    def look(self, item: Input | None, *, now: float) -> None:
         """Log new peers, new links and congestion; log the counts every PERIOD."""
         match item:
-            case AtOnce(packets=several):
-                for each in several:
-                    self.on_input(each, now=now)
             case Packets(link=link):
                 for peer, _ in item.datagrams:
                     if (link, peer) not in self._heard:
@@ -60,11 +56,6 @@ class FieldNotes:
             if self._count_at > -inf:
                 log.debug("received so far: %s", self._counts())
             self._count_at = now + PERIOD
-
-    def on_output(
-        self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
-    ) -> None:
-        """Ignore output: the engine's events are logged anyway."""
 
     def close(self) -> None:
         """Log the final counts."""

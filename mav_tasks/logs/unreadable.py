@@ -4,22 +4,12 @@ A wrong baud rate looks like that, and a port on which a rover speaks another pr
 """
 
 import logging
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from mav_tasks.engine.inputs import (
-    AtOnce,
-    Input,
-    LinkChanged,
-    LinkSide,
-    Outgoing,
-    Packets,
-    Peer,
-    PeerChanged,
-)
+from mav_tasks.engine.inputs import Input, Packets, Peer, PeerChanged
+from mav_tasks.logs.link_observer import LinkObserver
 from mav_tasks.mavlink.codec import crc_fits
 from mav_tasks.mavlink.stream import PeerStreams
-from mav_tasks.tasks.events import Event
 
 WITHIN = 5.0  # s in which a rover has sent several packets, whatever its link
 ENOUGH = 32  # bytes; less may be noise of a line on which nobody speaks
@@ -38,40 +28,25 @@ class _Peer:
     is_known: bool = False
 
 
-@dataclass
-class Unreadable:
+class Unreadable(LinkObserver):
     """Implements ``EngineObserver``."""
 
-    _links: dict[str, bool] = field(default_factory=dict)  # to vehicles: whether it is a stream
-    _peers: dict[tuple[str, Peer], _Peer] = field(default_factory=dict)
+    def __init__(self) -> None:
+        super().__init__()
+        self._peers: dict[tuple[str, Peer], _Peer] = {}
 
-    def on_input(self, item: Input | None, *, now: float) -> None:
+    def look(self, item: Input | None, *, now: float) -> None:
         """Look at what vehicle links deliver."""
         match item:
-            case AtOnce(packets=several):
-                for each in several:
-                    self.on_input(each, now=now)
             case Packets() if item.link in self._links:
                 for peer, data in item.datagrams:
                     known = self._peers.get((item.link, peer))
                     if known is None or not known.is_known:
-                        self._look(item.link, peer, data, now)
-            case LinkChanged():
-                self._links.pop(item.link, None)
-                if item.side is LinkSide.VEHICLES and item.up:
-                    self._links[item.link] = item.is_stream
+                        self._count(item.link, peer, data, now)
             case PeerChanged():
                 self._peers.pop((item.link, item.peer), None)
 
-    def on_output(
-        self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
-    ) -> None:
-        """Ignore output."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-    def _look(self, link: str, peer: Peer, data: bytes, now: float) -> None:
+    def _count(self, link: str, peer: Peer, data: bytes, now: float) -> None:
         if len(self._peers) >= MOST_PEERS:
             self._peers.clear()
         streams = PeerStreams(is_stream=self._links[link])

@@ -1,21 +1,13 @@
 """Logs the vehicles' texts (STATUSTEXT), as an observer of the engine."""
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 
-from mav_tasks.engine.inputs import (
-    AtOnce,
-    Input,
-    LinkChanged,
-    LinkSide,
-    Outgoing,
-    Packets,
-    Peer,
-    PeerChanged,
-)
+from mav_tasks.engine.inputs import Input, LinkChanged, Packets, Peer, PeerChanged
 from mav_tasks.engine.packet_reader import PacketReader
+from mav_tasks.logs.link_observer import LinkObserver
 from mav_tasks.logs.rendering import clean
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder
@@ -25,7 +17,6 @@ from mav_tasks.mavlink.packet import MAGIC_V1, Packet
 from mav_tasks.mavlink.stream import is_whole
 from mav_tasks.services.text_receiver import Text, TextReceiver
 from mav_tasks.services.token_bucket import TokenBucket
-from mav_tasks.tasks.events import Event
 
 RATE = 10.0  # texts per second of one vehicle; more are only counted
 BURST = 50  # texts at once: an autopilot that starts sends many
@@ -71,11 +62,11 @@ class _Talk:
         return False
 
 
-class VehicleTexts:
+class VehicleTexts(LinkObserver):
     """Implements ``EngineObserver``: decodes texts, limits their rate, logs them."""
 
     def __init__(self) -> None:
-        self._links: dict[str, bool] = {}  # links to vehicles -> whether it is a stream
+        super().__init__()
         self._intake = PacketReader()
         self._counts = DecodeCounts()
         self._decoder = Decoder()
@@ -86,30 +77,18 @@ class VehicleTexts:
     def __repr__(self) -> str:
         return f"VehicleTexts({self._receiver}, {len(self._talks)} vehicles)"
 
-    def on_input(self, item: Input | None, *, now: float) -> None:
+    def look(self, item: Input | None, *, now: float) -> None:
         """Log the texts in received packets."""
         if now >= self._due:
             self._handle_deadline(now)
         match item:
-            case AtOnce(packets=several):
-                for each in several:
-                    self.on_input(each, now=now)
             case Packets() if item.link in self._links:
                 for peer, packet in self._texts_in(item, now):
                     self._receive(packet, (item.link, peer), now)
-            case LinkChanged(side=LinkSide.VEHICLES, up=True):
-                self._links[item.link] = item.is_stream
-                self._intake.change_link(item)
             case LinkChanged():
-                self._links.pop(item.link, None)
                 self._intake.change_link(item)
             case PeerChanged():
                 self._intake.change_peer(item)
-
-    def on_output(
-        self, packets: Sequence[Outgoing], events: Sequence[Event], *, now: float
-    ) -> None:
-        """Ignore output."""
 
     def close(self) -> None:
         """Log incomplete texts and pending counts."""

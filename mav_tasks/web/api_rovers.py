@@ -1,5 +1,6 @@
 """Operations on rovers: their state, STOP, pause, resume, queue, fence and rally points."""
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
@@ -105,6 +106,14 @@ def operations(services: Services) -> list[Operation]:
         tasks = await client.history(vehicle=known(call), limit=50 if limit is None else limit)
         return {"tasks": [live.task_form(each) for each in tasks]}
 
+    async def defaults(call: Call) -> object:
+        rover = known(call)
+        speed, rate = await asyncio.gather(
+            client.parameter("TSK_SPEED", vehicle=rover),
+            client.parameter("TSK_TURN", vehicle=rover),
+        )
+        return {"speed": round(speed, 3), "rate": round(rate, 3)}
+
     async def track(call: Call) -> object:
         return {"points": live.tracks.of_vehicle(known(call), since=call.query["since"] or 0.0)}
 
@@ -164,6 +173,13 @@ def operations(services: Services) -> list[Operation]:
         Operation("GET", f"{one}/queue", "The queue", queue, query=[LIMIT], answer="Queue"),
         Operation(
             "GET", f"{one}/history", "Finished tasks", history, query=[LIMIT], answer="Tasks"
+        ),
+        Operation(
+            "GET",
+            f"{one}/defaults",
+            "Speed and turn rate of goals that name none, unless DO_CHANGE_SPEED has set another",
+            defaults,
+            answer="Defaults",
         ),
         Operation(
             "GET",

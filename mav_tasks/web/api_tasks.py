@@ -111,7 +111,9 @@ def operations(services: Services) -> list[Operation]:
         return await client.status(call.task, vehicle=rovers[0].id)
 
     async def task(call: Call) -> Any:
-        return live.task_form(await status_of(call), is_whole=True)
+        status = await status_of(call)
+        await services.look_up_user(status.id)
+        return live.task_form(status, is_whole=True)
 
     async def timing(call: Call) -> Any:
         status = await status_of(call)

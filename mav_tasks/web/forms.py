@@ -9,6 +9,7 @@ from mav_tasks.client.descriptions import (
     end_of,
     needs_decision,
     remedy_for,
+    remedy_for_pause,
     waits_of,
     why_of,
     with_resume,
@@ -74,7 +75,7 @@ def queue_form(queue: QueueStatus, *, goals: Mapping[int, Any] | None = None) ->
     current = queue.current
     return queue_json(queue) | {
         "paused_words": paused_words(queue.paused),
-        "paused_remedy": queue.paused and remedy_for(queue.paused, resume=PRESS),
+        "paused_remedy": queue.paused and remedy_for_pause(queue.paused, resume=PRESS),
         "more": max(queue.waiting_count - len(queue.waiting), 0),
         "current": None if current is None else task_form(current, goals=goals),
         "waiting": [task_form(e, why=waits[e.id], goals=goals) for e in queue.waiting],
@@ -139,4 +140,4 @@ def _control_of(vehicle: VehicleStatus, queue: QueueStatus | None) -> tuple[str,
     control = "taken over" if queue.paused in TAKEN else "paused"
     if queue.paused is TaskReason.STOPPED:
         control = "stopped"
-    return control, f"{name} is paused: {why}. {remedy_for(queue.paused, resume=PRESS)}"
+    return control, f"{name} is paused: {why}. {remedy_for_pause(queue.paused, resume=PRESS)}"

@@ -7,11 +7,13 @@ from itertools import islice
 from typing import Any
 
 from mav_tasks.errors import StoreError
+from mav_tasks.logs.export import for_people
+from mav_tasks.logs.joined import joined
 from mav_tasks.logs.rendering import event_values
 from mav_tasks.store.base import Which
 from mav_tasks.store.opening import kind_of
 from mav_tasks.tasks.events import TaskSubmitted
-from mav_tasks.tasks.goal import Goal
+from mav_tasks.tasks.task import Task
 
 DAY = 24 * 3600.0
 
@@ -40,17 +42,19 @@ class Journal:
         since = time.time() - DAY if task is None and after is None else None
         which = Which(task=task, vehicle=vehicle, since=since, after=after)
         with closing(kind_of(self._place).open_journal(self._place, which)) as reader:
-            events = reader.take(offset=0.0)
+            events = joined(reader.take(offset=0.0))
             found = deque(events if after is None else islice(events, limit), maxlen=limit)
         return [
-            {"number": number, "at": round(event.at, 3)} | event_values(event, offset=0.0)
-            for number, event in found
+            {"number": number, "at": round(event.at, 3)}
+            | event_values(event, offset=0.0)
+            | {"message": for_people(words)}
+            for number, event, words in found
         ]
 
-    def goal_of(self, task: int) -> Goal | None:
-        """Return the goal of a task; None if the journal does not have it."""
+    def submission_of(self, task: int) -> Task | None:
+        """Return a task as it was submitted; None if the journal does not have it."""
         with closing(kind_of(self._place).open_journal(self._place, Which(task=task))) as reader:
             for _, event in reader.take(offset=0.0):
                 if isinstance(event, TaskSubmitted):
-                    return event.task.goal
+                    return event.task
         return None

@@ -52,7 +52,7 @@ class Live:
         self.stops = Stops(client, self._publish_stop)
         self.queues: dict[int, QueueStatus] = {}
         self.places: dict[int, list[Place]] = {}
-        self.users: dict[int, str] = {}  # who submitted tasks by this page
+        self.users: dict[int, str] = {}  # who submitted tasks, as far as that is known
         self._places_count = 0
         self._rows = QueueRows()
         self._server = server
@@ -138,7 +138,7 @@ class Live:
             self._places_count -= len(self.places.pop(next(iter(self.places))))
 
     def remember_user(self, task_id: int, user: str) -> None:
-        """Keep who submitted a task by the page."""
+        """Keep who submitted a task."""
         self.users[task_id] = user
         _shorten(self.users, MOST_TOLD)
 

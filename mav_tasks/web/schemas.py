@@ -286,6 +286,7 @@ SCHEMAS: dict[str, Schema] = {
     "Shape": SHAPE,
     "Fence": whole({"shapes": listed(ref("Shape"))}),
     "Count": whole({"items": INTEGER}),
+    "Defaults": whole({"speed": said(NUMBER, "m/s"), "rate": said(NUMBER, "deg/s")}),
     "Plan": whole(
         {
             "items": INTEGER,

@@ -8,6 +8,7 @@ from typing import Any
 
 from mav_tasks.client.aio import Client
 from mav_tasks.errors import StoreError
+from mav_tasks.mavlink.address import who_is
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.web.goal_places import places_of_goals
 from mav_tasks.web.journal import Journal
@@ -48,10 +49,21 @@ class Services:
         self._looking.add(looking)
         looking.add_done_callback(self._looking.discard)
 
+    async def look_up_user(self, task: int) -> None:
+        """Read from the journal who submitted a task, unless that is known: no status has names."""
+        if self.journal is None or task in self.live.users:
+            return
+        with suppress(StoreError):  # then it is said by which program
+            async with self._reading:
+                submitted = await asyncio.to_thread(self.journal.submission_of, task)
+            if submitted is not None:
+                self.live.remember_user(task, who_is(str(submitted.submitter)))
+
     async def _remember_places(self, journal: Journal, task: int) -> None:
         with suppress(StoreError):  # the map lacks the places; nothing else does
             async with self._reading:
-                goal = await asyncio.to_thread(journal.goal_of, task)
+                submitted = await asyncio.to_thread(journal.submission_of, task)
+            goal = None if submitted is None else submitted.goal
             steps = goal.steps if isinstance(goal, Plan) else ()
             places = places_of_goals([step for step in steps if isinstance(step, GoTo)])
             if places:

@@ -203,6 +203,10 @@ def test_tasks_of_every_kind_are_added_with_the_form(chromium: Any, it: Web) -> 
 def test_the_form_says_what_is_wrong(chromium: Any, it: Web) -> None:
     with opened(chromium, it, may_fail=True) as page:
         page.click("text=Add a task…")
+        page.wait_for_selector(".box [name=speed][placeholder='0.5 m/s by default']")
+        page.select_option(".box [name=kind]", "face")
+        page.wait_for_selector(".box [name=rate][placeholder='40 deg/s by default']")
+        page.select_option(".box [name=kind]", "move")
         page.click(".box >> text='Add the task'")
         says(page, ".box .failure", "Distance (m): Please fill out this field.")
         page.fill(".box [name=distance]", "1000000")
@@ -260,7 +264,7 @@ def test_a_waiting_task_is_changed(chromium: Any, it: Web, shots: Path) -> None:
         says(page, "#panel-task .log li", "deadline")
         task = it.task(second)
         assert (task["priority"], task["after"], task["every"]) == (7, first, None)
-        page.click("text=Change…")
+        page.click("#panel-task >> text=Change…")
         page.fill(".box [name=after]", "")
         page.fill(".box [name=cron]", "30 7 * * 1-5 Europe/Berlin")
         page.click(".box >> text='Change it'")

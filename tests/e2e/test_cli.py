@@ -196,6 +196,14 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     assert (queue["current"]["priority"], queue["current"]["left_unit"]) == (8, "s")
     assert [(task["id"], task["priority"]) for task in queue["waiting"]] == [(waiting["id"], 9)]
 
+    (later,) = called("submit", "move", "1", "--json", server=server).objects
+    (last,) = called("submit", "move", "1", "--json", server=server).objects
+    called("modify", str(last["id"]), "--before", str(later["id"]), server=server)
+    (queue,) = called("queue", "--json", server=server).objects
+    assert [task["id"] for task in queue["waiting"]][:2] == [last["id"], later["id"]]
+    for each in (last, later):
+        assert called("cancel", str(each["id"]), server=server).status == 0
+
     table = mav_tasks("queue", server=server)
     assert table.lines[0].startswith(f"rover 1: task {first} ")
     assert "\x1b" not in table.output
@@ -328,7 +336,7 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
     why = {"pause": "operator", "stop": "STOP"}[halt]
     assert done.error == (
         f"mav-tasks: rover 1: task {number} waits: the queue is paused ({why});"
-        " to resume: mav-tasks resume\n"
+        " to let it run, use: mav-tasks resume\n"
     )
     assert called("submit", "move", "1", "--json", server=server).error == ""
     assert called("clear", server=server).status == 0
@@ -410,7 +418,7 @@ def test_a_task_that_fails_is_status_1(server: str, client: SyncClient) -> None:
     assert waiting.stdout is not None
     assert waiting.stdout.readline() == (
         f"rover 1: task {first.id}: plan of 2 items: queued (queue paused);"
-        " to resume: mav-tasks resume\n"
+        " to let it run, use: mav-tasks resume\n"
     )
     client.cancel(first.id)
     output, error = waiting.communicate(timeout=20)

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -234,6 +235,33 @@ def test_only_a_terminal_gets_long_lines_wrapped_at_words(tmp_path: Path) -> Non
     with terminal(*command, "--json", size=(24, 50)) as screen:
         assert screen.end() == 0
     assert json.loads(screen.written)["before"]["priority"] == 5
+
+
+def test_one_change_of_several_properties_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "t.sqlite3"
+    terms = [Terms(), Terms(priority=9)]
+    terms += [replace(terms[-1], start_at=at) for at in (600.0, 601.0)]
+    terms += [replace(terms[-1], label=label) for label in ("to the n", "to the north")]
+    times = (0.0, 0.5, 1.0, 1.5, 1.6)  # and the fifth by somebody else; the sixth later
+    changes = [
+        TaskModified(TaskId(3), 1, 2, after, "client", at, before)
+        for at, before, after in zip(times, terms[:-1], terms[1:], strict=True)
+    ]
+    other = replace(terms[-1], label="x")
+    changes += [TaskModified(TaskId(3), 1, 2, other, "pilot", 1.7, terms[-1])]
+    changes += [TaskModified(TaskId(3), 1, 2, terms[-1], "pilot", 9.0, other)]
+    with opened(path) as store:
+        store.append(changes)
+    said = [
+        line.partition("modified by ")[2] for line in export("--store", str(path))[1].split("\n")
+    ]
+    assert said == [
+        "client: priority 9 (was 5), start in 599.5 s, start in 600 s, label 'to the north'",
+        "pilot: label 'x'",
+        "pilot: label 'to the north'",
+        "",
+    ]
+    assert len(export("--store", str(path), "--json")[1].splitlines()) == len(changes)
 
 
 @pytest.mark.parametrize("follow", [(), ("--follow",)])

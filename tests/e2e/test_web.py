@@ -102,6 +102,7 @@ def test_answers_are_as_the_document_says(page: Web) -> None:
         ("Vehicle", "/vehicles/1"),
         ("Queue", "/vehicles/1/queue"),
         ("Tasks", "/vehicles/1/history"),
+        ("Defaults", "/vehicles/1/defaults"),
         ("Track", "/vehicles/1/track"),
         ("Path", "/vehicles/1/mission"),
         ("Fence", "/vehicles/1/fence"),

@@ -90,6 +90,12 @@ def test_the_server_knows_who_submitted_and_who_stopped(rig: Rig) -> None:
     assert rig.http("sam", "POST", f"/tasks/{task}/cancel", {}).status_code == 204
     entries = rig.http("ola", "GET", f"/tasks/{task}/journal").json()["entries"]
     assert sum("signed sam" in json.dumps(entry) for entry in entries) >= 2
+    messages = [entry["message"] for entry in entries]
+    assert any(" by sam at " in words for words in messages)
+    assert "244/190" not in " ".join(messages)
+    script = rig.clients["otto"].submit(Wait(5), delay=LATER)
+    assert rig.http("ola", "GET", f"/tasks/{script.id}").json()["submitted_by"] == "otto"
+    script.cancel()
     rig.clients["otto"].resume()  # of the STOP of another test
     assert rig.submit("ola").status_code == 403  # over her own connection, which is open now
     stop = rig.http("ola", "POST", "/stop", {})

@@ -79,16 +79,34 @@ def test_home_is_where_the_rover_was_armed_last(
     assert far_from(world, 3.0, 0.0) < NEAR
 
 
-@both
 def test_a_return_at_once_after_the_arming_knows_the_new_home(
-    make_world: MakeWorld, persona: Persona, path: Path
+    make_world: MakeWorld, path: Path
 ) -> None:
-    world = make(make_world, persona, path)
+    world = make(make_world, PROMPT, path)
     world.run(1.1)  # ArduPilot looks each second; the server was told of a home at (0, 0)
     world.client.command(RETURN, target=(1, 1))
     world.run(15)
     assert world.is_idle(tasks=3)
     assert far_from(world, 3.0, 0.0) < NEAR
+
+
+@pytest.mark.parametrize("phase", [0.0, 1.6])
+def test_a_return_begins_nowhere_before_the_home_of_its_arming_is_known(
+    make_world: MakeWorld, phase: float
+) -> None:
+    """A PX4 sets home at the arming, and says where only when it is asked, or each 2 s."""
+    world = make_world(persona=PROMPT_PX4)
+    world.client.move(0.8)
+    world.until_idle(tasks=1)
+    world.until(lambda: not world.rover.autopilot.armed, within=10)
+    world.run(1.0 + phase)
+    world.client.command(RETURN, target=(1, 1))
+    farthest = 0.0
+    for _ in range(80):
+        world.run(0.1)
+        farthest = max(farthest, far_from(world, 0.8, 0.0))
+    assert world.is_idle(tasks=2)
+    assert farthest < NEAR
 
 
 @both

@@ -43,10 +43,21 @@ def choose(world: World, party: QgcParty, mode: Mode) -> None:
     world.run(1.5)
 
 
-def driving_far(make_world: MakeWorld, persona: Persona) -> tuple[World, QgcParty]:
-    """Have the rover on its way to a place that the person has clicked."""
+def joined(
+    make_world: MakeWorld, persona: Persona, plan: Plan | None = None
+) -> tuple[World, QgcParty]:
+    """Have a person at QGroundControl, who has uploaded a plan."""
     world = make_world(persona=persona)
     party = join(world, V4)
+    if plan is not None:
+        party.plans.upload(plan)
+        world.until(lambda: party.plans.is_done, within=5)
+    return world, party
+
+
+def driving_far(make_world: MakeWorld, persona: Persona) -> tuple[World, QgcParty]:
+    """Have the rover on its way to a place that the person has clicked."""
+    world, party = joined(make_world, persona)
     arm(world, party)
     party.operator.go_to(*FAR)
     world.until(lambda: world.truth.north > 0.5, within=20)
@@ -55,10 +66,7 @@ def driving_far(make_world: MakeWorld, persona: Persona) -> tuple[World, QgcPart
 
 def driving_plan(make_world: MakeWorld, persona: Persona) -> tuple[World, QgcParty]:
     """Have the rover on its way in a plan."""
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.plans.upload(ROUND)
-    world.until(lambda: party.plans.is_done, within=5)
+    world, party = joined(make_world, persona, ROUND)
     party.operator.start()
     world.until(lambda: world.truth.north > 0.5, within=25)
     return world, party
@@ -128,8 +136,7 @@ def test_return_drives_after_an_emergency_stop_in_a_plan(
 def test_return_drives_from_any_mode_and_leaves_the_queue_running(
     make_world: MakeWorld, persona: Persona, mode: Mode
 ) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
+    world, party = joined(make_world, persona)
     choose(world, party, Mode.HOLD)
     arm(world, party)
     party.operator.action(MOVE, 1.0, component=191)
@@ -151,10 +158,7 @@ def test_return_drives_from_any_mode_and_leaves_the_queue_running(
 def test_start_drives_from_manual_before_what_waits_there(
     make_world: MakeWorld, persona: Persona
 ) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.plans.upload(ROUND)
-    world.until(lambda: party.plans.is_done, within=5)
+    world, party = joined(make_world, persona, ROUND)
     choose(world, party, Mode.MANUAL)
     arm(world, party)
     party.operator.action(MOVE, -2.0, component=191)
@@ -170,8 +174,7 @@ def test_start_drives_from_manual_before_what_waits_there(
 def test_a_click_in_manual_drives_without_a_warning(
     make_world: MakeWorld, persona: Persona
 ) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
+    world, party = joined(make_world, persona)
     choose(world, party, Mode.MANUAL)
     arm(world, party)
     at = world.now
@@ -267,10 +270,7 @@ def test_stop_ends_clicks_and_is_left_by_continue_only(
 def test_start_and_return_drive_beside_a_held_task_and_one_warning_names_it(
     make_world: MakeWorld, persona: Persona
 ) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.plans.upload(ROUND)
-    world.until(lambda: party.plans.is_done, within=5)
+    world, party = joined(make_world, persona, ROUND)
     world.client.move(5.0)
     world.until(lambda: world.truth.north > 0.5, within=20)
     world.observer.expects_gaps = True

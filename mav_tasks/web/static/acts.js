@@ -12,9 +12,7 @@ export const may = (what) => Boolean(state.session && state.session.may.includes
 /** What helps, in words for who may not resume a rover. */
 export const forMe = (words) => (may("resume") ? words : words.replace("press Resume", "an operator must press Resume"));
 
-export function pause(vehicle) {
-  return post(`/vehicles/${vehicle}/pause`, {});
-}
+export const pause = (vehicle) => post(`/vehicles/${vehicle}/pause`, {});
 
 export function resume(queue) {
   const rover = state.vehicles.get(queue.vehicle);

@@ -35,10 +35,7 @@ export async function request(method, path, body, { key, within = WITHIN } = {})
     const words = error.name === "TimeoutError" ? `no answer within ${within / 1000} s` : "the web process cannot be reached";
     throw new Problem(0, words, null);
   }
-  let problem = {};
-  try {
-    problem = await answer.json();
-  } catch { /* an answer of something in between */ }
+  const problem = await answer.json().catch(() => ({})); // of something in between
   throw new Problem(answer.status, problem.detail ?? `answer ${answer.status}`, problem.reason ?? null);
 }
 

@@ -28,9 +28,7 @@ rovers.begin();
 tabs();
 views();
 drawLink();
-onChange((names) => {
-  if (["server", "clock", "session", "whole"].some((name) => names.has(name))) drawLink();
-});
+onChange(["server", "clock", "session", "whole"], drawLink);
 start();
 
 async function start() {
@@ -59,9 +57,7 @@ async function start() {
   stream.open(refused);
 }
 
-function refused() {
-  logIn(start);
-}
+const refused = () => logIn(start);
 
 // the page shows rovers and STOP before the map's library has come
 function leaflet() {

@@ -1,7 +1,6 @@
 // Dialogues: below the bar with STOP, which stays in reach. Escape closes; the focus comes back.
 
-import { failureWords } from "./api.js";
-import { focusNear, h, say, show } from "./dom.js";
+import { failureLine, focusNear, h } from "./dom.js";
 
 const place = () => document.getElementById("dialogs");
 
@@ -16,33 +15,25 @@ const below = () => [document.getElementById("main"), document.querySelector(".v
 export function ask({ title, words = [], word, act, fields, isBeside = false, isNeeded = false, onClose = () => {} }) {
   close();
   const before = document.activeElement;
-  const failure = h("p", { class: "failure", role: "alert", hidden: true });
+  const failure = failureLine();
   const go = h("button", { class: "small main-word", type: "submit" }, word);
   const form = h("form", { class: "box", role: "dialog", "aria-labelledby": "dialog-title", tabIndex: -1, noValidate: true },
     h("h2", { id: "dialog-title" }, title),
     ...words.map((each) => (each instanceof Node ? each : h("p", {}, each))),
     fields,
-    failure,
+    failure.element,
     h("div", { class: "row" }, !isNeeded && h("button", { class: "small", type: "button", onclick: () => close() }, "Back"), go));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     if (go.disabled) return;
     const wrong = form.querySelector("input:invalid");
     if (wrong) {
-      say(failure, `${wrong.labels[0].firstChild.textContent}: ${wrong.validationMessage}`);
-      show(failure, true);
+      failure.tell(`${wrong.labels[0].firstChild.textContent}: ${wrong.validationMessage}`);
       return wrong.focus();
     }
     go.disabled = true;
-    show(failure, false);
-    try {
-      await act(form);
-      close();
-    } catch (error) {
-      say(failure, failureWords(error));
-      show(failure, true);
-      go.disabled = false;
-    }
+    if (await failure.trying(() => act(form))) close();
+    else go.disabled = false;
   });
   const cover = h("div", { class: isBeside ? "cover beside" : "cover" }, form);
   document.addEventListener("keydown", onKey);

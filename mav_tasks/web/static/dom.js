@@ -1,5 +1,7 @@
 // Small helpers for the DOM. Data become text nodes only: nothing that others sent is read as HTML.
 
+import { failureWords } from "./api.js";
+
 /**
  * Make an element. A property "on…" is a listener, "class" the class, "data-…"/"aria-…" an attribute.
  * @param {string} tag
@@ -38,6 +40,26 @@ export function show(element, isShown) {
   const hadFocus = !isShown && element.contains(document.activeElement);
   element.hidden = !isShown;
   if (hadFocus) focusNear(element.parentElement);
+}
+
+/** A line that tells what failed. "trying" does something, and returns whether it did not fail. */
+export function failureLine() {
+  const element = h("p", { class: "failure", role: "alert", hidden: true });
+  const tell = (words) => {
+    say(element, words);
+    show(element, Boolean(words));
+  };
+  const trying = async (act, wordsOf = failureWords) => {
+    tell("");
+    try {
+      await act();
+      return true;
+    } catch (error) {
+      tell(wordsOf(error));
+      return false;
+    }
+  };
+  return { element, tell, trying };
 }
 
 /** Focus what is around a place whose focused element is gone: a keyboard does not begin at the top again. */

@@ -20,12 +20,7 @@ const REFRESH = 30000; // ms
 let map = null;
 let hasTiles = false;
 let reference = null; // the place on earth at the grid's origin
-let trackLayer = null;
-let groundLayer = null;
-let goalLayer = null;
-let previewLayer = null;
-let taskTrackLayer = null;
-let runLayer = null;
+let [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer, runLayer] = [];
 let isFitted = false;
 let awaited = null; // what to look at once the map has a size
 let isPast = false; // a recorded run is shown
@@ -47,7 +42,7 @@ export function begin() {
   } else {
     grid().addTo(map);
   }
-  map.setView([0, 0], hasTiles ? 3 : 3);
+  map.setView([0, 0], 3);
   [groundLayer, trackLayer, goalLayer, taskTrackLayer, previewLayer, runLayer] = Array.from({ length: 6 }, () => L.layerGroup().addTo(map));
   tracks.begin(trackLayer, goalLayer, { point, here, placed });
   document.getElementById("map-fit").addEventListener("click", fit);
@@ -63,14 +58,15 @@ export function begin() {
     map.invalidateSize();
     if (awaited) lookAt(...awaited);
   }).observe(document.getElementById("map"));
-  onChange((names) => {
-    if (names.has("whole")) reset();
-    if (names.has("vehicles") || names.has("clock")) drawRovers();
-    if (names.has("chosen") || names.has("session")) centre();
-    if (["vehicles", "chosen", "queues"].some((name) => names.has(name))) tracks.drawTracks();
-    if (["vehicles", "queues", "chosen", "tasks"].some((name) => names.has(name))) tracks.drawGoals();
-    if (names.has("chosen") || names.has("ground")) drawGround();
+  onChange(["whole"], () => {
+    for (const mark of marks.values()) mark.remove();
+    marks.clear();
   });
+  onChange(["vehicles", "clock"], drawRovers);
+  onChange(["chosen", "session"], centre);
+  onChange(["vehicles", "chosen", "queues"], tracks.drawTracks);
+  onChange(["vehicles", "queues", "chosen", "tasks"], tracks.drawGoals);
+  onChange(["chosen", "ground"], drawGround);
   setInterval(loadGround, REFRESH);
 }
 
@@ -84,24 +80,23 @@ export async function loadGround() {
   change("ground");
 }
 
-function reset() {
-  for (const mark of marks.values()) mark.remove();
-  marks.clear();
-}
-
 /** The point of the map for a place, of a rover's frame or on earth; null: not known. */
 function point(place, vehicle) {
   const origin = vehicle ? vehicle.origin : null;
-  let { latitude, longitude } = place;
-  if (latitude === undefined && origin) {
-    latitude = origin.latitude + place.north / METRES;
-    longitude = origin.longitude + place.east / (METRES * Math.cos((origin.latitude * Math.PI) / 180));
-  }
-  if (hasTiles) return latitude === undefined || latitude === null ? null : [latitude, longitude];
-  if (latitude === undefined || latitude === null) return place.north === undefined ? null : [place.north, place.east];
-  if (!reference) return place.north === undefined ? null : [place.north, place.east];
-  return [(latitude - reference.latitude) * METRES, (longitude - reference.longitude) * METRES * Math.cos((reference.latitude * Math.PI) / 180)];
+  const { latitude, longitude } = place.latitude === undefined && origin ? onEarth(origin, place.north, place.east) : place;
+  const isKnown = (latitude ?? null) !== null;
+  if (hasTiles) return isKnown ? [latitude, longitude] : null;
+  if (isKnown && reference) return offset(reference, latitude, longitude);
+  return place.north === undefined ? null : [place.north, place.east];
 }
+
+const across = (latitude) => METRES * Math.cos((latitude * Math.PI) / 180); // m of a degree of longitude
+
+/** The place on earth that is so many metres from another one. */
+const onEarth = (from, north, east) => ({ latitude: from.latitude + north / METRES, longitude: from.longitude + east / across(from.latitude) });
+
+/** How many metres a place on earth is north and east of another one. */
+const offset = (from, latitude, longitude) => [(latitude - from.latitude) * METRES, (longitude - from.longitude) * across(from.latitude)];
 
 /** What the points of a rover's frame depend on: if it changes, they are drawn again. */
 const placed = ({ origin }) => `${origin?.latitude} ${origin?.longitude} ${reference?.latitude} ${reference?.longitude}`;
@@ -109,12 +104,7 @@ const placed = ({ origin }) => `${origin?.latitude} ${origin?.longitude} ${refer
 /** The place of a point of the map, for a goal: on earth, or in the rover's frame. */
 function placeAt(latlng, vehicle) {
   if (hasTiles) return { latitude: latlng.lat, longitude: latlng.lng };
-  if (reference) {
-    return {
-      latitude: reference.latitude + latlng.lat / METRES,
-      longitude: reference.longitude + latlng.lng / (METRES * Math.cos((reference.latitude * Math.PI) / 180)),
-    };
-  }
+  if (reference) return onEarth(reference, latlng.lat, latlng.lng);
   return vehicle ? { north: latlng.lat, east: latlng.lng } : null;
 }
 
@@ -202,20 +192,23 @@ function drawGround() {
   const vehicle = state.vehicles.get(state.chosen);
   if (!ground || !vehicle) return;
   drawShapes(ground.shapes, vehicle, groundLayer);
-  for (const place of ground.places) {
-    const at = point(place, vehicle);
-    if (at) L.circleMarker(at, { radius: 6, color: "#6a4fb3", weight: 2, fill: false }).bindTooltip("rally point").addTo(groundLayer);
-  }
-  const path = ground.path.map((place) => point(place, vehicle)).filter(Boolean);
+  drawRally(ground.places, vehicle, groundLayer);
+  const path = points(ground.path, vehicle);
   if (path.length > 1) L.polyline(path, { color: "#3b6fd4", weight: 2, opacity: 0.5, dashArray: "2 6", interactive: false }).addTo(groundLayer);
+}
+
+const points = (places, vehicle) => places.map((place) => point(place, vehicle)).filter(Boolean);
+
+function drawRally(places, vehicle, layer) {
+  for (const at of points(places, vehicle)) L.circleMarker(at, { radius: 6, color: "#6a4fb3", weight: 2, fill: false }).bindTooltip("rally point").addTo(layer);
 }
 
 function drawShapes(shapes, vehicle, layer) {
   for (const shape of shapes) {
     const style = { color: shape.inclusion ? "#2f8f4e" : "#c4161c", weight: 2, fillOpacity: shape.inclusion ? 0.03 : 0.12, interactive: false };
     if (shape.kind === "polygon") {
-      const points = shape.points.map((place) => point(place, vehicle)).filter(Boolean);
-      if (points.length > 2) L.polygon(points, style).addTo(layer);
+      const corners = points(shape.points, vehicle);
+      if (corners.length > 2) L.polygon(corners, style).addTo(layer);
     } else {
       const at = point(shape.centre, vehicle);
       // in the grid, a unit is a metre
@@ -234,15 +227,12 @@ export function preview(plan, beside) {
   previewLayer.clearLayers();
   if (!plan) return;
   const vehicle = state.vehicles.get(state.chosen);
-  const path = plan.path.map((place) => point(place, vehicle)).filter(Boolean);
+  const path = points(plan.path, vehicle);
   if (path.length) {
     L.polyline(path, { color: "#d1602d", weight: 4, interactive: false }).addTo(previewLayer);
     for (const at of path) L.circleMarker(at, { radius: 4, color: "#d1602d", fillOpacity: 1, interactive: false }).addTo(previewLayer);
   }
-  for (const place of plan.rally) {
-    const at = point(place, vehicle);
-    if (at) L.circleMarker(at, { radius: 6, color: "#6a4fb3", weight: 2, fill: false, interactive: false }).addTo(previewLayer);
-  }
+  drawRally(plan.rally, vehicle, previewLayer);
   drawShapes(plan.fence, vehicle, previewLayer);
   const bounds = L.featureGroup(previewLayer.getLayers()).getBounds();
   if (bounds.isValid()) lookAt(bounds.pad(0.2), { maxZoom: hasTiles ? 20 : 4, paddingBottomRight: covered(beside) });
@@ -263,14 +253,14 @@ export function showTrack(track) {
   taskTrackLayer.clearLayers();
   if (!track) return;
   const vehicle = state.vehicles.get(track.vehicle);
-  const places = track.points.map(([, north, east]) => point({ north, east }, vehicle)).filter(Boolean);
-  if (places.length < 2) return;
   const lines = [[]];
   for (const [at, each] of track.points.entries()) {
     if (at && tracks.isGap(track.points[at - 1], each)) lines.push([]);
     const shown = point({ north: each[1], east: each[2] }, vehicle);
     if (shown) lines.at(-1).push(shown);
   }
+  const places = lines.flat();
+  if (places.length < 2) return;
   L.polyline(lines, { color: taskColour(track.id), weight: 7, opacity: 0.5, interactive: false }).addTo(taskTrackLayer);
   lookAt(L.latLngBounds(places).pad(0.4), { maxZoom: hasTiles ? 21 : 4 });
 }
@@ -318,7 +308,8 @@ function clicked(latlng) {
   const target = "latitude" in place
     ? { kind: "goto_global", latitude: round(place.latitude, 7), longitude: round(place.longitude, 7) }
     : { kind: "goto", north: round(place.north, 2), east: round(place.east, 2) };
-  const [north, east] = offset(from, [latlng.lat, latlng.lng]);
+  const { lat, lng } = latlng;
+  const [north, east] = hasTiles ? offset({ latitude: from[0], longitude: from[1] }, lat, lng) : [lat - from[0], lng - from[1]];
   const heading = round(((Math.atan2(east, north) * 180) / Math.PI + 360) % 360, 1);
   const away = Math.hypot(north, east);
   const id = vehicle.vehicle;
@@ -343,11 +334,7 @@ function fenceHere(id, place) {
     words: ["The rover must stay inside the circle. This replaces its present fence. A task that would leave it is refused, and a driving rover stops at it."],
     fields: h("div", { class: "fields" }, h("label", {}, "Radius (m)", h("input", { name: "radius", type: "number", min: 1, max: 10000, step: "any", value: FENCE_RADIUS }))),
     word: "Set the fence",
-    act: async (form) => {
-      const radius = Number(new FormData(form).get("radius"));
-      await request("PUT", `/vehicles/${id}/fence`, { circle: { ...place, radius } });
-      await loadGround();
-    },
+    act: (form) => request("PUT", `/vehicles/${id}/fence`, { circle: { ...place, radius: Number(new FormData(form).get("radius")) } }).then(loadGround),
   });
 }
 
@@ -356,16 +343,8 @@ function removeFence(id) {
     title: `Remove the fence of rover ${id}?`,
     words: ["Nothing then keeps its tasks inside an area. The present fence is not kept anywhere else."],
     word: "Remove the fence",
-    act: async () => {
-      await request("DELETE", `/vehicles/${id}/fence`);
-      await loadGround();
-    },
+    act: () => request("DELETE", `/vehicles/${id}/fence`).then(loadGround),
   });
-}
-
-function offset(from, to) {
-  if (!hasTiles) return [to[0] - from[0], to[1] - from[1]];
-  return [(to[0] - from[0]) * METRES, (to[1] - from[1]) * METRES * Math.cos((from[0] * Math.PI) / 180)];
 }
 
 const round = (value, digits) => Number(value.toFixed(digits));
@@ -390,18 +369,12 @@ function grid() {
     // from one line before: its words reach into this tile
     for (let east = (Math.ceil(west / step) - 1) * step; east < west + size; east += step) {
       const x = Math.round((east - west) * 2 ** coords.z) + 0.5;
-      pen.beginPath();
-      pen.moveTo(x, 0);
-      pen.lineTo(x, 256);
-      pen.stroke();
+      pen.strokeRect(x, -1, 512, 512);
       if (Math.round(north / step) % 2 === 0) pen.fillText(named(east, "E", "W"), x + 2, 10);
     }
     for (let at = Math.floor(north / step) * step; at > north - size - step; at -= step) {
       const y = Math.round((north - at) * 2 ** coords.z) + 0.5;
-      pen.beginPath();
-      pen.moveTo(0, y);
-      pen.lineTo(256, y);
-      pen.stroke();
+      pen.strokeRect(-1, y, 512, 512);
       if (Math.round(west / step) % 2 === 0) pen.fillText(named(at, "N", "S"), 2, y - 2);
     }
     return tile;

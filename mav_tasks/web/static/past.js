@@ -2,7 +2,7 @@
 
 import { failureWords, get } from "./api.js";
 import * as acts from "./acts.js";
-import { h, reconcile, say, show } from "./dom.js";
+import { failureLine, h, reconcile, say, show } from "./dom.js";
 import { showTrack } from "./map.js";
 import { onChange, serverNow, state } from "./store.js";
 import { goTo, showTask } from "./routes.js";
@@ -22,12 +22,10 @@ let whole = { vehicle: 0, wanted: 0 }; // what "tasks" has
 
 export function begin() {
   panel.append(list, none);
-  onChange((names) => {
-    if (names.has("route")) open();
-    if (names.has("tasks") && state.task !== null && state.tasks.has(state.task)) drawFacts(state.tasks.get(state.task));
-    if (names.has("session") && task && task.id === state.task) drawFacts(task);
-    if (["chosen", "tasks", "queues", "whole"].some((name) => names.has(name))) refresh();
-  });
+  onChange(["route"], open);
+  onChange(["tasks"], () => state.tasks.has(state.task) && drawFacts(state.tasks.get(state.task)));
+  onChange(["session"], () => task && task.id === state.task && drawFacts(task));
+  onChange(["chosen", "tasks", "queues", "whole"], refresh);
 }
 
 /** Load more finished tasks than the list has at first. */
@@ -82,18 +80,16 @@ function make(task) {
   const mark = h("span", { class: "state" });
   const info = h("p", { class: "why" });
   const element = h("li", { class: "task" }, h("div", { class: "line" }, h("span", { class: "title" }, link), mark), info);
-  return {
-    element,
-    update: (shown) => {
-      say(link, taskName(shown));
-      say(mark, stateWords(shown));
-      const parts = [];
-      if (shown.endedAt) parts.push(`ended ${clock(shown.endedAt)}`);
-      if (shown.execution_time) parts.push(`driven ${duration(shown.execution_time)}`);
-      if (shown.why && shown.why !== shown.state) parts.push(shown.why);
-      say(info, parts.join(" · "));
-    },
+  const update = (shown) => {
+    say(link, taskName(shown));
+    say(mark, stateWords(shown));
+    const parts = [];
+    if (shown.endedAt) parts.push(`ended ${clock(shown.endedAt)}`);
+    if (shown.execution_time) parts.push(`driven ${duration(shown.execution_time)}`);
+    if (shown.why && shown.why !== shown.state) parts.push(shown.why);
+    say(info, parts.join(" · "));
   };
+  return { element, update };
 }
 
 const facts = h("dl", { class: "facts-table" });
@@ -104,10 +100,10 @@ const release = h("button", { class: "small main-word", type: "button", hidden: 
 const cancel = h("button", { class: "small", type: "button", hidden: true, onclick: () => acts.cancel(task) }, "Cancel…");
 const modify = h("button", { class: "small", type: "button", hidden: true, onclick: () => openChangeForm(task) }, "Change…");
 const buttons = h("div", { class: "row" }, release, modify, cancel);
-const failure = h("p", { class: "failure", role: "alert", hidden: true });
+const failure = failureLine();
 const log = h("ol", { class: "log", "aria-label": "Journal of the task" });
 const logNone = h("p", { class: "empty" });
-detail.append(h("button", { class: "small", type: "button", onclick: () => showTask(null) }, "← Back to the list"), title, facts, failure, buttons, h("h3", {}, "What happened"), log, logNone);
+detail.append(h("button", { class: "small", type: "button", onclick: () => showTask(null) }, "← Back to the list"), title, facts, failure.element, buttons, h("h3", {}, "What happened"), log, logNone);
 
 async function open() {
   const id = state.task;
@@ -119,15 +115,9 @@ async function open() {
   log.replaceChildren();
   for (const each of [release, modify, cancel]) show(each, false);
   say(logNone, "");
-  show(failure, false);
-  try {
-    const found = await get(`/tasks/${id}`);
-    if (state.task !== id) return;
-    drawFacts(found);
-  } catch (error) {
-    say(failure, failureWords(error));
-    return show(failure, true);
-  }
+  let found;
+  if (!(await failure.trying(async () => (found = await get(`/tasks/${id}`)))) || state.task !== id) return;
+  drawFacts(found);
   // each as soon as it has come: a slow journal keeps nothing back
   const part = async (request, shown, failed = () => {}) => {
     try {

@@ -3,7 +3,7 @@
 import { failureWords, newKey, post, request } from "./api.js";
 import { consequenceOf, may } from "./acts.js";
 import { ask } from "./dialogs.js";
-import { h, say, show } from "./dom.js";
+import { failureLine, h } from "./dom.js";
 import { loadGround, preview } from "./map.js";
 import { state } from "./store.js";
 
@@ -11,19 +11,11 @@ const LARGEST = 10_000_000; // characters; the server's own limit
 
 /** A place to drop a plan file on, or to choose one by keyboard. */
 export function planDrop() {
-  const failure = h("p", { class: "failure", role: "alert", hidden: true });
+  const failure = failureLine();
   const input = h("input", { type: "file", id: "plan-file", class: "quiet", accept: ".plan,.waypoints,.txt" });
   const choose = h("button", { class: "small", type: "button", onclick: () => input.click() }, "choose a plan file…");
-  const area = h("div", { class: "drop" }, "Drop a .plan or waypoints file here, or ", choose, h("label", { class: "quiet", htmlFor: "plan-file" }, "Plan file"), input, failure);
-  const take = async (file) => {
-    show(failure, false);
-    try {
-      await open(file);
-    } catch (error) {
-      say(failure, `${file.name}: ${error instanceof RangeError ? error.message : failureWords(error)}`);
-      show(failure, true);
-    }
-  };
+  const area = h("div", { class: "drop" }, "Drop a .plan or waypoints file here, or ", choose, h("label", { class: "quiet", htmlFor: "plan-file" }, "Plan file"), input, failure.element);
+  const take = (file) => failure.trying(() => open(file), (error) => `${file.name}: ${error instanceof RangeError ? error.message : failureWords(error)}`);
   input.addEventListener("change", () => {
     if (input.files[0]) take(input.files[0]);
     input.value = "";
@@ -83,14 +75,9 @@ async function open(file) {
     },
     onClose: () => preview(null),
   });
-  showMap();
+  document.querySelector("[data-show=map]").click(); // on a phone the map is a view of its own
   preview(plan, form);
   if (!may(plan.items ? "submit" : "fence")) form.querySelector(".main-word").disabled = true;
-}
-
-// on a phone the map is a view of its own
-function showMap() {
-  document.querySelector("[data-show=map]").click();
 }
 
 const counted = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;

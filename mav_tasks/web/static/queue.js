@@ -1,9 +1,9 @@
 // The queue of the chosen rover: what runs, what waits and why, in order; and what a person can do about it.
 
-import { failureWords, request } from "./api.js";
+import { request } from "./api.js";
 import * as acts from "./acts.js";
 import { makeDraggable } from "./dragging.js";
-import { h, reconcile, renew, say, show } from "./dom.js";
+import { failureLine, h, reconcile, renew, say, show } from "./dom.js";
 import { openTaskForm } from "./task_form.js";
 import { planDrop } from "./plans.js";
 import { chosenQueue, onChange, state } from "./store.js";
@@ -21,7 +21,7 @@ const why = h("strong");
 const remedy = h("span");
 const go = h("button", { class: "small main-word", type: "button", onclick: () => acts.resume(chosenQueue()) }, "Resume…");
 const notice = h("div", { class: "notice", role: "status", hidden: true }, h("div", {}, why, " ", remedy), go);
-const failure = h("p", { class: "failure", role: "alert", hidden: true });
+const failure = failureLine();
 // at the end: it moves no row away below a finger
 const said = h("p", { class: "said", "aria-live": "polite" });
 const SAID = 8000; // ms for which it stays
@@ -31,11 +31,9 @@ const more = h("p", { class: "empty" });
 const drop = planDrop();
 
 export function begin() {
-  panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure, current, list, more, drop, said);
-  onChange((names) => {
-    if (names.has("session")) for (const each of [current, list]) renew(each);
-    if (["queues", "chosen", "tasks", "clock", "whole", "session"].some((name) => names.has(name))) draw();
-  });
+  panel.append(what, h("div", { class: "panel-head" }, add, clear), notice, failure.element, current, list, more, drop, said);
+  onChange(["session"], () => [current, list].forEach(renew));
+  onChange(["queues", "chosen", "tasks", "clock", "whole", "session"], draw);
 }
 
 function draw() {
@@ -77,7 +75,7 @@ function make(task, isCurrent) {
   const later = button("▼", () => step(id, +1), `Move task ${id} down`);
   const release = h("button", { class: "small main-word", type: "button", onclick: () => acts.release(now(), chosenQueue().halt_epoch) }, "Release…");
   const cancel = button("Cancel…", () => acts.cancel(now()), `Cancel task ${id}`);
-  const pause = button("Pause", async () => guarded(() => acts.pause(now().vehicle)), `Pause task ${id}`);
+  const pause = button("Pause", () => failure.trying(() => acts.pause(now().vehicle)), `Pause task ${id}`);
   // ▲ and ▼ do the same for a keyboard and a screen reader
   const grip = h("span", { class: "grip", "aria-hidden": "true", title: "Drag to another place" }, "⠿");
   const element = h("li", { class: isCurrent ? "task now" : "task", "data-task": String(id) },
@@ -133,16 +131,6 @@ function tell(words) {
   if (words) telling = setTimeout(() => say(said, ""), SAID);
 }
 
-async function guarded(act) {
-  show(failure, false);
-  try {
-    await act();
-  } catch (error) {
-    say(failure, failureWords(error));
-    show(failure, true);
-  }
-}
-
 /** The tasks that stand in line, in order; those behind them wait for something else. */
 const line = () => chosenQueue().waiting.filter((task) => task.state === "queued");
 
@@ -153,7 +141,7 @@ function follower(id, place) {
 }
 
 function move(id, place) {
-  return guarded(async () => {
+  return failure.trying(async () => {
     const before = follower(id, place);
     await request("PATCH", `/tasks/${id}`, { before });
     tell(before ? `Task ${id} runs before task ${before} now.` : `Task ${id} runs last now.`);

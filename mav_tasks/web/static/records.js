@@ -1,7 +1,7 @@
 // Recorded runs: their ways on the map, and what happened, at any moment of the run.
 
-import { failureWords, get } from "./api.js";
-import { h, reconcile, say, show } from "./dom.js";
+import { get } from "./api.js";
+import { failureLine, h, reconcile, say, show } from "./dom.js";
 import { showRun } from "./map.js";
 import { onChange, state } from "./store.js";
 import { clock, duration } from "./words.js";
@@ -13,7 +13,7 @@ const EVENTS = 40; // lines before the moment
 
 const list = h("ol", { class: "cards", "aria-label": "Recorded runs, the newest first" });
 const none = h("p", { class: "empty" });
-const failure = h("p", { class: "failure", role: "alert", hidden: true });
+const failure = failureLine();
 const title = h("h3", {});
 const scrub = h("input", { type: "range", class: "scrub", min: 0, max: 1000, step: 1, value: 0, "aria-label": "Moment of the run" });
 const moment = h("p", { class: "why" });
@@ -29,58 +29,42 @@ let at = 0;
 let timer = 0;
 
 export function begin() {
-  panel.append(failure, one, all);
+  panel.append(failure.element, one, all);
   scrub.addEventListener("input", () => go(run.begins + (Number(scrub.value) / 1000) * (run.ends - run.begins)));
-  onChange((names) => {
-    if (!names.has("session")) return;
+  onChange(["session"], () => {
     show(tab, Boolean(state.session && state.session.records));
     if (tab.hidden && tab.ariaSelected === "true") document.getElementById("tab-queue").click();
   });
 }
 
 /** The tab was opened: list the runs. */
-export async function shown() {
+export function shown() {
   if (run) return;
-  show(failure, false);
-  try {
+  failure.trying(async () => {
     const { records } = await get("/records");
     say(none, records.length ? "" : "No recording in this folder yet.");
     reconcile(list, records, (each) => each.name, make);
-  } catch (error) {
-    say(failure, failureWords(error));
-    show(failure, true);
-  }
+  });
 }
 
 /** Another tab was opened: the map shows the present again. */
-export function left() {
-  if (run) close();
-}
+export const left = () => run && close();
 
 function make(record) {
   const info = h("p", { class: "why" });
   const element = h("li", { class: "card" }, h("button", { class: "pick", type: "button", onclick: () => open(record.name) }, record.name), info);
-  return {
-    element,
-    update: (each) => {
-      const parts = each.files.length === 2 ? "packets and decisions" : each.files[0].endsWith(".tlog") ? "packets" : "decisions";
-      say(info, `${clock(each.changed)} · ${(each.bytes / 1e6).toFixed(1)} MB · ${parts}`);
-    },
+  const update = (each) => {
+    const parts = each.files.length === 2 ? "packets and decisions" : each.files[0].endsWith(".tlog") ? "packets" : "decisions";
+    say(info, `${clock(each.changed)} · ${(each.bytes / 1e6).toFixed(1)} MB · ${parts}`);
   };
+  return { element, update };
 }
 
 async function open(name) {
-  show(failure, false);
   say(none, `Reading ${name}…`);
-  try {
-    run = await get(`/records/${encodeURIComponent(name)}`, { within: 130000 });
-  } catch (error) {
-    say(failure, failureWords(error));
-    show(failure, true);
-    return;
-  } finally {
-    say(none, "");
-  }
+  const isRead = await failure.trying(async () => (run = await get(`/records/${encodeURIComponent(name)}`, { within: 130000 })));
+  say(none, "");
+  if (!isRead) return;
   say(title, `${name}, ${duration(run.ends - run.begins)}`);
   show(one, true);
   show(all, false);

@@ -1,8 +1,7 @@
 // The cards of the rovers: state, who has control, how old the data are, in words when something is wrong.
 
-import { failureWords } from "./api.js";
 import * as acts from "./acts.js";
-import { h, reconcile, say, sayParts, show } from "./dom.js";
+import { failureLine, h, reconcile, say, sayParts, show } from "./dom.js";
 import { stopButton } from "./stop.js";
 import { choose, dataAge, linkAge, onChange, state } from "./store.js";
 import { duration } from "./words.js";
@@ -14,9 +13,7 @@ const LOW = 20; // percent
 const MANY = 6; // rovers; beyond that only the chosen one shows all its facts
 
 export function begin() {
-  onChange((names) => {
-    if (["vehicles", "queues", "chosen", "clock", "server", "whole", "session"].some((name) => names.has(name))) draw();
-  });
+  onChange(["vehicles", "queues", "chosen", "clock", "server", "whole", "session"], draw);
 }
 
 function draw() {
@@ -35,20 +32,11 @@ function make({ rover }) {
   const ages = h("p", { class: "facts facts-more" });
   const says = h("p", { class: "says" });
   const prearm = h("ul", { class: "says warn" });
-  const failure = h("p", { class: "failure", role: "alert", hidden: true });
+  const failure = failureLine();
   const go = h("button", { class: "small main-word", type: "button", onclick: () => acts.resume(state.queues.get(id)) }, "Resume…");
-  const pause = h("button", { class: "small", type: "button" }, "Pause");
-  pause.addEventListener("click", async () => {
-    show(failure, false);
-    try {
-      await acts.pause(id);
-    } catch (error) {
-      say(failure, failureWords(error));
-      show(failure, true);
-    }
-  });
+  const pause = h("button", { class: "small", type: "button", onclick: () => failure.trying(() => acts.pause(id)) }, "Pause");
   const element = h("li", { class: "card" },
-    h("div", { class: "head" }, pick, go, pause, stopButton(id)), facts, ages, says, prearm, failure);
+    h("div", { class: "head" }, pick, go, pause, stopButton(id)), facts, ages, says, prearm, failure.element);
   const update = ({ rover: shown }) => {
     const queue = state.queues.get(id);
     const isChosen = state.chosen === id;

@@ -34,10 +34,8 @@ export function begin() {
       if (!event.repeat) stop(null);
     }
   });
-  onChange((names) => {
-    if (names.has("chosen") || names.has("vehicles")) drawOne();
-    if (["stops", "clock", "queues", "vehicles"].some((name) => names.has(name))) draw();
-  });
+  onChange(["chosen", "vehicles"], drawOne);
+  onChange(["stops", "clock", "queues", "vehicles"], draw);
 }
 
 /** A button that stops a rover, for its card. */
@@ -102,13 +100,11 @@ function draw() {
   for (const each of recent.slice(-LINES)) lines.push({ key: each.number, words: outcomeWords(each), isFailure: ["refused", "unanswered"].includes(each.phase) });
   reconcile(outcome, lines.slice(-LINES - 1), (line) => line.key, () => {
     const element = h("span", {});
-    return {
-      element,
-      update: (line) => {
-        say(element, line.words);
-        element.className = line.isFailure ? "bad" : "";
-      },
+    const update = (line) => {
+      say(element, line.words);
+      element.className = line.isFailure ? "bad" : "";
     };
+    return { element, update };
   });
 }
 

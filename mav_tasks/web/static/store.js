@@ -22,9 +22,9 @@ const listeners = [];
 let changed = new Set();
 let isAsked = false;
 
-/** Call a view with the names of what has changed, before the next frame is drawn. */
-export function onChange(view) {
-  listeners.push(view);
+/** Call a view before the next frame is drawn if one of these has changed. */
+export function onChange(names, view) {
+  listeners.push({ names, view });
 }
 
 /** Note that parts of the state have changed. */
@@ -41,7 +41,7 @@ function tell() {
   isAsked = false;
   const names = changed;
   changed = new Set();
-  for (const view of listeners) view(names);
+  for (const each of listeners) if (each.names.some((name) => names.has(name))) each.view();
 }
 
 /** Seconds of this page's clock. */
@@ -139,15 +139,13 @@ export function choose(vehicle) {
 /** The queue of the chosen rover. */
 export const chosenQueue = () => (state.chosen === null ? null : state.queues.get(state.chosen) ?? null);
 
+const agedBy = (age, vehicle) => (age === null ? null : age + (now() - vehicle.takenAt));
+
 /** How old the position of a rover is now, s; null: it has none. */
-export function dataAge(vehicle) {
-  return vehicle.data_age === null ? null : vehicle.data_age + (now() - vehicle.takenAt);
-}
+export const dataAge = (vehicle) => agedBy(vehicle.data_age, vehicle);
 
 /** How long ago its heartbeat was, s; null: not known. */
-export function linkAge(vehicle) {
-  return vehicle.heartbeat_age === null ? null : vehicle.heartbeat_age + (now() - vehicle.takenAt);
-}
+export const linkAge = (vehicle) => agedBy(vehicle.heartbeat_age, vehicle);
 
 const APART = 0.1; // m between two points of a track
 const MOST_POINTS = 20000;

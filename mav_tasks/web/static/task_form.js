@@ -1,6 +1,6 @@
 // A form for a new task, made from what the API says of goals and their limits.
 
-import { newKey, post, request } from "./api.js";
+import { get, newKey, post, request } from "./api.js";
 import { consequenceOf } from "./acts.js";
 import { ask } from "./dialogs.js";
 import { h } from "./dom.js";
@@ -21,13 +21,20 @@ export function openTaskForm(vehicle, goal = {}) {
   const select = h("select", { name: "kind" }, ...kinds.map((kind) => h("option", { value: kind.kind, selected: kind.kind === goal.kind }, NAMES[kind.kind] ?? kind.kind)));
   const meaning = h("small");
   const numbers = h("div", { class: "fields" });
+  let defaults = {};
+  const kindOf = () => kinds.find((each) => each.kind === select.value);
+  const fill = () => {
+    for (const { name, unit } of kindOf().numbers) if (name in defaults) numbers.querySelector(`[name=${name}]`).placeholder = `${defaults[name]} ${unit} by default`;
+  };
   const draw = () => {
-    const kind = kinds.find((each) => each.kind === select.value);
+    const kind = kindOf();
     meaning.textContent = kind.meaning;
     numbers.replaceChildren(...kind.numbers.map((number) => field(number, goal[number.name])));
+    fill();
   };
   select.addEventListener("change", draw);
   draw();
+  get(`/vehicles/${vehicle}/defaults`).then((found) => { defaults = found; fill(); }, () => {}); // the form works without them
   const consequence = h("p", { class: "empty", "aria-live": "polite" }, consequenceOf(vehicle));
   const who = h("select", { name: "rover" }, h("option", { value: vehicle }, `Rover ${vehicle}`), h("option", { value: ANY }, "Any rover"));
   const isAny = () => who.value === ANY;
@@ -40,7 +47,7 @@ export function openTaskForm(vehicle, goal = {}) {
     fields: h("div", {}, numbers, termFields({}), consequence),
     word: "Add the task",
     act: async (form) => {
-      const body = bodyOf(form, kinds.find((each) => each.kind === select.value));
+      const body = bodyOf(form, kindOf());
       const task = await post(`/vehicles/${who.value}/tasks`, body, { key: keys[who.value] });
       if (isAny()) choose(task.vehicle);
     },
@@ -99,7 +106,7 @@ function field(number, value) {
   if (number.most !== null) hint.push(`at most ${number.most}`);
   const input = h("input", {
     name: number.name, type: "number", step: "any", required: number.required, value: value ?? "",
-    min: number.least ?? undefined, max: number.most ?? undefined, placeholder: number.required ? "" : "default",
+    min: number.least ?? undefined, max: number.most ?? undefined,
   });
   return labelled(`${number.name.charAt(0).toUpperCase()}${number.name.slice(1).replace("_", " ")}${number.unit ? ` (${number.unit})` : ""}`, input, hint.join("; "));
 }

@@ -1,7 +1,7 @@
 // Texts of rovers and the server, and the journal, filtered.
 
-import { failureWords, get } from "./api.js";
-import { h, reconcile, say, show } from "./dom.js";
+import { get } from "./api.js";
+import { failureLine, h, reconcile, say, show } from "./dom.js";
 import { onChange, state, takeOlderTexts } from "./store.js";
 import { goTo } from "./routes.js";
 import { clock } from "./words.js";
@@ -20,7 +20,7 @@ const list = h("ol", { class: "log", "aria-label": "Texts, the newest first" });
 const none = h("p", { class: "empty" });
 const said = h("p", { class: "said", role: "status" });
 const older = h("button", { class: "small", type: "button", hidden: true, onclick: () => showOlder() }, "Older");
-const failure = h("p", { class: "failure", role: "alert", hidden: true });
+const failure = failureLine();
 let journal = [];
 let journalOf = ""; // the rover that it was requested for
 let most = SHOWN;
@@ -28,17 +28,15 @@ let isAsking = false;
 
 export function begin() {
   panel.append(h("div", { class: "filters" }, h("label", {}, "From", source), h("label", {}, "Rover", rover), h("label", {}, "Level", level), h("label", {}, "Search", search)),
-    list, none, said, failure, older);
+    list, none, said, failure.element, older);
   for (const each of [rover, level, source]) each.addEventListener("change", filtered);
   search.addEventListener("input", filtered);
-  onChange((names) => {
-    if (names.has("route") || names.has("session")) {
-      source.options[1].disabled = !(state.session && state.session.journal);
-      if (source.options[1].disabled) source.value = "texts";
-    }
-    if (names.has("chosen") && isJournal() && journalOf !== wantedOf()) loadJournal();
-    if (["texts", "chosen", "whole", "session"].some((name) => names.has(name))) draw();
+  onChange(["route", "session"], () => {
+    source.options[1].disabled = !(state.session && state.session.journal);
+    if (source.options[1].disabled) source.value = "texts";
   });
+  onChange(["chosen"], () => isJournal() && journalOf !== wantedOf() && loadJournal());
+  onChange(["texts", "chosen", "whole", "session"], draw);
 }
 
 const isJournal = () => source.value === "journal";
@@ -47,28 +45,21 @@ const wantedOf = () => (rover.value && state.chosen !== null ? `&vehicle=${state
 function filtered(event) {
   most = SHOWN;
   say(said, "");
-  show(failure, false);
+  failure.tell("");
   if (isJournal() && (event.target === source || journalOf !== wantedOf())) loadJournal();
   draw();
 }
 
-async function loadJournal() {
+function loadJournal() {
   const vehicle = wantedOf();
   journalOf = vehicle;
   journal = [];
-  try {
+  return failure.trying(async () => {
     const { entries } = await get(`/journal?limit=${KEPT}${vehicle}`);
     if (journalOf !== vehicle) return; // another rover was chosen meanwhile
     journal = entries;
     draw();
-  } catch (error) {
-    fail(error);
-  }
-}
-
-function fail(error) {
-  say(failure, failureWords(error));
-  show(failure, true);
+  });
 }
 
 /** The lines that the filters let pass, the oldest first. */
@@ -86,8 +77,7 @@ async function showOlder() {
   const before = matching().length;
   isAsking = true; // the button is not disabled: the keyboard stays on it
   list.ariaBusy = "true";
-  show(failure, false);
-  try {
+  await failure.trying(async () => {
     let found = before;
     while (!isJournal() && !state.areTextsWhole && found < Math.min(most, before) + MORE) {
       const first = state.texts[0];
@@ -99,9 +89,7 @@ async function showOlder() {
     const added = Math.min(found, most + MORE) - Math.min(before, most);
     most += MORE;
     say(said, added > 0 ? `${added} older line${added === 1 ? "" : "s"} shown.` : "No older line fits these filters.");
-  } catch (error) {
-    fail(error);
-  }
+  });
   isAsking = false;
   list.ariaBusy = "false";
   draw();

@@ -40,9 +40,7 @@ export function begin() {
   const known = Number(kept("time line", ""));
   take(SPANS.some(([seconds]) => seconds === known) ? known : span);
   document.addEventListener("past", draw);
-  onChange((names) => {
-    if (["queues", "chosen", "clock", "whole"].some((name) => names.has(name))) draw();
-  });
+  onChange(["queues", "chosen", "clock", "whole"], draw);
 }
 
 function take(seconds) {
@@ -153,19 +151,17 @@ function draw() {
   });
   reconcile(bars, shown, ({ task }) => task.id, ({ task }) => {
     const element = h("button", { type: "button", class: "bar", tabIndex: -1, onclick: () => showTask(task.id), onfocus: () => (focused = task.id) });
-    return {
-      element,
-      update: (bar) => {
-        element.style.left = `${bar.left}%`;
-        element.style.width = `${Math.max(0.4, bar.width)}%`;
-        const name = `bar ${bar.kind}`;
-        if (element.className !== name) element.className = name;
-        // a number that does not fit would lie on the next one's
-        say(element, (bar.width * strip.clientWidth) / 100 > 8 * String(bar.task.id).length + 8 ? `${bar.task.id}` : "");
-        element.title = `${taskName(bar.task)}: ${bar.task.state}`;
-        element.setAttribute("aria-label", element.title);
-      },
+    const update = (bar) => {
+      element.style.left = `${bar.left}%`;
+      element.style.width = `${Math.max(0.4, bar.width)}%`;
+      const name = `bar ${bar.kind}`;
+      if (element.className !== name) element.className = name;
+      // a number that does not fit would lie on the next one's
+      say(element, (bar.width * strip.clientWidth) / 100 > 8 * String(bar.task.id).length + 8 ? `${bar.task.id}` : "");
+      element.title = `${taskName(bar.task)}: ${bar.task.state}`;
+      element.setAttribute("aria-label", element.title);
     };
+    return { element, update };
   });
   // one stop of the Tab key; arrow keys go on from there
   const reached = shown.some(({ task }) => task.id === focused) ? focused : shown.length ? shown[shown.length - 1].task.id : 0;

@@ -4,9 +4,11 @@ import pytest
 
 from mav_tasks.agents.advice import advice_of, advice_on_queue
 from mav_tasks.agents.forms import TASK, queue_form, refusal, result, task_form
-from mav_tasks.client.descriptions import needs_decision
+from mav_tasks.cli.words import headline_of
+from mav_tasks.client.descriptions import needs_decision, remedy_for_pause
 from mav_tasks.client.values import QueueStatus, TaskStatus, Unit
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.web.forms import queue_form as page_form
 
 S, R = TaskState, TaskReason
 
@@ -71,6 +73,16 @@ def test_a_held_task_needs_a_decision_until_it_is_released() -> None:
     assert needs_decision(task(S.HELD, R.LATE))
     assert not needs_decision(task(S.HELD, R.NO_POSITION))  # released; it waits to start
     assert not needs_decision(task(S.EXECUTING))
+
+
+@pytest.mark.parametrize("reason", [R.OPERATOR, R.STOPPED, R.TAKEOVER, R.STUCK, R.ARM_REFUSED])
+def test_each_surface_says_how_a_paused_queue_is_resumed(reason: TaskReason) -> None:
+    paused = queue(None, reason)
+    said = remedy_for_pause(reason, resume="{}")
+    assert advice_on_queue(paused).endswith(said.format("call resume with epoch: 12"))
+    assert page_form(paused)["paused_remedy"] == said.format("press Resume")
+    clause = said.format("use: mav-tasks resume").removesuffix(".")
+    assert clause[1:] in headline_of(paused)
 
 
 def test_a_queue_says_what_blocks_it() -> None:

@@ -212,7 +212,10 @@ def test_what_has_no_room_is_counted() -> None:
         (replace(QUEUE, current=None, running=None), "rover 1: no task runs; 1 waiting"),
         (
             replace(QUEUE, current=None, running=None, paused=TaskReason.STOPPED),
-            ("rover 1: no task runs; queue paused (STOP); to resume: mav-tasks resume; 1 waiting"),
+            (
+                "rover 1: no task runs; queue paused (STOP);"
+                " to let it run, use: mav-tasks resume; 1 waiting"
+            ),
         ),
         (
             replace(QUEUE, current=HELD),
@@ -248,7 +251,11 @@ def test_why_it_waits_has_the_rovers_own_words() -> None:
 def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
     assert "release it: mav-tasks release 12" in words.line_of(HELD)
     released = replace(HELD, reason=TaskReason.NO_POSITION)
-    assert words.way_on_of(released) == "wait for its position, or check its GPS"
+    assert words.way_on_of(released) == "wait until the rover knows its position; check its GPS"
+
+
+RESUME = "to let it run, use: mav-tasks resume"
+ARM = "arm the rover in HOLD; or, if the server may arm it, use: mav-tasks resume"
 
 
 @pytest.mark.parametrize(
@@ -256,15 +263,18 @@ def test_a_released_task_that_waits_for_its_rover_needs_no_decision() -> None:
     [
         (
             replace(WAITING, reason=TaskReason.RESTARTED),
-            "rover 1: task 13: move 2 m: queued (after a restart); to resume: mav-tasks resume",
+            "rover 1: task 13: move 2 m: queued (after a restart); " + RESUME,
         ),
         (
             replace(WAITING, reason=TaskReason.QUEUE_PAUSED),
-            "rover 1: task 13: move 2 m: queued (queue paused); to resume: mav-tasks resume",
+            "rover 1: task 13: move 2 m: queued (queue paused); " + RESUME,
         ),
         (
             replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.TAKEOVER),
-            "rover 1: task 12: rotate 90 deg: paused (takeover); to resume: mav-tasks resume",
+            (
+                "rover 1: task 12: rotate 90 deg: paused (takeover); once nobody else drives it,"
+                " centre the sticks, set HOLD, then use: mav-tasks resume"
+            ),
         ),
         (
             replace(RUNNING, state=TaskState.PAUSED, reason=TaskReason.PREEMPTED),
@@ -349,7 +359,7 @@ NEW = replace(WAITING, reason=TaskReason.QUEUE_PAUSED, words="move 2 m: queued (
     [
         (WAITING, QUEUE, ""),
         (RUNNING, QUEUE, ""),
-        (NEW, PAUSED, "the queue is paused (operator); to resume: mav-tasks resume"),
+        (NEW, PAUSED, "the queue is paused (operator); to let it run, use: mav-tasks resume"),
         (
             replace(NEW, reason=TaskReason.HELD_AHEAD),
             replace(QUEUE, current=HELD),
@@ -358,7 +368,7 @@ NEW = replace(WAITING, reason=TaskReason.QUEUE_PAUSED, words="move 2 m: queued (
         (
             replace(NEW, reason=TaskReason.DISARMED, words="move 2 m: queued (disarmed)"),
             replace(QUEUE, current=None),
-            "disarmed; arm it in HOLD (or mav-tasks resume, if the server may arm)",
+            f"disarmed; {ARM}",
         ),
     ],
 )
@@ -375,20 +385,30 @@ DISARMED = replace(WAITING, reason=TaskReason.DISARMED, words="move 2 m: queued 
 @pytest.mark.parametrize(
     ("reason", "said"),
     [
-        (TaskReason.QUEUE_PAUSED, "to resume: mav-tasks resume --vehicle 1"),
+        (TaskReason.QUEUE_PAUSED, "to let it run, use: mav-tasks resume --vehicle 1"),
         (
             TaskReason.DISARMED,
-            "arm it in HOLD (or mav-tasks resume --vehicle 1, if the server may arm)",
+            f"{ARM} --vehicle 1",
         ),
-        (TaskReason.WRONG_MODE, "set HOLD, then: mav-tasks resume --vehicle 1"),
-        (TaskReason.NOT_READY, "wait, or fix what the rover reports"),
+        (TaskReason.WRONG_MODE, "set the rover to HOLD, then use: mav-tasks resume --vehicle 1"),
+        (TaskReason.NOT_READY, "wait, or mend what the rover reports"),
         (
             TaskReason.LOSS_FAILSAFE,
-            "to make it stop without setpoints: mav-tasks probe --set-failsafe --vehicle 1",
+            (
+                "let the rover stop when setpoints end:"
+                " run 'mav-tasks probe --set-failsafe --vehicle 1'"
+            ),
         ),
-        (TaskReason.OUTSIDE_OWN_FENCE, "drive it back manually, or switch that fence off"),
+        (TaskReason.OUTSIDE_OWN_FENCE, "drive the rover back manually, or switch that fence off"),
         (TaskReason.BEHIND_OTHERS, ""),
-        (TaskReason.OTHER_CONTROLLER, "end the other program that drives it"),
+        (
+            TaskReason.HELD_AHEAD,
+            (
+                "look at the queue, and release the held task before it:"
+                " mav-tasks release again|remainder|skip --vehicle 1"
+            ),
+        ),
+        (TaskReason.OTHER_CONTROLLER, "end the other program that drives the rover"),
     ],
 )
 def test_one_of_several_rovers_is_named_in_the_command(reason: TaskReason, said: str) -> None:
@@ -404,7 +424,7 @@ def test_a_task_that_has_ended_needs_no_command() -> None:
 
 
 def test_a_paused_queue_of_one_of_several_rovers_names_it() -> None:
-    resume = "to resume: mav-tasks resume --vehicle 1"
+    resume = "to let it run, use: mav-tasks resume --vehicle 1"
     assert words.headline_of(PAUSED, is_alone=False) == (
         f"rover 1: no task runs; queue paused (operator); {resume}; 1 waiting"
     )
@@ -423,13 +443,12 @@ def drawn_of_several(queue: QueueStatus) -> list[str]:
 
 def test_the_first_line_says_what_the_next_task_waits_for_and_what_to_do() -> None:
     idle = replace(QUEUE, current=None, running=None, waiting=(DISARMED,))
-    remedy = "arm it in HOLD (or mav-tasks resume, if the server may arm)"
     assert words.headline_of(idle) == (
-        f"rover 1: no task runs; task 13 waits: disarmed; {remedy}; 1 waiting"
+        f"rover 1: no task runs; task 13 waits: disarmed; {ARM}; 1 waiting"
     )
     starting = replace(RUNNING, state=TaskState.STARTING, reason=TaskReason.NOT_READY)
     assert words.headline_of(replace(QUEUE, current=starting)) == (
-        "rover 1: task 12 starting (not ready); wait, or fix what the rover reports; 1 waiting"
+        "rover 1: task 12 starting (not ready); wait, or mend what the rover reports; 1 waiting"
     )
     paused = replace(idle, paused=TaskReason.OPERATOR)
     assert "disarmed" not in words.headline_of(paused)

@@ -11,7 +11,7 @@ from math import inf, nan
 import pytest
 
 from mav_tasks.errors import UsageError
-from mav_tasks.logs.export import COLUMNS, csv_entry, json_entry, parse_moment, text_entry
+from mav_tasks.logs.export import COLUMNS, csv_entry, json_entry, parse_moment, text_entries
 from mav_tasks.logs.lines import json_line
 from mav_tasks.logs.rendering import clean, in_commands, level_of, utc_text
 from mav_tasks.tasks.events import (
@@ -170,7 +170,7 @@ def test_the_figures_of_a_drive_are_in_its_line_and_in_cells_of_their_own() -> N
         "136 setpoints at 20 Hz: p50 50.0, p99 51.2, max 150.0 ms, "
     )
     assert str(DRIVEN) == f"{words}1 late"
-    assert text_entry(9, shifted(DRIVEN)) == f"{TIME} {words}1 late\n"
+    assert list(text_entries([(9, shifted(DRIVEN))])) == [f"{TIME} {words}1 late\n"]
     (row,) = csv.reader(io.StringIO(csv_entry(9, shifted(DRIVEN))))
     cells = dict(zip(COLUMNS, row, strict=True))
     assert {name: float(cells[name]) for name in FIGURES} == FIGURES
@@ -233,7 +233,7 @@ def test_times_within_an_event_are_utc() -> None:
 def test_what_came_from_the_wire_gives_no_orders_to_a_terminal() -> None:
     event = VehicleNoted(1, "a\x1b[31mb\r\nc\x07\u202ed\x9b é", UTC)
     assert clean(str(event)) == "rover 1: a[31mb  cd é"
-    assert text_entry(1, event) == f"{TIME} rover 1: a[31mb  cd é\n"
+    assert list(text_entries([(1, event)])) == [f"{TIME} rover 1: a[31mb  cd é\n"]
     assert strictly(json_entry(1, event))["text"] == event.text
     assert "\x1b" not in csv_entry(1, event)
 
