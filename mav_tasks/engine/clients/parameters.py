@@ -5,6 +5,7 @@ Messages about the vehicle's own parameters are forwarded to it.
 """
 
 from collections.abc import Mapping
+from functools import partial
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -63,7 +64,6 @@ class ParameterServer:
         self._kept = dict(kept)
         #: by name, the latest PARAM_SET that is not durable yet
         self._pending: dict[str, _Wish] = {}
-        submissions.gate.knows(_Wish, self._accept, self._give_up)
         self._settings, self._why_not = with_all(settings, self._kept)
         #: whether settings changed since the last ``take_change``
         self.is_changed = False
@@ -185,7 +185,8 @@ class ParameterServer:
         if name in self._pending or value != self._kept.get(name):
             self._registry.record(ParameterSet(name, value, str(wish.who), now))
         self._pending[name] = wish
-        self._submissions.gate.hold(wish, now=now)
+        accept, give_up = partial(self._accept, wish), partial(self._give_up, wish)
+        self._submissions.gate.hold(accept, give_up, now=now)
 
     def _accept(self, wish: _Wish, *, now: float) -> None:
         is_latest = self._settled(wish)

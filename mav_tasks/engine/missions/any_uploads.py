@@ -8,7 +8,6 @@ plan is whole, of each rover. One upload is under way at a time, as at every add
 from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -42,14 +41,6 @@ R = TaskReason
 
 #: the messages of an upload
 UploadMessage = m.MissionCount | m.MissionItem | m.MissionItemInt | m.MissionAck
-
-
-class _Plan(NamedTuple):
-    """A plan that waits for the store."""
-
-    sender: Sender
-    vehicle: Vehicle
-    task: Task
 
 
 class _AnyCheck(PlanCheck):
@@ -92,7 +83,6 @@ class AnyUploads:
         self._check = _AnyCheck(settings)
         self._receiver = MissionReceiver(check=self._check, form=m.MissionRequestInt)
         self._timer = timers.timer(Turn.UPLOADS, self._ask_again)
-        submissions.gate.knows(_Plan, self._accept, self._withdraw)
 
     def __repr__(self) -> str:
         return f"AnyUploads({self._receiver!r})"
@@ -198,7 +188,8 @@ class AnyUploads:
         goal = driven_by(vehicle, wanted.plan)
         draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)
         task = self._submissions.submit_plan(client.rights, vehicle, draft, now=now)
-        self._submissions.gate.hold(_Plan(sender, vehicle, task), now=now)
+        accept = partial(self._accept, vehicle, task)
+        self._submissions.gate.hold(accept, partial(self._withdraw, vehicle, task), now=now)
 
     def _decide(self, upload: Upload, *, now: float) -> None:
         """Submit a whole plan, perhaps held back before, to the best rover now, or refuse it."""
@@ -207,8 +198,7 @@ class AnyUploads:
         except Rejection as why:
             self._refuse(why, now=now)
 
-    def _accept(self, plan: _Plan, *, now: float) -> None:
-        _, vehicle, task = plan
+    def _accept(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         if self._registry.get(task.id) is None:
             return  # retracted, and answered
         self._vehicles.mark_dirty(vehicle)  # its task may start
@@ -218,8 +208,7 @@ class AnyUploads:
         )
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
-    def _withdraw(self, plan: _Plan, *, now: float) -> None:
-        _, vehicle, task = plan
+    def _withdraw(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         if self._registry.get(task.id) is None:
             return
         self._vehicles.mark_dirty(vehicle)

@@ -89,7 +89,7 @@ class MissionServers:
         self._timers = timers
         self._answers = MissionAnswers(gcs, registry)
         self._uploads = MissionUploads(gcs, vehicles, registry, submissions, plans, self._answers)
-        self._clearing = MissionClearing(vehicles, registry, submissions, plans, self._answers)
+        self._clearing = MissionClearing(vehicles, submissions, plans, self._answers)
         self._go_to = GoToItems(submissions, registry)
         self._desks: dict[tuple[int, int, int], _Desk] = {}
 

@@ -8,7 +8,6 @@ the vehicle, at either address.
 from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import blake2b
-from typing import NamedTuple
 from zlib import crc32
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -70,28 +69,6 @@ class UploadSession:
         self.receiver = MissionReceiver(check=check, form=form)
 
 
-class _Mission(NamedTuple):
-    """A mission submitted as a task; if staged, it replaced the plan ``before``."""
-
-    desk: UploadSession
-    vehicle: Vehicle
-    sender: Sender
-    task: Task
-    before: Stored
-
-
-class _Kept(NamedTuple):
-    """Fence or rally points, or an empty mission, that replaced the plan ``before``."""
-
-    desk: UploadSession
-    vehicle: Vehicle
-    kind: int
-    plan_id: int
-    before: Stored
-    task: Task | None  # of the mission before
-    actor: str
-
-
 @dataclass(repr=False, eq=False)
 class MissionUploads:
     """The decision about whole uploads, and the answers to their clients."""
@@ -102,10 +79,6 @@ class MissionUploads:
     _submissions: Submissions
     _plans: Plans
     _answers: MissionAnswers
-
-    def __post_init__(self) -> None:
-        self._submissions.gate.knows(_Mission, self._accept, self._withdraw)
-        self._submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
 
     def flush(
         self,
@@ -203,10 +176,21 @@ class MissionUploads:
             self._plans.keep(
                 vehicle, MISSION, Stored(task.id, upload.items), actor=str(sender.address), now=now
             )
-        self._submissions.gate.hold(_Mission(desk, vehicle, sender, task, before), now=now)
+        accept = partial(self._accept, desk, vehicle, sender, task)
 
-    def _accept(self, mission: _Mission, *, now: float) -> None:
-        desk, vehicle, sender, task, _ = mission
+        def withdraw(*, now: float) -> None:
+            self._vehicles.mark_dirty(vehicle)
+            self._submissions.take_back(vehicle, task, now=now)
+            if is_staged:
+                self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
+            self._refuse(desk, vehicle, refusal, now=now)
+
+        self._submissions.gate.hold(accept, withdraw, now=now)
+
+    def _accept(
+        self, desk: UploadSession, vehicle: Vehicle, sender: Sender, task: Task, *, now: float
+    ) -> None:
         self._vehicles.get(vehicle.system_id)  # marks it dirty: a task may start
         desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
         self.flush(desk, vehicle, now=now)
@@ -221,15 +205,6 @@ class MissionUploads:
                 what += f", task {active.id} goes on until then"
         words = f"Task {task.id} {what}: {describe(task.goal)}{skipped(task.goal)}"
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
-
-    def _withdraw(self, mission: _Mission, *, now: float) -> None:
-        desk, vehicle, sender, task, before = mission
-        self._vehicles.mark_dirty(vehicle)
-        self._submissions.take_back(vehicle, task, now=now)
-        if task.terms.is_staged:
-            self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
-        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
-        self._refuse(desk, vehicle, refusal, now=now)
 
     def _replace(
         self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
@@ -246,26 +221,24 @@ class MissionUploads:
         write_through(vehicle, kind, items, store, partial(self._refuse, desk, vehicle), now=now)
 
     def _store(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
-        sender, kind = upload.sender, upload.mission_type
+        kind, actor = upload.mission_type, str(upload.sender.address)
         before, task = self._plans.stored(vehicle.system_id, kind), self._plans.task(vehicle)
         plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
-        actor, stored = str(sender.address), Stored(plan_id, upload.items)
-        self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
-        kept = _Kept(desk, vehicle, kind, plan_id, before, task, actor)
-        self._submissions.gate.hold(kept, now=now)
+        self._plans.keep(vehicle, kind, Stored(plan_id, upload.items), actor=actor, now=now)
 
-    def _accept_kept(self, kept: _Kept, *, now: float) -> None:
-        desk, vehicle = kept.desk, kept.vehicle
-        if kept.kind == MISSION:
-            self._vehicles.mark_dirty(vehicle)
-            self._plans.let_go(vehicle, kept.task, R.CLEARED, actor=kept.actor, now=now)
-        desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=kept.plan_id, now=now)
-        self.flush(desk, vehicle, now=now)
+        def accept(*, now: float) -> None:
+            if kind == MISSION:
+                self._vehicles.mark_dirty(vehicle)
+                self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+            desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
+            self.flush(desk, vehicle, now=now)
 
-    def _undo_kept(self, kept: _Kept, *, now: float) -> None:
-        self._plans.keep(kept.vehicle, kept.kind, kept.before, actor=kept.actor, now=now)
-        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: nothing changed")
-        self._refuse(kept.desk, kept.vehicle, refusal, now=now)
+        def undo(*, now: float) -> None:
+            self._plans.keep(vehicle, kind, before, actor=actor, now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: nothing changed")
+            self._refuse(desk, vehicle, refusal, now=now)
+
+        self._submissions.gate.hold(accept, undo, now=now)
 
     def _refuse(
         self, desk: UploadSession, vehicle: Vehicle, refusal: Rejection, *, now: float
