@@ -46,7 +46,7 @@ class MissionClearing:
         def refuse(refusal: Rejection, *, now: float) -> None:
             self._answers.ack(sender, kind, result_of(refusal), refusal.reason)
             message_id = m.MissionClearAll.id
-            self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+            self._answers.refused(sender, refusal, message_id=message_id, now=now)
 
         def clear_next(*, now: float) -> None:
             """Clear one type after the other, bounds on the vehicle first."""
