@@ -118,7 +118,7 @@ class Submissions:
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
-        again, refuse = partial(self._submit_late, asked), partial(self.refuse, asked)
+        again, refuse = partial(self.submit, asked), partial(self.refuse, asked)
         if self.questions.hold(draft.terms.after, again, refuse, now=now):
             return
         waits = bool(vehicle.tasks.paused)  # then nothing moves before a command to continue
@@ -154,13 +154,6 @@ class Submissions:
         if tasks.paused:
             return tasks.halts.by is asked.sender
         return vehicle.joint.state(now=now).is_led and vehicle.armed
-
-    def _submit_late(self, asked: CommandRequest, *, now: float) -> None:
-        """Submit what was held back, by the state of the vehicle now."""
-        try:
-            self.submit(asked, now=now)
-        except Rejection as refusal:
-            self.refuse(asked, refusal, now=now)
 
     def refuse(self, asked: CommandRequest, refusal: Rejection, *, now: float) -> None:
         """Answer a refused command; record it, and tell the client the words."""
