@@ -22,6 +22,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         }
     ),
     "mav_tasks.histogram": frozenset(),
+    "mav_tasks.latest": frozenset(),
     "mav_tasks.mailbox": frozenset(),
     "mav_tasks.link_reader": frozenset({"mav_tasks.engine", "mav_tasks.links"}),
     "mav_tasks.setting_keys": frozenset({"mav_tasks.errors"}),
@@ -33,15 +34,24 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         {"mav_tasks.whole_file", "mav_tasks.mavlink", "mav_tasks.errors"}
     ),
     "mav_tasks.services": frozenset(
-        {"mav_tasks.mavlink", "mav_tasks.setting_keys", "mav_tasks.settings", "mav_tasks.errors"}
+        {
+            "mav_tasks.mavlink",
+            "mav_tasks.setting_keys",
+            "mav_tasks.settings",
+            "mav_tasks.latest",
+            "mav_tasks.errors",
+        }
     ),
-    "mav_tasks.tasks": frozenset({"mav_tasks.histogram", "mav_tasks.errors", "mav_tasks.settings"}),
+    "mav_tasks.tasks": frozenset(
+        {"mav_tasks.histogram", "mav_tasks.latest", "mav_tasks.errors", "mav_tasks.settings"}
+    ),
     "mav_tasks.engine": frozenset(
         {
             "mav_tasks.tasks",
             "mav_tasks.services",
             "mav_tasks.mavlink",
             "mav_tasks.histogram",
+            "mav_tasks.latest",
             "mav_tasks.settings",
             "mav_tasks.errors",
         }
@@ -207,6 +217,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.client": frozenset(
         {
+            "mav_tasks.latest",
             "mav_tasks.services",
             "mav_tasks.mavlink",
             "mav_tasks.links",
@@ -233,6 +244,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     ),
     "mav_tasks.web": frozenset(
         {
+            "mav_tasks.latest",
             "mav_tasks.folders",
             "mav_tasks.histogram",
             "mav_tasks.crowd",

@@ -4,6 +4,7 @@ from datetime import UTC, datetime
 from random import SystemRandom
 
 from mav_tasks.client import wire
+from mav_tasks.latest import keep_latest
 from mav_tasks.tasks.task import MAX_NONCE
 
 LATE_ACK = 3.0  # s for which a copy of an ack may still arrive
@@ -37,10 +38,7 @@ class Submissions:
 
     def note(self, task_id: int, nonce: int, *, now: float) -> None:
         """Remember the task id of a submission."""
-        self._nonces.pop(task_id, None)
-        self._nonces[task_id] = nonce, now
-        while len(self._nonces) > REMEMBERED_IDS:
-            del self._nonces[next(iter(self._nonces))]
+        keep_latest(self._nonces, task_id, (nonce, now), most=REMEMBERED_IDS)
 
     def is_anothers(self, task_id: int, nonce: int, *, now: float) -> bool:
         """Return whether another submission got this id just now: a late copy of its ack."""
@@ -57,9 +55,7 @@ class Submissions:
         known = self._delays.get(nonce)
         if known is None:
             known = max(delay, utc_of(at) - datetime.now(UTC).timestamp(), 0.0)
-            self._delays[nonce] = known
-            if len(self._delays) > REMEMBERED_DELAYS:
-                del self._delays[next(iter(self._delays))]
+            keep_latest(self._delays, nonce, known, most=REMEMBERED_DELAYS)
         return known
 
 

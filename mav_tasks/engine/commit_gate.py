@@ -1,75 +1,60 @@
-"""Holds values back until all events recorded so far are durable, each with a time limit.
+"""Holds effects back until all events recorded so far are durable, each with a time limit.
 
 The answer to a command that halts a vehicle may leave earlier: once the store has kept the halts.
-``knows`` registers, once for each type, how such a value is carried out and how it is given up.
-Values that wait for the same leave in the order in which they came.
+Effects that wait for the same are carried out in the order in which they came.
 """
 
 from math import inf
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple
 
-from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.timers import Effect, Timers, Turn
 from mav_tasks.tasks.registry import TaskRegistry
-
-Kind = TypeVar("Kind")
-Kind_contra = TypeVar("Kind_contra", contravariant=True)
-
-
-class Step(Protocol[Kind_contra]):
-    """A function that carries out, or gives up, one value."""
-
-    def __call__(self, held: Kind_contra, /, *, now: float) -> None: ...
 
 
 class _Held(NamedTuple):
-    """A value, the event that must be kept, until when, and whether only the halts must be."""
+    """The event that must be kept, until when, and whether only the halts must be; and effects."""
 
     number: int
     until: float
     is_halt: bool
-    what: Any
+    accept: Effect
+    give_up: Effect
 
 
 class CommitGate:
-    """The values that wait, in the order in which they came."""
+    """The effects that wait, in the order in which they came."""
 
     def __init__(self, registry: TaskRegistry, timers: Timers, *, within: float) -> None:
-        """``within``: seconds that each value waits at most."""
+        """``within``: seconds that each effect waits at most."""
         self._registry = registry
         self.within = within
         self._held: list[_Held] = []
         self._halts = 0  # number up to which the halts are kept
-        self._accept: dict[type, Step[Any]] = {}
-        self._give_up: dict[type, Step[Any]] = {}
         self._timer = timers.timer(Turn.SUBMISSIONS, self._look)
 
     def __len__(self) -> int:
         return len(self._held)
 
-    def knows(self, kind: type[Kind], accept: Step[Kind], give_up: Step[Kind]) -> None:
-        """Register how values of a type are carried out, and given up."""
-        self._accept[kind], self._give_up[kind] = accept, give_up
-
-    def hold(self, what: object, *, now: float, is_halt: bool = False) -> None:
-        """Carry out a value once all events recorded so far are durable, or give it up if late.
+    def hold(self, accept: Effect, give_up: Effect, *, now: float, is_halt: bool = False) -> None:
+        """Do ``accept`` once all events recorded so far are durable, or ``give_up`` if late.
 
         ``is_halt``: it is enough that the halts among them are kept.
         """
-        held = _Held(self._registry.recorded, now + self.within, is_halt, what)
+        held = _Held(self._registry.recorded, now + self.within, is_halt, accept, give_up)
         if self._is_kept(held):
-            self._accept[type(what)](what, now=now)
+            accept(now=now)
             return
         if not self._held:
             self._timer.set(held.until)
         self._held.append(held)
 
     def committed(self, through: int, *, now: float) -> None:
-        """Carry out all values that waited for events up to ``through``."""
+        """Carry out all effects that waited for events up to ``through``."""
         self._registry.durable = through
         self._look(now=now)
 
     def halts_kept(self, through: int, *, now: float) -> None:
-        """Carry out all values that waited for halts up to ``through``."""
+        """Carry out all effects that waited for halts up to ``through``."""
         self._halts = through
         self._look(now=now)
 
@@ -82,9 +67,9 @@ class CommitGate:
         waiting, self._held = self._held, []
         for held in waiting:
             if self._is_kept(held):
-                self._accept[type(held.what)](held.what, now=now)
+                held.accept(now=now)
             elif held.until <= now:
-                self._give_up[type(held.what)](held.what, now=now)
+                held.give_up(now=now)
             else:
                 self._held.append(held)
         self._timer.set(min((held.until for held in self._held), default=inf))

@@ -34,7 +34,6 @@ from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.figures import Figures
 from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Peer
-from mav_tasks.engine.missions.any_uploads import AnyUploads
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionServers
 from mav_tasks.engine.missions.plans import Plans
@@ -128,8 +127,8 @@ class Engine:
         self._any = AnyRover(
             vehicles, registry, room, submissions, assignments, displays, elsewhere, settings
         )
-        self._any_plans = AnyUploads(
-            gcs, vehicles, registry, submissions, assignments, timers, settings
+        self._desks = MissionServers(
+            gcs, vehicles, registry, submissions, assignments, plans, timers, settings
         )
         self._publisher = Publisher(
             gcs, vehicles, registry, displays, submissions, rates, timers, now=now
@@ -152,8 +151,7 @@ class Engine:
             modes=modes,
             displays=displays,
             setup=SetupSigning(self.signatures, vehicles),
-            desks=MissionServers(gcs, vehicles, registry, submissions, plans, timers),
-            any_plans=self._any_plans,
+            desks=self._desks,
             operator=self._operator,
             parameters=self._parameters,
             passing=self._passing,
@@ -233,7 +231,7 @@ class Engine:
             case inputs.IdsGranted(first=first, count=count):
                 self._registry.ids.grant(first, count)
             case inputs.NonceTaken():
-                self._any_plans.nonce_taken(item, now=now)
+                self._desks.nonce_taken(item, now=now)
                 self._any.nonce_taken(item, now=now)
             case inputs.SettingsChanged(settings=settings):
                 self._apply(self._parameters.configured(settings))
@@ -415,7 +413,7 @@ class Engine:
         self._submissions.apply(settings)
         self._assignments.apply(settings)
         self._any.apply(settings)
-        self._any_plans.apply(settings)
+        self._desks.apply(settings)
         self._reports.apply(settings)
         self._operator.apply(settings)
 

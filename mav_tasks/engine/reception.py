@@ -23,7 +23,6 @@ from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.task_control import TaskControl
 from mav_tasks.engine.commands.words import kind_of_message
 from mav_tasks.engine.inputs import FLEET_LINK, Packets
-from mav_tasks.engine.missions.any_uploads import AnyUploads
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionMessage, MissionServers
 from mav_tasks.engine.packet_reader import PacketReader
@@ -50,7 +49,6 @@ class Reception:
     displays: MessageRequests
     setup: SetupSigning
     desks: MissionServers
-    any_plans: AnyUploads
     operator: OperatorWatch
     parameters: ParameterServer
     passing: Forwarder
@@ -169,9 +167,8 @@ class Reception:
             self.displays.set_streams(client, message)
         elif isinstance(message, m.SetupSigning):
             self.setup.receive(client, message, now=now)
-        elif isinstance(message, MissionMessage) and (
-            self.desks.receive(client, packet, message, now=now)
-            or self.any_plans.receive(client, packet, message, now=now)
+        elif isinstance(message, MissionMessage) and self.desks.receive(
+            client, packet, message, now=now
         ):
             return
         else:

@@ -8,6 +8,7 @@ beyond our own needs is given as a whole, again and again, and goes back when no
 from collections.abc import Mapping
 from math import inf
 
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.services.token_bucket import TokenBucket
@@ -124,9 +125,8 @@ class IntervalRequester:
         interval = self._wanted.get(asked)
         if accepted is not False or interval is None:
             return
-        self._refused[asked] = max(interval, self._refused.get(asked, 0.0))
-        if len(self._refused) > MAX_REFUSED:
-            del self._refused[next(iter(self._refused))]
+        least = max(interval, self._refused.get(asked, 0.0))
+        keep_latest(self._refused, asked, least, most=MAX_REFUSED)
         own = WANTED.get(asked)
         if own is None:
             del self._wanted[asked]

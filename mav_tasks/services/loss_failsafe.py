@@ -25,16 +25,14 @@ what this table says (PX4 1.15 to 1.17: commander's failsafe.cpp, its parameters
 Whether there are sticks (COM_RC_IN_MODE; 4: never) makes no difference here: they may be lost in
 the same moment as we are. Their loss alone is another matter (NAV_RCL_ACT, unless bit 2 of
 COM_RCL_EXCEPT excepts Offboard): then the server is there, and sees the mode that it enters.
-MAVLink guide, "Parameter Protocol".
 """
 
 from collections.abc import Mapping
 from enum import Enum
-from math import isnan
-from struct import pack, unpack
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.messages import ParamRequestRead, ParamValue
+from mav_tasks.services.asked_parameters import AskedParameters
 
 AFTER, ACTION = "COM_OF_LOSS_T", "COM_OBL_RC_ACT"  # s; what is done then
 NO_STICKS = "NAV_RCL_ACT"
@@ -44,8 +42,7 @@ OFFBOARD_BIT = 4  # of COM_DLL_EXCEPT
 KEEPS_MOVING = "keeps moving when setpoints stop"
 LONGEST = 5.0  # s that a vehicle may drive on without setpoints; ArduPilot takes 3
 ASKS = 10  # times that a parameter is asked for
-NEVER = ASKS + 1
-REAL32 = 9  # MAV_PARAM_TYPE; an integer's bytes stand in the float
+NAMES = (AFTER, ACTION, NO_STICKS, NO_STATION, EXCEPT)
 #: what makes a PX4 rover stand: Hold after a second, and Hold where a ground station is missed
 STANDING: Mapping[str, float] = {AFTER: 1.0, ACTION: 5, NO_STATION: 1}
 
@@ -78,34 +75,32 @@ OF_ABSENCE: Mapping[int, Deed] = {  # NAV_RCL_ACT and NAV_DLL_ACT
 }
 
 
-class LossFailsafe:
+class LossFailsafe(AskedParameters):
     """What is known of one vehicle's failsafe."""
 
     def __init__(self, target: Address, *, is_by_parameters: bool) -> None:
-        self._target = target
-        self._values: dict[str, float] = {}
-        self._old: set[str] = set()  # of before a restart
-        self._asked = 0 if is_by_parameters else NEVER
+        super().__init__(target, NAMES if is_by_parameters else (), is_bytewise=True, asks=ASKS)
         self._has_changed = False  # what ``take_news`` says
 
-    def __repr__(self) -> str:
-        return f"LossFailsafe({self._values})"
+    @property
+    def _has_said(self) -> bool:
+        return AFTER in self._values and ACTION in self._values
 
     @property
     def is_unknown(self) -> bool:
         """Whether it was asked for, and did not say."""
-        return self._asked == ASKS and bool({AFTER, ACTION}.intersection(self._missing))
+        return bool(self._names) and not self._asks_left and not self._has_said
 
     @property
     def awaits_answer(self) -> bool:
         """Whether what it does is being asked for, and nobody knows it yet."""
-        return self._asked < ASKS and bool(self._missing)
+        missing = [n for n in self._names if n not in self._values and self._matters(n)]
+        return bool(self._asks_left and missing)
 
     @property
     def stands(self) -> bool:
         """Whether the vehicle has said that it stands when setpoints stop."""
-        is_known = self._asked != NEVER and not {AFTER, ACTION}.intersection(self._missing)
-        return is_known and not self.why_off
+        return self._has_said and not self.why_off
 
     @property
     def why_off(self) -> str:
@@ -133,7 +128,7 @@ class LossFailsafe:
     @property
     def what_it_does(self) -> str:
         """Return in words what the vehicle does when setpoints stop, as far as it has said."""
-        if self._asked == NEVER or {AFTER, ACTION}.intersection(self._missing):
+        if not self._has_said:
             return ""
         if self.why_off:
             return f"{KEEPS_MOVING}: {self.why_off}"
@@ -142,29 +137,15 @@ class LossFailsafe:
 
     def requests(self) -> list[ParamRequestRead]:
         """Return what is to be asked now; called about once a second."""
-        missing = [*self._missing, *sorted(self._old)]
-        if not missing or self._asked >= ASKS:
-            return []
-        self._asked += 1
-        self._has_changed = self._has_changed or self.is_unknown
-        return [ParamRequestRead(*self._target, name.encode(), -1) for name in missing]
+        requests = super().requests()
+        self._has_changed |= bool(requests) and self.is_unknown
+        return requests
 
     def receive(self, message: ParamValue) -> None:
         """Take in a parameter of the vehicle; whoever asked for it, or changed it."""
-        if self._asked == NEVER:
-            return
-        name = message.param_id
-        if name not in (AFTER, ACTION, NO_STICKS, NO_STATION, EXCEPT):
-            return
-        value = message.param_value
-        if message.param_type != REAL32:
-            (value,) = unpack("<i", pack("<f", value))
-        if isnan(value):
-            return
         before = self.why_off
-        self._old.discard(name)
-        self._values[name] = float(value)
-        self._has_changed = self._has_changed or self.why_off != before
+        super().receive(message)
+        self._has_changed |= self.why_off != before
 
     def take_news(self) -> str:
         """Return in words what is known anew, "" if nothing is."""
@@ -175,20 +156,10 @@ class LossFailsafe:
             return "does not report whether it stops when setpoints stop"
         return self.what_it_does or "stops when setpoints stop"
 
-    def forget(self) -> None:
-        """The vehicle has restarted: asked again, and until it answers they are as they were."""
-        if self._asked != NEVER:
-            self._asked = 0
-            self._old = set(self._values)
-
-    @property
-    def _missing(self) -> list[str]:
-        """What is not known yet; what few firmwares have is asked for only where it matters."""
-        names = [AFTER, ACTION, NO_STICKS, NO_STATION]
-        without_station = OF_ABSENCE.get(int(self._values.get(NO_STATION, 0.0)))
-        if without_station is not None and without_station not in STANDS:
-            names.append(EXCEPT)
-        return [name for name in names if name not in self._values]
+    def _matters(self, name: str) -> bool:
+        """Return whether to ask: few firmwares have what says what is excepted."""
+        without_station = OF_ABSENCE.get(int(self._values.get(NO_STATION, 0.0)), Deed.HOLD)
+        return name != EXCEPT or without_station not in STANDS
 
     def _deed_of(self, action: int) -> tuple[str, Deed | None]:
         """Return which parameters decide, in words, and what is done; None: that is not known."""

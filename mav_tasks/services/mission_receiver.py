@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from math import isnan
 from typing import NamedTuple
 
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
@@ -220,7 +221,7 @@ class MissionReceiver:
         session.items.append(item)
         session.form = session.last_form
         if isinstance(message, m.MissionItemInt):
-            self._note_int(sender)
+            keep_latest(self._sends_int, sender, None, most=INT_SENDERS)
         session.asked, session.ask_at, session.give_up_at = 0, now, now + GIVE_UP
         session.over_at += EACH_ITEM
         self._advance(now=now)
@@ -300,12 +301,6 @@ class MissionReceiver:
         if beyond <= 0 or beyond % 2 == 0:
             return session.form
         return m.MissionRequest if session.form is m.MissionRequestInt else m.MissionRequestInt
-
-    def _note_int(self, sender: Sender) -> None:
-        self._sends_int.pop(sender, None)
-        self._sends_int[sender] = None
-        if len(self._sends_int) > INT_SENDERS:
-            del self._sends_int[next(iter(self._sends_int))]
 
     def _note_in_vain(self, session: _Session, refused: Item | None = None, *, now: float) -> None:
         """An upload came to nothing: its client will try again, and mean what it meant."""

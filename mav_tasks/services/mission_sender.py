@@ -6,6 +6,7 @@ MAVLink guide, "Mission Protocol", "Download a Mission from the Vehicle".
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavMissionResult
 from mav_tasks.services.mission_item import Item, float_message_of, message_of
@@ -41,7 +42,8 @@ class MissionSender:
     ) -> ToClient:
         """A client asks for the list: give the count."""
         self._forget(now=now)
-        self._downloads[sender, mission_type] = _Download(items, now)
+        download = _Download(items, now)
+        keep_latest(self._downloads, (sender, mission_type), download, most=MOST)
         count = m.MissionCount(*sender.address, len(items), mission_type, opaque_id)
         return ToClient(sender, count)
 
@@ -62,7 +64,8 @@ class MissionSender:
         download = self._downloads.get((sender, mission_type))
         if download is None:
             self._forget(now=now)
-            download = self._downloads[sender, mission_type] = _Download(present(), now)
+            download = _Download(present(), now)
+            keep_latest(self._downloads, (sender, mission_type), download, most=MOST)
         download.at = now
         if seq < len(download.items):
             make = message_of if form is m.MissionRequestInt else float_message_of
@@ -77,5 +80,3 @@ class MissionSender:
     def _forget(self, *, now: float) -> None:
         for key in [key for key, d in self._downloads.items() if now - d.at > KEPT]:
             del self._downloads[key]
-        while len(self._downloads) >= MOST:
-            del self._downloads[next(iter(self._downloads))]

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from math import inf
 
+from mav_tasks.latest import shorten
 from mav_tasks.services.message_interval import LONGEST_US
 from mav_tasks.services.token_bucket import TokenBucket
 
@@ -40,8 +41,7 @@ class TaskStatusSender:
     def changed(self, task_id: int) -> None:
         """Note that a task's state changed; telling it twice before it is sent counts once."""
         self._changed[task_id] = None
-        if len(self._changed) > MOST:  # the oldest news; a request still shows that task
-            del self._changed[next(iter(self._changed))]
+        shorten(self._changed, MOST)  # a request still shows those tasks
         self._wake(self._retry_at)
 
     def set_interval(self, vehicle: int, interval: float | None, *, now: float) -> None:

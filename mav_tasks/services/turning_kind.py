@@ -4,14 +4,11 @@ ArduPilot Rover 4.6: SERVOn_FUNCTION 26 is steering, 73 and 74 are the throttles
 right side; one that has both is skid-steered. TURN_RADIUS is the least radius, m. PX4 1.15 to 1.17:
 CA_AIRFRAME 5 is Ackermann, 6 differential, 13 mecanum; where that is not there the thousands of
 SYS_AUTOSTART (51 Ackermann). Its least radius is RA_WHEEL_BASE over the tangent of RA_MAX_STR_ANG.
-MAVLink guide, "Parameter Protocol".
 """
 
-from math import isfinite, pi, tan
-from struct import pack, unpack
+from math import pi, tan
 
-from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.messages import ParamRequestRead, ParamValue
+from mav_tasks.services.asked_parameters import AskedParameters
 from mav_tasks.settings import DEFAULT_TURNING_RADIUS, Turning
 
 OUTPUTS = 8  # of which a rover's steering and throttles are some
@@ -24,23 +21,10 @@ BY_AIRFRAME = {5: Turning.STEERED, 6: Turning.ON_SPOT, 13: Turning.ON_SPOT}
 BY_AUTOSTART = {50: Turning.ON_SPOT, 51: Turning.STEERED, 52: Turning.ON_SPOT}
 ARDUPILOT = (*FUNCTIONS, RADIUS)
 PX4 = (AIRFRAME, AUTOSTART, BASE, ANGLE)
-ASKS = 5  # times that a parameter is asked for
-REAL32 = 9  # MAV_PARAM_TYPE
 
 
-class TurningKind:
+class TurningKind(AskedParameters):
     """What is known of one vehicle's way of turning."""
-
-    def __init__(self, target: Address, names: tuple[str, ...], *, is_bytewise: bool) -> None:
-        """``is_bytewise``: an integer's bytes stand in the float of a PARAM_VALUE."""
-        self._target = target
-        self._is_bytewise = is_bytewise
-        self._names = names
-        self._values: dict[str, float] = {}
-        self._asked = 0
-
-    def __repr__(self) -> str:
-        return f"TurningKind({self.turning})"
 
     @property
     def turning(self) -> Turning | None:
@@ -59,28 +43,9 @@ class TurningKind:
         # asked for less it swings beyond: its steering takes its time (ArduPilot 4.6.3)
         return radius if radius is not None and radius > DEFAULT_TURNING_RADIUS else None
 
-    def requests(self) -> list[ParamRequestRead]:
-        """Return what is to be asked now; called about once a second."""
-        missing = [name for name in self._names if name not in self._values]
-        if not missing or self._asked >= ASKS:
-            return []
-        self._asked += 1
-        return [ParamRequestRead(*self._target, name.encode(), -1) for name in missing]
-
-    def receive(self, message: ParamValue) -> None:
-        """Take in a parameter of the vehicle; whoever asked for it, or changed it."""
-        name = message.param_id
-        if name not in self._names:
-            return
-        value = float(message.param_value)
-        if self._is_bytewise and message.param_type != REAL32:
-            (value,) = unpack("<i", pack("<f", message.param_value))
-        if isfinite(value):
-            self._values[name] = value
-
     def forget(self) -> None:
         """The vehicle has restarted, or is another one: it is asked again."""
-        self._asked = 0
+        super().forget()
         self._values.clear()
 
     def _by_airframe(self) -> Turning | None:

@@ -10,6 +10,7 @@ from enum import Enum, auto
 from math import hypot
 
 from mav_tasks.errors import Rejection
+from mav_tasks.latest import keep_latest
 from mav_tasks.tasks.frames import to_local
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Place
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskReason
@@ -147,7 +148,8 @@ class SubmissionDeduplicator:
         if client is None:
             if len(self._clients) >= MANY_CLIENTS:
                 self._forget_old(now=now)
-            client = self._clients[submitter] = _Client()
+            client = _Client()
+            keep_latest(self._clients, submitter, client, most=MANY_CLIENTS)
         client.at = at
         if marks.nonce and not isinstance(task.goal, GoTo):
             return  # its nonce alone identifies it
@@ -160,9 +162,7 @@ class SubmissionDeduplicator:
             return
         client.of_command[vehicle, task.command] = last
         if marks.packet:
-            client.packets[marks.packet] = last
-            if len(client.packets) > PACKETS:
-                del client.packets[next(iter(client.packets))]
+            keep_latest(client.packets, marks.packet, last, most=PACKETS)
 
     def held(self, submitter: Submitter, vehicle: int) -> None:
         """Forget a client's last return after its halt: the next return is new (rule 4).
@@ -222,8 +222,6 @@ class SubmissionDeduplicator:
     def _forget_old(self, *, now: float) -> None:
         for submitter in [s for s, c in self._clients.items() if now - c.at > LONGEST]:
             del self._clients[submitter]
-        while len(self._clients) >= MANY_CLIENTS:
-            del self._clients[next(iter(self._clients))]
 
 
 def reused(nonce: int) -> Rejection:

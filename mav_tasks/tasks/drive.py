@@ -162,7 +162,7 @@ class Drive:
         metres = self._bounds.metres_to_leave(single, here, motion.pose, seen.origin)
         if metres is not None:
             words = f"would leave the fence in task {task.id} after {metres:.1f} m"
-            self._registry.record(VehicleNoted(task.vehicle, words, now))
+            self._note(task, words, now=now)
             return _refused(task)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
         driving = self._settings.driving
@@ -192,8 +192,7 @@ class Drive:
         if most is None or way <= most * CORRECTIONS + SLACK:
             return None
         long = "unknown" if isnan(way) else f"{way:.1f} m"
-        words = f"task {task.id} may drive {most:g} m: its way is {long}"
-        self._registry.record(VehicleNoted(task.vehicle, words, now))
+        self._note(task, f"task {task.id} may drive {most:g} m: its way is {long}", now=now)
         return Becomes(S.FAILED, R.NOT_ALLOWED)
 
     def go_on(
@@ -255,10 +254,9 @@ class Drive:
         period = self._settings.watch.setpoint_period
         news = self._follows.look(self._last_velocity, motion, seconds=period, now=now)
         if news:
-            self._registry.record(VehicleNoted(task.vehicle, news, now))
+            self._note(task, news, now=now)
         if self._astray.is_astray(course, motion):
-            words = "does not follow its setpoints: check its heading"
-            self._registry.record(VehicleNoted(task.vehicle, words, now))
+            self._note(task, "does not follow its setpoints: check its heading", now=now)
             return Becomes(S.HELD, R.OFF_TRACK)
         speed = None if course is self._way_back else course.progress.speed
         driving, slowest = self._driving_of(task), self._arrival.slowest(course)
@@ -270,6 +268,10 @@ class Drive:
         if velocity is None:
             return Becomes(S.HELD, R.FENCE)
         return Demand(DemandKind.DRIVE, velocity)
+
+    def _note(self, task: Task, words: str, *, now: float) -> None:
+        """Report a text about the vehicle of a task."""
+        self._registry.record(VehicleNoted(task.vehicle, words, now))
 
     def _driving_of(self, task: Task) -> Driving:
         """Return the settings for a task; a task that is cruising has the vehicle's own speed."""

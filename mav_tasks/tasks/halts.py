@@ -7,6 +7,7 @@ from collections.abc import Hashable
 from math import inf
 from typing import NamedTuple
 
+from mav_tasks.latest import keep_latest
 from mav_tasks.tasks.events import SERVER
 from mav_tasks.tasks.lifecycle import TaskReason, words_of
 
@@ -121,13 +122,11 @@ class Halts:
 
         A late copy of an older halt of the same sender does not replace the last one.
         """
-        before = self._numbers.pop(sender, -1)
+        before = self._numbers.get(sender, -1)
         if number >= before:
             self.command = command
         self.by, self.number = sender, max(number, before)
-        self._numbers[sender] = self.number
-        if len(self._numbers) > SENDERS:
-            del self._numbers[next(iter(self._numbers))]
+        keep_latest(self._numbers, sender, self.number, most=SENDERS)
 
     def was_asked_to_go_on(self) -> None:
         """Note a request to resume, whether it was accepted or not."""

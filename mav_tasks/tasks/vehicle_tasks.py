@@ -110,18 +110,18 @@ class VehicleTasks(Lineup):
             self.executor.let_go(actor=SERVER, now=now)
             self._ended(active.id, now=now)
 
-    def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> Task:
+    def run_now(self, draft: Draft, seen: VehicleView, *, actor: str, now: float) -> TaskId:
         """Add a task that runs at once; all others wait until the queue is resumed.
 
-        Raise Rejection if it cannot start now: it must not start later, when somebody parks the
-        vehicle.
+        Return its id. Raise Rejection if it cannot start now: it must not start later, when
+        somebody parks the vehicle.
         """
         if self.is_stopped:
             raise Rejection(R.STOPPED, CONTINUE_FIRST)
         self.check_start(seen, present_goal(draft.goal, Progress()), now=now)
         task = self.room.submit(draft, now=now)
         self.give_way_to(task, actor=actor, now=now)
-        return task
+        return task.id
 
     def give_way_to(self, task: Task, *, actor: str, now: float) -> None:
         """Run a waiting task at once; all others, if any, wait until the queue is resumed.

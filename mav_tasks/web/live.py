@@ -16,6 +16,7 @@ from mav_tasks.client.aio import Client
 from mav_tasks.client.descriptions import what_of
 from mav_tasks.client.values import News, QueueStatus, TaskStatus, Text, VehicleChanged
 from mav_tasks.errors import ClientError
+from mav_tasks.latest import shorten
 from mav_tasks.web.forms import queue_form, task_form, text_form, vehicle_form
 from mav_tasks.web.goal_places import Place, places_of_words
 from mav_tasks.web.hub import Hub
@@ -126,7 +127,7 @@ class Live:
         is_plan = what_of(status).startswith(PLAN) and not status.is_over
         if known is None and is_plan and status.id not in self._looked_up:
             self._looked_up[status.id] = None
-            _shorten(self._looked_up, LOOKED_UP)
+            shorten(self._looked_up, LOOKED_UP)
             self.on_unknown_places(status.id)
         return known or places_of_words(what_of(status))
 
@@ -140,7 +141,7 @@ class Live:
     def remember_user(self, task_id: int, user: str) -> None:
         """Keep who submitted a task."""
         self.users[task_id] = user
-        _shorten(self.users, MOST_TOLD)
+        shorten(self.users, MOST_TOLD)
 
     def show_again(self, task_id: int) -> None:
         """Publish the queue of a task again: its places are known now."""
@@ -234,7 +235,7 @@ class Live:
         told = (status.version, status.state, status.reason, status.progress, status.remaining)
         if self._told.get(status.id) != told:  # else the answer to a request
             self._told[status.id] = told
-            _shorten(self._told, MOST_TOLD)
+            shorten(self._told, MOST_TOLD)
             self.hub.publish("task", self.task_form(status))
 
     def _on_text(self, text: Text) -> None:
@@ -319,9 +320,3 @@ def _is_listed(status: TaskStatus, queue: QueueStatus) -> bool:
         each.id == status.id and (each.state, each.reason) == (status.state, status.reason)
         for each in shown
     )
-
-
-def _shorten(table: dict[int, Any], most: int) -> None:
-    """Drop the oldest entries beyond a number."""
-    while len(table) > most:
-        del table[next(iter(table))]

@@ -58,7 +58,7 @@ def needs_of(engine: Engine) -> Iterator[tuple[Timer, float, object]]:
     yield gate._timer, gate._held[0][1] if gate._held else inf, gate
     for desk in e._reception.desks._desks.values():
         due = desk.uploads.receiver.next_deadline()
-        yield desk._timer, inf if due is None else due, desk.uploads.receiver
+        yield desk.uploads.timer, inf if due is None else due, desk.uploads.receiver
     times = e._fleet.room.times
     yield e._starting, times.next_at, times
     limit = e._settings.watch.operator_lost

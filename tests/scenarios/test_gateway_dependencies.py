@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from mav_tasks.engine.commands.dependency_questions import WITHIN
+from mav_tasks.engine.inputs import PeerChanged
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -269,6 +270,23 @@ def test_a_mission_runs_after_a_task_of_another_gateway(pair: Pair) -> None:
     assert plan.state is S.BLOCKED
     pair.until(first, S.COMPLETED)
     pair.until(int(plan.id), S.EXECUTING, within=10)
+
+
+@pytest.mark.parametrize("target", [(B, 191), (250, 191)])
+def test_a_plan_whose_client_has_gone_meanwhile_is_no_task(
+    pair: Pair, target: tuple[int, int]
+) -> None:
+    """Its questions are answered when nobody is there any more who could hear of a task."""
+    items = [Item(16, **at(1.0, 0.0)), Item(OPTIONS, param1=5, param4=pair.submit(A, 3.0))]
+    pair.b.is_looking = False
+    Upload(pair.client(pair.b), items, target=target)
+    pair.world.run(0.3)
+    gone = PeerChanged("b:clients", "client b", up=False)
+    pair.b.pump.handle(gone, now=pair.world.now)
+    pair.b.is_looking = True
+    pair.b.notified()
+    pair.world.run(0.5)
+    assert [task for task in pair.world.shared.tasks() if task.vehicle == B] == []
 
 
 def test_the_rovers_go_on_after_their_gateways_have_resumed(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from itertools import islice, repeat
 
 from mav_tasks.engine.inputs import LinkChanged, LinkSide, Packets, Peer
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink.enums import MavCmd
 from mav_tasks.mavlink.packet import CRC, HEADER_V1, HEADER_V2, MAGIC_V2, SIGNATURE_LENGTH, SIGNED
 from mav_tasks.services.token_bucket import TokenBucket
@@ -121,8 +122,6 @@ class FloodGate:
             if self._strangers is None:
                 self._strangers = TokenBucket(rate=STRANGERS, burst=STRANGERS, now=now)
             return self._strangers
-        if len(self._buckets) >= MOST_BUCKETS:
-            del self._buckets[next(iter(self._buckets))]
-        burst = self._rate * WITHIN
-        bucket = self._buckets[peer] = TokenBucket(rate=self._rate, burst=burst, now=now)
+        bucket = TokenBucket(rate=self._rate, burst=self._rate * WITHIN, now=now)
+        keep_latest(self._buckets, peer, bucket, most=MOST_BUCKETS)
         return bucket

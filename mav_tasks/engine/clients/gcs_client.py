@@ -8,6 +8,7 @@ from mav_tasks.engine.clients.sender import Memory, Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.engine.packet_sender import PacketSender
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
@@ -166,10 +167,7 @@ class GcsClient:
 
     def follow(self, task_id: int) -> None:
         """Send the client each change of this task from now on."""
-        self._followed.pop(task_id, None)
-        self._followed[task_id] = None
-        if len(self._followed) > MAX_FOLLOWED:
-            del self._followed[next(iter(self._followed))]
+        keep_latest(self._followed, task_id, None, most=MAX_FOLLOWED)
 
     def follows(self, task_id: int) -> bool:
         """Whether the client has asked about this task."""
@@ -182,9 +180,8 @@ class GcsClient:
             return self._observers
         sender = self._senders.get(source)
         if sender is None:
-            if len(self._senders) >= MAX_SENDERS:
-                del self._senders[next(iter(self._senders))]
-            sender = self._senders[source] = Sender(self._memory)
+            sender = Sender(self._memory)
+            keep_latest(self._senders, source, sender, most=MAX_SENDERS)
         return sender
 
     def heard(self, packet: Packet, *, now: float) -> None:
@@ -198,9 +195,7 @@ class GcsClient:
         self.heard_at = now
         self.is_heard = True
         if source not in self._addresses:
-            if len(self._addresses) >= MAX_ADDRESSES:
-                del self._addresses[next(iter(self._addresses))]
-            self._addresses[source] = None
+            keep_latest(self._addresses, source, None, most=MAX_ADDRESSES)
 
     def forget(self, system_id: int, tasks: Collection[int]) -> None:
         """Forget a vehicle with its ``tasks``; what the client itself said stays known.

@@ -5,7 +5,6 @@ Messages about the vehicle's own parameters are forwarded to it.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -15,7 +14,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection, SettingError
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST
 from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer, param_receiver
@@ -24,22 +23,9 @@ from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, wit
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.server_events import ParameterSet
-from mav_tasks.tasks.task import Submitter
 
 LIST_EACH = 0.2  # s between lists: one packet asks for many, no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet | m.FileTransferProtocol
-
-
-class _Wish(NamedTuple):
-    """A PARAM_SET of a client; it takes effect, and is announced, once it is durable."""
-
-    client: GcsClient
-    vehicle: Vehicle
-    asker: Address
-    message: m.ParamSet
-    who: Submitter
-    name: str
-    value: float
 
 
 class ParameterServer:
@@ -62,8 +48,7 @@ class ParameterServer:
         self._configured = settings
         self._kept = dict(kept)
         #: by name, the latest PARAM_SET that is not durable yet
-        self._pending: dict[str, _Wish] = {}
-        submissions.gate.knows(_Wish, self._accept, self._give_up)
+        self._pending: dict[str, m.ParamSet] = {}
         self._settings, self._why_not = with_all(settings, self._kept)
         #: whether settings changed since the last ``take_change``
         self.is_changed = False
@@ -162,65 +147,60 @@ class ParameterServer:
         *,
         now: float,
     ) -> None:
-        """Check a PARAM_SET and record it; the commit gate makes it take effect."""
-        name, value = message.param_id, as_sent(message.param_value)
-        wish = _Wish(client, vehicle, packet.source, message, client.who, name, value)
+        """Check a PARAM_SET and record it; it takes effect, and is announced, once durable."""
+        name, value, who = message.param_id, as_sent(message.param_value), str(client.who)
+        asker = packet.source
+
+        def refuse(text: str, why: int, *, now: float) -> None:
+            source = vehicle.server_address
+            client.outlet.send(param_receiver.error(message, why, to=asker), source)
+            if name in PARAMETERS:  # for clients that do not know PARAM_ERROR
+                client.outlet.send(param_receiver.value_of(self._values(), name), source)
+            client.tell(text, MavSeverity.WARNING, source, now=now)
+
+        def settle(*, was_stored: bool, now: float) -> None:
+            """Forget it, and record the value in force unless a later one is on its way."""
+            if self._pending.get(name) is message:
+                del self._pending[name]
+                if not was_stored:
+                    self._registry.record(ParameterSet(name, self._kept.get(name), who, now))
+
+        def accept(*, now: float) -> None:
+            try:
+                changed(self._settings, name, value)
+            except SettingError as error:  # the values that it was checked against were not stored
+                settle(was_stored=False, now=now)
+                refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+            else:
+                settle(was_stored=True, now=now)
+                self._take(name, value)
+
+        def give_up(*, now: float) -> None:
+            settle(was_stored=False, now=now)
+            words = f"{name} was not stored in time: not set"
+            refuse(words, MavParamError.PERMISSION_DENIED, now=now)
+
         if name not in PARAMETERS:
-            self._refuse(wish, f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
+            refuse(f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
             return
         try:
             if message.param_type != MavParamType.REAL32:
                 raise SettingError(f"{name} must be sent as REAL32")
-            pending = {each.name: each.value for each in self._pending.values()}
+            pending = {each: as_sent(set_.param_value) for each, set_ in self._pending.items()}
             expected, _ = with_all(self._configured, self._kept | pending)
             changed(expected, name, value)
             client.rights.require(row_of_message(m.ParamSet.id).role, "set parameters")
             self._submissions.check_open()
         except SettingError as error:
-            self._refuse(wish, str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
+            refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
             return
         except Rejection as refusal:
-            self._refuse(wish, refusal.text, MavParamError.PERMISSION_DENIED, now=now)
+            refuse(refusal.text, MavParamError.PERMISSION_DENIED, now=now)
             return
         if name in self._pending or value != self._kept.get(name):
-            self._registry.record(ParameterSet(name, value, str(wish.who), now))
-        self._pending[name] = wish
-        self._submissions.gate.hold(wish, now=now)
-
-    def _accept(self, wish: _Wish, *, now: float) -> None:
-        is_latest = self._settled(wish)
-        try:
-            changed(self._settings, wish.name, wish.value)
-        except SettingError as error:  # the values that it was checked against were not stored
-            if is_latest:
-                self._record_kept(wish, now=now)
-            self._refuse(wish, str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
-        else:
-            self._take(wish.name, wish.value)
-
-    def _give_up(self, wish: _Wish, *, now: float) -> None:
-        if self._settled(wish):  # otherwise a later value is on its way to the store
-            self._record_kept(wish, now=now)
-        words = f"{wish.name} was not stored in time: not set"
-        self._refuse(wish, words, MavParamError.PERMISSION_DENIED, now=now)
-
-    def _settled(self, wish: _Wish) -> bool:
-        """Remove a pending PARAM_SET; return whether it was the latest of its parameter."""
-        is_latest = self._pending.get(wish.name) is wish
-        if is_latest:
-            del self._pending[wish.name]
-        return is_latest
-
-    def _record_kept(self, wish: _Wish, *, now: float) -> None:
-        kept = self._kept.get(wish.name)
-        self._registry.record(ParameterSet(wish.name, kept, str(wish.who), now))
-
-    def _refuse(self, wish: _Wish, text: str, why: int, *, now: float) -> None:
-        client, source = wish.client, wish.vehicle.server_address
-        client.outlet.send(param_receiver.error(wish.message, why, to=wish.asker), source)
-        if wish.name in PARAMETERS:  # for clients that do not know PARAM_ERROR
-            client.outlet.send(param_receiver.value_of(self._values(), wish.name), source)
-        client.tell(text, MavSeverity.WARNING, source, now=now)
+            self._registry.record(ParameterSet(name, value, who, now))
+        self._pending[name] = message
+        self._submissions.gate.hold(accept, give_up, now=now)
 
     def _take(self, name: str, value: float) -> None:
         self._kept[name] = value

@@ -4,7 +4,7 @@ A TASK_STATUS with a final state is sent once that state is durable, so that it 
 or after the time limit of the commit gate. A state that a client requests is sent at once.
 """
 
-from typing import NamedTuple
+from functools import partial
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -34,12 +34,6 @@ from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 
 
-class _Ended(NamedTuple):
-    """Tasks that ended; their status waits at the commit gate, at most for its time limit."""
-
-    tasks: frozenset[TaskId]
-
-
 class Publisher:
     """The sender of heartbeats, TASK_STATUS and texts to clients."""
 
@@ -62,7 +56,6 @@ class Publisher:
         self._submissions = submissions
         self._rates = rates
         self._ended: set[int] = set()  # tasks whose end is not durable yet
-        submissions.gate.knows(_Ended, self._tell_ends, self._tell_ends)
         timers.rhythm(Turn.HEARTBEATS, self._beat, period=INTERVAL, now=now)
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
@@ -81,13 +74,11 @@ class Publisher:
 
     def publish(self, events: list[Event], *, now: float) -> None:
         """Send events as texts to all clients, and as TASK_STATUS to submitters and followers."""
-        ended: set[TaskId] = set()
-        for event in events:
-            if isinstance(event, TaskChanged) and event.new in TERMINAL:
-                ended.add(event.task_id)
+        ended = {e.task_id for e in events if isinstance(e, TaskChanged) and e.new in TERMINAL}
         if ended:
             self._ended |= ended
-            self._submissions.gate.hold(_Ended(frozenset(ended)), now=now)
+            tell = partial(self._tell_ends, ended)
+            self._submissions.gate.hold(tell, tell, now=now)
         for event in events:
             if isinstance(event, TaskSubmitted):
                 if event.task.is_made:
@@ -111,9 +102,9 @@ class Publisher:
         for vehicle in self._vehicles.all:
             self._gcs.tell(text, MavSeverity.ERROR, vehicle.server_address, now=now)
 
-    def _tell_ends(self, ended: _Ended, *, now: float) -> None:
-        self._ended -= ended.tasks
-        for task_id in sorted(ended.tasks):
+    def _tell_ends(self, ended: set[TaskId], *, now: float) -> None:
+        self._ended -= ended
+        for task_id in sorted(ended):
             self.note_change(task_id)
         self.send_statuses(now=now)
 

@@ -10,6 +10,7 @@ from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -49,10 +50,7 @@ class Refusals:
             return
         if not client.may_be_refused(now=now):
             return
-        self._streams.pop(key, None)
-        if len(self._streams) >= REMEMBERED:
-            del self._streams[next(iter(self._streams))]
-        self._streams[key] = now
+        keep_latest(self._streams, key, now, most=REMEMBERED)
         self._record(client, system_id, packet, refusal, now=now)
         look_at = self._vehicles.look_at
         if vehicle := look_at(system_id) or look_at(packet.system_id):

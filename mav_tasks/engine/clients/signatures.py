@@ -9,6 +9,7 @@ from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Outgoing, Peer, Place
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.packet import MAGIC_V2, Packet
@@ -374,12 +375,10 @@ class Signatures:
     def _signer(self, link: str, peer: Peer, key: Key) -> Signer:
         signer = self._signers.get((link, peer))
         if signer is None or signer.key != key:
-            if len(self._signers) >= MOST_SIGNERS:
-                del self._signers[next(iter(self._signers))]
             signer = Signer(key, link_id=self._links[link].number)
             # a forgotten signer may have been ahead of the clock, by one unit for each packet
             signer.last = min(self._highest, self._own_clock() + int(UNITS))
-            self._signers[link, peer] = signer
+            keep_latest(self._signers, (link, peer), signer, most=MOST_SIGNERS)
         return signer
 
     def _clock(self) -> int:

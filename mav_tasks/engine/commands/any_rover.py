@@ -163,7 +163,7 @@ class AnyRover:
             self._passed_on[copied] = now, gateway
             self._elsewhere.pass_to(gateway, client, packet)
             return
-        again = partial(self._submit_late, client, packet, pending)
+        again = partial(self._submit, client, packet, pending)
         refuse = partial(self._refuse, client, packet, pending)
         if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
             return
@@ -193,15 +193,6 @@ class AnyRover:
             del self._passed_on[key]
         _, gateway = self._passed_on.get(copied, (now, ""))
         return gateway
-
-    def _submit_late(
-        self, client: GcsClient, packet: Packet, pending: Pending, *, now: float
-    ) -> None:
-        """Submit what was held back, to the rover that is the best one now."""
-        try:
-            self._submit(client, packet, pending, now=now)
-        except Rejection as refusal:
-            self._refuse(client, packet, pending, refusal, now=now)
 
     def _answer_repeat(
         self, client: GcsClient, packet: Packet, pending: Pending, known: Known, *, now: float

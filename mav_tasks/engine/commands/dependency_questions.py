@@ -9,7 +9,7 @@ from collections import deque
 from math import inf
 from typing import NamedTuple, Protocol
 
-from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.timers import Effect, Timers, Turn
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.pending_tasks import PendingTasks
@@ -20,14 +20,8 @@ MOST = 256  # submissions
 R = TaskReason
 
 
-class GoOn(Protocol):
-    """Handles a submission again."""
-
-    def __call__(self, *, now: float) -> None: ...
-
-
 class Refuse(Protocol):
-    """Refuses a submission."""
+    """Refuses what a client asked for."""
 
     def __call__(self, refusal: Rejection, /, *, now: float) -> None: ...
 
@@ -35,7 +29,7 @@ class Refuse(Protocol):
 class _Held(NamedTuple):
     after: int
     until: float
-    go_on: GoOn
+    go_on: Effect
     refuse: Refuse
 
 
@@ -55,10 +49,10 @@ class DependencyQuestions:
         """The tasks that are asked about."""
         return {held.after for held in self._held}
 
-    def hold(self, after: int, go_on: GoOn, refuse: Refuse, *, now: float) -> bool:
+    def hold(self, after: int, go_on: Effect, refuse: Refuse, *, now: float) -> bool:
         """Hold a submission back if that is necessary; return whether it is held.
 
-        Raise Rejection if too many are.
+        Raise Rejection if too many are. ``go_on`` handles it again, or raises Rejection.
         """
         if not after or not self._room.is_in_question(after):
             return False
@@ -74,8 +68,11 @@ class DependencyQuestions:
         for each in held:
             if self._room.is_in_question(each.after):
                 self._held.append(each)
-            else:
+                continue
+            try:
                 each.go_on(now=now)
+            except Rejection as refusal:
+                each.refuse(refusal, now=now)
         self._plan()
 
     def keys_revoked(self, *, now: float) -> None:

@@ -6,7 +6,7 @@ through ``deliver``.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY
 from mav_tasks.engine.clients.gcs_client import GcsClient
@@ -29,7 +29,6 @@ from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.commands.words import halts_again
 from mav_tasks.engine.missions.plans import Plans
 from mav_tasks.engine.policy import Kind, is_task_command
-from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -46,21 +45,6 @@ R = TaskReason
 MODE_TRIED_AGAIN = 2.0  # s; QGroundControl asks again after 1.3 s
 
 
-class _UndoesHold(NamedTuple):
-    """A "go to" just after a HOLD: it shows that MAVSDK, and no person, sent that HOLD."""
-
-    vehicle: Vehicle
-    number: int  # identifies the HOLD
-    actor: str
-
-
-class _Repeats(NamedTuple):
-    """A task that repeats from now on; the request is acknowledged once that is durable."""
-
-    asked: CommandRequest
-    task_id: int
-
-
 @dataclass(repr=False, eq=False)
 class Commands:
     """The dispatcher of client commands."""
@@ -73,10 +57,6 @@ class Commands:
     _control: TaskControl
     _displays: MessageRequests
     _any: AnyRover
-
-    def __post_init__(self) -> None:
-        self._submissions.gate.knows(_UndoesHold, _undo_hold, _leave_hold)
-        self._submissions.gate.knows(_Repeats, _acknowledge_repeats, self._refuse_repeats)
 
     def receive(self, client: GcsClient, packet: Packet, command: Command, *, now: float) -> None:
         """Execute or refuse a client's command, and answer it."""
@@ -207,7 +187,7 @@ class Commands:
             ):
                 task_id = self._control.act(asked, now=now)
                 if sets_repetition(asked.command):  # a crash must not leave a task that runs once
-                    self._submissions.gate.hold(_Repeats(asked, task_id), now=now)
+                    self._answer_repeats(asked, task_id, now=now)
                 else:
                     asked.answer(MavResult.ACCEPTED, task_id)
             case MavCmd.NAV_TAKEOFF if claims:  # examples for every kind of vehicle send it
@@ -244,9 +224,17 @@ class Commands:
                 return False
         return True
 
-    def _refuse_repeats(self, repeats: _Repeats, *, now: float) -> None:
-        words = f"task {repeats.task_id}: not stored in time that it repeats: send it again"
-        self._registry.record(repeats.asked.refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now))
+    def _answer_repeats(self, asked: CommandRequest, task_id: int, *, now: float) -> None:
+        """Acknowledge a request that a task repeats once that is durable."""
+
+        def accept(*, now: float) -> None:  # noqa: ARG001
+            asked.answer(MavResult.ACCEPTED, task_id)
+
+        def give_up(*, now: float) -> None:
+            words = f"task {task_id}: not stored in time that it repeats: send it again"
+            self._registry.record(asked.refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now))
+
+        self._submissions.gate.hold(accept, give_up, now=now)
 
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
         """Raise Rejection if an observer's question is too much for the rover's link."""
@@ -280,9 +268,11 @@ class Commands:
             self._undo_hold_before(asked, now=now)
 
     def _undo_hold_before(self, asked: CommandRequest, *, now: float) -> None:
+        """Undo a HOLD just before a "go to": MAVSDK, and no person, has sent that HOLD."""
         number = asked.vehicle.hold_before.undoing(asked.sender, now=now)
         if number is not None and asked.rights.reach(OPERATOR):
-            self._submissions.gate.hold(_UndoesHold(asked.vehicle, number, asked.actor), now=now)
+            undo = partial(asked.vehicle.joint.go_to_follows, number, actor=asked.actor)
+            self._submissions.gate.hold(undo, _leave_hold, now=now)
 
     # STOP, pause, modes
 
@@ -351,15 +341,7 @@ def _looks_for_servers(command: Command) -> bool:
     return is_request and message_id_of(command) == m.TaskQueueStatus.id
 
 
-def _acknowledge_repeats(repeats: _Repeats, *, now: float) -> None:  # noqa: ARG001
-    repeats.asked.answer(MavResult.ACCEPTED, repeats.task_id)
-
-
-def _undo_hold(undoes: _UndoesHold, *, now: float) -> None:
-    undoes.vehicle.joint.go_to_follows(undoes.number, actor=undoes.actor, now=now)
-
-
-def _leave_hold(undoes: _UndoesHold, *, now: float) -> None:
+def _leave_hold(*, now: float) -> None:
     """Do nothing: the "go to" was not stored in time, so the HOLD stays."""
 
 

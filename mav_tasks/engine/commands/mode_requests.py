@@ -5,7 +5,6 @@ acknowledgement: its sender waits until a heartbeat shows the mode.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
@@ -33,13 +32,6 @@ CRUISING = Terms(is_cruising=True)
 STOPPED = Rejection(R.STOPPED, CONTINUE_FIRST)
 
 
-class _Started(NamedTuple):
-    """A mission that was started or resumed, and the request to answer."""
-
-    asked: CommandRequest
-    task: Task
-
-
 @dataclass(repr=False, eq=False)
 class ModeRequests:
     """The handler of mode requests and mission starts of all clients."""
@@ -49,9 +41,6 @@ class ModeRequests:
     _submissions: Submissions
     _plans: Plans
     _refusals: Refusals
-
-    def __post_init__(self) -> None:
-        self._submissions.gate.knows(_Started, self._accept, self._give_up)
 
     def asked(self, asked: CommandRequest, *, now: float) -> bool:
         """Handle DO_SET_MODE. Return False if the vehicle itself is to answer it."""
@@ -118,17 +107,21 @@ class ModeRequests:
             task = self._submissions.submit_draft(asked, started, now=now)
             self._plans.restarted(vehicle, task, now=now)
         else:
-            self._submissions.gate.hold(_Started(asked, started), now=now)
+            self._answer_started(asked, started, now=now)
         give_back(asked, now=now)
 
-    def _accept(self, started: _Started, *, now: float) -> None:
-        del now
-        started.asked.answer(MavResult.ACCEPTED, started.task.id)
+    def _answer_started(self, asked: CommandRequest, task: Task, *, now: float) -> None:
+        """Answer the start of a mission once that is durable."""
 
-    def _give_up(self, started: _Started, *, now: float) -> None:
-        self._plans.stage_again(started.asked.vehicle, started.task, now=now)
-        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
-        self._registry.record(started.asked.refuse(refusal, now=now))
+        def accept(*, now: float) -> None:  # noqa: ARG001
+            asked.answer(MavResult.ACCEPTED, task.id)
+
+        def give_up(*, now: float) -> None:
+            self._plans.stage_again(asked.vehicle, task, now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
+            self._registry.record(asked.refuse(refusal, now=now))
+
+        self._submissions.gate.hold(accept, give_up, now=now)
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Start the mission of a vehicle that was to be armed first and is armed now."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Hashable
 from functools import partial
-from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -49,21 +48,6 @@ GIVEN_UP = 3.5  # s, after which a client has stopped waiting for an answer
 NONCE = 3  # its index among the parameters
 
 
-class Submitted(NamedTuple):
-    """A submitted task; the request is acknowledged once the task is durable."""
-
-    asked: CommandRequest
-    task: Task
-
-
-class _Halted(NamedTuple):
-    """A command that has halted a vehicle; its answer is sent once that is kept."""
-
-    client: GcsClient
-    pending: Pending
-    to: Address
-
-
 class Submissions:
     """The entry of all new tasks, which are acknowledged once durable."""
 
@@ -83,8 +67,6 @@ class Submissions:
         self.questions = questions
         #: holds what waits for the store, also for other modules
         self.gate = CommitGate(registry, timers, within=settings.watch.commit)
-        self.gate.knows(Submitted, self._accept, self._withdraw)
-        self.gate.knows(_Halted, _answer, self._answer_unkept)
         #: by task that is not durable yet: requests to answer, one for each client and command
         self._undecided: dict[TaskId, list[CommandRequest]] = {}
         self._store_is_away = False
@@ -136,7 +118,7 @@ class Submissions:
         why_not = why_older(asked, now=now) if runs_now else ""
         if self._is_repeat(asked, draft, confirmation=command.confirmation, now=now):
             return
-        again, refuse = partial(self._submit_late, asked), partial(self.refuse, asked)
+        again, refuse = partial(self.submit, asked), partial(self.refuse, asked)
         if self.questions.hold(draft.terms.after, again, refuse, now=now):
             return
         waits = bool(vehicle.tasks.paused)  # then nothing moves before a command to continue
@@ -172,13 +154,6 @@ class Submissions:
         if tasks.paused:
             return tasks.halts.by is asked.sender
         return vehicle.joint.state(now=now).is_led and vehicle.armed
-
-    def _submit_late(self, asked: CommandRequest, *, now: float) -> None:
-        """Submit what was held back, by the state of the vehicle now."""
-        try:
-            self.submit(asked, now=now)
-        except Rejection as refusal:
-            self.refuse(asked, refusal, now=now)
 
     def refuse(self, asked: CommandRequest, refusal: Rejection, *, now: float) -> None:
         """Answer a refused command; record it, and tell the client the words."""
@@ -281,11 +256,11 @@ class Submissions:
         """Acknowledge a new task once it is durable."""
         self._deduplicator.remember(task, at=now, now=now)
         self._undecided[task.id] = [asked]
-        self.gate.hold(Submitted(asked, task), now=now)
+        accept = partial(self._accept, asked, task)
+        self.gate.hold(accept, partial(self._withdraw, asked, task), now=now)
 
-    def _accept(self, submitted: Submitted, *, now: float) -> None:
+    def _accept(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         """Acknowledge a durable submission with the task's id, and tell all clients."""
-        asked, task = submitted
         if task.id not in self._undecided:
             return  # retracted, and answered
         for each in self._undecided.pop(task.id):
@@ -316,8 +291,7 @@ class Submissions:
             severity = MavSeverity.INFO if is_calm else MavSeverity.WARNING
             client.tell(words, severity, source, now=now)
 
-    def _withdraw(self, submitted: Submitted, *, now: float) -> None:
-        asked, task = submitted
+    def _withdraw(self, asked: CommandRequest, task: Task, *, now: float) -> None:
         if task.id not in self._undecided:
             return
         askers = self._undecided.pop(task.id)
@@ -353,22 +327,30 @@ class Submissions:
         The record of halts knows no tasks: one that was cancelled would come back and drive.
         """
         assert pending.answer is not None, "it was decided"
-        if pending.answer.result in IN_FORCE and not pending.is_held:  # else this was a copy
-            pending.is_held = True
-            number, first = pending.command.command, pending.command.params[0]
-            ends_tasks = number in OF_ONE_TASK or (number, first) == (MavCmd.TASK_STOP, 1.0)
-            self.gate.hold(_Halted(client, pending, to), now=now, is_halt=not ends_tasks)
+        if pending.answer.result not in IN_FORCE or pending.is_held:  # the latter: a copy
+            return
+        pending.is_held = True
 
-    def _answer_unkept(self, halted: _Halted, *, now: float) -> None:
-        client, pending, to = halted
-        answer, pending.is_held = pending.answer, False
-        assert answer is not None, "what is held has one"
-        reason = int(R.STORE_UNAVAILABLE)
-        pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
-        client.answer(pending.answer, to)
-        what = "STOP" if answer.command == MavCmd.TASK_STOP else f"Command {answer.command}"
-        words = f"{what} in force but not stored: a server restart loses it. See its log"
-        self._gcs.tell(words, MavSeverity.ERROR, answer.source, now=now)
+        def accept(*, now: float) -> None:
+            pending.is_held = False
+            assert pending.answer is not None, "what is held has one"
+            client.answer(pending.answer, to)
+            if pending.words is not None:
+                client.tell_refusal(*pending.words, now=now)
+
+        def give_up(*, now: float) -> None:
+            answer, pending.is_held = pending.answer, False
+            assert answer is not None, "what is held has one"
+            reason = int(R.STORE_UNAVAILABLE)
+            pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
+            client.answer(pending.answer, to)
+            what = "STOP" if answer.command == MavCmd.TASK_STOP else f"Command {answer.command}"
+            words = f"{what} in force but not stored: a server restart loses it. See its log"
+            self._gcs.tell(words, MavSeverity.ERROR, answer.source, now=now)
+
+        number, first = pending.command.command, pending.command.params[0]
+        ends_tasks = number in OF_ONE_TASK or (number, first) == (MavCmd.TASK_STOP, 1.0)
+        self.gate.hold(accept, give_up, now=now, is_halt=not ends_tasks)
 
     def answer_repeat(self, asked: CommandRequest, known: Known, *, now: float) -> None:
         """Give a repeated submission the answer of the first, once that has one."""
@@ -397,15 +379,6 @@ def give_back(asked: CommandRequest, *, now: float) -> None:
     is_over = tasks.paused in TAKEN or tasks.halts.by is asked.sender
     if is_over and not tasks.has_others:
         asked.vehicle.joint.go_on(actor=asked.actor, now=now)
-
-
-def _answer(halted: _Halted, *, now: float) -> None:
-    client, pending, to = halted
-    assert pending.answer is not None, "what is held has one"
-    pending.is_held = False
-    client.answer(pending.answer, to)
-    if pending.words is not None:
-        client.tell_refusal(*pending.words, now=now)
 
 
 def _priority_of(submitter: Submitter, settings: Settings) -> int:

@@ -12,6 +12,7 @@ from mav_tasks.engine.commands.goals import MAX_DELAY, flag, identifier, number,
 from mav_tasks.engine.policy import row_of_message
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
@@ -154,10 +155,9 @@ class TaskControl:
     def _with_piece(self, task: Task, command: Command, times: Times, *, now: float) -> Terms:
         """Return a task's terms with a piece of its repetition; unchanged until all have come."""
         size = whole(command, 4, "bytes", low=1, high=MAX_REPEAT, default=None)
-        text = _with_piece(self._begun.pop(task.id, ""), command, "repeat", most=MAX_REPEAT)
-        self._begun[task.id] = text  # also when all have come: the last one may come twice
-        if len(self._begun) > MOST_BEGUN:
-            del self._begun[next(iter(self._begun))]
+        text = _with_piece(self._begun.get(task.id, ""), command, "repeat", most=MAX_REPEAT)
+        # also when all have come: the last one may come twice
+        keep_latest(self._begun, task.id, text, most=MOST_BEGUN)
         if len(text.encode()) < size:
             return task.terms
         return _repeating(task, text, times, now=now)

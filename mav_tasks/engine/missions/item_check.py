@@ -3,6 +3,8 @@
 An upload is refused at the first bad item, so that its client learns which one it is.
 """
 
+from mav_tasks.engine.commands.ability import Ability
+from mav_tasks.engine.commands.assignments import check_any
 from mav_tasks.engine.commands.goals import bad
 from mav_tasks.engine.missions.fence_items import check_fence_item, check_rally_item
 from mav_tasks.engine.missions.plan_items import (
@@ -18,6 +20,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.services.mission_item import Item
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.goal import GoTo, Step, number_of
 from mav_tasks.tasks.lifecycle import TaskReason
 
@@ -86,6 +89,24 @@ class PlanCheck:
         if seq <= len(read):
             read[seq:] = [(item, step)]
         return step
+
+
+class AnyCheck(PlanCheck):
+    """The item check of plans for any rover."""
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        self.settings = settings
+
+    @property
+    def _manner(self) -> MissionParseOptions:
+        return MissionParseOptions(has_home=False, ability=Ability(), driving=self.settings.driving)
+
+    def _check_place(self, step: GoTo, seq: int) -> None:
+        try:
+            check_any(step)
+        except Rejection as refusal:
+            raise Rejection(refusal.reason, f"item {seq + 1}: {refusal.text}") from None
 
 
 class ItemCheck(PlanCheck):

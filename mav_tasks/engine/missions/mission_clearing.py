@@ -1,8 +1,6 @@
 """Clears plans: a mission that is not being driven, fence and rally points."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
@@ -16,20 +14,8 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType
 from mav_tasks.services.mission_receiver import Sender
 from mav_tasks.tasks.lifecycle import ACTIVE, TaskReason, TaskState
-from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Task, TaskId
 
 R = TaskReason
-
-
-class _Cleared(NamedTuple):
-    """Plans that a client cleared."""
-
-    vehicle: Vehicle
-    sender: Sender
-    asked: int  # the plan type, or all of them
-    before: tuple[tuple[int, Stored], ...]  # by plan type
-    task: Task | None
 
 
 @dataclass(repr=False, eq=False)
@@ -37,13 +23,9 @@ class MissionClearing:
     """The handler of MISSION_CLEAR_ALL."""
 
     _vehicles: VehicleSide
-    _registry: TaskRegistry
     _submissions: Submissions
     _plans: Plans
     _answers: MissionAnswers
-
-    def __post_init__(self) -> None:
-        self._submissions.gate.knows(_Cleared, self._accept, self._undo)
 
     def clear(
         self, vehicle: Vehicle, sender: Sender, kind: int, *, is_late: bool, now: float
@@ -57,66 +39,45 @@ class MissionClearing:
         if kinds[0] not in STORED:
             self._answers.ack(sender, kind, MavMissionResult.UNSUPPORTED)
             return
-        task = self._plans.task(vehicle)
-        if MISSION in kinds and task is not None and task.state in ACTIVE - AT_REST:
-            self._answers.ack(sender, kind, MavMissionResult.DENIED)
-            words = f"clear: task {task.id} is being driven: pause or cancel it first"
-            self._refused(sender, vehicle, Rejection(R.WRONG_STATE, words), now=now)
-            return
-        if MISSION in kinds and task is not None and is_late and task.state is TaskState.HELD:
-            self._answers.ack(sender, kind, MavMissionResult.DENIED)
-            words = f"clear: delayed by the server; task {task.id} is held now: clear again"
-            self._refused(sender, vehicle, Rejection(R.STALE, words), now=now)
-            return
-        stored = [k for k in kinds if self._plans.stored(vehicle.system_id, k).plan_id]
-        self._forget(vehicle, sender, kind, stored, {}, now=now)
-
-    def _forget(
-        self,
-        vehicle: Vehicle,
-        sender: Sender,
-        asked: int,
-        kinds: Sequence[int],
-        before: Mapping[int, Stored],
-        *,
-        now: float,
-    ) -> None:
-        """Clear one type after the other, bounds on the vehicle first; then hold the answer."""
-        actor = str(sender.address)
-        if not kinds:
-            task = (
-                self._registry.get(TaskId(before[MISSION].plan_id)) if MISSION in before else None
-            )
-            cleared = _Cleared(vehicle, sender, asked, tuple(before.items()), task)
-            self._submissions.gate.hold(cleared, now=now)
-            return
-        first, rest = kinds[0], kinds[1:]
-
-        def go_on(*, now: float) -> None:
-            so_far = {**before, first: self._plans.stored(vehicle.system_id, first)}
-            self._plans.keep(vehicle, first, NOTHING, actor=actor, now=now)
-            self._forget(vehicle, sender, asked, rest, so_far, now=now)
+        number, actor, before = vehicle.system_id, str(sender.address), dict[int, Stored]()
+        left = [each for each in kinds if self._plans.stored(number, each).plan_id]
+        task = self._plans.task(vehicle) if MISSION in kinds else None
 
         def refuse(refusal: Rejection, *, now: float) -> None:
-            self._answers.ack(sender, asked, result_of(refusal), refusal.reason)
-            self._refused(sender, vehicle, refusal, now=now)
+            self._answers.ack(sender, kind, result_of(refusal), refusal.reason)
+            message_id = m.MissionClearAll.id
+            self._answers.refused(sender, refusal, message_id=message_id, now=now)
 
-        if first == MISSION:
-            go_on(now=now)
+        def clear_next(*, now: float) -> None:
+            """Clear one type after the other, bounds on the vehicle first."""
+            if not left:
+                self._submissions.gate.hold(accept, undo, now=now)
+            elif left[0] == MISSION:
+                cleared(now=now)
+            else:
+                write_through(vehicle, left[0], (), cleared, refuse, now=now)
+
+        def cleared(*, now: float) -> None:
+            first = left.pop(0)
+            before[first] = self._plans.stored(number, first)
+            self._plans.keep(vehicle, first, NOTHING, actor=actor, now=now)
+            clear_next(now=now)
+
+        def accept(*, now: float) -> None:
+            self._vehicles.mark_dirty(vehicle)
+            self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+            self._answers.ack(sender, kind, MavMissionResult.ACCEPTED)
+
+        def undo(*, now: float) -> None:
+            for each, stored in before.items():
+                self._plans.keep(vehicle, each, stored, actor=actor, now=now)
+            self._answers.ack(sender, kind, MavMissionResult.ERROR)
+
+        if task is not None and task.state in ACTIVE - AT_REST:
+            words = f"clear: task {task.id} is being driven: pause or cancel it first"
+            refuse(Rejection(R.WRONG_STATE, words), now=now)
+        elif task is not None and is_late and task.state is TaskState.HELD:
+            words = f"clear: delayed by the server; task {task.id} is held now: clear again"
+            refuse(Rejection(R.STALE, words), now=now)
         else:
-            write_through(vehicle, first, (), go_on, refuse, now=now)
-
-    def _accept(self, cleared: _Cleared, *, now: float) -> None:
-        vehicle, task, actor = cleared.vehicle, cleared.task, str(cleared.sender.address)
-        self._vehicles.mark_dirty(vehicle)
-        self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
-        self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ACCEPTED)
-
-    def _undo(self, cleared: _Cleared, *, now: float) -> None:
-        actor = str(cleared.sender.address)
-        for kind, stored in cleared.before:
-            self._plans.keep(cleared.vehicle, kind, stored, actor=actor, now=now)
-        self._answers.ack(cleared.sender, cleared.asked, MavMissionResult.ERROR)
-
-    def _refused(self, sender: Sender, vehicle: Vehicle, why: Rejection, *, now: float) -> None:
-        self._answers.refused(sender, vehicle, why, message_id=m.MissionClearAll.id, now=now)
+            clear_next(now=now)

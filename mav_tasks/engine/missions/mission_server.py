@@ -3,31 +3,36 @@
 ``mission_uploads`` handles whole uploads, ``mission_clearing`` MISSION_CLEAR_ALL.
 """
 
-from collections.abc import Callable
+from collections.abc import Collection
 from functools import partial
-from math import inf
+from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.commands.assignments import Assignments
 from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.engine.missions.go_to_items import GoToItems
-from mav_tasks.engine.missions.item_check import ItemCheck
+from mav_tasks.engine.missions.item_check import AnyCheck, ItemCheck, PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
 from mav_tasks.engine.missions.mission_clearing import MissionClearing
 from mav_tasks.engine.missions.mission_uploads import MissionUploads, UploadSession
+from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.engine.missions.plans import MISSION, STORED, Plans, Stored
 from mav_tasks.engine.policy import GO_TO, row_of
-from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.timers import Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
-from mav_tasks.mavlink.enums import MavMissionResult, MavSeverity
+from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.mission_item import unpacked
 from mav_tasks.services.mission_receiver import RequestForm, Sender
 from mav_tasks.services.mission_sender import MissionSender
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.deduplicator import reused
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -48,28 +53,17 @@ MissionMessage = (
 )
 
 
+#: the messages of an upload
+UploadMessage = m.MissionCount | m.MissionItem | m.MissionItemInt | m.MissionAck
+
 GIVES_UP = 3.0  # s without MISSION_CURRENT, after which MAVSDK has taken a refusal in
 
 
-class _Desk:
+class _Desk(NamedTuple):
     """The uploads to and downloads from one address, of one plan type."""
 
-    def __init__(
-        self, check: ItemCheck, form: RequestForm, timers: Timers, ask_again: Callable[..., None]
-    ) -> None:
-        """``ask_again`` is called with the desk when an item is to be requested again."""
-        self.uploads = UploadSession(check, form)
-        self.sender = MissionSender()
-        self._timer = timers.timer(Turn.UPLOADS, partial(ask_again, self))
-
-    def close(self, timers: Timers) -> None:
-        """End all transfers."""
-        timers.forget(self._timer)
-
-    def plan(self) -> None:
-        """Set the timer to the upload's next repeated request or time-out."""
-        due = self.uploads.receiver.next_deadline()
-        self._timer.set(inf if due is None else due)
+    uploads: UploadSession
+    sender: MissionSender
 
 
 class MissionServers:
@@ -81,17 +75,38 @@ class MissionServers:
         vehicles: VehicleSide,
         registry: TaskRegistry,
         submissions: Submissions,
+        assignments: Assignments,
         plans: Plans,
         timers: Timers,
+        settings: Settings,
     ) -> None:
         self._vehicles = vehicles
+        self._registry = registry
         self._plans = plans
         self._timers = timers
-        self._answers = MissionAnswers(gcs, registry)
-        self._uploads = MissionUploads(gcs, vehicles, registry, submissions, plans, self._answers)
-        self._clearing = MissionClearing(vehicles, registry, submissions, plans, self._answers)
+        self._answers = MissionAnswers(gcs, vehicles, registry)
+        self._uploads = MissionUploads(
+            gcs, vehicles, registry, submissions, assignments, plans, self._answers
+        )
+        self._clearing = MissionClearing(vehicles, submissions, plans, self._answers)
         self._go_to = GoToItems(submissions, registry)
         self._desks: dict[tuple[int, int, int], _Desk] = {}
+        #: of plans at the server's own address, for any vehicle
+        self._check_any = AnyCheck(settings)
+        self._any = self._session(None, self._check_any, m.MissionRequestInt)
+
+    def apply(self, settings: Settings) -> None:
+        self._check_any.settings = settings
+
+    def nonce_taken(self, taken: NonceTaken, *, now: float) -> None:
+        """Answer an upload with the task that the fleet had with its nonce."""
+        task = self._registry.get(taken.task_id)
+        if task is None or task.command != MavCmd.MISSION_START:
+            return
+        if taken.payload == task.marks.payload:
+            self._any.accept(taken.known, now=now)
+        else:
+            self._any.refuse(reused(task.marks.nonce), now=now)
 
     def receive(
         self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
@@ -100,33 +115,23 @@ class MissionServers:
         # most messages leave the vehicle as it is; the others mark it dirty
         vehicle = self._vehicles.look_at(message.target_system)
         if vehicle is None:
-            return False
+            return self._receive_for_any(client, packet, message, now=now)
         component = message.target_component or AUTOPILOT
         at_server = component == vehicle.server_component
         if not at_server and (component != AUTOPILOT or not vehicle.parts.settings.claim):
             return False
         desk = self._desk(vehicle, component, getattr(message, "mission_type", MISSION))
-        who = (client.key, client.signed_by.name)  # an endpoint may have several keys
-        sender = Sender(who, packet.source, Address(vehicle.system_id, component))
-        if self._is_refused(client, vehicle, sender, packet, message, now=now):
+        sender = _sender(client, packet, Address(vehicle.system_id, component))
+        if self._is_refused(client, sender, packet, message, STORED, now=now):
             return True
         match message:
-            case m.MissionCount() if message.mission_type not in STORED:
-                self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
-                words = f"upload: mission type {message.mission_type} is not supported"
-                unknown = Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
-                self._uploads.refused(sender, vehicle, unknown, now=now)
-            case m.MissionCount():
-                desk.uploads.receiver.end_gone(self._answers.client, now=now)
-                desk.uploads.receiver.count(message, sender, rank=client.rights.rank, now=now)
             case m.MissionItem() | m.MissionItemInt() if message.current in GO_TO:
                 self._vehicles.mark_dirty(vehicle)  # never a plan item, even during an upload
                 self._go_to.receive(client, vehicle, packet, message, now=now)
-            case m.MissionItem() | m.MissionItemInt():
-                desk.uploads.receiver.item(message, sender, now=now)
-            case m.MissionAck():
-                desk.uploads.receiver.cancelled(message, sender, now=now)
-                desk.sender.end(sender, message.mission_type)
+            case m.MissionCount() | m.MissionItem() | m.MissionItemInt() | m.MissionAck():
+                self._receive_upload(desk.uploads, client, sender, message, now=now)
+                if isinstance(message, m.MissionAck):
+                    desk.sender.end(sender, message.mission_type)
             case m.MissionRequestList():
                 self._list(desk, vehicle, sender, message.mission_type, now=now)
             case m.MissionRequest() | m.MissionRequestInt():
@@ -151,46 +156,83 @@ class MissionServers:
                 self._set_current(vehicle, client, sender, message.seq, now=now)
             case m.MissionRequestPartialList() | m.MissionWritePartialList():
                 self._answers.ack(sender, message.mission_type, MavMissionResult.UNSUPPORTED)
-        self._uploads.flush(desk.uploads, vehicle, now=now)
-        desk.plan()
         return True
+
+    def _receive_for_any(
+        self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
+    ) -> bool:
+        """Handle an upload to the server's own address. Return False if it is none."""
+        ours = self._vehicles.our_address
+        addressed = message.target_system, message.target_component or ours.component_id
+        if addressed != ours or not isinstance(message, UploadMessage):
+            return False
+        sender = _sender(client, packet, ours)
+        if not self._is_refused(client, sender, packet, message, (MISSION,), now=now):
+            self._receive_upload(self._any, client, sender, message, now=now)
+        return True
+
+    def _receive_upload(
+        self,
+        session: UploadSession,
+        client: GcsClient,
+        sender: Sender,
+        message: UploadMessage,
+        *,
+        now: float,
+    ) -> None:
+        receiver = session.receiver
+        match message:
+            case m.MissionCount():
+                receiver.end_gone(self._answers.client, now=now)
+                receiver.count(message, sender, rank=client.rights.rank, now=now)
+            case m.MissionAck():
+                receiver.cancelled(message, sender, now=now)
+            case _:
+                receiver.item(message, sender, now=now)
+        session.flush(now=now)
 
     def forget(self, vehicle: int) -> None:
         """End the transfers of a vehicle's plans: clients begin again at its next gateway."""
         for key in [each for each in self._desks if each[0] == vehicle]:
-            self._desks.pop(key).close(self._timers)
+            self._timers.forget(self._desks.pop(key).uploads.timer)
 
     def _is_refused(
         self,
         client: GcsClient,
-        vehicle: Vehicle,
         sender: Sender,
         packet: Packet,
         message: MissionMessage,
+        kinds: Collection[int],
         *,
         now: float,
     ) -> bool:
-        """Whether a message is refused because of the client's role; if so, answer it."""
+        """Whether a message is refused because of the client's role, or an upload by its kind.
+
+        If so, answer it.
+        """
         if isinstance(message, m.MissionSetCurrent) or getattr(message, "current", 0) in GO_TO:
             return False  # these are checked and answered elsewhere
         kind = getattr(message, "mission_type", MISSION)
         row = row_of(packet.message_id, message)
         try:
             client.rights.require(row.role, f"do this ({row.about})")
+            if isinstance(message, m.MissionCount) and kind not in kinds:
+                why = "belongs to one rover: name it" if kind in STORED else "is not supported"
+                words = f"upload: mission type {kind} {why}"
+                raise Rejection(TaskReason.NOT_SUPPORTED_BY_VEHICLE, words)
         except Rejection as refusal:
             if isinstance(message, m.MissionCount | m.MissionClearAll):
-                self._answers.ack(sender, kind, MavMissionResult.DENIED, refusal.reason)
+                self._answers.ack(sender, kind, result_of(refusal), refusal.reason)
                 message_id = 0 if isinstance(message, m.MissionCount) else type(message).id
-                self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+                self._answers.refused(sender, refusal, message_id=message_id, now=now)
             return True
         return False
 
-    def _ask_again(self, vehicle: Vehicle, desk: _Desk, *, now: float) -> None:
-        """Request an item again, or end the upload after its time-out."""
-        self._vehicles.mark_dirty(vehicle)
-        desk.uploads.receiver.handle_deadline(now=now)
-        self._uploads.flush(desk.uploads, vehicle, now=now)
-        desk.plan()
+    def _session(
+        self, vehicle: Vehicle | None, check: PlanCheck, form: RequestForm
+    ) -> UploadSession:
+        decide = partial(self._uploads.decide, vehicle)
+        return UploadSession(check, form, self._answers, self._timers, decide)
 
     def _desk(self, vehicle: Vehicle, component: int, kind: int) -> _Desk:
         key = vehicle.system_id, component, kind if kind in STORED else MISSION
@@ -198,9 +240,8 @@ class MissionServers:
         if desk is None:
             is_plain = component == AUTOPILOT and not vehicle.persona.has_int_requests
             form = m.MissionRequest if is_plain else m.MissionRequestInt
-            check = ItemCheck(vehicle, component)
-            ask_again = partial(self._ask_again, vehicle)
-            desk = self._desks[key] = _Desk(check, form, self._timers, ask_again)
+            session = self._session(vehicle, ItemCheck(vehicle, component), form)
+            desk = self._desks[key] = _Desk(session, MissionSender())
         return desk
 
     def _downloadable(self, vehicle: Vehicle, component: int, kind: int) -> Stored:
@@ -235,9 +276,13 @@ class MissionServers:
                 client.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
         except Rejection as refusal:
             message_id = m.MissionSetCurrent.id
-            self._answers.refused(sender, vehicle, refusal, message_id=message_id, now=now)
+            self._answers.refused(sender, refusal, message_id=message_id, now=now)
             client.gives_up_at = now + GIVES_UP
             return
         client.outlet.send(
             self._plans.current(vehicle, seq=seq), Address(vehicle.system_id, AUTOPILOT)
         )
+
+
+def _sender(client: GcsClient, packet: Packet, addressed: Address) -> Sender:
+    return Sender((client.key, client.signed_by.name), packet.source, addressed)  # of several keys

@@ -2,24 +2,28 @@
 
 The autopilot's address has one mission, which is staged until it is started, as on an autopilot.
 The task server's address takes any number; each is queued at once. Fence and rally points belong to
-the vehicle, at either address.
+the vehicle, at either address. A plan at the server's own address becomes a task of the vehicle
+that it chooses.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import blake2b
-from typing import NamedTuple
+from math import inf
 from zlib import crc32
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
-from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.commands.assignments import Assignments, driven_by
+from mav_tasks.engine.commands.submissions import Submissions, chosen_words
 from mav_tasks.engine.missions.fence_items import fence_for_vehicle, fence_of
 from mav_tasks.engine.missions.item_check import PlanCheck
 from mav_tasks.engine.missions.mission_answers import MissionAnswers
-from mav_tasks.engine.missions.plan_items import ParsedMission, result_of, skipped
+from mav_tasks.engine.missions.plan_items import result_of, skipped
 from mav_tasks.engine.missions.plans import MISSION, Plans, Stored, is_of_autopilot
 from mav_tasks.engine.missions.write_through import write_through
+from mav_tasks.engine.timers import Timers, Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
@@ -36,7 +40,7 @@ from mav_tasks.services.mission_receiver import (
 from mav_tasks.tasks.goal import describe
 from mav_tasks.tasks.lifecycle import ACTIVE, TERMINAL, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Draft, Marks, Submitter, Task
+from mav_tasks.tasks.task import ANY, Draft, Marks, Submitter, Task
 
 R = TaskReason
 
@@ -48,171 +52,180 @@ ENDED = {
 }
 
 
-def refusal_of(result: int, words: str) -> Rejection:
-    """Return why the receiver itself ended an upload with this MAV_MISSION_RESULT."""
-    reason = ENDED.get(MavMissionResult(result), R.BAD_PARAMETER)
-    return Rejection(reason, f"upload: {words or 'an item cannot be read'}")
-
-
-def draft_of(vehicle: int, wanted: ParsedMission, client: GcsClient, sender: Sender) -> Draft:
-    """Return the submission of a whole upload; two of one content differ by their nonces."""
-    what = f"{sender.addressed} {wanted.plan.source}".encode()
-    marks = Marks(wanted.nonce, blake2b(what, digest_size=9).hexdigest())
-    submitter = client.submitter(sender.address)
-    return Draft(vehicle, MavCmd.MISSION_START, wanted.plan, submitter, wanted.terms, marks)
-
-
 class UploadSession:
-    """The receiver of uploads to one address, and their item check."""
+    """The receiver of uploads to one address, and the answers to them."""
 
-    def __init__(self, check: PlanCheck, form: RequestForm) -> None:
+    def __init__(
+        self,
+        check: PlanCheck,
+        form: RequestForm,
+        answers: MissionAnswers,
+        timers: Timers,
+        decide: Callable[..., None],
+    ) -> None:
+        """``decide`` submits or stores a whole upload, or raises Rejection."""
         self.check = check
         self.receiver = MissionReceiver(check=check, form=form)
+        self._answers = answers
+        self._decide = decide
+        #: requests an item again, or ends the upload after its time-out
+        self.timer = timers.timer(Turn.UPLOADS, self._ask_again)
 
+    def flush(self, *, now: float, refusal: Rejection | None = None) -> None:
+        """Send messages, and decide about whole uploads; ``refusal``: of the one just decided."""
+        outgoing, uploads = self.receiver.take()
+        for told in outgoing:
+            ack = told.message
+            if not isinstance(ack, m.MissionAck) or not ack.type:
+                self._answers.send(told)
+                continue
+            why = None if told.why else refusal or self.check.take_refusal()
+            if why is None:
+                reason = ENDED.get(MavMissionResult(ack.type), R.BAD_PARAMETER)
+                why = Rejection(reason, f"upload: {told.why or 'an item cannot be read'}")
+            ack.opaque_id = why.reason
+            self._answers.send(told)
+            self._answers.refused(told.sender, why, now=now)
+        for upload in uploads:
+            self.decide(upload, now=now)
+        due = self.receiver.next_deadline()
+        self.timer.set(inf if due is None else due)
 
-class _Mission(NamedTuple):
-    """A mission submitted as a task; if staged, it replaced the plan ``before``."""
+    def decide(self, upload: Upload, *, now: float) -> None:
+        """Decide about a whole upload, perhaps held back before."""
+        try:
+            self._decide(self, upload, now=now)
+        except Rejection as refusal:
+            self.refuse(refusal, now=now)
 
-    desk: UploadSession
-    vehicle: Vehicle
-    sender: Sender
-    task: Task
-    before: Stored
+    def accept(self, plan_id: int, *, now: float) -> None:
+        self.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=plan_id, now=now)
+        self.flush(now=now)
 
+    def refuse(self, refusal: Rejection, *, now: float) -> None:
+        self.receiver.finish(result_of(refusal), opaque_id=0, now=now)
+        self.flush(refusal=refusal, now=now)
 
-class _Kept(NamedTuple):
-    """Fence or rally points, or an empty mission, that replaced the plan ``before``."""
-
-    desk: UploadSession
-    vehicle: Vehicle
-    kind: int
-    plan_id: int
-    before: Stored
-    task: Task | None  # of the mission before
-    actor: str
+    def _ask_again(self, *, now: float) -> None:
+        self.receiver.handle_deadline(now=now)
+        self.flush(now=now)
 
 
 @dataclass(repr=False, eq=False)
 class MissionUploads:
-    """The decision about whole uploads, and the answers to their clients."""
+    """The decision about whole uploads."""
 
     _gcs: GcsSide
     _vehicles: VehicleSide
     _registry: TaskRegistry
     _submissions: Submissions
+    _assignments: Assignments
     _plans: Plans
     _answers: MissionAnswers
 
-    def __post_init__(self) -> None:
-        self._submissions.gate.knows(_Mission, self._accept, self._withdraw)
-        self._submissions.gate.knows(_Kept, self._accept_kept, self._undo_kept)
-
-    def flush(
-        self,
-        desk: UploadSession,
-        vehicle: Vehicle,
-        *,
-        now: float,
-        refusal: Rejection | None = None,
+    def decide(
+        self, vehicle: Vehicle | None, session: UploadSession, upload: Upload, *, now: float
     ) -> None:
-        """Send a session's messages, and decide about its complete uploads.
-
-        ``refusal``: why the upload just decided about was refused.
-        """
-        outgoing, uploads = desk.receiver.take()
-        for told in outgoing:
-            if isinstance(told.message, m.MissionAck) and told.message.type:
-                ended = refusal_of(told.message.type, told.why)
-                why = ended if told.why else refusal or desk.check.take_refusal() or ended
-                told.message.opaque_id = why.reason
-                self._answers.send(told)
-                self.refused(told.sender, vehicle, why, now=now)
-            else:
-                self._answers.send(told)
-        for upload in uploads:
+        """Submit or store a whole upload; None: for any vehicle. Raise Rejection if refused."""
+        self._submissions.check_open()
+        client = self._answers.client(upload.sender)
+        if client is None:
+            raise Rejection(R.WRONG_STATE, "the client has gone")
+        is_staged = upload.sender.addressed.component_id == AUTOPILOT
+        if vehicle is not None:
             self._vehicles.mark_dirty(vehicle)
-            self._decide(desk, vehicle, upload, now=now)
+            is_mission = upload.mission_type == MISSION
+            if is_mission and len(upload.items) <= (vehicle.persona.has_home_item and is_staged):
+                self._check_not_begun(vehicle, client, upload.sender)
+                upload = upload._replace(items=())
+            if not is_mission or not upload.items:
+                self._replace(session, vehicle, upload, now=now)
+                return
+        self._take_in(session, vehicle, client, upload, is_staged=is_staged, now=now)
 
-    def _decide(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
-        try:
-            self._submissions.check_open()
-            if upload.mission_type != MISSION:
-                self._replace(desk, vehicle, upload, now=now)
-            elif self._is_nothing(vehicle, upload):
-                self._check_not_begun(vehicle)
-                client = self._client(upload.sender)
-                self._check_replaced(client, vehicle, client.submitter(upload.sender.address))
-                self._replace(desk, vehicle, upload._replace(items=()), now=now)
-            else:
-                self._take_in(desk, vehicle, upload, now=now)
-        except Rejection as refusal:
-            self._refuse(desk, vehicle, refusal, now=now)
-
-    def _decide_late(
-        self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
-    ) -> None:
-        """Decide about an upload that was held back."""
-        if self._answers.client(upload.sender) is None:
-            self._refuse(desk, vehicle, Rejection(R.WRONG_STATE, "the client has gone"), now=now)
-        else:
-            self._decide(desk, vehicle, upload, now=now)
-
-    def _check_not_begun(self, vehicle: Vehicle) -> None:
+    def _check_not_begun(self, vehicle: Vehicle, client: GcsClient, sender: Sender) -> None:
+        """Raise Rejection unless a client may remove the mission, which must not have started."""
         task = self._plans.task(vehicle)
         if task is not None and task.state in ACTIVE:
             raise Rejection(R.NOT_ALLOWED, f"task {task.id} has started: cancel it first")
-
-    def _is_nothing(self, vehicle: Vehicle, upload: Upload) -> bool:
-        """Whether a mission is empty: no item, or only ArduPilot's home item."""
-        is_staged = upload.sender.addressed.component_id == AUTOPILOT
-        return len(upload.items) <= (vehicle.persona.has_home_item and is_staged)
+        self._check_replaced(client, vehicle, client.submitter(sender.address))
 
     def _take_in(
-        self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
+        self,
+        session: UploadSession,
+        vehicle: Vehicle | None,
+        client: GcsClient,
+        upload: Upload,
+        *,
+        is_staged: bool,
+        now: float,
     ) -> None:
         """Submit a mission as a task, staged or queued."""
         sender = upload.sender
-        is_staged = sender.addressed.component_id == AUTOPILOT
-        wanted = desk.check.plan_of(upload.items, now=now)
+        wanted = session.check.plan_of(upload.items, now=now)
         terms = replace(wanted.terms, is_staged=is_staged, is_cruising=is_staged)
-        wanted = wanted._replace(terms=terms, nonce=0 if is_staged else wanted.nonce)
-        client = self._client(sender)
-        draft = draft_of(vehicle.system_id, wanted, client, sender)
+        what = f"{sender.addressed} {wanted.plan.source}".encode()
+        nonce = 0 if is_staged else wanted.nonce  # two of one content differ by their nonces
+        draft = Draft(
+            ANY if vehicle is None else vehicle.system_id,
+            MavCmd.MISSION_START,
+            wanted.plan,
+            client.submitter(sender.address),
+            terms,
+            Marks(nonce, blake2b(what, digest_size=9).hexdigest()),
+        )
+        client.rights.check_content(draft)
         # ``begun_at``: a long plan may come again later than submissions are remembered
         known = None
         if not is_staged:
             known = self._submissions.known_plan(draft, begun_at=upload.begun_at, now=now)
         if known is not None:
-            desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=known, now=now)
-            self.flush(desk, vehicle, now=now)
-            words = f"repeated plan, no new task: see task {known}"
-            self._answers.tell(sender, vehicle, words, now=now)
+            session.accept(known, now=now)
+            words, by = f"repeated plan, no new task: see task {known}", sender.addressed
+            client.tell(words, MavSeverity.WARNING, by, now=now)
             return
-        again = partial(self._decide_late, desk, vehicle, upload)
-        refuse = partial(self._refuse, desk, vehicle)
-        if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
+        again, after = partial(session.decide, upload), draft.terms.after
+        if self._submissions.questions.hold(after, again, session.refuse, now=now):
             return
+        if vehicle is None:
+            choice = self._assignments.choose(wanted.plan, now=now)
+            vehicle = self._vehicles.get(choice.vehicle)
+            assert vehicle is not None, "it was chosen among them"
+            goal = driven_by(vehicle, wanted.plan)
+            draft = replace(draft, vehicle=choice.vehicle, goal=goal, choice=choice.words)
         halts = vehicle.tasks.halts
         if not is_staged and upload.begun_at < halts.at:
             raise Rejection(R.STALE, f"{halts.words} came during the upload: upload it again")
-        before = self._plans.stored(vehicle.system_id, MISSION)
+        before, actor = self._plans.stored(vehicle.system_id, MISSION), str(sender.address)
         if is_staged:
             self._check_replaced(client, vehicle, draft.submitter)
         task = self._submissions.submit_plan(client.rights, vehicle, draft, now=now)
         if is_staged:
-            self._plans.keep(
-                vehicle, MISSION, Stored(task.id, upload.items), actor=str(sender.address), now=now
-            )
-        self._submissions.gate.hold(_Mission(desk, vehicle, sender, task, before), now=now)
+            stored = Stored(task.id, upload.items)
+            self._plans.keep(vehicle, MISSION, stored, actor=actor, now=now)
+        accept = partial(self._accept, session, vehicle, task, actor=actor)
 
-    def _accept(self, mission: _Mission, *, now: float) -> None:
-        desk, vehicle, sender, task, _ = mission
-        self._vehicles.get(vehicle.system_id)  # marks it dirty: a task may start
-        desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=task.id, now=now)
-        self.flush(desk, vehicle, now=now)
+        def withdraw(*, now: float) -> None:
+            if self._registry.get(task.id) is None:
+                return  # retracted, and answered
+            self._vehicles.mark_dirty(vehicle)
+            self._submissions.take_back(vehicle, task, now=now)
+            if is_staged:
+                self._plans.keep(vehicle, MISSION, before, actor=actor, now=now)
+            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
+            session.refuse(refusal, now=now)
+
+        self._submissions.gate.hold(accept, withdraw, now=now)
+
+    def _accept(
+        self, session: UploadSession, vehicle: Vehicle, task: Task, *, actor: str, now: float
+    ) -> None:
+        if self._registry.get(task.id) is None:
+            return  # retracted, and answered
+        self._vehicles.mark_dirty(vehicle)  # a task may start
+        session.accept(task.id, now=now)
         what = "queued"
         if task.terms.is_staged:
-            actor = str(sender.address)
             self._plans.end_replaced(vehicle, is_started=False, actor=actor, now=now)
             self._plans.begin_at(vehicle, 0)
             what = "ready to start"
@@ -220,69 +233,42 @@ class MissionUploads:
             if active is not None and is_of_autopilot(active) and not vehicle.tasks.paused:
                 what += f", task {active.id} goes on until then"
         words = f"Task {task.id} {what}: {describe(task.goal)}{skipped(task.goal)}"
+        words += chosen_words(task)
         self._gcs.tell(words, MavSeverity.INFO, vehicle.server_address, now=now)
 
-    def _withdraw(self, mission: _Mission, *, now: float) -> None:
-        desk, vehicle, sender, task, before = mission
-        self._vehicles.mark_dirty(vehicle)
-        self._submissions.take_back(vehicle, task, now=now)
-        if task.terms.is_staged:
-            self._plans.keep(vehicle, MISSION, before, actor=str(sender.address), now=now)
-        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not accepted")
-        self._refuse(desk, vehicle, refusal, now=now)
-
     def _replace(
-        self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
+        self, session: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float
     ) -> None:
         """Store an empty mission, or fence or rally points, which the vehicle gets first."""
-        if upload.mission_type == MISSION:
-            self._store(desk, vehicle, upload, now=now)
+        kind, items, actor = upload.mission_type, upload.items, str(upload.sender.address)
+
+        def store(*, now: float) -> None:
+            before, task = self._plans.stored(vehicle.system_id, kind), self._plans.task(vehicle)
+            plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
+            self._plans.keep(vehicle, kind, Stored(plan_id, upload.items), actor=actor, now=now)
+
+            def accept(*, now: float) -> None:
+                if kind == MISSION:
+                    self._vehicles.mark_dirty(vehicle)
+                    self._plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+                session.accept(plan_id, now=now)
+
+            def undo(*, now: float) -> None:
+                self._plans.keep(vehicle, kind, before, actor=actor, now=now)
+                refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: nothing changed")
+                session.refuse(refusal, now=now)
+
+            self._submissions.gate.hold(accept, undo, now=now)
+
+        if kind == MISSION:
+            store(now=now)
             return
-        kind, items = upload.mission_type, upload.items
         if kind == MavMissionType.FENCE:
             fence_of(items)  # if it raises, the fence before stays in force
             items = fence_for_vehicle(items)
-        store = partial(self._store, desk, vehicle, upload)
-        write_through(vehicle, kind, items, store, partial(self._refuse, desk, vehicle), now=now)
-
-    def _store(self, desk: UploadSession, vehicle: Vehicle, upload: Upload, *, now: float) -> None:
-        sender, kind = upload.sender, upload.mission_type
-        before, task = self._plans.stored(vehicle.system_id, kind), self._plans.task(vehicle)
-        plan_id = crc32(packed(upload.items).encode()) if upload.items else 0
-        actor, stored = str(sender.address), Stored(plan_id, upload.items)
-        self._plans.keep(vehicle, kind, stored, actor=actor, now=now)
-        kept = _Kept(desk, vehicle, kind, plan_id, before, task, actor)
-        self._submissions.gate.hold(kept, now=now)
-
-    def _accept_kept(self, kept: _Kept, *, now: float) -> None:
-        desk, vehicle = kept.desk, kept.vehicle
-        if kept.kind == MISSION:
-            self._vehicles.mark_dirty(vehicle)
-            self._plans.let_go(vehicle, kept.task, R.CLEARED, actor=kept.actor, now=now)
-        desk.receiver.finish(MavMissionResult.ACCEPTED, opaque_id=kept.plan_id, now=now)
-        self.flush(desk, vehicle, now=now)
-
-    def _undo_kept(self, kept: _Kept, *, now: float) -> None:
-        self._plans.keep(kept.vehicle, kept.kind, kept.before, actor=kept.actor, now=now)
-        refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: nothing changed")
-        self._refuse(kept.desk, kept.vehicle, refusal, now=now)
-
-    def _refuse(
-        self, desk: UploadSession, vehicle: Vehicle, refusal: Rejection, *, now: float
-    ) -> None:
-        desk.receiver.finish(result_of(refusal), opaque_id=0, now=now)
-        self.flush(desk, vehicle, refusal=refusal, now=now)
-
-    def refused(self, sender: Sender, vehicle: Vehicle, refusal: Rejection, *, now: float) -> None:
-        """Tell the client why an upload was refused, and record it."""
-        self._answers.refused(sender, vehicle, refusal, message_id=0, now=now)
+        write_through(vehicle, kind, items, store, session.refuse, now=now)
 
     def _check_replaced(self, client: GcsClient, vehicle: Vehicle, submitter: Submitter) -> None:
         task = self._plans.task(vehicle)
         if task is not None and task.state not in TERMINAL:
             client.rights.require_own(task, submitter, "replace that plan")
-
-    def _client(self, sender: Sender) -> GcsClient:
-        client = self._answers.client(sender)
-        assert client is not None, "it has just spoken"
-        return client

@@ -1,7 +1,6 @@
 """Writes fence and rally points to the vehicle first, which enforces them without the server."""
 
-from typing import Protocol
-
+from mav_tasks.engine.commands.dependency_questions import Refuse
 from mav_tasks.engine.timers import Effect
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
@@ -10,12 +9,6 @@ from mav_tasks.services.mission_item import Item
 from mav_tasks.tasks.lifecycle import TaskReason
 
 R = TaskReason
-
-
-class Refuse(Protocol):
-    """Called if the vehicle refuses the plan, or does not answer."""
-
-    def __call__(self, refusal: Rejection, *, now: float) -> None: ...
 
 
 def write_through(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import inf
 
 from mav_tasks.engine.vehicles.armings import BY_CLIENT, LATE
+from mav_tasks.latest import keep_latest
 from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind
@@ -89,10 +90,7 @@ class Authority:
         Only the last client that asked may drive: the vehicle would obey neither of two at once.
         """
         self._asked_mode, self._asked_at = mode, now
-        self._passed_on.pop(mode, None)
-        self._passed_on[mode] = now
-        if len(self._passed_on) > MOST_MODES:
-            del self._passed_on[next(iter(self._passed_on))]
+        keep_latest(self._passed_on, mode, now, most=MOST_MODES)
         if mode == self._persona.control_mode:
             self._granted = {client}
             self._mode_is_ours = self._mode_is_ours or present_mode == mode

@@ -8,7 +8,6 @@ from collections.abc import Callable, Hashable
 from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import Any
 
 from mav_tasks.engine.vehicles.armings import SHOWN_LATE
 from mav_tasks.engine.vehicles.control import Event, effects_of
@@ -41,13 +40,13 @@ class JointControl:
     def __repr__(self) -> str:
         return f"JointControl({self._parts.control!r}, {self._parts.tasks!r})"
 
-    def on(self, event: Event, word: Word, *, now: float) -> Any:
-        """Carry out the table's effects for an event; return the last result that is not None.
+    def on(self, event: Event, word: Word, *, now: float) -> TaskId | None:
+        """Carry out the table's effects for an event; return the task that it was about, if any.
 
         Raise Rejection if the request is refused. The effects before the refusal remain in force.
         """
         self.decide(now=now)
-        result = None
+        result: TaskId | None = None
         for effect in effects_of(event, self.state(now=now)):
             if isinstance(effect, Event):
                 found = self.on(effect, word, now=now)
@@ -83,18 +82,15 @@ class JointControl:
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """STOP: send zero and HOLD in this very step. Return the id of the killed task."""
         self.stopped_at = now
-        killed: TaskId | None = self.on(Event.STOP, Word(R.STOPPED, actor, clear=clear), now=now)
-        return killed
+        return self.on(Event.STOP, Word(R.STOPPED, actor, clear=clear), now=now)
 
     def hold(self, *, sender: Hashable, actor: str, now: float) -> TaskId | None:
         """Handle a client's HOLD. Return the id of the task that it pauses."""
-        paused: TaskId | None = self.on(Event.HOLD, Word(actor=actor, sender=sender), now=now)
-        return paused
+        return self.on(Event.HOLD, Word(actor=actor, sender=sender), now=now)
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
         """Pause the queue and the active task, if there is one. Return its id."""
-        paused: TaskId | None = self.on(Event.PAUSE, Word(actor=actor), now=now)
-        return paused
+        return self.on(Event.PAUSE, Word(actor=actor), now=now)
 
     def disarm(self, *, by_force: bool, actor: str, now: float) -> None:
         """Handle a client's disarming: only a newer request arms the vehicle again.
@@ -189,8 +185,7 @@ class JointControl:
             allows = may_arm and not authority.may_arm
             return self._parts.tasks.proceed(seen, allows=allows, actor=actor, now=now)
 
-        going: TaskId | None = self.on(Event.CONTINUE, Word(R.NONE, actor, do=go_on), now=now)
-        return going
+        return self.on(Event.CONTINUE, Word(R.NONE, actor, do=go_on), now=now)
 
     def go_on(self, *, actor: str, now: float) -> None:
         """End a pause like ``proceed``, but do not allow arming again: nobody asked for that.
@@ -239,11 +234,12 @@ class JointControl:
         """
         self._parts.check_not_manual(now=now)
 
-        def take_in() -> Task:
+        def take_in() -> TaskId:
             return self._parts.tasks.run_now(draft, self._as_in_hold(now), actor=actor, now=now)
 
-        task: Task = self.on(Event.RUN_NOW, Word(R.NONE, actor, do=take_in), now=now)
-        return task
+        task_id = self.on(Event.RUN_NOW, Word(R.NONE, actor, do=take_in), now=now)
+        assert task_id is not None, "it was taken in"
+        return self._parts.registry[task_id]
 
     def give_way_to(self, task: Task, *, actor: str, now: float) -> None:
         """Run a mission at once, from whatever mode; all others wait until the queue resumes."""

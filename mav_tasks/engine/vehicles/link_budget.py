@@ -7,6 +7,7 @@ small requests a second, would delay the telemetry that a task is driven by.
 from collections.abc import Hashable
 from math import inf
 
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import file_transfer
@@ -63,12 +64,10 @@ class LinkBudget:
 
     def _of(self, who: Hashable, *, now: float) -> TokenBucket:
         """Return the token bucket of one client."""
-        bucket = self._own.pop(who, None)
+        bucket = self._own.get(who)
         if bucket is None:
             bucket = TokenBucket(rate=self._rate, burst=WITHIN * self._rate, now=now)
-            if len(self._own) >= MOST_CLIENTS:
-                del self._own[next(iter(self._own))]
-        self._own[who] = bucket
+        keep_latest(self._own, who, bucket, most=MOST_CLIENTS)
         return bucket
 
 

@@ -111,11 +111,9 @@ class Parts:
 
     def forget_firmware(self) -> None:
         """Forget what belongs to the vehicle's firmware: it is asked again."""
-        requests = self.requests
-        requests.intervals.ask_all_again()
-        requests.loss_failsafe.forget()
-        requests.turning.forget()
-        requests.cruise.forget()
+        self.requests.intervals.ask_all_again()
+        for asked in self.requests.asked:
+            asked.forget()
 
     def forget_start(self) -> None:
         """Forget that a mission starts with the arming: it changed, or is unwanted."""

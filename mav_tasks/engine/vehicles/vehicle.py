@@ -90,8 +90,8 @@ class Vehicle:
         self.where, self.shown = parts.where, parts.shown
         self.hold_before, self.start_mark = parts.hold_before, parts.start_mark
         self._registry, self._monitor = registry, monitor
-        self.pilot = Pilot(parts, self._view)
-        self.joint = JointControl(parts, self.pilot, self._view)
+        self.pilot = Pilot(parts, self.view)
+        self.joint = JointControl(parts, self.pilot, self.view)
         self._takeovers = Takeovers(parts, self.joint)
         self._clock = self.pilot.clock
         self.last_heartbeat: Packet | None = None
@@ -357,11 +357,8 @@ class Vehicle:
         self.requests.flush(now=now)
         self._ask_for_rates(now=now)
 
-    def view(self, *, now: float) -> VehicleView:
+    def view(self, now: float) -> VehicleView:
         """Return a snapshot of the vehicle for the task domain."""
-        return self._view(now)
-
-    def _view(self, now: float) -> VehicleView:
         return self.parts.view(drives_on=self._says.may_drive_on, now=now)
 
     def apply(self, settings: Settings) -> None:

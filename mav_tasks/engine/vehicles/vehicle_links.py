@@ -13,6 +13,7 @@ from mav_tasks.engine.timers import Timer, Timers, Turn
 from mav_tasks.engine.vehicles.link_budget import LinkBudget
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.ways import Way
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.mavlink.packet import Packet
@@ -180,9 +181,8 @@ class VehicleLinks:
         """Return what is known about a place at which the id of a vehicle is heard."""
         way = self._ways.get((system_id, place))
         if way is None:
-            if len(self._ways) >= MAX_PEERS:
-                del self._ways[next(iter(self._ways))]
-            way = self._ways[system_id, place] = Way(now)
+            way = Way(now)
+            keep_latest(self._ways, (system_id, place), way, most=MAX_PEERS)
         return way
 
     def moves(

@@ -62,13 +62,12 @@ class VehicleRequests:
         self._unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
-        self.cruise = CruiseSpeed(target, persona.cruise_parameters)
+        is_bytewise = persona.has_bytewise_parameters
+        self.cruise = CruiseSpeed(target, persona.cruise_parameters, is_bytewise=is_bytewise)
         self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
-        self.turning = TurningKind(
-            target,
-            persona.turning_parameters,
-            is_bytewise=persona.has_bytewise_parameters,
-        )
+        self.turning = TurningKind(target, persona.turning_parameters, is_bytewise=is_bytewise)
+        #: what the vehicle is asked for, how it stops by itself, turns and drives
+        self.asked = self.loss_failsafe, self.turning, self.cruise
         self._shows = ASK_TO_SHOW  # how many more times it is asked for a heartbeat
         #: home may have moved since the vehicle said it last: by an arming or a DO_SET_HOME
         self.is_home_old = False
@@ -215,9 +214,9 @@ class VehicleRequests:
 
     def ask_for_parameters(self) -> None:
         """Ask how it stops by itself, how it turns and how fast it drives, until it answers."""
-        failsafe, turning = self.loss_failsafe.requests(), self.turning.requests()
-        for request in (*failsafe, *turning, *self.cruise.requests()):
-            self._outlet.send(request, self._source)
+        for asked in self.asked:
+            for request in asked.requests():
+                self._outlet.send(request, self._source)
 
     def has_not_said_which(self, *, now: float) -> bool:
         """Return whether it was asked for its identity often enough, and did not answer."""

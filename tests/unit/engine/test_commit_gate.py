@@ -1,17 +1,11 @@
+from functools import partial
 from math import inf
-from typing import NamedTuple
 
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.timers import Timers
 from mav_tasks.tasks.registry import TaskRegistry
 
 WITHIN = 0.4  # s
-
-
-class Ack(NamedTuple):
-    """What waits here."""
-
-    name: str
 
 
 class Rig:
@@ -21,22 +15,21 @@ class Rig:
         self.timers = Timers()
         self.registry = TaskRegistry()
         self.gate = CommitGate(self.registry, self.timers, within=WITHIN)
-        self.gate.knows(Ack, self.accept, self.give_up)
         self.log: list[tuple[str, str, float]] = []
 
     def hold(self, name: str, number: int, *, now: float = 0.0) -> None:
         self.registry.recorded = number
-        self.gate.hold(Ack(name), now=now)
+        self.gate.hold(partial(self.accept, name), partial(self.give_up, name), now=now)
 
     def handle_deadline(self, *, now: float) -> None:
         for timer in self.timers.take_due(now=now):
             timer.do(now=now)
 
-    def accept(self, ack: Ack, *, now: float) -> None:
-        self.log.append((ack.name, "released", now))
+    def accept(self, name: str, *, now: float) -> None:
+        self.log.append((name, "released", now))
 
-    def give_up(self, ack: Ack, *, now: float) -> None:
-        self.log.append((ack.name, "given up", now))
+    def give_up(self, name: str, *, now: float) -> None:
+        self.log.append((name, "given up", now))
 
 
 def test_a_value_waits_for_its_event() -> None:

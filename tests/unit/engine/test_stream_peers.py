@@ -239,9 +239,9 @@ def test_what_is_at_another_place_is_armed_only_if_we_may_arm_there(
     assert "is now at" in " ".join(map(str, rig.engine.take_events()))
     vehicle = rig.engine._vehicles.get(1)
     assert vehicle is not None
-    assert vehicle._view(0.0).may_arm is may
+    assert vehicle.view(0.0).may_arm is may
     vehicle.joint.proceed(actor="somebody", now=0.0)
-    assert vehicle._view(0.0).may_arm is may
+    assert vehicle.view(0.0).may_arm is may
 
 
 def test_as_long_as_it_is_there_another_of_its_id_is_ignored(rig: Rig) -> None:

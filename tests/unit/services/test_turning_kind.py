@@ -6,8 +6,9 @@ import pytest
 
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.messages import ParamValue
+from mav_tasks.services.asked_parameters import ASKS
 from mav_tasks.services.persona import ARDUPILOT, PX4, Persona
-from mav_tasks.services.turning_kind import ASKS, TurningKind
+from mav_tasks.services.turning_kind import TurningKind
 from mav_tasks.settings import Turning
 
 REAL32, INT32, INT16 = 9, 6, 4
