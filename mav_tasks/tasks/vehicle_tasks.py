@@ -157,12 +157,13 @@ class VehicleTasks(Lineup):
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
         """Cancel a task, or end it at once (``kill``); the vehicle stands before anything starts.
 
-        A vehicle that somebody else has is not made to stand: STOP does that.
+        A vehicle that somebody else has is not made to stand: STOP does that. To be replaced is no
+        halt: who uploads or starts another mission wants it driven.
         """
-        if task.state not in WAITING and task.id not in self.suspended_ids:
+        rests = task.state in WAITING or task.id in self.suspended_ids
+        if not rests and reason is not R.REPLACED:
             self.halt(reason, actor=actor, now=now)
-        state = S.KILLED if kill else S.CANCELLED
-        self._end(task, state, reason, actor=actor, now=now)
+        self._end(task, S.KILLED if kill else S.CANCELLED, reason, actor=actor, now=now)
 
     def _end(
         self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
