@@ -157,12 +157,13 @@ class VehicleTasks(Lineup):
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
         """Cancel a task, or end it at once (``kill``); the vehicle stands before anything starts.
 
-        A vehicle that somebody else has is not made to stand: STOP does that.
+        A vehicle that somebody else has is not made to stand: STOP does that. To be replaced is no
+        halt: who uploads or starts another mission wants it driven.
         """
-        if task.state not in WAITING and task.id not in self.suspended_ids:
+        rests = task.state in WAITING or task.id in self.suspended_ids
+        if not rests and reason is not R.REPLACED:
             self.halt(reason, actor=actor, now=now)
-        state = S.KILLED if kill else S.CANCELLED
-        self._end(task, state, reason, actor=actor, now=now)
+        self._end(task, S.KILLED if kill else S.CANCELLED, reason, actor=actor, now=now)
 
     def _end(
         self, task: Task, state: TaskState, reason: TaskReason, *, actor: str, now: float
@@ -300,18 +301,18 @@ class VehicleTasks(Lineup):
     def restarted(self, *, was_paused: TaskReason, now: float) -> bool:
         """Hold the tasks of a vehicle that has rebooted, and pause the queue until it is resumed.
 
-        Return whether the active task, which has not moved, starts again by itself instead.
-        ``was_paused`` is why the queue was paused before the vehicle showed disarmed: the reboot
-        disarmed it, no takeover.
+        Return whether a person must decide about a task: one that has not moved starts again by
+        itself. ``was_paused`` is why the queue was paused before the vehicle showed disarmed: the
+        reboot disarmed it, no takeover.
         """
         self.released = None
         self._end_cancelling(now=now)
         if not self.suspended_ids and self.executor.begins_again(now=now):
-            return True
+            return False
         self.hold(R.FRAME_RESET, now=now)
         if self.is_driving and not was_paused:
             self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
-        return False
+        return self.is_driving
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """Kill the active task and latch STOP; with ``clear`` cancel the others. Return its id.

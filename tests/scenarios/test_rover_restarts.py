@@ -305,6 +305,8 @@ def test_it_is_not_armed_any_more_once_its_clock_tells_of_the_restart(driving: W
 
 
 EVERYTHING, ALL_BUT_HEARTBEATS = frozenset(range(300)), frozenset(range(1, 300))
+HEARTBEATS = frozenset({0})
+HANDED_BACK = 6.0  # s after a task, in which the server has HOLD shown and disarms
 
 
 @pytest.fixture
@@ -333,6 +335,56 @@ def test_a_rover_that_restarts_between_two_tasks_is_driven(
     world.run(10)
     world.client.move(0.5, nonce=2)
     world.until_state(2, S.COMPLETED, within=40)
+
+
+@pytest.mark.parametrize("moment", ["RELEASING", "armed by a client"])
+@pytest.mark.parametrize("withheld", [None, ALL_BUT_HEARTBEATS, HEARTBEATS, EVERYTHING])
+def test_a_rover_that_restarts_armed_between_two_tasks_is_driven(
+    make_world: MakeWorld, persona: Persona, moment: str, withheld: frozenset[int] | None
+) -> None:
+    """Nobody has disarmed it, and nothing was held that a person would have to decide about."""
+    world = make_world(persona=persona)
+    world.client.move(0.5)
+    world.until_state(1, S.COMPLETED)
+    if moment == "armed by a client":
+        world.client.arm()
+        world.run(HANDED_BACK)
+    else:
+        world.until(lambda: world.control() == moment, within=10)
+    assert world.rover.autopilot.armed
+    world.rover.autopilot.reboot(now=world.now)
+    world.fault(Faults(withheld=withheld or frozenset()))
+    world.run(2.2)
+    world.fault(Faults())
+    world.run(0.2)
+    world.client.move(0.5, nonce=2)
+    world.until_state(2, S.COMPLETED, within=40)
+    assert world.paused() is R.NONE
+
+
+@pytest.mark.parametrize("moment", ["before it", "after it"])
+def test_a_rover_that_a_person_disarmed_stays_so_across_its_restart(
+    idle: World, moment: str
+) -> None:
+    world = idle
+    world.client.arm()
+    world.run(1.2)
+    if moment == "before it":
+        world.operator_arm(False)
+        world.run(1.2)
+    world.rover.autopilot.reboot(now=world.now)
+    world.run(UP)
+    if moment == "after it":
+        world.operator_arm(True)
+        world.run(1.2)
+        world.operator_arm(False)
+        world.run(1.2)
+    at = world.now
+    world.client.move(0.5, nonce=2)
+    world.run(8)
+    assert "arm" not in world.observer.sent_since(at)
+    assert proceed(world).result == ACCEPTED
+    world.until_state(2, S.COMPLETED, within=30)
 
 
 def test_a_rover_that_is_silent_for_longer_than_it_was_up_before_is_driven(idle: World) -> None:

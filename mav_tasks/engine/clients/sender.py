@@ -18,8 +18,12 @@ class _Said(NamedTuple):
     life: int  # of the sender, by its restarts: after one, an equal command is a new one
     epoch: int  # halt epoch of the vehicle when the first copy came
     at: float  # s, of the last copy
-    packets: frozenset[bytes]  # the latest copies
+    packets: dict[bytes, float]  # the latest copies, and when each came, s
     copies: int  # confirmation of the last one
+
+    def has(self, packet: Packet, now: float) -> bool:
+        """Return whether this very packet came lately: numbers go round after 256 packets."""
+        return now - self.packets.get(packet.raw, -inf) <= DOUBLED
 
 
 class Memory:
@@ -67,9 +71,10 @@ class Sender:
         said = self._said.get((self, content))
         if said is None:
             return None
-        if said.life != self.line.lives and not (is_anothers and packet.raw in said.packets):
+        is_same = said.has(packet, now)
+        if said.life != self.line.lives and not (is_anothers and is_same):
             return None
-        within = DOUBLED if is_counted or packet.raw in said.packets else COPIED
+        within = DOUBLED if is_counted or is_same else COPIED
         return said.epoch if now - said.at <= within else None
 
     def counts_on(self, content: Hashable, packet: Packet, copies: int, *, within: float) -> bool:
@@ -84,10 +89,10 @@ class Sender:
             return copies > 0
         return copies > 0 and not self.line.has_all(packet.seq, within=within)
 
-    def has_said(self, content: Hashable, packet: Packet) -> bool:
+    def has_said(self, content: Hashable, packet: Packet, *, now: float) -> bool:
         """Return whether this very packet came before, since the sender last restarted."""
         said = self._said.get((self, content))
-        return said is not None and said.life == self.line.lives and packet.raw in said.packets
+        return said is not None and said.life == self.line.lives and said.has(packet, now)
 
     def last_copy_at(self, content: Hashable) -> float:
         """Return when the last copy of this command came, s; -inf: none came."""
@@ -99,9 +104,8 @@ class Sender:
     ) -> None:
         """Remember a command, or one more copy of it; ``copies`` is its confirmation."""
         before = self._said.pop((self, content), None)
-        packets = frozenset() if before is None or len(before.packets) >= COPIES else before.packets
-        self._said[self, content] = _Said(
-            self.line.lives, epoch, now, packets | {packet.raw}, copies
-        )
+        packets = {} if before is None or len(before.packets) >= COPIES else before.packets
+        packets[packet.raw] = now
+        self._said[self, content] = _Said(self.line.lives, epoch, now, packets, copies)
         if len(self._said) > REMEMBERED:
             self._said.popitem(last=False)

@@ -34,7 +34,9 @@ def next_words(tasks: VehicleTasks) -> str:
     """Return which task drives next, to end a text; "" if none does."""
     task_id = None if tasks.held else tasks.executor.task_id or tasks.turns.next_id
     task = None if task_id is None else tasks.registry[task_id]
-    return "" if task is None else f": task {task.id} is next, {describe(task.goal)}"
+    if task is None or task.state is TaskState.CANCELLING:
+        return ""
+    return f": task {task.id} is next, {describe(task.goal)}"
 
 
 def _waiting(count: int) -> str:

@@ -70,7 +70,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     # number under way), or if no copy came for REPEATED s.
     follows = halts.by is sender and number > halts.number
     is_over = halts.is_undone or halts.command == asked.command.command
-    is_repeated = is_counted or sender.has_said(content, packet)
+    is_repeated = is_counted or sender.has_said(content, packet, now=now)
     if follows and not is_repeated and (is_over or now - sender.last_copy_at(content) > REPEATED):
         epoch = halts.epoch
     else:

@@ -70,7 +70,7 @@ class Authority:
 
     def restarted(self, *, was_allowed: bool) -> None:
         """Withdraw the permission to arm after a vehicle restart; any person may restore it."""
-        self.is_withdrawn_by_restart = was_allowed
+        self.is_withdrawn_by_restart |= was_allowed
         self.may_arm = False
 
     def moved(self, *, may_arm: bool) -> None:

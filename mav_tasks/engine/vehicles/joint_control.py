@@ -56,10 +56,10 @@ class JointControl:
         return result
 
     def decide(self, *, now: float) -> None:
-        """Take a mode change for a person's: the vehicle's clock has shown no restart."""
-        decide, self._parts.undecided = self._parts.undecided, None
-        if decide is not None:
-            decide(now)
+        """Take what changed for a person's doing: the vehicle's clock has shown no restart."""
+        undecided, self._parts.undecided = self._parts.undecided, []
+        for by_person in undecided:
+            by_person(now)
 
     def step(self, now: float) -> None:
         """Run the tasks, carry out their demand, and handle the events that this reveals."""

@@ -59,8 +59,8 @@ class Parts:
     shown: ShownHeartbeat = field(default_factory=ShownHeartbeat)
     #: s, until when it is only listened to: another controller may show itself
     listens_until: float = -inf
-    #: handles a mode change that a person, or a restart, has caused; no task starts before that
-    undecided: Callable[[float], None] | None = None
+    #: handle changes that a person, or a restart, has caused; no task starts before that
+    undecided: list[Callable[[float], None]] = field(default_factory=list)
 
     @property
     def control(self) -> OffboardControl:
@@ -90,7 +90,7 @@ class Parts:
         It may also have just restarted.
         """
         unidentified = bool(self.tasks.terms.uid) and not self.requests.is_identified
-        return unidentified or self.undecided is not None or now < self.listens_until
+        return unidentified or bool(self.undecided) or now < self.listens_until
 
     def note(self, text: str, *, now: float) -> None:
         """Report a text about the vehicle."""

@@ -4,6 +4,7 @@ A change may be our own doing, a client's through us, a person's at the vehicle,
 This module finds out which; the control table decides what follows.
 """
 
+from collections.abc import Callable
 from functools import partial
 from math import inf
 
@@ -102,7 +103,7 @@ class Takeovers:
         if armed or mode != was_mode or now - self._undecided_at > UNDECIDED:
             self._joint.decide(now=now)
         if mode != was_mode:
-            self._mode_changed(was_mode, mode, was_armed=was_armed, now=now)
+            self._mode_changed(was_mode, mode, now=now)
         if was_armed and not armed:
             self._disarmed(before, now=now)
         parts.armings.shows(armed=armed, now=now)
@@ -135,28 +136,25 @@ class Takeovers:
         parts = self._parts
         if self._undecided_at < booted_at:
             self._joint.decide(now=now)
-        parts.undecided = None  # the restart has changed the mode
+        parts.undecided.clear()  # it was the restart
         self._shows_restart = True
         parts.forget_answers()
         before = parts.authority.take_disarmed(since=booted_at)
-        was_engaged = parts.control.is_engaged
+        could_arm = (before or parts.authority).may_arm
+        was_paused = (before or parts.tasks).paused
+        # heartbeats that show the disarming may be lost or under way
+        was_armed = before or parts.monitor.armed or parts.control.is_engaged
 
         def restart() -> None:
-            was_paused = parts.tasks.paused if before is None else before.paused
-            begins_again = parts.tasks.restarted(was_paused=was_paused, now=now)
-            if before is not None:
-                parts.authority.restarted(was_allowed=before.may_arm)
-            elif was_engaged and not begins_again:
-                parts.authority.restarted(was_allowed=parts.authority.may_arm)
+            needs_person = parts.tasks.restarted(was_paused=was_paused, now=now)
+            if needs_person and was_armed:
+                parts.authority.restarted(was_allowed=could_arm)
             held, words = parts.tasks.held, "restarted"
             if held is not None:
                 words += f": task {held.id} is held. Press {BUTTONS}, then Continue"
             parts.note(words, now=now)
 
         self._joint.on(Event.REBOOTED, Word(R.FRAME_RESET, text="restarted", do=restart), now=now)
-        # heartbeats that show the disarming may be lost or under way
-        if parts.monitor.armed and not parts.control.may_have_disarmed(now=now):
-            self._disarmed_by_restart(parts.authority.may_arm)
         parts.monitor.restarted()
         parts.control.restarted()
 
@@ -180,7 +178,7 @@ class Takeovers:
     ) -> None:
         self._joint.on(event, Word(reason, self._parts.actor, what), now=now)
 
-    def _mode_changed(self, was_mode: int, mode: int, *, was_armed: bool, now: float) -> None:
+    def _mode_changed(self, was_mode: int, mode: int, *, now: float) -> None:
         parts = self._parts
         persona, control = parts.persona, parts.control
         by_us, is_late = control.may_have_set(mode, now=now), self._comes_late(mode, now=now)
@@ -197,22 +195,22 @@ class Takeovers:
             self._joint.on(Event.LATE_MODE, Word(text=words), now=now)
         elif ours or was_mode == persona.booting_mode:
             pass
-        elif was_armed or not self._may_come_from_restart(mode):
-            self._changed_by_person(mode, now)
-            self._look_for_parking(was_mode, mode, now=now)
         else:
-            parts.undecided = partial(self._changed_by_person, mode)
-            self._undecided_at = now
+            self._judge(partial(self._changed_by_person, mode), now=now)
+            if parts.monitor.armed:
+                self._look_for_parking(was_mode, mode, now=now)
 
-    def _may_come_from_restart(self, mode: int) -> bool:
-        """Return whether an idle vehicle shows a mode in which it may boot.
+    def _judge(self, by_person: Callable[[float], None], *, now: float) -> None:
+        """Take a change for a person's, unless a restart may have caused it: then it waits.
 
-        Its first heartbeat may come before a message with its clock, which tells of the restart.
+        The first heartbeat may come before a message with its clock, which tells of the restart.
         """
         parts = self._parts
-        is_idle = parts.tasks.active is None and not parts.control.is_engaged
-        boots_in = {parts.persona.hold_mode, *parts.persona.manual_modes}
-        return is_idle and not parts.monitor.armed and mode in boots_in
+        if parts.monitor.armed or parts.tasks.active or parts.authority.has_any_grant:
+            by_person(now)
+        else:
+            parts.undecided.append(by_person)
+            self._undecided_at = now
 
     def _changed_by_person(self, mode: int, now: float) -> None:
         """Handle a mode that a person, another program or a failsafe has set."""
@@ -264,23 +262,18 @@ class Takeovers:
         parts = self._parts
         others_drove, self._others_drive = self._others_drive, False
         follows = (parts.persona.hold_mode, parts.persona.control_mode)
-        is_parked = mode == parts.persona.hold_mode and parts.monitor.armed
-        if is_parked and (others_drove or was_mode not in follows):
+        if mode == parts.persona.hold_mode and (others_drove or was_mode not in follows):
             self._taken(Event.PARKED, "", now=now)
 
     def _disarmed(self, before: Before, *, now: float) -> None:
         parts = self._parts
-        if parts.control.may_have_disarmed(now=now) or parts.armings.expects_disarmed:
-            return
-        if self._shows_restart:  # this heartbeat, or the clock before it, has shown it
-            self._disarmed_by_restart(before.may_arm)
-            return
-        self._taken(Event.DISARMED, "disarmed", now=now)
-        parts.authority.note_disarmed(before)  # it may turn out that a restart did it
+        is_expected = parts.control.may_have_disarmed(now=now) or parts.armings.expects_disarmed
+        if not is_expected and not self._shows_restart:
+            self._judge(partial(self._disarmed_by_person, before), now=now)
 
-    def _disarmed_by_restart(self, could_arm: bool) -> None:
-        authority = self._parts.authority
-        authority.restarted(was_allowed=could_arm or authority.is_withdrawn_by_restart)
+    def _disarmed_by_person(self, before: Before, now: float) -> None:
+        self._taken(Event.DISARMED, "disarmed", now=now)
+        self._parts.authority.note_disarmed(before)  # it may turn out that a restart did it
 
     def _note_rest(self, *, now: float) -> None:
         """Learn its noise at rest while nothing can be telling it to move."""

@@ -124,3 +124,32 @@ def test_a_first_packet_that_comes_again_and_again_undoes_no_newer_halt(world: W
         script.send_raw(first)
         world.run(6)
     assert stays(world, 5)
+
+
+def test_a_new_command_with_the_bytes_of_one_from_a_minute_ago_is_no_copy(
+    make_world: MakeWorld,
+) -> None:
+    """Numbers of packets go round after 256, and a script arms again and again."""
+    world = make_world()
+    sent: list[bytes] = []
+    world.client.on_sent = lambda _, raw: sent.append(raw)
+
+    def arms() -> int | None:
+        answered = world.client.arm()
+        world.run(1.5)
+        world.client.arm(False)
+        world.run(0.5)
+        return answered.result
+
+    assert arms() == ACCEPTED
+    first = sent[0]
+    world.client.stream(common.MAVLink_system_time_message(0, 0), rate=3)
+    for _ in range(3):
+        world.run(18)  # longer than a repeat comes late, and shorter than a copy is remembered
+        assert arms() == ACCEPTED
+    world.until(lambda: sent[-1][4] == (first[4] - 2) % 256, within=20)
+    world.client.end_streams()
+    world.client.arm(False)  # of the number before
+    world.run(0.3)
+    assert arms() == ACCEPTED
+    assert first in sent[1:]
