@@ -292,3 +292,35 @@ def test_a_click_behind_a_driven_task_says_so(make_world: MakeWorld) -> None:
     party.operator.go_to(*degrees(0, 5))
     world.run(1)
     assert any(text.startswith("Task 2 queued behind task 1: go to") for text in party_texts(party))
+
+
+@both
+def test_start_finishes_the_plan_that_a_late_server_holds(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    """It is what "Continue the mission from the current waypoint" says."""
+    world, party = driving_plan(make_world, persona)
+    world.observer.expects_gaps = True
+    world.suspend_server(3.0)
+    world.until(lambda: world.state(1) == (S.HELD, R.LATE), within=10)
+    world.run(4)
+    at = world.now
+    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert is_at(world, 3.0, 1.0)
+    assert len(world.tasks()) == 1
+    assert texts(party, since=at, worst=3) == []
+
+
+@one
+def test_start_finishes_the_plan_of_a_restarted_rover(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world, party = driving_plan(make_world, persona)
+    world.rover.autopilot.reboot(now=world.now)
+    world.until(lambda: world.state(1) == (S.HELD, R.FRAME_RESET), within=20)
+    world.run(8)
+    party.operator.start()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert len(world.tasks()) == 1
+    assert world.paused() is R.NONE
