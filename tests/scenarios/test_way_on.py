@@ -84,7 +84,7 @@ def test_an_emergency_stop_ends_a_go_to_and_the_next_click_drives(
     assert world.rover.autopilot.mode is Mode.HOLD
     assert texts(party, since=at) == []
     assert [text for text in texts(party, since=at, worst=6) if "Task" in text] == [
-        "Task 1 killed: STOP"
+        "Task 1 stopped for good by a ground station"
     ]
     arm(world, party)
     stood = world.truth.north
@@ -245,6 +245,22 @@ def test_what_an_emergency_stop_leaves_waits_and_continue_names_it(
     world.until_state(2, S.COMPLETED, within=30)
     assert "Queue resumed by a ground station: task 2 is next, move -1 m" in party_texts(party)
     party.check()
+
+
+@one
+def test_a_resume_says_that_a_click_waits_behind_the_plan(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    """The marker of that click is gone since the rover left Guided."""
+    world, party = driving_plan(make_world, persona)
+    party.operator.go_to(*degrees(0, 1))
+    world.run(1)
+    choose(world, party, Mode.HOLD)
+    world.run(2)
+    party.operator.go_on()
+    world.run(1)
+    (said,) = [text for text in party_texts(party) if "is next" in text]
+    assert said.endswith("task 1 is next, plan of 2 items; 1 task waits behind it")
 
 
 @one

@@ -33,8 +33,12 @@ def summary_of(tasks: VehicleTasks) -> str:
 def next_words(tasks: VehicleTasks) -> str:
     """Return which task drives next, to end a text; "" if none does."""
     task_id = None if tasks.held else tasks.executor.task_id or tasks.turns.next_id
-    task = None if task_id is None else tasks.registry[task_id]
-    return "" if task is None else f": task {task.id} is next, {describe(task.goal)}"
+    if task_id is None:
+        return ""
+    task = tasks.registry[task_id]
+    behind = len(tasks.waiting) - (task_id in tasks.waiting)
+    wait = f"; {_waiting(behind)} behind it" if behind else ""
+    return f": task {task.id} is next, {describe(task.goal)}{wait}"
 
 
 def _waiting(count: int) -> str:
