@@ -1,10 +1,13 @@
-"""The heartbeats of one vehicle as clients see them: its own, with two changes.
+"""The heartbeats of one vehicle as clients see them, its own with two changes; and PX4's checks.
 
 The mode may differ for a moment. A ground station that asks for a mode waits until a heartbeat
 shows it. If the server does the job itself, a mission or a return, the vehicle would never show it.
 
 Armed is shown as active. An ArduPilot that stands armed in HOLD reports standby, and ground
 stations then hide what an operator may have it do next.
+
+PX4 reports (EVENT) that no mission can start, because the server keeps the missions, and
+QGroundControl then hides "Start mission". The server drives one wherever PX4 could stand in Hold.
 """
 
 from copy import copy
@@ -12,12 +15,17 @@ from math import inf
 
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavModeFlag, MavState
-from mav_tasks.mavlink.messages import Heartbeat
+from mav_tasks.mavlink.messages import Event, Heartbeat
 from mav_tasks.mavlink.packet import Packet, with_payload
 
 #: offsets in the payload of HEARTBEAT
 CUSTOM_MODE, BASE_MODE, SYSTEM_STATUS = 0, 6, 7
 BYTES = 4  # of custom_mode
+#: of component 1; PX4's id is the 24-bit FNV-1a of "commander_arming_check_summary"
+ARMING_CHECKS = (1 << 24 | 11047904).to_bytes(4, "little")
+#: offsets in its payload: the modes in which PX4 could be armed, or run
+CAN_ARM, CAN_RUN = 22, 26
+MISSION, LOITER = 1 << 3, 1 << 4
 
 
 class ShownHeartbeat:
@@ -47,6 +55,8 @@ class ShownHeartbeat:
 
     def applied(self, packet: Packet, *, now: float) -> Packet:
         """Return a packet of the vehicle as clients see it."""
+        if packet.message_id == Event.id:
+            return _with_mission(packet)
         if packet.message_id != Heartbeat.id or packet.component_id != AUTOPILOT:
             return packet
         payload = packet.payload
@@ -62,3 +72,14 @@ class ShownHeartbeat:
 def _status(base_mode: int, status: int) -> int:
     is_armed = base_mode & MavModeFlag.SAFETY_ARMED
     return MavState.ACTIVE if is_armed and status == MavState.STANDBY else status
+
+
+def _with_mission(packet: Packet) -> Packet:
+    """Return a report of PX4's checks that allows a mission if it allows Hold."""
+    if packet.payload[:4] != ARMING_CHECKS:
+        return packet
+    for at in (CAN_ARM, CAN_RUN):
+        modes = int.from_bytes(packet.payload[at : at + 1])
+        if modes & LOITER:
+            packet = with_payload(packet, at, bytes((modes | MISSION,)))
+    return packet
