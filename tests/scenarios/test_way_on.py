@@ -273,13 +273,15 @@ def test_stop_ends_clicks_and_is_left_by_continue_only(
     party.operator.action(STOP, component=191)
     world.run(4)
     assert [world.state(each) for each in (1, 2)] == [(S.KILLED, R.STOP)] * 2
-    party.operator.return_home()
+    assert {"go to", "return", "continue"}.isdisjoint(party.operator.offers), "it would refuse"
+    choose(world, party, Mode.AUTO)
     world.run(4)
     assert world.stands()
     assert len(world.tasks()) == 2
     party.operator.action(PAUSE_CONTINUE, 1)
     world.run(4)
     assert world.stands()
+    assert {"go to", "return"} <= party.operator.offers
 
 
 @one

@@ -4,7 +4,8 @@ The mode may differ for a moment. A ground station that asks for a mode waits un
 shows it. If the server does the job itself, a mission or a return, the vehicle would never show it.
 
 Armed is shown as active. An ArduPilot that stands armed in HOLD reports standby, and ground
-stations then hide what an operator may have it do next.
+stations then hide what an operator may have it do next. Under STOP that is right: nothing of it
+works, and QGroundControl has room for "Continue" beside "STOP".
 
 PX4 reports (EVENT) that no mission can start, because the server keeps the missions, and
 QGroundControl then hides "Start mission". The server drives one wherever PX4 could stand in Hold.
@@ -47,20 +48,20 @@ class ShownHeartbeat:
         self._until = -inf
 
     def in_message(self, heartbeat: Heartbeat, *, now: float) -> Heartbeat:
-        """Return a copy of a heartbeat message as clients see it."""
+        """Return a copy of a heartbeat message as clients see it without a STOP."""
         shown = copy(heartbeat)
         shown.custom_mode = self._mode if now < self._until else heartbeat.custom_mode
         shown.system_status = _status(heartbeat.base_mode, heartbeat.system_status)
         return shown
 
-    def applied(self, packet: Packet, *, now: float) -> Packet:
+    def applied(self, packet: Packet, *, is_stopped: bool, now: float) -> Packet:
         """Return a packet of the vehicle as clients see it."""
         if packet.message_id == Event.id:
             return _with_mission(packet)
         if packet.message_id != Heartbeat.id or packet.component_id != AUTOPILOT:
             return packet
         payload = packet.payload
-        if len(payload) > SYSTEM_STATUS:
+        if len(payload) > SYSTEM_STATUS and not is_stopped:
             status = _status(payload[BASE_MODE], payload[SYSTEM_STATUS])
             if status != payload[SYSTEM_STATUS]:
                 packet = with_payload(packet, SYSTEM_STATUS, bytes((status,)))
