@@ -24,8 +24,7 @@ CUSTOM_MODE, BASE_MODE, SYSTEM_STATUS = 0, 6, 7
 BYTES = 4  # of custom_mode
 #: of component 1; PX4's id is the 24-bit FNV-1a of "commander_arming_check_summary"
 ARMING_CHECKS = (1 << 24 | 11047904).to_bytes(4, "little")
-#: offsets in its payload: the modes in which PX4 could be armed, or run
-CAN_ARM, CAN_RUN = 22, 26
+CAN_ARM = 22  # offset in its payload: the modes in which PX4 could be armed
 MISSION, LOITER = 1 << 3, 1 << 4
 
 
@@ -77,10 +76,7 @@ def _status(base_mode: int, status: int) -> int:
 
 def _with_mission(packet: Packet) -> Packet:
     """Return a report of PX4's checks that allows a mission if it allows Hold."""
-    if packet.payload[:4] != ARMING_CHECKS:
+    modes = packet.payload[CAN_ARM : CAN_ARM + 1]  # none if zeros at the end were left out
+    if packet.payload[:4] != ARMING_CHECKS or not modes or not modes[0] & LOITER:
         return packet
-    for at in (CAN_ARM, CAN_RUN):
-        modes = int.from_bytes(packet.payload[at : at + 1])
-        if modes & LOITER:
-            packet = with_payload(packet, at, bytes((modes | MISSION,)))
-    return packet
+    return with_payload(packet, CAN_ARM, bytes((modes[0] | MISSION,)))
