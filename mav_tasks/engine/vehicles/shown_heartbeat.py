@@ -22,10 +22,10 @@ from mav_tasks.mavlink.packet import Packet, with_payload
 #: offsets in the payload of HEARTBEAT
 CUSTOM_MODE, BASE_MODE, SYSTEM_STATUS = 0, 6, 7
 BYTES = 4  # of custom_mode
-#: of component 1; PX4's id is the 24-bit FNV-1a of "commander_arming_check_summary"
-ARMING_CHECKS = (1 << 24 | 11047904).to_bytes(4, "little")
+#: PX4's event "commander_arming_check_summary": 24 bits of the name's FNV-1a, then its component
+ARMING_CHECKS = b"\xe0\x93\xa8\x01"
 CAN_ARM = 22  # offset in its payload: the modes in which PX4 could be armed
-MISSION, LOITER = 1 << 3, 1 << 4
+MISSION, LOITER = 8, 16
 
 
 class ShownHeartbeat:
@@ -46,10 +46,10 @@ class ShownHeartbeat:
         """Show the vehicle's own mode again."""
         self._until = -inf
 
-    def in_message(self, heartbeat: Heartbeat, *, now: float) -> Heartbeat:
-        """Return a copy of a heartbeat message as clients see it without a STOP."""
+    def in_message(self, heartbeat: Heartbeat) -> Heartbeat:
+        """Return a copy of a heartbeat message with the mode to be shown."""
         shown = copy(heartbeat)
-        shown.custom_mode = self._mode if now < self._until else heartbeat.custom_mode
+        shown.custom_mode = self._mode
         shown.system_status = _status(heartbeat.base_mode, heartbeat.system_status)
         return shown
 

@@ -38,7 +38,7 @@ def test_what_is_armed_is_shown_active(base_mode: int, status: int, shown: int) 
     heartbeats = ShownHeartbeat()
     own = beat(base_mode, status)
     assert read(heartbeats.applied(packet(own), is_stopped=False, now=0.0)) == (base_mode, 4, shown)
-    assert heartbeats.in_message(own, now=0.0).system_status == shown
+    assert heartbeats.in_message(own).system_status == shown
 
 
 def test_a_mode_is_shown_for_a_while() -> None:
