@@ -102,7 +102,9 @@ class Reception:
                 if is_ours or packet.message_id == m.CommandAck.id or self.reports.replaces(packet):
                     self.publisher.withhold(packet)
                 else:
-                    self.gcs.forward(vehicle.shown.applied(packet, now=now), now=now)
+                    is_stopped = vehicle.tasks.is_stopped
+                    shown = vehicle.shown.applied(packet, is_stopped=is_stopped, now=now)
+                    self.gcs.forward(shown, now=now)
 
     def _halts_first(self, received: list[Received]) -> list[Received]:
         """Move packets that start or drive a rover behind those that halt one.

@@ -171,7 +171,7 @@ def stop(it: MavProxy, running: Stand) -> None:
     assert it.ask("long 54000 20", TASK_SHOWN % 54000)[1] == "1"
     wait_until(lambda: running.speed() > 0.3, within=10, what="the rover at speed")
     it.ask("long 54003", TASK_SHOWN % 54003)
-    it.wait_for("AP: Task 1 killed: STOP")
+    it.wait_for("AP: Task 1 stopped for good")
     it.wait_for_mode("HOLD")
     wait_until(lambda: running.speed() < 0.05, within=10, what="the rover standing")
     it.ask("resume", "DO_PAUSE_CONTINUE: ACCEPTED")

@@ -7,6 +7,7 @@ from struct import pack, unpack
 
 import pytest
 from pymavlink.dialects.v20 import common
+from pymavlink.generator.mavcrc import x25crc
 
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -36,6 +37,29 @@ each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lamb
 @pytest.fixture
 def world(make_world: MakeWorld) -> World:
     return make_world(persona=PROMPT_PX4)
+
+
+@pytest.mark.parametrize(
+    ("modes", "shown"),
+    [(1 << 14 | 0b10000, 1 << 14 | 0b11000), (0b101, 0b101), (None, None)],
+    ids=["Hold is possible", "Hold is not", "zeros are left out"],
+)
+def test_its_checks_allow_a_mission_wherever_they_allow_hold(
+    world: World, modes: int | None, shown: int | None
+) -> None:
+    """It has no mission itself, and QGroundControl would offer no start of the server's."""
+
+    def payload(can_arm: int | None) -> bytes:
+        head = pack("<IIHBBB", 1 << 24 | 11047904, 12_000, 7, 0, 0, 0x8F)
+        return head if can_arm is None else head + pack("<BIIII", 0, 3, 0, can_arm, 0b10110)
+
+    packet = bytes((len(payload(modes)), 0, 0, 9, 1, 1, 410 & 0xFF, 410 >> 8, 0)) + payload(modes)
+    crc = x25crc(packet + b"\xa0").crc
+    world.from_vehicle_side(b"\xfd" + packet + pack("<H", crc), peer="rover1")
+    world.run(0.2)
+    (event,) = world.client.of_id(410)
+    assert event.payload.rstrip(b"\0") == payload(shown).rstrip(b"\0")
+    assert pack("<H", x25crc(event.raw[1:-2] + b"\xa0").crc) == event.raw[-2:]
 
 
 class TestDriving:

@@ -96,7 +96,7 @@ def test_what_needs_a_hand_is_a_warning(world: World) -> None:
     assert {said[each] for each in told_with_it} == {INFO}, "one warning for one event"
     assert said["STOP by a ground station: press Continue to resume"] == WARNING
     assert said["cannot start: wrong mode, set HOLD first"] == WARNING
-    assert said["Task 1 killed: STOP"] == INFO
+    assert said["Task 1 stopped for good by a ground station"] == INFO
     assert NOTICE not in said.values()
 
 

@@ -120,6 +120,21 @@ def test_a_rover_that_was_silent_on_both_is_heard_again_on_either(make_fleet: Ma
     fleet.until_state(1, S.COMPLETED)
 
 
+def test_a_rover_that_restarts_at_once_at_another_place_is_heard_again(
+    make_fleet: MakeFleet,
+) -> None:
+    """A simulated autopilot gets another port; a restart takes it less than a second."""
+    fleet = make_fleet(TWO_LINKS)
+    fleet.run(6)
+    fleet.radios["a"].vehicles.clear()
+    fleet.run(0.5)
+    again = twin_of(1, start=Pose(north=0.5), now=fleet.now, is_same=True)
+    fleet.radios["b"].vehicles.append(again)
+    fleet.run(15)
+    assert not any("shares its id" in text for text in notes(fleet))
+    assert "is now at b" in [each.text for each in fleet.events(VehicleSeen)]
+
+
 @pytest.mark.parametrize("switched_on", ["later", "at the same time"])
 def test_a_stranger_with_the_id_is_never_driven_whatever_it_says(
     make_fleet: MakeFleet, switched_on: str

@@ -84,7 +84,7 @@ def test_an_emergency_stop_ends_a_go_to_and_the_next_click_drives(
     assert world.rover.autopilot.mode is Mode.HOLD
     assert texts(party, since=at) == []
     assert [text for text in texts(party, since=at, worst=6) if "Task" in text] == [
-        "Task 1 killed: STOP"
+        "Task 1 stopped for good by a ground station"
     ]
     arm(world, party)
     stood = world.truth.north
@@ -248,6 +248,22 @@ def test_what_an_emergency_stop_leaves_waits_and_continue_names_it(
 
 
 @one
+def test_a_resume_says_that_a_click_waits_behind_the_plan(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    """The marker of that click is gone since the rover left Guided."""
+    world, party = driving_plan(make_world, persona)
+    party.operator.go_to(*degrees(0, 1))
+    world.run(1)
+    choose(world, party, Mode.HOLD)
+    world.run(2)
+    party.operator.go_on()
+    world.run(1)
+    (said,) = [text for text in party_texts(party) if "is next" in text]
+    assert said.endswith("task 1 is next, plan of 2 items; 1 task waits behind it")
+
+
+@one
 def test_stop_ends_clicks_and_is_left_by_continue_only(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -257,13 +273,15 @@ def test_stop_ends_clicks_and_is_left_by_continue_only(
     party.operator.action(STOP, component=191)
     world.run(4)
     assert [world.state(each) for each in (1, 2)] == [(S.KILLED, R.STOP)] * 2
-    party.operator.return_home()
+    assert {"go to", "return", "continue"}.isdisjoint(party.operator.offers), "it would refuse"
+    choose(world, party, Mode.AUTO)
     world.run(4)
     assert world.stands()
     assert len(world.tasks()) == 2
     party.operator.action(PAUSE_CONTINUE, 1)
     world.run(4)
     assert world.stands()
+    assert {"go to", "return"} <= party.operator.offers
 
 
 @one
@@ -292,3 +310,35 @@ def test_a_click_behind_a_driven_task_says_so(make_world: MakeWorld) -> None:
     party.operator.go_to(*degrees(0, 5))
     world.run(1)
     assert any(text.startswith("Task 2 queued behind task 1: go to") for text in party_texts(party))
+
+
+@both
+def test_start_finishes_the_plan_that_a_late_server_holds(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    """It is what "Continue the mission from the current waypoint" says."""
+    world, party = driving_plan(make_world, persona)
+    world.observer.expects_gaps = True
+    world.suspend_server(3.0)
+    world.until(lambda: world.state(1) == (S.HELD, R.LATE), within=10)
+    world.run(4)
+    at = world.now
+    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert is_at(world, 3.0, 1.0)
+    assert len(world.tasks()) == 1
+    assert texts(party, since=at, worst=3) == []
+
+
+@one
+def test_start_finishes_the_plan_of_a_restarted_rover(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world, party = driving_plan(make_world, persona)
+    world.rover.autopilot.reboot(now=world.now)
+    world.until(lambda: world.state(1) == (S.HELD, R.FRAME_RESET), within=20)
+    world.run(8)
+    party.operator.start()
+    world.until_state(1, S.COMPLETED, within=60)
+    assert len(world.tasks()) == 1
+    assert world.paused() is R.NONE

@@ -64,7 +64,9 @@ class Publisher:
             if vehicle.system_id in client.introduced or not vehicle.is_heard(now=now):
                 continue  # a silent vehicle must not look alive
             if vehicle.last_heartbeat is not None:
-                heartbeat = vehicle.shown.applied(vehicle.last_heartbeat, now=now)
+                heartbeat = vehicle.shown.applied(
+                    vehicle.last_heartbeat, is_stopped=vehicle.tasks.is_stopped, now=now
+                )
                 client.introduce(heartbeat, last_seq=vehicle.last_seq)
 
     def withhold(self, packet: Packet) -> None:

@@ -36,7 +36,9 @@ def next_words(tasks: VehicleTasks) -> str:
     task = None if task_id is None else tasks.registry[task_id]
     if task is None or task.state is TaskState.CANCELLING:
         return ""
-    return f": task {task.id} is next, {describe(task.goal)}"
+    behind = len(tasks.waiting) - (task.id in tasks.waiting)
+    wait = f"; {_waiting(behind)} behind it" if behind else ""
+    return f": task {task.id} is next, {describe(task.goal)}{wait}"
 
 
 def _waiting(count: int) -> str:

@@ -164,7 +164,7 @@ class ModeRequests:
         """Show clients a mode at once: SET_MODE has no other answer."""
         lasts = START_WAITS if vehicle.start_mark.is_put(now=now) else SHOWN_FOR
         vehicle.shown.show(mode, until=now + lasts)
-        heartbeat = vehicle.shown.in_message(vehicle.parts.monitor.latest, now=now)
+        heartbeat = vehicle.shown.in_message(vehicle.parts.monitor.latest)
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs.clients:
             if vehicle.system_id in client.introduced:

@@ -233,9 +233,11 @@ def text_of(event: Event) -> tuple[int, MavSeverity, str] | None:
             text = f"Task {event.task_id} {new.name.lower()}: {words_of(reason)}"
             return event.vehicle, MavSeverity.ERROR, text
         case TaskChanged(
-            new=TaskState.KILLED | TaskState.CANCELLED as new, reason=TaskReason.CANCELLED
+            new=TaskState.KILLED | TaskState.CANCELLED as new,
+            reason=TaskReason.CANCELLED | TaskReason.STOP,
         ):
-            text = f"Task {event.task_id} {new.name.lower()}{_by(event.actor)}"
+            how = "stopped for good" if new is TaskState.KILLED else "cancelled"
+            text = f"Task {event.task_id} {how}{_by(event.actor)}"
             return event.vehicle, _severity(event.reason), text
         case TaskChanged(new=TaskState.PAUSED, reason=TaskReason.OPERATOR):
             text = f"Task {event.task_id} paused{_by(event.actor)}"

@@ -11,7 +11,6 @@ from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
 from mav_tasks.engine.missions.fence_items import fence_of, rally_of
 from mav_tasks.engine.missions.plan_items import plan_of, steps_of
 from mav_tasks.engine.missions.plan_table import MissionParseOptions
-from mav_tasks.engine.vehicles.hands import BUTTONS
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
@@ -195,11 +194,17 @@ class Plans:
         return task
 
     def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
-        """Resume an active mission and its queue; start a waiting one, even in a paused queue."""
+        """Resume an active mission and its queue; start a waiting one, even in a paused queue.
+
+        A held one drives its remainder: who starts it has decided that it goes on.
+        """
         joint, tasks = vehicle.joint, vehicle.tasks
         _check_state(task)
-        if task == tasks.active:
-            joint.go_on(actor=actor, now=now)
+        if task.state is S.HELD:
+            joint.release(task, again=False, may_continue=True, actor=actor, now=now)
+        if task == tasks.active or task.state is S.HELD:
+            if task.state is not S.HELD or tasks.paused:
+                joint.go_on(actor=actor, now=now)
             return
         if is_of_autopilot(task):
             self.end_replaced(vehicle, is_started=True, actor=actor, now=now)
@@ -312,9 +317,7 @@ def is_of_autopilot(task: Task) -> bool:
 
 
 def _check_state(task: Task | None) -> None:
-    """Raise Rejection if a mission is held, or is being cancelled."""
-    if task is not None and task.state is S.HELD:
-        raise Rejection(R.HELD_AHEAD, f"task {task.id} is held: press {BUTTONS}")
+    """Raise Rejection if a mission is being cancelled."""
     if task is not None and task.state is S.CANCELLING:
         raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
 

@@ -192,14 +192,16 @@ class VehicleLinks:
 
         One with two ways moves to the better one; one that fell silent to where its id is heard.
         An id that was heard there while the vehicle was still heard is another vehicle, for good,
-        unless its unique id and its clock show that it is the same.
+        unless its unique id and its clock show that it is the same. One that has restarted has
+        another clock, but is not heard at the old place since.
         """
         number, old, is_heard = vehicle.system_id, vehicle.requests.place, vehicle.is_heard(now=now)
         way, used = self.way(number, (link, peer), now=now), self._ways.get((number, old))
         is_beat, was_same = isinstance(message, m.Heartbeat), way.is_same
         if was_same and now - way.heard_at > self._settings.watch.heartbeat_lost:
             way.is_same, way.first_at = None, now  # another one may be there now
-        uid = "" if is_heard and not vehicle.requests.is_identified else vehicle.tasks.terms.uid
+        may_judge = vehicle.requests.is_identified and vehicle.heard_at > way.first_at
+        uid = "" if is_heard and not may_judge else vehicle.tasks.terms.uid
         way.judge(message, uid, used, is_heard=is_heard)
         is_gone = not is_heard or self._is_gone(old)
         is_better = way.is_better_than(used, vehicle.counted_at, now=now)

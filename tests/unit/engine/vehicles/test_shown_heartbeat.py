@@ -37,27 +37,27 @@ def read(found: Packet) -> tuple[int, int, int]:
 def test_what_is_armed_is_shown_active(base_mode: int, status: int, shown: int) -> None:
     heartbeats = ShownHeartbeat()
     own = beat(base_mode, status)
-    assert read(heartbeats.applied(packet(own), now=0.0)) == (base_mode, 4, shown)
-    assert heartbeats.in_message(own, now=0.0).system_status == shown
+    assert read(heartbeats.applied(packet(own), is_stopped=False, now=0.0)) == (base_mode, 4, shown)
+    assert heartbeats.in_message(own).system_status == shown
 
 
 def test_a_mode_is_shown_for_a_while() -> None:
     heartbeats = ShownHeartbeat()
     heartbeats.show(10, until=1.0)
     own = packet(beat(ARMED, STANDBY))
-    assert read(heartbeats.applied(own, now=0.9)) == (ARMED, 10, ACTIVE)
-    assert read(heartbeats.applied(own, now=1.0)) == (ARMED, 4, ACTIVE)
+    assert read(heartbeats.applied(own, is_stopped=False, now=0.9)) == (ARMED, 10, ACTIVE)
+    assert read(heartbeats.applied(own, is_stopped=False, now=1.0)) == (ARMED, 4, ACTIVE)
     heartbeats.show(10, until=3.0)
     heartbeats.forget()
-    assert read(heartbeats.applied(own, now=2.0)) == (ARMED, 4, ACTIVE)
+    assert read(heartbeats.applied(own, is_stopped=False, now=2.0)) == (ARMED, 4, ACTIVE)
 
 
 def test_everything_else_is_as_it_came() -> None:
     heartbeats = ShownHeartbeat()
     cut_short = packet(m.Heartbeat(10, 3, ARMED, 4, 0, 0))  # zeros at the end are not sent
-    assert heartbeats.applied(cut_short, now=0.0) == cut_short
+    assert heartbeats.applied(cut_short, is_stopped=False, now=0.0) == cut_short
     heartbeats.show(10, until=1.0)
     others = (beat(ARMED, STANDBY), 191), (m.SystemTime(1, 1), 1)
     for message, component in others:
         other = packet(message, component=component)
-        assert heartbeats.applied(other, now=0.0) == other
+        assert heartbeats.applied(other, is_stopped=False, now=0.0) == other
