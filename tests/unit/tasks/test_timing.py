@@ -45,12 +45,13 @@ def test_what_is_gone_on_with_is_as_if_it_had_never_paused(
     earlier: list[float], later: list[float]
 ) -> None:
     first = measured(earlier)
-    both = measured(later, before=first, at=7.0 + sum(earlier) + 1000.0)
+    begin = 7.0 + sum(earlier) + 1000.0
+    both = measured(later, before=first, at=begin)
     assert both.count == len(earlier) + len(later)
     assert both.longest < 100.0, "the pause itself is no interval"
     assert both.spread[1::2] != ()
     assert sum(both.spread[1::2]) == both.count
-    assert both.late == first.late + measured(later).late
+    assert both.late == first.late + measured(later, at=begin).late
 
 
 def test_one_setpoint_is_no_interval() -> None:
