@@ -183,6 +183,7 @@ def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
         exact = ("--noise", "off", *rover_options(broken))
         with process(*again, *exact, folder=tmp_path, name="broken") as rover:
             rover.wait_for("rover 1")
+            it.server.wait_for("rover 1: restarted")  # nobody types the next command sooner
             ended = [run(*shlex.split(command)[1:]) for command in told]
     assert [done.status for done in ended] == [1, 0, 0]
     moved, queue, resumed = ended

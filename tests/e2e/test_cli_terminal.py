@@ -120,7 +120,7 @@ def test_a_watched_queue_fits_its_window_and_follows_it(there: Stand, client: Sy
         screen.wait_for(lambda text: "and 22 more" in text)
         assert len(screen.lines) == 12
         assert screen.lines[0].startswith(
-            "rover 1: no task runs; queue paused (operator); to resume:"
+            "rover 1: no task runs; queue paused (operator); to let it run, use:"
         )
         assert screen.lines[1].startswith("30 scheduled")
         screen.resize(8, 40)

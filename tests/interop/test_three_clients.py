@@ -213,7 +213,7 @@ def drive(prompt: MavProxy, mavsdk: Script, plain: Plain, running: Stand) -> Non
         assert truth[-1]["north"] - old * running.speed() - 0.1 < north
         assert north < truth[-1]["north"] + 0.1
     submit(plain.link, TASK_STOP)
-    wait_until_all_are_told("Task 4 stopped for good", prompt, mavsdk, plain)
+    wait_until_all_are_told("Task 4 stopped for good by 200/0", prompt, mavsdk, plain)
     prompt.wait_for_mode("HOLD")
     wait_until(lambda: running.speed() < 0.01, within=10, what="the rover standing")
 
