@@ -35,10 +35,13 @@ class Way:
         self.answered_at = now
         self.least, self.most = answer.tc1 / NANO - now, (answer.tc1 - answer.ts1) / NANO
 
-    def judge(self, message: m.Message, uid: str, used: "Way | None", *, is_heard: bool) -> None:
+    def judge(
+        self, message: m.Message, uid: str, used: "Way | None", *, is_heard: bool, used_at: float
+    ) -> None:
         """Look whether a message shows that this leads to the vehicle with that unique id.
 
-        While that is heard at the place in use, both clocks must agree.
+        While that is heard at the place in use, both clocks must agree. If they do not, it may also
+        have restarted here, as long as nothing came from there since (``used_at``).
         """
         if not isinstance(message, m.AutopilotVersion) or not uid or self.is_same is False:
             return
@@ -46,8 +49,8 @@ class Way:
         if is_same and is_heard:
             if used is None or abs(self.answered_at - used.answered_at) > UNANSWERED:
                 is_same = None  # it is asked again
-            else:
-                is_same = self.least - DRIFT <= used.most and used.least <= self.most + DRIFT
+            elif self.least - DRIFT > used.most or used.least > self.most + DRIFT:
+                is_same = False if used_at > self.first_at else None
         self.is_same = is_same
 
     def is_better_than(self, used: "Way | None", used_at: float, *, now: float) -> bool:
