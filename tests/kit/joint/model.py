@@ -294,6 +294,8 @@ def _goes_on(state: State) -> Iterator[State]:
         yield going
         return
     yield going._replace(work=Work.STANDS)  # it is held, or its position reference changed
+    if state.is_urgent:  # a mission that was started drives first
+        yield going
     if state.driver is Driver.NOBODY:  # a mission goes on out of any mode
         yield going._replace(work=Work.RUNS)
 
@@ -311,12 +313,14 @@ def _released(state: State) -> Iterator[State]:
 
 def _run_now(state: State) -> Iterator[State]:
     yield state  # refused
-    if state.driver is not Driver.NOBODY:
-        return
     immediate = state._replace(is_urgent=True)
     paused = (
         immediate if immediate.queue is not Queue.RUNS else immediate._replace(queue=Queue.PAUSED)
     )
+    if state.driver is not Driver.NOBODY:  # a mission waits until nobody else drives
+        yield immediate._replace(work=Work.WAITS)
+        yield paused._replace(work=Work.WAITS)
+        return
     for work in (Work.WAITS, Work.RUNS, *([Work.ENDS] if state.work is Work.RUNS else [])):
         yield immediate._replace(work=work)
         yield paused._replace(work=work)
@@ -364,7 +368,8 @@ def _restarted(state: State) -> Iterator[State]:
         for work in {state.work, *active}:  # it starts again if it has not driven yet
             each = state._replace(may_arm=may_arm, work=work, waits=state.waits & ~Waits.RELEASE)
             yield each
-            if work not in NO_TASK and each.queue in (Queue.RUNS, Queue.TAKEN):
+            # one of those that wait may have begun, and is held
+            if work is not Work.NONE and each.queue in (Queue.RUNS, Queue.TAKEN):
                 yield each._replace(queue=Queue.PAUSED)
             if work not in NO_TASK:
                 yield from _over(each)
