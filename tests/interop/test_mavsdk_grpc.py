@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 
 from tests.kit.own_network import is_possible
-from tests.kit.scripts import ROOT, each_net
+from tests.kit.scripts import ROOT, a_net
 
 pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(280)]
 
 LIMIT = 250.0  # s; what it starts has shorter ones, so that it ends what it has started
 
 
-@each_net
+@a_net
 def test_the_older_api_drives_a_mission_and_to_a_place(loss: float, tmp_path: Path) -> None:
     if not is_possible():
         pytest.skip("this machine does not allow a network of one's own")
