@@ -155,7 +155,7 @@ class TcpInLink(TcpLink):
             self._is_accepting = True
 
     def _on_ended(self, connection: Connection, reason: str) -> None:
-        if connection.is_told:
+        if connection.is_told or self._is_heard(connection.peer):
             self._end(connection, self._told_as(connection, f"disconnected: {reason}"))
         else:
             words = "a connection ended without a valid packet"

@@ -23,7 +23,7 @@ FROM_HERE = 0  # all of a held task again: the rover may have rolled off its pat
 METRES = 0.5
 LATER = 600.0  # s
 CHAIN = 5
-SEEDS = tries(8, long=1000)  # 1.8 s each
+SEEDS = tries(4, long=1000)  # 1.8 s each
 AT_ONCE = 4
 
 

@@ -51,7 +51,7 @@ def cases() -> list[Any]:
     for make in MAKES:
         names = (*NAMES, "stick") if make.startswith("ardupilot") else NAMES
         for name in names:
-            if name == "tasks" and make not in some(list(MAKES), 0, 3):  # 10 s each
+            if name == "tasks" and make not in some(list(MAKES), 0):  # 10 s each
                 continue
             why = KNOWN.get((make, name))
             marks = () if why is None else pytest.mark.xfail(strict=True, reason=why)

@@ -7,12 +7,14 @@ told to.
 import re
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 from mav_tasks.engine.commands import dispatch, mode_requests
 from tests.kit.joint.search import search
+from tests.kit.volume import some
 from tests.kit.world import PROMPT, World
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and ends with its parent")
@@ -31,8 +33,9 @@ STARTS = (
 
 @pytest.mark.volume
 @pytest.mark.timeout(LIMIT + 10)
-@pytest.mark.parametrize("start", STARTS, ids=" ".join)
-@pytest.mark.parametrize("persona", ["ardupilot", "px4"])
+@pytest.mark.parametrize(
+    ("persona", "start"), some([*product(("ardupilot", "px4"), STARTS)], 1, 3, 4, 7, 8)
+)
 def test_whatever_happens_in_any_state_what_holds_the_rover_holds(
     persona: str, start: tuple[str, ...]
 ) -> None:
