@@ -242,7 +242,7 @@ def codes(code: CodeType) -> Iterator[CodeType]:
 
 
 def put(tree: ast.Module, path: str, names: Iterable[str]) -> int:
-    """Give the functions with these names the code of a changed module; return how many had it."""
+    """Give functions the code of a changed module, by their names; return how many got it."""
     whole = str(ROOT / path)
     wanted, done = set(names), 0
     for code in codes(compile(tree, whole, "exec", dont_inherit=True)):

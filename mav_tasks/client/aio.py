@@ -257,7 +257,7 @@ class Client:
     async def parameter(self, name: str, *, vehicle: int | None = None) -> float:
         """Return a parameter of the server, such as TSK_SPEED.
 
-        Raise NoAnswer if there is none of this name.
+        Raise NoAnswer if the server has no parameter of this name.
         """
         return await self._ask.parameter(name, self._task_server(vehicle))
 

@@ -129,7 +129,7 @@ class Asker:
         return await self._shown(request, what, TaskTiming, is_meant)
 
     async def parameter(self, name: str, target: Address) -> float:
-        """Return a parameter of a task server. Raise NoAnswer if there is none of this name."""
+        """Return a parameter of a task server. Raise NoAnswer if that has none of this name."""
         session = self._connection.session
         with self._future(float) as future:
 

@@ -231,7 +231,7 @@ class SyncClient(BlockingClient):
     def parameter(self, name: str, *, vehicle: int | None = None) -> float:
         """Return a parameter of the server, such as TSK_SPEED.
 
-        Raise NoAnswer if there is none of this name.
+        Raise NoAnswer if the server has no parameter of this name.
         """
         return self._call(self._aio.parameter(name, vehicle=vehicle))
 

@@ -40,7 +40,7 @@ class AskedParameters:
         return [ParamRequestRead(*self._target, name.encode(), -1) for name in names]
 
     def receive(self, message: ParamValue) -> None:
-        """Take in a parameter of the vehicle, whoever has asked for it, or changed it."""
+        """Note the value of a parameter, also if somebody else asked for it or changed it."""
         name, value = message.param_id, float(message.param_value)
         if name not in self._names:
             return

@@ -157,8 +157,8 @@ class VehicleTasks(Lineup):
     def cancel(self, task: Task, *, kill: bool, reason: TaskReason, actor: str, now: float) -> None:
         """Cancel a task, or end it at once (``kill``); the vehicle stands before anything starts.
 
-        A vehicle that somebody else has is not made to stand: STOP does that. To be replaced is no
-        halt: who uploads or starts another mission wants it driven.
+        A vehicle that somebody else has is not made to stand: STOP does that. The end of a
+        task that another one replaces halts nothing: who replaces it wants the other one driven.
         """
         rests = task.state in WAITING or task.id in self.suspended_ids
         if not rests and reason is not R.REPLACED:

@@ -161,7 +161,7 @@ class MissionServers:
     def _receive_for_any(
         self, client: GcsClient, packet: Packet, message: MissionMessage, *, now: float
     ) -> bool:
-        """Handle an upload to the server's own address. Return False if it is none."""
+        """Handle an upload to the server's own address; return whether the message is one."""
         ours = self._vehicles.our_address
         addressed = message.target_system, message.target_component or ours.component_id
         if addressed != ours or not isinstance(message, UploadMessage):
