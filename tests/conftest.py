@@ -12,7 +12,6 @@ from mav_tasks.engine import engine
 from tests.kit.places import place as place
 from tests.kit.postgres import postgres as postgres
 from tests.kit.postgres import postgres_server as postgres_server
-from tests.kit.run_again import RunAgain
 from tests.kit.skips import Skips
 
 for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
@@ -40,8 +39,7 @@ def closed_stores() -> Iterator[None]:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Rerun tests that failed while the machine stalled; fail for unexpected skips."""
-    config.pluginmanager.register(RunAgain())
+    """Fail for unexpected skips."""
     config.pluginmanager.register(Skips())
 
 

@@ -410,6 +410,7 @@ def measure(options: argparse.Namespace, mutants: list[Mutant], folder: Path) ->
     os.chdir(ROOT)
     sys.path[:0] = [str(ROOT), str(ROOT / "sim")]
     arguments = [*options.only, "-q", "--capture=sys", "-p", "no:cacheprovider", "-n", "0"]
+    arguments += ["-p", "no:randomly"]
     arguments += [f"--ignore=tests/{each}" for each in LEFT_OUT]
     status = pytest.main(arguments, plugins=[loop])
     if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) or not loop.results:

@@ -1,18 +1,23 @@
-"""Fails a run in which a test is skipped for a reason that nobody expects, as CI runs it.
+"""Fails a run in which a test is skipped for a reason that nobody expects.
 
 What a machine may lack is listed here. Each skip is named in pytest's summary in any case.
 """
 
-import os
-import re
-
 import pytest
 
-STRICT = "NO_UNEXPECTED_SKIPS"  # set by tools/test --all
-MAY_LACK = re.compile(
-    r"no Python 3|no systemd-analyze|root may write anywhere|may not make a small file system"
-    r"|needs a file system of its own|PostgreSQL|playwright is missing|browser|axe|the core is"
-    r" compiled|pybullet|this machine|the package that compresses"
+MAY_LACK = (
+    "no Python 3.",  # test_wheel tries later ones where they are
+    "no systemd-analyze",
+    "root may write anywhere",
+    "may not make a small file system",
+    "needs a file system of its own",
+    "this machine gives no file system of one's own",
+    "this machine does not allow a network of one's own",
+    "PostgreSQL",  # pgserver has no wheel for the machine
+    "no Chromium",
+    "the core is compiled",
+    "pybullet",  # no wheel for Python 3.12 and later
+    "the package that compresses",  # of MCAP, optional there
 )
 
 
@@ -34,7 +39,7 @@ class Skips:
     def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
         """Fail the run; the first failure's status stays."""
         is_worker = hasattr(session.config, "workerinput")
-        if self._unexpected and STRICT in os.environ and not is_worker and not exitstatus:
+        if self._unexpected and not is_worker and not exitstatus:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
@@ -45,5 +50,5 @@ class Skips:
     def _note(self, report: pytest.TestReport | pytest.CollectReport) -> None:
         if report.skipped and not hasattr(report, "wasxfail"):
             reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else ""
-            if not MAY_LACK.search(reason):
+            if not any(each in reason for each in MAY_LACK):
                 self._unexpected.add(reason or report.nodeid)
