@@ -44,6 +44,7 @@ from mav_tasks.links.base import (
 )
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.mavlink.stream import has_packet
 from mav_tasks.observer import EngineObserver
 from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
@@ -89,7 +90,7 @@ def peer_changed(link: Link, change: PeerChange) -> PeerChanged | Congestion | N
     match change.state:
         case PeerState.UP | PeerState.DOWN as state:
             return PeerChanged(link.name, change.peer, up=state is PeerState.UP)
-        case PeerState.HEARD:
+        case PeerState.HEARD | PeerState.REFUSED:
             return None
         case state:
             return Congestion(link.name, change.peer, is_congested=state is PeerState.CONGESTED)
@@ -209,7 +210,8 @@ class Runner:
                 self._guarded(link_changed(link, side, policy))
                 if isinstance(link, ListeningLink):
                     is_heard = partial(self._pump.engine.has_heard, link.name)
-                    link.watch(is_heard, is_signed=not policy.takes_unsigned)
+                    is_signed = not policy.takes_unsigned
+                    link.watch(is_heard, has_packet=has_packet, is_signed=is_signed)
             self._reader = LinkReader(self._sides, clock=self._clock, note=self._note)
             for link, _ in self._sides:
                 self._loop.add_reader(link.fileno(), self._on_readable, self._reader)
@@ -287,7 +289,7 @@ class Runner:
     def _note(self, link: StreamLink, changes: list[PeerChange]) -> None:
         for change in changes:
             if change.words:
-                is_lost = change.state is PeerState.DOWN
+                is_lost = change.state in (PeerState.DOWN, PeerState.REFUSED)
                 level = logging.WARNING if is_lost else logging.INFO
                 log.log(level, "link %s %s", link.name, change.words)
             item = peer_changed(link, change)

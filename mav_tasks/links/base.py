@@ -65,6 +65,7 @@ class PeerState(Enum):
     UP = auto()
     HEARD = auto()  # a valid packet has come: for the log
     DOWN = auto()
+    REFUSED = auto()  # closed before it was up: for the log
     CONGESTED = auto()  # packets to the peer pile up
     CLEAR = auto()  # no longer congested
 
@@ -117,8 +118,17 @@ class ListeningLink(Link, Protocol):
     def refused(self) -> int:
         """Number of connections that were closed for others, or without a valid packet."""
 
-    def watch(self, is_heard: Callable[[Peer], bool], *, is_signed: bool) -> None:
-        """Take whether a valid packet of a peer has come; ``is_signed``: only signed ones count."""
+    def watch(
+        self,
+        is_heard: Callable[[Peer], bool],
+        *,
+        has_packet: Callable[[bytes], bool],
+        is_signed: bool,
+    ) -> None:
+        """Take whether a valid packet of a peer has come, and whether bytes have a packet.
+
+        ``is_signed``: only signed ones count.
+        """
 
 
 TEND_PERIOD = 0.05  # s

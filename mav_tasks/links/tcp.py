@@ -78,7 +78,8 @@ class TcpLink:
             if not ready or len(self._by_peer) < before:
                 break
             if not all(isinstance(key.data, Connection) for key, _ in ready):
-                self._on_ready()
+                self._on_ready(received, limit)
+                break
         return received
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
@@ -100,8 +101,8 @@ class TcpLink:
             self._end(connection, None)
         self._selector.close()
 
-    def _on_ready(self) -> None:
-        """Handle the link's own socket, which is ready."""
+    def _on_ready(self, received: list[tuple[Peer, bytes]], limit: int) -> None:
+        """Handle what is the link's own and ready; add what was read."""
         raise NotImplementedError
 
     def _on_ended(self, connection: Connection, reason: str) -> None:

@@ -82,7 +82,7 @@ class TcpOutLink(TcpLink):
             return
         self._on_ready()
 
-    def _on_ready(self) -> None:
+    def _on_ready(self, *_: object) -> None:
         """The connection that was dialled is there, or has failed."""
         sock = self._dialling
         assert sock is not None

@@ -115,6 +115,11 @@ class StreamSplitter:
         return packets, start
 
 
+def has_packet(data: bytes) -> bool:
+    """Return whether there is a packet in these bytes."""
+    return bool(StreamSplitter().feed(data, now=0.0))
+
+
 def is_whole(data: bytes) -> bool:
     """Return whether a datagram has whole packets only, by their lengths."""
     start: int | None = 0

@@ -105,6 +105,7 @@ def _opening() -> bytes:
 KINDS: dict[str, Callable[[int], None]] = {
     "silent": lambda port: _held(port, 1100),
     "half a packet": lambda port: _held(port, 200, b"\xfd\x09"),
+    "whole packets": lambda port: _held(port, 1100, b"\xfd\x09" + bytes(19)),  # wrong CRC
     "half a request": lambda port: _held(port, 1100, b"POST /api/v1/stop HTTP/1.1\r\nHo"),
     "half a body": lambda port: _held(port, 900, _slow_body(port, "/api/v1/stop")),
     "half a call": lambda port: _held(port, 900, _slow_body(port, "/mcp")),

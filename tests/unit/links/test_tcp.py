@@ -1,5 +1,6 @@
 """TCP links on real loopback sockets with ports that the system chooses."""
 
+import resource
 import select
 import socket
 import time
@@ -23,6 +24,7 @@ IN_USE = (
     "Address already in use: end the program that has it (ss -lntup names it), or choose another"
 )
 HOST = "127.0.0.1"
+PACKET = b"a packet"
 LIMIT = 10.0  # s
 
 
@@ -75,10 +77,15 @@ class Watched:
     @property
     def states(self) -> list[PeerState]:
         """What the engine is told."""
-        return [change.state for change in self.changes if change.state is not PeerState.HEARD]
+        for_the_log = PeerState.HEARD, PeerState.REFUSED
+        return [each.state for each in self.changes if each.state not in for_the_log]
 
     def heard(self, peer: Peer) -> bytes:
         return b"".join(data for who, data in self.pieces if who == peer)
+
+
+def has_packet(data: bytes) -> bool:
+    return PACKET in data
 
 
 def read(sock: socket.socket, count: int) -> bytes:
@@ -215,17 +222,15 @@ def is_open(sock: socket.socket) -> bool:
 
 
 def test_who_sends_nothing_valid_gives_way_the_oldest_first(small: TcpInLink) -> None:
-    heard = set[Peer]()
-    small.watch(heard.__contains__, is_signed=False)
+    small.watch(lambda _peer: False, has_packet=has_packet, is_signed=False)
     watched, silent = up(small, 3)
     for _ in range(50):  # far more than there is room for, and nobody is refused
         late = dial(small)
-        heard.add(late.getsockname())
+        late.sendall(PACKET)
         watched.until(lambda late=late: late.getsockname() in _up_at(watched))  # type: ignore[misc]
-        heard.discard(late.getsockname())
         silent.append(late)
+    watched.until(lambda: small.refused == 50)
     assert [is_open(each) for each in silent] == [False] * 50 + [True] * 3
-    assert small.refused == 50
     words = {change.words for change in watched.changes if change.state is PeerState.DOWN}
     assert f"{HOST}: a connection ended without a valid packet: the link is full" in words
     assert len(watched.changes) > 100
@@ -239,17 +244,66 @@ def _up_at(watched: Watched) -> set[Peer]:
 
 
 def test_an_address_with_few_connections_loses_none_to_one_with_many(small: TcpInLink) -> None:
-    small.watch(lambda _peer: False, is_signed=False)
+    small.watch(lambda _peer: False, has_packet=has_packet, is_signed=False)
     watched = Watched(small)
     with socket.socket() as other:
         other.bind(("127.0.0.2", 0))
         other.connect((HOST, small.port))
         watched.until(lambda: watched.states == [PeerState.UP])
         crowd = [dial(small) for _ in range(20)]
-        watched.until(lambda: watched.states.count(PeerState.UP) == 21)
+        for each in crowd[10:]:
+            each.sendall(PACKET)
+        watched.until(lambda: watched.states.count(PeerState.UP) == 13)
         assert is_open(other)
         for each in crowd:
             each.close()
+
+
+def test_who_speaks_is_heard_at_once_among_strangers_who_do_not(small: TcpInLink) -> None:
+    """In a few turns, and before the next ``poll``: so is one who listens, of another address."""
+    small.watch(lambda _peer: False, has_packet=has_packet, is_signed=False)
+    watched, strangers = Watched(small), list[socket.socket]()
+    for number in range(300):
+        strangers.append(dial(small))
+        if number % 2:
+            strangers[-1].sendall(PACKET[:-1])
+    with socket.socket() as listener, dial(small) as late:
+        listener.bind(("127.0.0.2", 0))
+        listener.connect((HOST, small.port))
+        late.sendall(PACKET)
+        for _ in range(10):
+            watched.pieces += small.receive(64)
+            watched.changes += small.take_changes()
+        assert watched.heard(late.getsockname()) == PACKET
+        assert listener.getsockname() in _up_at(watched)
+        assert len(watched.states) < 20  # the engine knows nothing of the others
+        strangers[-1].sendall(PACKET[-1:])
+        watched.until(lambda: watched.heard(strangers[-1].getsockname()) == PACKET)
+    for each in strangers:
+        each.close()
+
+
+def test_who_waits_without_a_word_gets_a_place_that_is_free_and_at_most_so_many_wait() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, hard))
+    link = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=replace(TO_CLIENTS, connections=3))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    link.watch(lambda _peer: False, has_packet=has_packet, is_signed=False)
+    watched, first = up(link, 3)
+    waiting = [dial(link) for _ in range(100)]
+    watched.until(lambda: link.refused == 36)
+    assert [is_open(each) for each in waiting] == [False] * 36 + [True] * 64
+    first[0].close()
+    watched.until(lambda: waiting[36].getsockname() in _up_at(watched))
+    assert len(watched.states) == 5
+    waiting[40].sendall(bytes(300))
+    watched.until(lambda: watched.changes[-1].words.endswith("packet: bytes without a packet"))
+    waiting[41].close()
+    watched.until(lambda: watched.changes[-1].words.endswith("packet: closed by the other end"))
+    link.close()
+    assert not any(map(is_open, waiting[42:]))
+    for each in first + waiting:
+        each.close()
 
 
 @pytest.mark.parametrize("is_signed", [True, False])
@@ -258,7 +312,7 @@ def test_who_is_silent_on_a_link_for_signed_packets_is_closed(
 ) -> None:
     """On others it may listen: anybody could send a valid packet there."""
     heard = set[Peer]()
-    small.watch(heard.__contains__, is_signed=is_signed)
+    small.watch(heard.__contains__, has_packet=has_packet, is_signed=is_signed)
     watched, (silent, valid) = up(small, 2)
     heard.add(valid.getsockname())
     end = time.monotonic() + 0.5
@@ -273,17 +327,20 @@ def test_beyond_the_limit_there_is_a_place_for_a_short_time_also_for_a_stop(
     small: TcpInLink,
 ) -> None:
     """All places are taken by clients that are heard."""
-    small.watch(lambda _peer: True, is_signed=False)
+    small.watch(lambda _peer: True, has_packet=has_packet, is_signed=False)
     watched, clients = up(small, 3)
     for number in range(30):
         with dial(small) as late:
-            late.sendall(b"stop")
+            late.sendall(PACKET)
             peer = late.getsockname()
-            watched.until(lambda peer=peer: watched.heard(peer) == b"stop")  # type: ignore[misc]
+            watched.until(lambda peer=peer: watched.heard(peer) == PACKET)  # type: ignore[misc]
             if number % 2:
                 clients.append(late.dup())  # stays
     watched.until(lambda: small.refused == 15)
     assert [is_open(each) for each in clients] == [True] * 3 + [False] * 15
+    clients.append(dial(small))  # and says nothing
+    watched.until(lambda: watched.changes[-1].state is PeerState.REFUSED)
+    assert watched.changes[-1].words.endswith("without a valid packet: 0.2 s are over")
     for client in clients:
         client.close()
 
