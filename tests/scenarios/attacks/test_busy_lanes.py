@@ -58,16 +58,6 @@ def test_an_operators_requests_are_answered_beside_an_observers_flood(
     assert answers(world, operator) == [ACCEPTED] * 20
 
 
-@FLOODS
-def test_another_observers_requests_are_answered_too(
-    make_world: MakeWorld, messages: tuple[int, ...]
-) -> None:
-    world = flooded(make_world, messages)
-    other = world.add_client("other", system_id=OTHER)
-    world.run(2.0)
-    assert answers(world, other) == [ACCEPTED] * 20
-
-
 def test_what_is_too_much_is_called_busy_and_never_unsupported(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(roles=Roles(addresses=ADDRESSES)), conditions=RADIO)
     flooder = world.add_client("flooder", system_id=OBSERVER)

@@ -82,19 +82,6 @@ def continued(world: World) -> tuple[FakeClient, list[tuple[float, bytes]]]:
     return script, sent
 
 
-@pytest.mark.parametrize("halt", ["pause", "HOLD"])
-def test_packets_that_a_net_brings_once_more_undo_no_newer_halt(world: World, halt: str) -> None:
-    script, sent = continued(world)
-    HALTS[halt](world, world.add_client("person"))
-    world.run(4)
-    late = world.now - sent[0][0]
-    for when, packet in sent:
-        world.run(when + late - world.now)
-        script.send_raw(packet)
-    world.run(1)
-    assert stays(world, 5)
-
-
 def test_who_means_it_anew_is_heard_4_s_later_all_the_same(world: World) -> None:
     script, _ = continued(world)
     HALTS["pause"](world, world.add_client("person"))

@@ -86,51 +86,6 @@ def test_an_arming_that_its_disarming_has_overtaken_begins_no_task(waiting: Worl
     assert waiting.paused() is R.OPERATOR
 
 
-def test_who_arms_it_after_that_means_it(waiting: World) -> None:
-    catch_arming(waiting)
-    waiting.client.arm()
-    waiting.run(0.1)
-    disarmed_at_last(waiting)
-    waiting.client.arm()
-    waiting.until_state(1, S.EXECUTING)
-
-
-def test_our_own_arming_is_called_back_as_well(world: World) -> None:
-    caught = catch_arming(world)
-    world.client.move(5, speed=0.5)
-    world.until(lambda: bool(caught), within=5)
-    world.watched.loses = lambda *_: False
-    disarmed_at_last(world)
-    world.bring_late(caught[0])
-    world.run(2)
-    assert stays(world, 3)
-    assert not world.rover.autopilot.armed
-
-
-def test_nor_does_one_arm_it_that_comes_after_a_stop(world: World) -> None:
-    caught = catch_arming(world)
-    world.client.move(5, speed=0.5)
-    world.until(lambda: bool(caught), within=5)
-    world.watched.loses = lambda *_: False
-    world.client.stop()
-    world.run(0.5)
-    world.bring_late(caught[0])
-    world.run(2)
-    assert stays(world, 3)
-    assert not world.rover.autopilot.armed
-
-
-def test_a_person_at_the_rover_arms_it_all_the_same(waiting: World) -> None:
-    """Though a client had asked for that before its disarming."""
-    catch_arming(waiting)
-    waiting.client.arm()
-    waiting.run(0.1)
-    disarmed_at_last(waiting)
-    waiting.run(5)
-    waiting.operator_arm(armed=True)
-    waiting.until_state(1, S.EXECUTING)
-
-
 def test_a_second_copy_of_a_return_does_not_undo_a_hold(world: World) -> None:
     """The net brings it to the rover twice, once before the HOLD and once after it."""
     away_from_home(world)

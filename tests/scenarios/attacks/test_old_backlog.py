@@ -5,15 +5,12 @@ of 20 s ago reached the rover, and a submission was driven that its client had g
 """
 
 import pytest
-from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
-    ARM,
     GUIDED,
     HOLD,
     MANUAL,
@@ -26,9 +23,7 @@ from tests.kit.client import (
     setpoint,
     sticks,
 )
-from tests.kit.mission import Item, Upload
-from tests.kit.world import World, at
-from tests.scenarios.conftest import MakeWorld
+from tests.kit.world import World
 
 STOOD = 20.0  # s
 WAYPOINT, CANCEL, START = 16, 54010, 300
@@ -111,12 +106,6 @@ def test_old_sticks_modes_and_set_points_do_not_move_an_armed_rover(
     assert not passed & MOVING
 
 
-def test_an_old_forced_arming_does_not_arm(world: World) -> None:
-    in_the_standstill(world, command_long(ARM, 1, 21196, target=(1, 1)))
-    world.run(1)
-    assert not world.rover.autopilot.armed
-
-
 def test_a_submission_that_its_client_has_given_up_on_is_not_driven(world: World) -> None:
     world.leave(world.server)
     world.watched.is_server_away = True
@@ -140,17 +129,6 @@ def test_a_submission_that_waited_for_a_second_is_taken_in(world: World) -> None
     assert submitted.answer == (ACCEPTED, 1)
 
 
-@pytest.mark.parametrize("guided", ["queue", "now"])
-def test_a_place_as_a_plan_item_is_not_driven_to_either(make_world: MakeWorld, guided: str) -> None:
-    world = make_world(settings=Settings(guided=guided))
-    world.client.mode(HOLD)
-    world.client.arm()
-    world.run(2)
-    in_the_standstill(world, Item(WAYPOINT, **at(5.0, 0.0), current=2).message(0, 0, (1, 1)))
-    assert moved(world, 8) < 0.01
-    assert world.tasks() == ()
-
-
 def test_a_cancel_of_what_is_held_since_lets_nothing_else_go(world: World) -> None:
     """It was driven when its sender called it off; now somebody has to look first."""
     world.client.move(20)
@@ -161,22 +139,3 @@ def test_a_cancel_of_what_is_held_since_lets_nothing_else_go(world: World) -> No
     assert moved(world, 6) < 0.01
     assert world.state(1) == (S.HELD, R.LATE)
     assert world.client.acks_of(CANCEL) == [(TEMPORARILY_REJECTED, R.STALE)]
-
-
-def test_a_clearing_of_a_mission_held_since_lets_nothing_else_go(world: World) -> None:
-    drive = (Item(WAYPOINT, frame=0, current=1), Item(WAYPOINT, **at(20.0, 0.0)))
-    upload = Upload(world.client, drive, target=(1, 1))
-    world.until(lambda: upload.result == 0, within=5)
-    started = world.client.command(START, target=(1, 1))
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    assert started.result == ACCEPTED
-    world.client.move(20)
-    world.run(1)
-    world.observer.expects_gaps = True
-    in_the_standstill(world, common.MAVLink_mission_clear_all_message(1, 1, 0))
-    world.run(0.5)
-    assert moved(world, 8) < 0.001
-    assert world.state(1) == (S.HELD, R.LATE)
-    assert "clear: delayed by the server; task 1 is held now: clear again" in "".join(
-        world.client.texts()
-    )

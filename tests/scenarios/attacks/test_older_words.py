@@ -13,12 +13,10 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
-    ARM,
     AUTO,
     GUIDED,
     HOLD,
     PAUSE_CONTINUE,
-    RTL,
     SET_MODE,
     TEMPORARILY_REJECTED,
     FakeClient,
@@ -108,52 +106,6 @@ def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str)
     assert driven_since(world, 2) < 0.001
 
 
-@pytest.mark.parametrize(("mode", "target"), [(GUIDED, (1, 1)), (RTL, (1, 1))])
-def test_copies_of_a_mode_undo_no_newer_hold(
-    world: World, mode: int, target: tuple[int, int]
-) -> None:
-    station, person = world.client, world.add_client("person")
-    station.arm()
-    world.run(1)
-    word = command_long(SET_MODE, 1, mode, target=target)
-    station.send(word)
-    world.run(1)
-    person.mode(HOLD)
-    world.run(1)
-    copies(station, word, 4, world, each=1.0)
-    world.run(1)
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
-def test_copies_of_an_arming_do_not_arm_what_was_disarmed_since(world: World) -> None:
-    station, person = world.client, world.add_client("person")
-    word = command_long(ARM, 1, target=(1, 1))
-    station.send(word)
-    world.run(1)
-    person.arm(False)
-    world.run(1)
-    copies(station, word, 5, world, each=1.0)
-    world.run(1)
-    assert not world.rover.autopilot.armed
-
-
-def test_a_copy_that_the_net_delivers_20_s_late_undoes_nothing(world: World) -> None:
-    """Its sender's numbers show that it had left long before."""
-    script, person = world.add_client("script", system_id=245), world.add_client("person")
-    script.move(20)
-    world.until_state(1, S.EXECUTING)
-    person.pause()
-    world.run(4)
-    late = script.packed(command_long(PAUSE_CONTINUE, 1, confirmation=3))
-    script.send(command_long(PAUSE_CONTINUE, 1))
-    world.run(3)
-    person.pause()
-    world.run(20)
-    script.send_raw(late)
-    assert driven_since(world, 3) < 0.001
-    assert world.paused() is R.OPERATOR
-
-
 @pytest.mark.parametrize("apart", [0.0, 0.02, 5.0])
 @pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
 def test_a_continue_that_its_senders_own_halt_has_overtaken_does_not_count(
@@ -206,17 +158,6 @@ def test_what_mavsdk_repeats_by_itself_does_not_undo_its_own_halt(world: World, 
 
 
 # people are not locked out
-
-
-def test_who_held_it_may_go_on_at_once(world: World) -> None:
-    world.client.move(20)
-    world.until_state(1, S.EXECUTING)
-    for _ in range(5):
-        world.client.pause()
-        world.run(0.3)
-        going = world.client.proceed()
-        world.run(0.5)
-        assert going.answer == (ACCEPTED, 1)
 
 
 @pytest.mark.parametrize("drives", [AUTO, GUIDED])

@@ -113,27 +113,6 @@ def test_a_newer_word_of_another_link_counts_however_late_it_is_read(
         assert driven_since(world, 6) > 1.0
 
 
-def test_copies_of_an_older_word_undo_no_halt(world: World) -> None:
-    """The first copy counts, also when the next one arrives after the halt."""
-    person, script = world.add_client("person"), world.add_client("script", system_id=245)
-    now = world.now
-    read(world, CLIENT_LINK, person, HALTS["STOP"], arrived=now + MS / 2, at=now + MS)
-    read(world, SECOND, script, GO_WORDS["continue"], arrived=now, at=now + 2 * MS)
-    for copy in (1, 2, 3):
-        again = command_long(PAUSE_CONTINUE, 1, confirmation=copy)
-        read(world, SECOND, script, again, arrived=now + copy, at=now + copy)
-    assert driven_since(world, 3) < 0.001
-    assert world.paused() is R.STOPPED
-
-
-def test_who_sent_both_in_order_is_obeyed_though_they_are_read_late(world: World) -> None:
-    """A script that does not wait for the answers: its own numbers tell the order."""
-    script, now = world.add_client("script", system_id=245), world.now
-    read(world, SECOND, script, HALTS["pause"], arrived=now, at=now + MS)
-    read(world, SECOND, script, GO_WORDS["continue"], arrived=now + MS / 2, at=now + 3 * MS)
-    assert driven_since(world, 4) > 1.0
-
-
 def test_a_new_task_of_before_a_halt_is_refused_where_it_would_be_driven(world: World) -> None:
     """Nothing is paused after a cancel: what waits is driven."""
     person, script = world.add_client("person"), world.add_client("script", system_id=245)

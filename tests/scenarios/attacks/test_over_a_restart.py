@@ -10,20 +10,18 @@ from struct import unpack_from
 import pytest
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, HOLD, MOVE, PAUSE_CONTINUE, command_long
+from tests.kit.client import ACCEPTED, HOLD, MOVE, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.attacks.test_late_arming import is_arming, mode_of
-from tests.scenarios.attacks.test_late_to_the_rover import catch, mend
+from tests.scenarios.attacks.test_late_to_the_rover import mend
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
 from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
 SETPOINT, MODE, DISARM = 84, 176, 400
 COMMANDS, NUMBER = (75, 76), 38
-CONTINUE = command_long(PAUSE_CONTINUE, 1)
 ENDS = pytest.mark.parametrize("ends", ["well", "killed"])
 
 
@@ -81,27 +79,6 @@ def test_a_halt_that_has_not_come_is_asked_for_again(
     mend(world)
     world.run(4)
     assert halted.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
-
-
-@ENDS
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
-def test_a_return_that_comes_late_after_it(world: World, path: Path, halt: str, ends: str) -> None:
-    person = world.add_client("person")
-    away_from_home(world)
-    world.client.mode(HOLD)
-    world.run(4)
-    caught = catch(world, RETURN)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(0.1)
-    mend(world)
-    halted = {"STOP": person.stop, "pause": person.pause}.get(halt, lambda: person.mode(HOLD))()
-    world.run(0.3)
-    assert halted.result == ACCEPTED
-    restart(world, path, ends=ends)
-    world.run(1.2)
-    world.bring_late(caught[0])
-    world.run(4)
     assert mode_of(world) is Mode.HOLD
 
 
@@ -200,29 +177,3 @@ def test_a_halt_after_it_lets_no_older_continue_through(
     assert halted.result == ACCEPTED
     assert late.result != ACCEPTED
     assert stays(world, 5)
-
-
-@ENDS
-@pytest.mark.parametrize("wait", [6.0, 15.0])
-def test_a_continue_whose_sender_has_spoken_since(
-    world: World, path: Path, ends: str, wait: float
-) -> None:
-    """Its number is from before the first that the new server has heard of its sender."""
-    script = world.add_client("script", system_id=245)
-    person = world.add_client("person", system_id=254)
-    world.run(1)
-    world.client.move(20)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=20)
-    script.pause()
-    world.run(3)
-    late = script.send_repeated(CONTINUE)
-    world.run(0.5)
-    halted = person.pause()
-    world.run(0.5)
-    assert halted.result == ACCEPTED
-    restart(world, path, ends=ends)
-    world.run(wait)
-    script.send_raw(late)
-    world.run(0.2)
-    assert stays(world, 4)
-    assert world.paused() is not R.NONE

@@ -67,19 +67,3 @@ def test_one_that_drives_home_during_a_gap_is_stopped_after_it(
     assert mode_of(world) is Mode.HOLD
     world.run(8)
     assert abs(world.truth.forward_speed) < 0.05
-
-
-def test_who_has_switched_it_during_a_gap_keeps_it(make_world: Callable[..., World]) -> None:
-    world = make_world()
-    person = world.add_client("person")
-    away_from_home(world)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(1)
-    cut(world)
-    person.mode(HOLD)
-    world.run(6)
-    world.operator_mode(Mode.MANUAL)
-    world.run(2)
-    mend(world)
-    world.run(5)
-    assert mode_of(world) is Mode.MANUAL

@@ -101,15 +101,6 @@ def test_a_slow_mission_keeps_no_fence_out(world: World) -> None:
     assert not slow.acks, "and goes on"
 
 
-def test_a_lower_role_displaces_nobody(world: World) -> None:
-    slow = SlowUpload(join(world, 12))
-    world.run(3.0)
-    submitter = join(world, 10)
-    assert result(world, Upload(submitter, PLAN)) == MISSION_DENIED
-    assert any("another client is uploading" in text for text in submitter.texts())
-    assert not slow.acks
-
-
 def test_an_upload_that_is_slow_for_ever_ends(world: World) -> None:
     """After a minute and half a second for each item: 35 of them at this pace."""
     began = world.now

@@ -13,7 +13,6 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
@@ -122,22 +121,6 @@ def test_a_person_at_the_rover_has_it_all_the_same(world: World) -> None:
     assert world.rover.autopilot.mode is Mode.MANUAL
 
 
-def test_who_takes_it_for_a_return_while_a_task_drives_has_it(world: World) -> None:
-    """Though a client had asked for a mode before, and a task was called off just now."""
-    world.client.move(20)
-    world.client.move(21)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    world.client.mode(GUIDED)
-    world.run(5)
-    world.client.command(CANCEL, 1)
-    world.until_state(2, S.EXECUTING)
-    world.run(0.3)
-    world.operator_mode(Mode.RTL)
-    world.run(3)
-    assert world.rover.autopilot.mode is Mode.RTL
-    assert world.paused() is R.TAKEOVER
-
-
 def test_a_pause_stops_what_somebody_has_taken_since_its_task_was_paused(world: World) -> None:
     world.client.move(20)
     world.until(lambda: world.truth.north > 3, within=40)
@@ -161,22 +144,6 @@ def px4(make_world: MakeWorld) -> World:
     return world
 
 
-def test_a_pause_stops_a_paused_rover_that_another_station_has_sent_to_a_place(px4: World) -> None:
-    """A PX4 shows HOLD all the way there."""
-    px4.rover.autopilot.parameters["RO_SPEED_LIM"] = 1.0
-    px4.client.pause()
-    px4.run(3)
-    other = px4.net.link("other station")
-    other.send("rover1", go_to(30, 5).pack(common.MAVLink(None, 255, 190)))
-    px4.run(4)
-    assert px4.rover.autopilot.mode is Mode.HOLD
-    assert px4.truth.forward_speed > 0.3
-    paused = px4.client.pause()
-    px4.run(4)
-    assert paused.result == ACCEPTED
-    assert stays(px4, 4)
-
-
 def test_a_go_to_that_its_senders_hold_has_overtaken_does_not_undo_it(px4: World) -> None:
     late = px4.client.send_repeated(go_to(5, 5))
     held = ask_mode(px4.client, PX4_HOLD)
@@ -198,13 +165,3 @@ def test_nor_does_a_copy_of_one_from_before_that(px4: World) -> None:
     px4.client.send(go_to(5, 5))
     px4.run(2)
     assert stays(px4, 4)
-
-
-def test_a_go_to_after_its_senders_hold_undoes_it(px4: World) -> None:
-    """As MAVSDK sends both."""
-    ask_mode(px4.client, PX4_HOLD)
-    px4.run(0.2)
-    px4.client.send(go_to(5, 5))
-    px4.run(3)
-    assert px4.paused() is R.NONE
-    assert px4.truth.forward_speed > 0.3
