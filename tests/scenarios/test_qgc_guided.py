@@ -7,7 +7,6 @@ import pytest
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
-from tests.kit.px4 import PROMPT_PX4
 from tests.kit.qgc.joined import (
     degrees,
     each_guided,
@@ -19,11 +18,10 @@ from tests.kit.qgc.joined import (
 )
 from tests.kit.qgc.party import QgcParty
 from tests.kit.qgc.profile import V4, Profile
-from tests.kit.world import PROMPT, World, is_at
+from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
 PAUSE_CONTINUE, STOP, MOVE, DRIVE = 193, 54003, 54000, 54002
-WHILE_DRIVING = {"disarm", "emergency stop", "go to", "pause", "return", "mode", "actions"}
 
 
 def driving(world: World, profile: Profile) -> QgcParty:
@@ -56,39 +54,9 @@ class TestWhileDriving:
         assert len(world.tasks()) == 1
         assert party.qgc.screen.complaints == []
 
-    def test_return_goes_home(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = driving(world, profile)
-        party.operator.return_home()
-        world.until_state(2, S.COMPLETED, within=60)
-        assert is_at(world, 0.0, 0.0)
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-        assert party.qgc.count_sent("SET_MODE") <= 1
-        assert party.qgc.screen.complaints == []
-
 
 @each_pair
 class TestAlsoWhileDriving:
-    def test_the_buttons_are_there(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = driving(world, profile)
-        assert party.operator.offers >= WHILE_DRIVING
-        assert party.qgc.screen.complaints == []
-
-    def test_the_speed_is_changed(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = driving(world, profile)
-        party.operator.change_speed(0.2, is_offered=False)
-        world.run(3)
-        assert world.truth.forward_speed == pytest.approx(0.2, abs=0.05)
-        assert party.qgc.screen.complaints == []
-
     def test_the_mode_menu_is_obeyed(
         self, make_world: MakeWorld, persona: Persona, profile: Profile
     ) -> None:
@@ -102,28 +70,6 @@ class TestAlsoWhileDriving:
         assert world.rover.autopilot.mode is Mode.MANUAL
         assert world.state(1) == (S.PAUSED, R.TAKEOVER)
         assert party.qgc.screen.complaints == []
-
-
-@pytest.mark.parametrize(
-    "persona",
-    [PROMPT, PROMPT_PX4],
-    ids=lambda p: p.name,
-)
-def test_a_rover_that_has_driven_may_be_sent_to_a_place(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    """It stands armed in HOLD, and nothing of it but its status tells that from having landed."""
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.operator.set_mode(persona.modes.numbers[Mode.HOLD])
-    world.run(1.2)
-    party.operator.arm()
-    world.run(1.2)
-    party.operator.action(MOVE, 0.3, component=191)
-    world.until_idle(tasks=1)
-    world.run(2)
-    assert world.rover.autopilot.armed
-    assert party.operator.offers >= {"go to", "emergency stop"}
 
 
 @pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
