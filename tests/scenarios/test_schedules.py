@@ -1,17 +1,15 @@
 """Tasks that repeat: a day of runs, crashes, STOP, outages, clocks that are set."""
 
-from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from shutil import copy
-from struct import unpack
 
 import pytest
 
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.mavlink.label import text_pieces
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import Event, TaskModified, TaskSubmitted, VehicleNoted
+from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -127,15 +125,6 @@ def test_a_day_of_hourly_runs(make_world: MakeWorld) -> None:
     assert [each.state for each in made[:-1]] == [S.COMPLETED] * 24
 
 
-def test_a_task_status_shows_series_and_repetition(world: World) -> None:
-    task = every(world, HOUR, delay=30)
-    world.client.request_status(task)
-    world.run(0.1)
-    payload = [p.payload for p in world.client.of_id(54000)][-1].ljust(200, b"\0")
-    series, repeat = unpack("<I64s", payload[132:200])
-    assert (series, repeat.rstrip(b"\0")) == (task, b"3600")
-
-
 def test_a_cron_expression_sets_the_start_by_the_wall_clock(world: World) -> None:
     set_clock(world, UTC)
     task = submit(world)
@@ -170,15 +159,6 @@ def test_an_invalid_period_is_refused(world: World, period: float) -> None:
     world.run(0.05)
     assert sent.answer == (DENIED, R.BAD_PARAMETER)
     assert world.task(1).terms.repeat == ""
-
-
-def test_a_run_that_takes_longer_than_its_period_is_not_doubled(world: World) -> None:
-    every(world, 10, distance=6.0)  # takes 13 s or so
-    world.run(60)
-    check_each_series_once(world)
-    made = runs(world)
-    assert [each.terms.start_at - made[0].terms.start_at for each in made[:3]] == [0, 20, 40]  # type: ignore[operator]
-    assert noted(world)[0].startswith("left out 1 run while task 1 waited or ran; task 2 is next")
 
 
 def test_a_run_in_a_paused_queue_waits_and_none_comes_behind_it(world: World) -> None:
@@ -230,15 +210,6 @@ def test_cancelling_the_series_ends_it_by_the_id_of_any_run(world: World, named:
     assert again.answer == (DENIED, R.WRONG_STATE)
 
 
-def test_a_series_can_end_after_its_present_run(world: World) -> None:
-    task = every(world, 20)
-    world.until_state(task, S.EXECUTING)
-    world.client.command(MODIFY, task, EVERY, 0)
-    world.until_state(task, S.COMPLETED)
-    world.run(40)
-    assert [each.id for each in runs(world)] == [task]
-
-
 @pytest.mark.parametrize("state", [S.SCHEDULED, S.QUEUED, S.EXECUTING])
 def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     """Hours after it, and long after a resume, nothing may start by itself."""
@@ -264,21 +235,6 @@ def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     assert waiting(world) == []
 
 
-def test_a_stop_of_one_rover_leaves_the_series_of_another(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    for number in (1, 2):
-        sent = world.client.command(54000, 0.2, 0, 0, 0, 0, 20, 5, target=(number, 191))
-        world.run(0.05)
-        world.client.command(MODIFY, sent.task_id, EVERY, 60, target=(number, 191))
-        world.run(0.05)
-    world.client.stop(target=(1, 191))
-    world.run(0.1)
-    assert [(each.vehicle, each.state) for each in runs(world)] == [
-        (1, S.KILLED),
-        (2, S.SCHEDULED),
-    ]
-
-
 @pytest.mark.parametrize("everything", [False, True])
 def test_a_cleared_queue_repeats_nothing(world: World, everything: bool) -> None:
     driven, _later = every(world, 30, distance=3.0), every(world, 30, delay=20)
@@ -288,16 +244,6 @@ def test_a_cleared_queue_repeats_nothing(world: World, everything: bool) -> None
     world.run(60)
     assert waiting(world) == []
     assert len(runs(world)) == 2
-
-
-def test_a_kill_ends_the_series(world: World) -> None:
-    task = every(world, 20)
-    world.until_state(task, S.EXECUTING)
-    world.client.command(CANCEL, task, 1)
-    world.run(30)
-    assert world.state(task)[0] is S.KILLED
-    assert waiting(world) == []
-    assert noted(world) == [f"will not repeat task {task}: killed"]
 
 
 def test_a_deadline_counts_from_each_start_and_its_end_is_one_run_only(world: World) -> None:
@@ -404,77 +350,7 @@ def test_a_run_that_was_driven_at_a_crash_is_held_and_the_series_waits_for_it(
     assert len(waiting(world)) == 1
 
 
-def test_an_end_without_a_run_behind_it_gets_one_after_a_restart(
-    make_world: MakeWorld, path: Path
-) -> None:
-    """As a gateway stores it that has no task id left."""
-    world = make_world(store=PromptSqliteStore(path, wall_offset=UTC), settings=GOES_ON)
-    task = every(world, 40)
-    world.until_state(task, S.EXECUTING)
-    ids = world.server.engine._registry.ids
-    ids.share()
-    world.until_state(task, S.COMPLETED)
-    world.run(1.0)
-    assert [each.id for each in runs(world)] == [task]
-    restart(world, path)
-    assert [each.terms.series for each in waiting(world)] == [task]
-    restart(world, path.with_name(f"{path.stem}+{path.suffix}"))
-    assert len(runs(world)) == 2
-    check_each_series_once(world)
-
-
-def test_when_ids_are_granted_again_the_next_run_is_made(world: World) -> None:
-    task = every(world, 40)
-    world.until_state(task, S.EXECUTING)
-    ids = world.server.engine._registry.ids
-    ids.share()
-    world.until_state(task, S.COMPLETED)
-    world.run(1.0)
-    assert waiting(world) == []
-    ids.grant(50, 10)
-    world.run(0.5)
-    assert [each.id for each in waiting(world)] == [50]
-
-
-def test_the_end_of_a_run_and_the_next_one_are_stored_in_one_append(
-    make_world: MakeWorld, path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store = PromptSqliteStore(path, wall_offset=UTC)
-    batches: list[list[Event]] = []
-    append = store.append
-
-    def noting(events: Sequence[Event]) -> None:
-        batches.append(list(events))
-        append(events)
-
-    monkeypatch.setattr(store, "append", noting)
-    world = make_world(store=store)
-    every(world, 20)
-    world.run(90)
-    with_runs = [
-        b for b in batches if any(isinstance(e, TaskSubmitted) and e.task.is_made for e in b)
-    ]
-    assert len(with_runs) >= 3
-    for batch in with_runs:
-        assert any(getattr(event, "new", None) in TERMINAL for event in batch)
-
-
 # clocks
-
-
-def test_a_clock_that_is_set_forward_leaves_out_what_it_passed(world: World) -> None:
-    set_clock(world, UTC)
-    submit(world)
-    cron(world, "0 * * * *", 1)
-    assert world.task(1).terms.start_utc == UTC + HOUR
-    set_clock(world, UTC + DAY + 60)
-    world.run(0.1)
-    assert world.state(1)[0] is S.SCHEDULED
-    assert world.task(1).terms.start_utc == UTC + DAY + HOUR
-    assert noted(world) == [
-        "left out 24 runs that passed meanwhile; task 1 starts 2027-01-16 09:00 UTC"
-    ]
-    assert len(world.events(TaskModified)) >= 1
 
 
 def test_a_clock_that_is_set_back_far_counts_from_now_and_a_little_does_not(world: World) -> None:
@@ -493,32 +369,3 @@ def test_a_clock_that_is_set_back_far_counts_from_now_and_a_little_does_not(worl
     world.run(0.1)
     assert world.task(following.id).terms.start_utc == UTC - DAY + HOUR
     check_each_series_once(world)
-
-
-def test_a_step_of_the_clock_changes_no_period(world: World) -> None:
-    set_clock(world, UTC)
-    task = every(world, 60, delay=30)
-    set_clock(world, UTC + DAY)
-    world.run(1)
-    assert world.state(task)[0] is S.SCHEDULED
-    set_clock(world, UTC - DAY)
-    world.until_state(task, S.COMPLETED, within=40)
-    assert noted(world) == []
-
-
-def test_a_deadline_moves_with_a_start_by_the_clock(world: World) -> None:
-    set_clock(world, UTC)
-    submit(world)
-    cron(world, "0 * * * *", 1)
-    world.client.command(MODIFY, 1, DEADLINE, 30)
-    world.run(0.1)
-    set_clock(world, UTC - 2 * HOUR)  # the run is now three hours ahead
-    world.run(60)
-    assert world.state(1)[0] is S.SCHEDULED
-    world.client.pause()
-    world.run(0.1)
-    set_clock(world, UTC + HOUR)
-    world.run(1)
-    assert world.state(1)[0] is S.QUEUED
-    world.run(31)
-    assert world.state(1) == (S.EXPIRED, R.DEADLINE)
