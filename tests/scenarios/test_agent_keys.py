@@ -10,7 +10,6 @@ import pytest
 from mav_tasks.agents import submission
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.submission import Wish
-from mav_tasks.client.idempotency import Numbers, numbers_of
 from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import NoAnswer, Refused, UsageError
 from mav_tasks.settings import Settings
@@ -83,24 +82,6 @@ def test_a_key_outlives_the_server(world: RoverWorld) -> None:
         world.server.start()
         async with agent(world) as rovers:
             assert (await submitted(rovers, "kept", start_in=3000.0)).id == task.id
-
-    world.run(script())
-
-
-def test_another_key_with_the_same_nonce_is_refused_though_the_content_is_equal(
-    world: RoverWorld, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def colliding(key: str, *, label: str) -> Numbers:
-        return numbers_of(key, label=label)._replace(nonce=4711)
-
-    monkeypatch.setattr(submission, "numbers_of", colliding)
-
-    async def script() -> None:
-        async with agent(world) as rovers:
-            first = await submitted(rovers, "one")
-            with pytest.raises(Refused, match="'other': it was used for another task"):
-                await submitted(rovers, "other")
-            assert (await submitted(rovers, "one")).id == first.id
 
     world.run(script())
 

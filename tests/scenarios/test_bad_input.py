@@ -121,23 +121,6 @@ def test_10000_bad_datagrams_change_nothing_and_are_counted(
     assert world.rover.autopilot.armed is False
 
 
-def test_bad_datagrams_do_not_disturb_a_driving_rover(world: World) -> None:
-    random = Random(5)
-    world.client.move(1)
-    world.until_state(1, S.EXECUTING)
-    while not world.is_idle(tasks=1):
-        for link, peer in ((CLIENT_LINK, "client"), (VEHICLE_LINK, "rover1")):
-            world.net.send(peer, link, garbage(random))
-            world.net.send("stranger", link, garbage(random))
-        world.run(0.02)
-    assert world.history(1) == [
-        (S.STARTING, R.NONE),
-        (S.EXECUTING, R.NONE),
-        (S.COMPLETED, R.NONE),
-    ]
-    assert world.truth.north == pytest.approx(1.0, abs=0.02)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_valid_packets_full_of_nonsense_raise_nothing(world: World, seed: int) -> None:
     """Every message of the base set, with random contents and a good CRC, on both sides."""
@@ -220,22 +203,6 @@ def test_nan_is_not_given_and_zero_is_nothing_to_do(world: World, command: int) 
     world.run(0.1)
     assert (given.answer, nothing.answer) == ((ACCEPTED, 1), (DENIED, R.BAD_PARAMETER))
     assert world.task(1).priority == 5
-
-
-def test_what_means_nothing_yet_is_refused_and_never_left_out(world: World) -> None:
-    reserved = world.client.command(MOVE, 1, 0, 7, 0, 0, 0, 5)
-    world.run(0.1)
-    unknown_task = world.client.command(MOVE, 1, 0, 0, 0, 99, 0, 5)
-    world.run(0.1)
-    option = world.client.command(54014, 1)
-    frame = world.client.command_int(MOVE, 1, frame=77)
-    world.run(0.1)
-    assert [s.answer for s in (reserved, unknown_task, frame)] == [
-        (DENIED, R.BAD_PARAMETER),
-        (DENIED, R.UNKNOWN_DEPENDENCY),
-        (DENIED, R.BAD_FRAME),
-    ]
-    assert option.answer == (common.MAV_RESULT_UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE)
 
 
 def test_unverified_bytes_of_our_own_address_are_no_second_server(world: World) -> None:

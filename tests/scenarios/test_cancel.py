@@ -57,24 +57,6 @@ def test_counted_copies_cancel_one_task_and_get_the_first_ones_answer(
     assert [t.state for t in world.tasks()] == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
 
 
-def test_a_copy_of_a_refused_cancel_cancels_nothing_that_has_begun_since(world: World) -> None:
-    world.client.command(CANCEL, 0)
-    world.client.move(1)
-    world.until_state(1, S.EXECUTING)
-    world.client.command(CANCEL, 0, confirmation=1)
-    world.run(0.1)
-    assert world.client.acks_of(CANCEL) == [(DENIED, R.NOT_FOUND)] * 2
-    world.client.command(CANCEL, 0)  # a new decision
-    world.until_state(1, S.CANCELLED, within=4)
-
-
-def test_a_counted_copy_whose_first_one_was_lost_counts(world: World) -> None:
-    driving(world)
-    sent = world.client.command(CANCEL, 0, confirmation=2)
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 1)
-
-
 def test_a_kill_is_zero_and_hold_at_once_and_no_latch(world: World) -> None:
     driving(world)
     at = world.now
@@ -144,16 +126,6 @@ def test_what_cannot_be_cancelled_is_said(
     sent = world.client.command(CANCEL, *params)
     world.run(0.1)
     assert sent.answer == answer
-
-
-def test_another_rovers_task_is_not_found_here(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.move(3, target=(2, 191))
-    world.run(0.1)
-    sent = world.client.command(CANCEL, 1, target=(1, 191))
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.NOT_FOUND)
-    assert world.state(1)[0] is not S.CANCELLED
 
 
 def test_command_cancel_takes_the_askers_latest_of_that_command(world: World) -> None:

@@ -6,8 +6,6 @@ import pytest
 
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.client import RTL
-from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
@@ -48,17 +46,6 @@ def test_a_go_to_is_driven_at_the_rovers_speed_within_the_bounds(
     world = cruising(make_world, cruise, fastest=fastest)
     goes(world)
     assert top_speed(world) == pytest.approx(driven, abs=0.05)
-
-
-def test_a_mission_and_a_return_are_driven_at_it_too(make_world: MakeWorld) -> None:
-    world = cruising(make_world, 1.2)
-    upload = Upload(world.client, [Item(WAYPOINT, **at(n, 0.0)) for n in (0.0, 12.0)])
-    world.until(lambda: upload.result is not None, within=5)
-    world.client.command(START, target=(1, 1))
-    assert top_speed(world) == pytest.approx(1.2, abs=0.05)
-    world.client.mode(RTL)
-    world.run(0.3)
-    assert abs(top_speed(world)) == pytest.approx(1.2, abs=0.05)
 
 
 @pytest.mark.parametrize("what", ["named", "changed", "at the task server", "of our own"])

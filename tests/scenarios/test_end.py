@@ -3,7 +3,6 @@
 import pytest
 
 from mav_tasks.engine.inputs import Shutdown
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import ServerStopped
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -27,16 +26,6 @@ def test_an_empty_queue_hands_the_rover_back_and_the_stream_ends(world: World) -
     assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
     assert world.stands()
     assert world.observer.sent_since(at) == []
-
-
-def test_a_rover_that_the_operator_armed_stays_armed(world: World) -> None:
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(1)
-    world.client.move(0.5)
-    world.until_idle(tasks=1)
-    world.run(3)
-    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, True)
 
 
 @pytest.mark.parametrize("after", [k * 0.003 for k in range(14)])
@@ -73,20 +62,6 @@ def test_the_orderly_end_is_zero_and_hold(world: World) -> None:
     assert [world.state(k) for k in (1, 2)] == [(S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE)]
 
 
-def test_a_server_that_drives_nothing_ends_at_once(world: World) -> None:
-    shut_down(world)
-    assert len(world.events(ServerStopped)) == 1
-
-
-def test_a_server_that_stops_a_standing_rover_ends_when_hold_is_seen(world: World) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    at = world.now
-    shut_down(world)
-    world.until(lambda: world.events(ServerStopped), within=3.1)
-    assert world.now - at < 0.7
-
-
 def test_a_lost_hold_is_sent_again_on_the_way_out(world: World) -> None:
     world.client.move(20, speed=1.0)
     world.run(4)
@@ -108,17 +83,6 @@ def test_submissions_are_refused_and_nothing_begins_on_the_way_out(world: World)
     assert refused.answer == (TEMPORARILY_REJECTED, R.RATE_LIMITED)
     world.run(5)
     assert world.state(2)[0] is S.QUEUED
-
-
-def test_waiting_tasks_do_not_begin_on_the_way_out(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(arming="operator"))
-    world.client.move(1)
-    world.run(1)
-    world.server.pump.handle(Shutdown(), now=world.now)
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(0.5)
-    assert world.state(1)[0] is S.QUEUED
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,6 @@ def box(command: int, south: float, west: float, north: float, east: float) -> l
     return corners(command, (south, west), (north, west), (north, east), (south, east))
 
 
-ERROR = 3  # MAV_SEVERITY
 YARD = box(INCLUSION, -3, -3, 3, 3)
 SILENT_AT = 1.0  # m north, where it still drives fast
 LOCAL_POSITION_NED = 32
@@ -58,17 +57,6 @@ def test_a_place_outside_is_denied_and_one_inside_is_driven_to(world: World) -> 
     assert go_to(world, 2, 1) == (ACCEPTED, 1)
     world.until_state(1, S.COMPLETED)
     assert is_at(world, 2, 1)
-
-
-def test_a_click_outside_is_refused_in_a_box_on_the_map(world: World) -> None:
-    """QGroundControl's own popup has no reason, and a warning stands in a list only."""
-    fenced(world, *YARD)
-    station = world.add_client("station", reads_dialect=False)
-    for _ in range(2):  # a second click soon after gets no second box
-        station.command_int(REPOSITION, -1, 0, 0, 0, **at(4, 0), frame=GLOBAL)
-        world.run(1)
-    said = [m for m in station.of_type("STATUSTEXT") if "fence" in m.text]
-    assert [(m.text, m.severity) for m in said] == [("the place is outside the fence", ERROR)]
 
 
 def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
@@ -131,13 +119,6 @@ def test_a_refused_upload_is_in_the_log_with_its_reason(
     assert world.client.texts().count(why) == 1
 
 
-def test_an_upload_that_nothing_more_comes_of_is_in_the_log(world: World) -> None:
-    world.client.send(common.MAVLink_mission_count_message(1, 1, 4, FENCE))
-    world.run(3)
-    (refused,) = world.events(SubmissionRefused)
-    assert "no item came for 2.3 s" in refused.text
-
-
 def test_an_item_outside_or_behind_an_exclusion_is_refused_as_it_comes(world: World) -> None:
     fenced(world, *YARD, *POND)
     outside = Upload(world.client, (HOME, place(0.5, 0), place(5, 0), place(0, 0)))
@@ -192,17 +173,6 @@ def test_a_rover_that_falls_silent_before_the_boundary_stops_before_it(
     assert world.stands()
 
 
-def test_a_way_that_a_new_fence_forbids_is_stopped(world: World) -> None:
-    world.client.move(20)
-    world.until_state(1, S.EXECUTING)
-    world.run(2)
-    fenced(world, *YARD)
-    world.until_state(1, S.HELD)
-    world.run(3)
-    assert world.state(1) == (S.HELD, R.FENCE)
-    assert world.truth.north < 3.0
-
-
 def test_a_rover_outside_may_come_back_in(world: World) -> None:
     world.client.move(4)
     world.until_idle(tasks=1)
@@ -210,13 +180,6 @@ def test_a_rover_outside_may_come_back_in(world: World) -> None:
     assert go_to(world, 1, 0) == (ACCEPTED, 2)
     world.until_state(2, S.COMPLETED)
     assert is_at(world, 1, 0)
-
-
-def test_without_a_fence_again_nothing_is_forbidden(world: World) -> None:
-    fenced(world, *YARD)
-    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, FENCE))
-    world.run(0.2)
-    assert go_to(world, 4, 0) == (ACCEPTED, 1)
 
 
 @pytest.mark.parametrize("how", ["command", "mode"])
@@ -252,28 +215,3 @@ def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float, tries
         world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
         world.run(1)
     assert on_board(world) == []
-
-
-def test_rally_points_are_on_board_too(world: World) -> None:
-    points = [Item(RALLY, **at(2, 2)), Item(RALLY, **at(-2, 0))]
-    fenced(world, *points, kind=RALLY_POINTS)
-    assert [command for command, _, _ in on_board(world, RALLY_POINTS)] == [RALLY, RALLY]
-
-
-def test_a_rover_that_does_not_answer_leaves_everything_as_it_was(world: World) -> None:
-    fenced(world, *YARD)
-    world.fault(Faults(deaf=True))
-    assert fenced(world, *box(INCLUSION, -9, -9, 9, 9)) == 1
-    world.run(0.1)
-    assert any("did not answer" in text for text in world.client.texts())
-    world.fault(Faults())
-    assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
-
-
-def test_the_answer_comes_in_time_for_who_waits_for_it(world: World) -> None:
-    world.fault(Faults(deaf=True))
-    upload = Upload(world.client, YARD, kind=FENCE)
-    world.until(lambda: len(upload.requests) == 4, within=1)
-    asked = world.now
-    world.until(lambda: upload.result is not None, within=5)
-    assert (upload.result, world.now - asked < 1.5) == (1, True)

@@ -1,6 +1,5 @@
 """Who has asked about a task is told how it goes on, whoever submitted it."""
 
-from mav_tasks.engine.clients.gcs_client import MAX_FOLLOWED
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import FakeClient
 from tests.kit.world import World
@@ -24,21 +23,3 @@ def test_who_has_asked_about_a_task_is_told_of_each_change(world: World) -> None
     assert states(other, first.task_id) == []
     seen = list(dict.fromkeys(states(other, second.task_id)))
     assert seen == [S.QUEUED, S.EXECUTING, S.COMPLETED]
-
-
-def test_those_asked_about_longest_ago_are_forgotten_first(world: World) -> None:
-    world.add_client("other", system_id=244)
-    world.run(1.5)
-    (served,) = [c for c in world.server.engine._gcs.clients if c.endpoint == "other"]
-    for task_id in range(MAX_FOLLOWED + 2):
-        served.follow(task_id)
-    served.follow(2)
-    served.follow(MAX_FOLLOWED + 5)
-    assert [served.follows(n) for n in (0, 1, 2, 3, 4, MAX_FOLLOWED)] == [
-        False,
-        False,
-        True,
-        False,
-        True,
-        True,
-    ]

@@ -9,14 +9,11 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
-    GET_INTERVAL,
     GUIDED,
-    HOLD,
     IDS,
     MOVE,
     REQUEST,
@@ -75,25 +72,6 @@ def test_no_client_sees_a_loss_that_is_none(world: World) -> None:
     for client in (world.client, other):
         assert [client.gaps(source) for source in ((1, 1), (1, 191))] == [0, 0]
     assert world.client.heard("ATTITUDE")
-
-
-def test_a_real_loss_stays_visible(world: World) -> None:
-    sent = lost = 0
-
-    def loses(source: str, target: str, _data: bytes) -> bool:
-        nonlocal sent, lost
-        if (source, target) != ("rover1", VEHICLE_LINK):
-            return False
-        sent += 1
-        lost += sent % 17 == 0
-        return sent % 17 == 0
-
-    world.watched.loses = loses
-    world.run(10)
-    world.watched.loses = lambda *_: False
-    world.run(2)
-    assert lost > 30
-    assert world.client.gaps((1, 1)) == lost
 
 
 def test_the_first_of_a_system_is_its_autopilots_heartbeat_then_ours_once_a_second(
@@ -159,25 +137,6 @@ def test_each_client_has_its_own_data_streams(world: World) -> None:
     }
     assert rates[ATTITUDE] == [pytest.approx(4, abs=0.3), 0, pytest.approx(10, abs=0.6)]
     assert rates[POSITION] == [pytest.approx(wish, abs=0.6) for wish in (2, 10, 10)]
-
-
-def test_an_interval_can_be_asked_for(world: World) -> None:
-    world.client.command(SET_INTERVAL, ATTITUDE, 40_000, target=(1, 1))
-    world.client.command(GET_INTERVAL, ATTITUDE, target=(1, 1))
-    world.run(0.1)
-    answer = world.client.of_type("MESSAGE_INTERVAL")[0]
-    assert (answer.message_id, answer.interval_us) == (ATTITUDE, 40_000)
-
-
-@pytest.mark.parametrize("message_id", [ATTITUDE, TASK_STATUS])
-def test_an_interval_that_is_too_long_to_be_told_is_the_longest(
-    world: World, message_id: int
-) -> None:
-    world.client.command(SET_INTERVAL, message_id, 3e38)
-    world.client.command(GET_INTERVAL, message_id)
-    world.run(0.1)
-    answer = world.client.of_type("MESSAGE_INTERVAL")[0]
-    assert (answer.message_id, answer.interval_us) == (message_id, 2**31 - 1)
 
 
 def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
@@ -257,15 +216,6 @@ def test_acks_go_to_who_asked_though_both_are_called_the_same(world: World) -> N
     assert [a.command for a in twin.acks] == [54001, REQUEST]
 
 
-def test_two_clients_send_the_same_command_at_once(world: World) -> None:
-    twin = world.add_client("twin")
-    world.run(0.1)
-    sent = [client.arm() for client in (world.client, twin)]
-    world.run(0.2)
-    assert [s.result for s in sent] == [ACCEPTED, ACCEPTED]
-    assert [len(c.acks) for c in (world.client, twin)] == [1, 1]
-
-
 def test_no_answer_in_0_4_s_is_a_rejection_and_the_late_ack_is_dropped(world: World) -> None:
     lost = world.lose_acks()
     at = world.now
@@ -278,32 +228,6 @@ def test_no_answer_in_0_4_s_is_a_rejection_and_the_late_ack_is_dropped(world: Wo
     assert len(world.client.acks) == 1
 
 
-def test_the_late_ack_of_one_client_is_not_given_to_another(world: World) -> None:
-    twin = world.add_client("twin")
-    world.run(0.1)
-    lost = world.lose_acks()
-    world.client.command(31000, target=(1, 1))
-    world.run(0.41)
-    world.watched.loses = lambda *_: False
-    second = twin.command(31000, target=(1, 1))
-    world.net.send("rover1", VEHICLE_LINK, lost[0])
-    world.run(0.05)
-    assert second.ack is None
-    world.run(0.6)
-    assert [len(c.acks) for c in (world.client, twin)] == [1, 1]
-
-
-def test_of_three_at_once_all_are_answered_within_half_a_second(world: World) -> None:
-    clients = [world.add_client(f"c{k}") for k in range(3)]
-    world.run(0.1)
-    world.lose_acks()
-    at = world.now
-    sent = [client.command(31000, target=(1, 1)) for client in clients]
-    world.run(2)
-    assert [s.result for s in sent] == [TEMPORARILY_REJECTED] * 3
-    assert all(s.acked_at - at <= 0.5 for s in sent)
-
-
 def test_disarm_never_waits(world: World) -> None:
     twin = world.add_client("twin")
     world.operator_arm(True)
@@ -314,17 +238,6 @@ def test_disarm_never_waits(world: World) -> None:
     twin.arm(False)
     world.run(0.05)
     assert not world.rover.autopilot.armed
-
-
-def test_an_answer_meant_for_another_ground_station_is_not_passed_on(world: World) -> None:
-    world.lose_acks()
-    world.client.command(31000, target=(1, 1))
-    world.run(0.05)
-    world.watched.loses = lambda *_: False
-    foreign = common.MAVLink_command_ack_message(31000, 0, 0, 0, 77, 190)
-    world.from_vehicle_side(packed(foreign, 1, 1), peer="rover1")
-    world.run(0.1)
-    assert world.client.acks == []
 
 
 @pytest.mark.parametrize("result", [7, 8, 9, 200])
@@ -350,15 +263,6 @@ def test_in_progress_is_not_passed_on_and_what_follows_is(world: World) -> None:
         world.run(0.05)
     assert [a.result for a in world.client.acks] == [ACCEPTED]
     assert sent.result == ACCEPTED
-
-
-def test_commands_for_systems_that_are_not_here_are_nobodys(world: World) -> None:
-    world.client.move(1, target=(9, 191))
-    world.client.stop(target=(9, 1))
-    world.client.arm(target=(9, 1))
-    world.run(1)
-    assert (world.client.acks, world.tasks()) == ([], ())
-    assert not world.rover.autopilot.armed
 
 
 # task status
@@ -443,18 +347,6 @@ def test_who_knows_our_dialect_is_told_of_its_tasks(world: World, how: str) -> N
     assert client.statuses(1)[-1].state == S.COMPLETED
 
 
-def test_a_stream_of_statuses_has_the_rate_that_was_asked_for(world: World) -> None:
-    world.client.move(4)
-    world.run(1)
-    world.client.command(SET_INTERVAL, TASK_STATUS, 200_000)
-    world.run(0.5)
-    since = world.now
-    world.run(4)
-    assert rate(world.client, TASK_STATUS, since, world.now) == pytest.approx(5, abs=0.5)
-    remaining = [s.remaining for s in world.client.statuses(1)][-15:]
-    assert remaining == sorted(remaining, reverse=True)
-
-
 def test_a_rover_with_a_191_of_its_own_moves_the_server_to_192(world: World) -> None:
     companion = common.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
     for seq in range(3):
@@ -494,26 +386,6 @@ def test_a_clients_setpoints_do_not_reach_a_rover_that_is_not_armed(world: World
     assert SETPOINT not in [packet.kind for packet in world.observer.reached]
     world.operator_arm(True)
     world.run(2)
-    assert world.stands()
-
-
-def test_a_clients_stream_does_not_move_a_rover_that_is_being_handed_back(world: World) -> None:
-    driver = world.add_client("driver")
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(0.5)
-    driver.mode(GUIDED)
-    world.run(0.2)
-    driver.stream(setpoint(0.5), rate=10)
-    world.run(2)
-    assert not world.stands()
-    world.fault(Faults(refuse_mode=True))
-    world.client.mode(HOLD)
-    world.run(0.1)
-    at = world.now
-    world.run(2)
-    assert world.control() == "RELEASING"
-    assert "move" not in world.observer.sent_since(at)
     assert world.stands()
 
 
@@ -568,14 +440,6 @@ def test_a_setpoint_that_is_not_finite_never_reaches_the_rover(world: World, fie
     assert slow.answer == (DENIED, R.BAD_PARAMETER)
 
 
-def test_a_mode_by_a_client_is_forwarded_and_answered(world: World) -> None:
-    asked = world.client.mode(10)
-    world.run(0.1)
-    assert world.client.acks_of(SET_MODE) == [(ACCEPTED, 0)]
-    assert asked.result == ACCEPTED
-    assert world.rover.autopilot.mode is Mode.AUTO
-
-
 def test_a_client_on_mavlink_1_is_a_client(make_world: MakeWorld) -> None:
     world = make_world()
     old = world.add_client("old")
@@ -612,38 +476,3 @@ def test_keys_are_not_set_through_the_server(world: World) -> None:
 
 
 # files
-
-
-@pytest.mark.parametrize("component", [1, 191])
-def test_a_file_that_nobody_has_is_refused_once_by_who_was_asked(
-    world: World, component: int
-) -> None:
-    asked = [
-        0xFF,
-        0x01,
-        7,
-        4,
-        3,
-        0,
-        0,
-        *b"\0\0\0\0\0a/b",
-    ]  # number 511, session 7, open for reading
-    payload = asked + [0] * (251 - len(asked))
-    other = world.add_client("other", system_id=245)
-    world.run(0.2)
-    world.client.send(common.MAVLink_file_transfer_protocol_message(0, 1, component, payload))
-    world.run(0.5)
-    (packet,) = world.client.of_id(110)
-    answer = world.client.decoded(packet)
-    assert packet.source == (1, component)
-    assert (answer.target_system, answer.target_component) == (255, 190)
-    assert list(answer.payload[:13]) == [0x00, 0x02, 7, 129, 1, 4, 0, 0, 0, 0, 0, 0, 10]
-    assert not list(other.of_id(110))
-
-
-def test_what_answers_no_request_of_ours_is_not_answered(world: World) -> None:
-    for opcode in (128, 129):
-        payload = [1, 0, 7, opcode] + [0] * 247
-        world.client.send(common.MAVLink_file_transfer_protocol_message(0, 1, 191, payload))
-    world.run(0.5)
-    assert not list(world.client.of_id(110))

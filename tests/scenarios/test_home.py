@@ -10,7 +10,7 @@ from rover_sim.personas import Persona
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import PROMPT, World, at, put_home
+from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_restart import restart
 
@@ -64,19 +64,6 @@ def make(make_world: MakeWorld, persona: Persona, path: Path) -> World:
     assert far_from(world, 3.0, 0.0) < NEAR
     world.until(lambda: not world.rover.autopilot.armed, within=10)
     return world
-
-
-@both
-def test_home_is_where_the_rover_was_armed_last(
-    make_world: MakeWorld, persona: Persona, path: Path
-) -> None:
-    world = make(make_world, persona, path)
-    world.run(1.1)
-    arm(world)
-    drive(world, (3.0, 3.0))
-    world.until_idle(tasks=3)
-    go_home(world, tasks=4)
-    assert far_from(world, 3.0, 0.0) < NEAR
 
 
 def test_a_return_at_once_after_the_arming_knows_the_new_home(
@@ -137,16 +124,6 @@ def test_a_client_sets_home_and_it_lasts_over_arming_and_the_server(
     assert far_from(world, 2.0, 1.0) < NEAR
 
 
-def test_home_that_another_station_sets_at_the_rover_is_home(
-    make_world: MakeWorld, path: Path
-) -> None:
-    world = make(make_world, PROMPT_PX4, path)
-    put_home(world, 1.0, 2.0)
-    world.run(2.1)  # the server reads it each 2 s
-    go_home(world, tasks=3)
-    assert far_from(world, 1.0, 2.0) < NEAR
-
-
 @both
 def test_a_return_that_was_paused_goes_on_to_the_home_of_now(
     make_world: MakeWorld, persona: Persona, path: Path
@@ -164,16 +141,3 @@ def test_a_return_that_was_paused_goes_on_to_the_home_of_now(
     world.client.proceed()
     world.until_idle(tasks=4)
     assert far_from(world, 1.0, 3.0) < NEAR
-
-
-def test_a_rover_that_has_booted_again_says_where_home_is(
-    make_world: MakeWorld, path: Path
-) -> None:
-    world = make(make_world, PROMPT, path)
-    world.client.command_int(SET_HOME, 0, 0, 0, nan, **at(2.0, 1.0), frame=0, target=(1, 1))
-    world.run(20)  # longer than two estimates of when it booted may differ
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(10)
-    drive(world, (5.0, 0.0), Item(RETURN))
-    world.until_idle(tasks=3)
-    assert far_from(world, 3.0, 0.0) < NEAR

@@ -4,7 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as ardupilot
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, PeerChanged
+from mav_tasks.engine.inputs import KeysChanged, PeerChanged
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Clients, Limits, Roles, Settings
@@ -17,7 +17,6 @@ from tests.kit.client import (
     AUTO,
     DENIED,
     GUIDED,
-    STOP,
     FakeClient,
     Message,
     set_mode,
@@ -88,19 +87,6 @@ def test_a_key_that_may_less_now_may_less_at_once(world: World, role: str) -> No
     assert len(world.tasks()) == 1
 
 
-def test_a_link_s_own_key_that_is_of_vehicles_now_is_no_client_s(world: World) -> None:
-    put(world, ALICE)
-    for up in (False, True):
-        change = LinkChanged(CLIENT_LINK, LinkSide.CLIENTS, up=up, key="alice")
-        world.server.pump.handle(change, now=world.now)
-    client = connected(world, ALICE)
-    vehicles = Key("alice", ALICE.secret, "")
-    world.server.pump.handle(KeysChanged((vehicles, BOB)), now=world.now)
-    world.run(2.0)
-    assert answer(world, client.move(2.0)) is None
-    assert world.tasks() == ()
-
-
 def test_requests_are_counted_whoever_else_signs_at_the_same_endpoint(world: World) -> None:
     """Or else a packet of another role between would begin each count anew."""
     few = Roles(unsigned="observer", submitter=Limits(rate=1.0), observer=Limits(rate=0.8))
@@ -136,17 +122,6 @@ def test_a_flood_of_go_to_items_fills_neither_disk_nor_net(with_roles: MakeRoles
     assert len(observer.texts()) <= 30
 
 
-def test_go_to_items_are_requests_as_others_are(with_roles: MakeRoles) -> None:
-    world = with_roles(submitter=Limits(rate=2.0))
-    submitter = join(world, SUBMITTER)
-    world.client.pause()
-    world.run(2.0)
-    for number in range(60):
-        submitter.send(go_to_item(2.0 + 2 * number))
-    world.run(0.3)
-    assert 5 <= len(world.tasks()) <= 12
-
-
 @pytest.mark.parametrize("message", ["ping", "timesync", "mission request", "mission ack"])
 def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
     with_roles: MakeRoles, message: str
@@ -171,18 +146,6 @@ def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
         observer.send(sent)
     world.run(0.5)
     assert 1 <= len(towards) <= 20
-
-
-def test_only_a_command_is_a_stop_that_is_never_too_much(with_roles: MakeRoles) -> None:
-    """Other messages, too, have a field for a command: they are counted."""
-    world = with_roles(observer=Limits(rate=2.0))
-    observer = join(world, OBSERVER)
-    before = world.server.engine._door.left_out
-    for _ in range(100):
-        observer.send(common.MAVLink_command_ack_message(STOP, 0, 0, 0, 1, 1))
-    world.run(0.2)
-    assert world.server.engine._door.left_out - before >= 80
-    assert answer(world, observer.stop()) is not None
 
 
 @pytest.mark.parametrize(
@@ -259,13 +222,6 @@ def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
     assert (message.get_msgId() in towards) == (who != OPERATOR)
 
 
-def test_switching_the_fence_off_as_a_switch_does_is_of_safety(with_roles: MakeRoles) -> None:
-    world = with_roles()
-    operator = join(world, OPERATOR)
-    fence = operator.command(218, 11, 0, target=(1, 1))  # DO_AUX_FUNCTION
-    assert answer(world, fence) == (DENIED, R.NOT_ALLOWED)
-
-
 def test_what_a_revoked_key_drives_stands(world: World) -> None:
     """It is not waited for until the rover itself misses the setpoints."""
     put(world, ALICE)
@@ -338,16 +294,3 @@ def test_an_upload_is_of_who_began_it_and_not_of_its_endpoint(world: World) -> N
     client.send(items(1))
     world.run(0.3)
     assert [task.submitter.key for task in world.tasks()] == ["alice"]
-
-
-def test_a_program_s_heartbeat_at_the_rover_s_address_is_none_of_the_rover(world: World) -> None:
-    """A ground station that is set up with the rover's ids, heard on the rover's link."""
-    world.client.move(3.0)
-    world.until_state(1, S.EXECUTING)
-    rovers_address = common.MAVLink(None, 1, 1)
-    for _ in range(20):
-        station = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)  # disarmed, by what it says
-        world.net.send("rover1", "server:vehicles", station.pack(rovers_address))
-        world.run(0.1)
-    assert world.state(1)[0] is S.EXECUTING
-    world.until_state(1, S.COMPLETED)

@@ -34,17 +34,6 @@ def test_a_refusal_names_the_row_of_the_file(
 
 
 @pytest.mark.parametrize(("persona", "before", "component"), WAYS)
-def test_a_wrong_parameter_names_the_row_of_the_file(
-    make_world: MakeWorld, persona: Persona, before: list[Item], component: int
-) -> None:
-    world = make_world(persona=persona)
-    wrong = Item(178, frame=2, param1=1, param2=-5.0)
-    upload = Upload(world.client, [*before, NEAR, wrong], target=(1, component))
-    world.until(lambda: upload.result is not None, within=5)
-    assert any("item 2: param2 speed -5" in text for text in world.client.texts())
-
-
-@pytest.mark.parametrize(("persona", "before", "component"), WAYS)
 def test_status_and_log_count_as_the_file_does(
     make_world: MakeWorld, persona: Persona, before: list[Item], component: int
 ) -> None:
@@ -64,18 +53,6 @@ def test_status_and_log_count_as_the_file_does(
     advanced = {event.item for event in world.events(TaskAdvanced)}
     assert advanced <= {0, 1, 2}, "0: the end, past the last item"
     assert any("plan of 2 items" in each.text for each in world.client.statuses(1))
-
-
-@pytest.mark.parametrize(("persona", "before"), [(ARDUPILOT, [HOME]), (PX4, [])])
-def test_an_item_that_is_chosen_is_named_as_in_the_file(
-    make_world: MakeWorld, persona: Persona, before: list[Item]
-) -> None:
-    world = make_world(persona=persona)
-    upload = Upload(world.client, [*before, NEAR, NEXT])
-    world.until(lambda: upload.result == 0, within=5)
-    world.client.command(SET_CURRENT, len(before) + 7, target=(1, 1))
-    world.run(0.2)
-    assert any("item 8: the last item is 2" in text for text in world.client.texts())
 
 
 @pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda persona: persona.name)

@@ -14,7 +14,6 @@ from mav_tasks.recording.replay import Replay
 from mav_tasks.settings import Limits
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from tests.kit.client import (
     ACCEPTED,
@@ -37,12 +36,10 @@ UTC = 1.8e9  # s, when the worlds begin
 WAYPOINT, JUMP, OPTIONS, MOVE, SPEED, RETURN = 16, 177, 54014, 54000, 178, 20
 REPOSITION, MISSION_START, SET_CURRENT, RELAY, MODIFY, CANCEL = 192, 300, 224, 181, 54012, 54010
 SERVO = 183
-LOCAL_POSITION = 32
 PRIORITY = 1  # TASK_MODIFY, param2
 BOSS = Key("boss", bytes(range(32)), "operator")
 SECRET = bytes(range(1, 33))
 NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
-QUEUED = (S.QUEUED, R.NONE)
 MISSION_ACCEPTED, MISSION_DENIED = 0, 14
 ANY = (250, 191)
 
@@ -127,18 +124,6 @@ def way(world: World, tasks: int) -> tuple[float, float]:
 
 
 # speed
-
-
-@pytest.mark.parametrize("named", [0.0, 0.1, float("nan")])
-def test_a_default_speed_is_bounded_and_driven(
-    world: World, limited: Callable[..., FakeClient], named: float
-) -> None:
-    agent = limited(max_speed=0.1)
-    assert answer(world, agent.move(0.6, speed=named)) == (ACCEPTED, 1)
-    metres, fastest = way(world, 1)
-    assert world.state(1)[0] is S.COMPLETED
-    assert metres == pytest.approx(0.6, abs=0.05)
-    assert fastest < 0.13
 
 
 @pytest.mark.parametrize(
@@ -282,22 +267,6 @@ def test_a_task_that_would_begin_too_far_away_fails_where_the_rover_stands(
     assert world.pose()[0] == pytest.approx(-4.0, abs=0.1)
 
 
-def test_a_plan_that_is_begun_again_and_again_ends_at_the_limit(
-    world: World, limited: Callable[..., FakeClient]
-) -> None:
-    agent = limited(max_distance=4.0)
-    assert uploaded(world, agent, *places(0.0, 1.0, 2.0), target=(1, 1)).result == MISSION_ACCEPTED
-    assert answer(world, agent.command(MISSION_START, target=(1, 1))) == (ACCEPTED, 1)
-    metres, before = 0.0, world.pose()
-    for tick in range(600):
-        world.run(0.1)
-        metres, before = metres + abs(world.pose()[0] - before[0]), world.pose()
-        if tick % 40 == 39 and world.state(1)[0] is S.EXECUTING:
-            agent.command(SET_CURRENT, 1 if before[0] > 1.2 else 2, target=(1, 1))
-    assert world.state(1) == (S.FAILED, R.NOT_ALLOWED)
-    assert metres <= 1.05 * 4.0 + 0.4
-
-
 def kept(path: Path) -> PromptSqliteStore:
     return PromptSqliteStore(path, wall_offset=UTC)
 
@@ -309,17 +278,6 @@ def restarted(world: World, path: Path, *keys: Key) -> None:
     later = kept(path)
     world.start_server(later, later.load())
     opened(world, *keys)
-
-
-def test_what_nobody_can_tell_is_refused(make_world: MakeWorld, path: Path) -> None:
-    world, key = make_world(store=kept(path)), agents(Limits(max_distance=3.0))
-    world.fault(Faults(withheld=frozenset({LOCAL_POSITION})))
-    world.run(1)
-    restarted(world, path, BOSS, key)
-    agent = signing(world, key)
-    sent = agent.command_int(REPOSITION, -1, 0, target=(1, 1), frame=6, **at(1.0, 0))
-    assert answer(world, sent) == NOT_ALLOWED
-    assert any("not unknown (position" in t for t in agent.texts())
 
 
 @pytest.mark.parametrize(
@@ -354,13 +312,6 @@ def test_a_bounded_key_drives_by_tasks_alone(
     assert answer(world, agent.proceed()) == (ACCEPTED, 0)
 
 
-def test_a_key_that_is_bounded_otherwise_drives_itself(
-    world: World, limited: Callable[..., FakeClient]
-) -> None:
-    agent = limited("operator", quota=2)
-    assert answer(world, agent.mode(GUIDED)) == (ACCEPTED, 0)
-
-
 # number, kind, commands to the rover
 
 
@@ -380,15 +331,6 @@ def test_number_and_kinds_are_the_keys_own(
     assert answer(world, sent) is not None
     assert sent.answer[1] == R.QUOTA  # type: ignore[index]
     assert len(world.tasks()) == 3
-
-
-def test_commands_to_the_rover_are_an_operators(
-    world: World, limited: Callable[..., FakeClient]
-) -> None:
-    agent = limited()
-    relay = of_ours(RELAY, 0, 1)
-    assert uploaded(world, agent, *places(1.0), relay).result == MISSION_DENIED
-    assert world.tasks() == ()
 
 
 # changes, owners, nonces
@@ -439,23 +381,3 @@ def test_a_record_keeps_the_limits_of_keys(make_world: MakeWorld, tmp_path: Path
     replay = Replay(record, secrets={each.fingerprint: each.secret for each in (BOSS, key)})
     assert len(list(replay.events())) > 5
     assert replay.difference is None
-
-
-def test_a_key_owns_its_tasks_from_any_endpoint(
-    world: World, limited: Callable[..., FakeClient]
-) -> None:
-    agent = limited()
-    boss = signing(world, BOSS, name="boss")
-    assert answer(world, boss.move(20.0)) == (ACCEPTED, 1)
-    assert answer(world, agent.move(1.0)) == (ACCEPTED, 2)
-    elsewhere = signing(world, agents(), name="elsewhere", system_id=99)
-    assert answer(world, elsewhere.command(CANCEL, 2)) == (ACCEPTED, 2)
-
-
-def test_a_nonce_belongs_to_its_key(world: World, limited: Callable[..., FakeClient]) -> None:
-    agent = limited(max_speed=0.1, max_distance=1.0)
-    boss = signing(world, BOSS, name="boss", system_id=77)  # the same address
-    assert answer(world, boss.move(12.0, speed=1.6, nonce=4711)) == (ACCEPTED, 1)
-    assert answer(world, agent.move(12.0, speed=1.6, nonce=4711)) == NOT_ALLOWED
-    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)
-    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)

@@ -12,13 +12,11 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.client import MOVE
 from tests.kit.world import World, near_pose
 
 HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
 SETPOINT, COMMAND = 84, 76
 ARM_DISARM, SET_MODE = common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_DO_SET_MODE
-INTERVAL = common.MAV_CMD_SET_MESSAGE_INTERVAL
 
 
 @pytest.fixture
@@ -96,28 +94,6 @@ def test_no_motion_on_data_older_than_0_3_s(driving: World) -> None:
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 
-@pytest.mark.parametrize("kind", [POSITION, ATTITUDE])
-def test_data_that_the_net_repeats_are_not_fresh(driving: World, kind: int) -> None:
-    world = driving
-    last: list[bytes] = []
-
-    def keeps(source: str, target: str, data: bytes) -> bool:
-        if (source, target, data[7]) == ("rover1", VEHICLE_LINK, kind):
-            last[:] = [data]
-        return False
-
-    world.watched.loses = keeps
-    world.run(0.2)
-    world.fault(Faults(withheld=frozenset({kind})))
-    at = world.now
-    for _ in range(30):
-        world.from_vehicle_side(last[0], peer="rover1")
-        world.run(0.05)
-    assert "move" in world.observer.sent_since(at)
-    assert "move" not in world.observer.sent_since(at + 0.35)
-    assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
-
-
 def test_a_position_frozen_at_rest_fails_as_stuck_before_it_gets_far(world: World) -> None:
     world.fault(Faults(position_frozen=True))
     world.client.move(10)
@@ -155,19 +131,6 @@ def test_a_lost_task_does_not_resume_on_a_disarmed_rover(driving: World) -> None
     assert not world.rover.autopilot.armed
 
 
-def test_another_rover_of_the_same_id_is_not_given_what_waited_for_the_lost_one(
-    world: World,
-) -> None:
-    world.client.command(MOVE, 2.0, 0, 0, 0, 0, 12.0)
-    world.run(0.5)
-    world.fault(Faults(silent=True))
-    world.run(6)
-    world.replace_rover(switched_on=0.0)  # for as long
-    world.run(25)
-    assert world.truth.north == 0.0
-    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.RESTARTED)
-
-
 @pytest.mark.parametrize("jump", [(2.5, 0.0), (0.0, -30.0), (50.0, 0.0)])
 def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float, float]) -> None:
     world = driving
@@ -182,15 +145,6 @@ def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float
     assert world.state(1) == (S.KILLED, R.STOP)
 
 
-def test_a_jump_while_paused_holds_the_task_too(driving: World) -> None:
-    world = driving
-    world.client.pause()
-    world.run(3)
-    world.fault(Faults(position_jump=(3.0, 0.0)))
-    world.run(1)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-
-
 def test_a_reboot_holds_the_task_and_the_rates_are_asked_for_again(driving: World) -> None:
     world = driving
     world.rover.autopilot.reboot(now=world.now)
@@ -203,25 +157,6 @@ def test_a_reboot_holds_the_task_and_the_rates_are_asked_for_again(driving: Worl
     assert len(list(world.client.of_id(POSITION))) - before >= 16
     assert set(world.observer.sent_since(at)) <= {"511"}
     assert world.stands()
-
-
-def test_a_reboot_of_an_idle_rover_does_not_keep_it_from_its_next_task(world: World) -> None:
-    world.client.move(0.5)
-    world.until_idle(tasks=1)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(6)
-    world.client.move(0.5)
-    world.until_idle(tasks=2)
-    assert world.state(2)[0] is S.COMPLETED
-
-
-def test_a_task_that_was_paused_when_the_rover_rebooted_is_held(driving: World) -> None:
-    world = driving
-    world.client.pause()
-    world.run(4)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(6)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
 def test_a_reboot_that_only_the_rovers_clock_tells_of_holds_the_task_too(driving: World) -> None:
@@ -291,26 +226,6 @@ def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(world: Wor
     assert set(zeros + others) == {inf}
 
 
-def test_a_client_that_wakes_a_late_server_does_not_make_it_drive_on(driving: World) -> None:
-    world = driving
-    world.observer.expects_gaps = True
-    world.leave(world.server)
-    world.run(1.0)
-    world.client.proceed()
-    world.run(0.01)
-    world.join(world.server)
-    world.run(0.1)
-    assert world.state(1) == (S.HELD, R.LATE)
-
-
-def test_a_tick_that_is_a_little_late_changes_nothing(driving: World) -> None:
-    world = driving
-    world.observer.expects_gaps = True
-    world.suspend_server(0.1)
-    world.run(0.5)
-    assert world.state(1)[0] is S.EXECUTING
-
-
 def test_what_came_while_the_server_stood_still_is_not_taken_for_fresh(driving: World) -> None:
     world = driving
     world.observer.expects_gaps = True
@@ -321,16 +236,6 @@ def test_what_came_while_the_server_stood_still_is_not_taken_for_fresh(driving: 
     world.run(0.2)
     assert world.state(1)[0] is S.EXECUTING
     assert set(world.observer.sent_since(at)) == {"zero"}
-
-
-def test_heartbeats_lost_singly_change_nothing(driving: World) -> None:
-    world = driving
-    for _ in range(3):
-        world.fault(Faults(withheld=frozenset({HEARTBEAT})))
-        world.run(1.7)
-        world.fault(Faults())
-        world.run(1.1)
-    assert (S.PAUSED, R.LINK_LOST) not in world.history(1)
 
 
 def test_a_held_task_keeps_its_queue_and_continue_says_so(driving: World) -> None:

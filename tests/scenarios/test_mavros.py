@@ -121,17 +121,6 @@ def test_one_on_the_rovers_side_keeps_its_address(make_world: MakeWorld) -> None
     assert not [text for text in other.client.texts() if "address" in text]
 
 
-def test_its_heartbeat_does_not_come_back_by_another_link(make_world: MakeWorld) -> None:
-    """A rover forwards what is for everybody to its other radio, where the server listens, too."""
-    world = make_world()
-    passed = world.passed_on((1, 191))
-    mavros = Mavros(world)
-    world.run(3)
-    assert IDS["TIMESYNC"] in passed
-    assert IDS["HEARTBEAT"] not in passed
-    assert mavros.state[0]
-
-
 @pytest.mark.parametrize("halt", [HOLD, None], ids=["HOLD", "disarm"])
 def test_it_arms_right_after_its_own_halt(make_world: MakeWorld, halt: int | None) -> None:
     """Each arming of mavros says that it is a repeat, and none is."""

@@ -16,7 +16,6 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.personas import Mode, Persona
 from tests.kit.car import Car
-from tests.kit.client import ACCEPTED
 from tests.kit.gateways.engines import FleetWorld
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.store import PromptSqliteStore
@@ -37,7 +36,6 @@ OTHERS = {"ArduPilot": PROMPT, "PX4": PROMPT_PX4}
 EVERY = {**OTHERS, **CARS}
 
 personas = pytest.mark.parametrize("persona", EVERY.values(), ids=EVERY.keys())
-cars = pytest.mark.parametrize("persona", CARS.values(), ids=CARS.keys())
 others = pytest.mark.parametrize("persona", OTHERS.values(), ids=OTHERS.keys())
 
 
@@ -121,43 +119,6 @@ def test_it_is_braked_and_gets_hold_when_it_stands(
     world.until_idle(tasks=1, within=60)
     assert world.state(1)[0] is S.COMPLETED
     assert abs(world.truth.north - 20.0) < 0.3
-
-
-@cars
-def test_stop_just_after_it_was_met_brakes_it_in_the_same_way(
-    make_world: MakeWorld, path: Path, persona: Persona
-) -> None:
-    world = driving(make_world, path, persona)
-    met = Met(world, path)
-    world.until(lambda: phase_of(world) == "CONTROL", within=1.5)
-    stop = world.client.stop()
-    world.run(0.1)
-    assert stop.result == ACCEPTED
-    assert phase_of(world) == "STOPPING"
-    met.stands()
-    assert world.paused() is R.STOPPED
-    assert world.state(1)[0] is S.KILLED
-    world.run(2)
-    assert not in_control_mode(world)
-
-
-@others
-def test_one_that_was_stopped_just_before_is_braked_too(
-    make_world: MakeWorld, path: Path, persona: Persona
-) -> None:
-    """The server died in the moment of the STOP, and nothing of that came to the rover.
-
-    Whether it steers as a car the new server does not know yet.
-    """
-    world = driving(make_world, path, persona)
-    world.watched.loses = lambda _source, target, _data: target == "rover1"
-    stop = world.client.stop()
-    world.run(0.1)
-    assert stop.result == ACCEPTED
-    met = Met(world, path, away=0.2)
-    world.watched.loses = lambda *_: False
-    met.stands()
-    assert world.paused() is R.STOPPED
 
 
 @personas

@@ -1,6 +1,5 @@
 """Metrics of a server in virtual time: exact counts and times of what happened."""
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
@@ -10,7 +9,6 @@ import pytest
 
 from mav_tasks.engine.inputs import LinkSide
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
-from mav_tasks.links.memory import MemoryLink
 from mav_tasks.metrics import families as f
 from mav_tasks.metrics.collector import Collector
 from mav_tasks.metrics.exposition import Family
@@ -121,31 +119,6 @@ def test_a_rover_that_falls_silent_grows_old(world: World) -> None:
     world.run(10.0)
     assert 9.0 < samples(collector, f.HEARTBEAT_AGE)[1,] < 11.2
     assert 9.0 < samples(collector, f.POSITION_AGE)[1,] < 10.3
-
-
-def test_packets_are_counted_by_link_and_direction(world: World) -> None:
-    collector = watched(world)
-    arrived: Counter[str] = Counter()
-    sent: Counter[str] = Counter()
-    before = world.watched.arrive, world.watched.send
-
-    def arrive(link: MemoryLink, source: str, data: bytes) -> None:
-        arrived[link.name] += 1
-        before[0](link, source, data)
-
-    def send(source: str, target: str, data: bytes) -> None:
-        sent[source] += 1
-        before[1](source, target, data)
-
-    world.watched.arrive, world.watched.send = arrive, send  # type: ignore[method-assign]
-    world.ready()
-    world.client.move(0.3)
-    world.run(8.0)
-    packets = samples(collector, f.LINK_PACKETS)
-    for name in (CLIENT_LINK, VEHICLE_LINK):
-        assert packets[name, "received"] == arrived[name] > 5
-        assert packets[name, "sent"] == sent[name] > 20
-        assert samples(collector, f.LINK_BYTES)[name, "sent"] > 20 * sent[name]
 
 
 def test_each_write_of_the_store_is_timed_until_it_is_durable(make_world: MakeWorld) -> None:

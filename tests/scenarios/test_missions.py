@@ -1,6 +1,6 @@
 """Plans: uploaded, looked at, started, driven, cleared."""
 
-from math import hypot, inf, nan
+from math import nan
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -84,17 +84,6 @@ def test_the_end_is_told_some_times_for_who_has_missed_it(world: World) -> None:
     assert reached(world.client) == [1, 2, 3, 3, 3, 3, 3, 3]
 
 
-def test_a_mission_that_is_started_again_is_not_told_the_end_of_the_last(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(1.2)
-    told = len(reached(world.client))
-    assert start(world) == (ACCEPTED, 2)
-    world.run(2.5)
-    assert 3 not in reached(world.client)[told:]
-
-
 def test_at_the_task_server_it_is_queued_at_once_and_so_is_the_next(world: World) -> None:
     first = uploaded(world, place(1, 0), place(1, 1), target=(1, 191))
     second = uploaded(world, place(0, 0), target=(1, 191))
@@ -110,15 +99,6 @@ def test_the_same_plan_again_a_moment_later_is_the_same_task(world: World) -> No
     world.run(2)
     again = uploaded(world, *plan, target=(1, 191))
     assert (again.result, again.opaque_id) == (0, first.opaque_id)
-    assert len(world.tasks()) == 1
-
-
-def test_of_copies_of_a_plan_the_last_one_counts(world: World) -> None:
-    """Each of their acks may have been lost, and a long plan takes its time."""
-    plan = (place(1, 0), place(1, 1))
-    for _ in range(3):
-        uploaded(world, *plan, target=(1, 191))
-        world.run(8)
     assert len(world.tasks()) == 1
 
 
@@ -165,15 +145,6 @@ def test_a_loop_in_which_nothing_is_driven_is_refused(world: World) -> None:
     assert world.tasks() == ()
 
 
-def test_a_jump_may_lead_ahead_of_all_items_that_have_come_by_then(world: World) -> None:
-    jump = Item(JUMP, param1=4, param2=1, frame=2)
-    assert uploaded(world, HOME, place(1, 0), jump, place(1, 3), place(1, 1)).result == 0
-    assert start(world) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert reached(world.client) == [1, 4]
-    assert is_at(world, 1.0, 1.0)
-
-
 def test_a_refused_plan_leaves_the_one_before(world: World) -> None:
     uploaded(world)
     uploaded(world, HOME, Item(MODE))
@@ -190,15 +161,6 @@ def test_another_plan_replaces_the_one_that_waits(world: World) -> None:
     assert world.state(1) == (S.CANCELLED, R.REPLACED)
     assert start(world) == (ACCEPTED, second.opaque_id)
     world.until_state(2, S.COMPLETED)
-
-
-def test_another_plan_does_not_disturb_the_one_that_is_driven(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.EXECUTING)
-    second = uploaded(world, HOME, place(0.5, 0, hold=0.1))
-    world.until_state(1, S.COMPLETED, within=60)
-    assert world.state(second.opaque_id)[0] is S.BLOCKED
 
 
 def test_two_wishes_to_start_are_one_and_later_it_is_another_task(world: World) -> None:
@@ -251,13 +213,6 @@ def test_a_start_without_a_plan_is_refused(world: World) -> None:
     assert start(world) == (DENIED, R.NOT_FOUND)
 
 
-def test_it_can_be_started_and_gone_on_with_at_any_item(world: World) -> None:
-    uploaded(world)
-    world.client.command(START, 3, target=(1, 1))
-    world.until_state(1, S.COMPLETED, within=60)
-    assert reached(world.client) == [3]
-
-
 @pytest.mark.parametrize("how", ["command", "message"])
 def test_another_item_is_gone_on_with(world: World, how: str) -> None:
     uploaded(world)
@@ -274,27 +229,6 @@ def test_another_item_is_gone_on_with(world: World, how: str) -> None:
         assert currents(world.client)[before].seq == 3
     world.until_state(1, S.COMPLETED, within=60)
     assert reached(world.client) == [3]
-
-
-def test_an_item_that_is_not_there_is_not_answered_as_by_an_ardupilot(world: World) -> None:
-    """MAVSDK gives up after 2.5 s without MISSION_CURRENT; others go on to get it."""
-    other = world.add_client("other")
-    uploaded(world)
-    world.run(1.5)
-    before, others = len(currents(world.client)), len(currents(other))
-    world.client.send(set_current(77))
-    world.run(2.8)
-    assert len(currents(world.client)) == before
-    assert len(currents(other)) > others
-    assert [text for text in world.client.texts() if "item 77" in text]
-    world.run(2)
-    assert {each.seq for each in currents(world.client)[before:]} == {0}
-
-
-def test_without_a_mission_no_item_is_chosen(world: World) -> None:
-    world.client.send(set_current(1))
-    world.run(0.1)
-    assert "there is no mission: upload one first" in world.client.texts()
 
 
 def test_an_upload_ends_with_the_connection_of_its_client(world: World) -> None:
@@ -425,51 +359,6 @@ def test_nothing_more_is_ordered_after_a_stop_or_a_takeover(world: World, what: 
     assert ordered(world, at_stop) == []
 
 
-def test_many_orders_in_a_row_all_reach_the_rover(world: World) -> None:
-    orders = [servo(1 + n % 8, 1000.0 + n) for n in range(25)]
-    uploaded(world, HOME, place(1, 0), *orders, place(3, 0))
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert ordered(world) == [1000.0 + n for n in range(25)]
-
-
-def test_an_order_with_a_number_that_is_none_never_reaches_the_rover(world: World) -> None:
-    assert uploaded(world, HOME, place(1, 0), servo(5, inf)).result == 7
-    uploaded(world, HOME, servo(5, nan), place(0.5, 0))
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert ordered(world) == [0.0]
-
-
-def test_a_distance_is_that_to_the_place_also_while_it_is_faced(world: World) -> None:
-    near = Item(114, param1=3.0, frame=2)
-    uploaded(world, HOME, place(1, 0, hold=0.1), near, servo(5), place(1, 8))
-    start(world)
-    world.until(lambda: ordered(world), within=60)
-    assert 7.0 > hypot(world.truth.north - 1, world.truth.east) > 4.7
-
-
-def test_clearing_ends_a_started_mission_that_still_waits(world: World) -> None:
-    world.client.move(3)
-    world.run(1)
-    uploaded(world)
-    start(world)
-    world.client.send(clear_all())
-    world.run(0.3)
-    assert world.state(2) == (S.CANCELLED, R.CLEARED)
-
-
-def test_a_start_drives_on_after_a_takeover(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.EXECUTING)
-    world.run(1.5)
-    world.operator_mode(Mode.MANUAL)
-    world.run(3)
-    assert start(world) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED, within=60)
-
-
 def test_a_start_does_not_allow_what_a_disarm_has_forbidden(world: World) -> None:
     world.client.arm(True)
     world.run(0.5)
@@ -487,16 +376,6 @@ def test_a_start_does_not_allow_what_a_disarm_has_forbidden(world: World) -> Non
     assert not world.rover.autopilot.armed
 
 
-def test_another_plan_also_replaces_one_that_was_started_and_waits(world: World) -> None:
-    world.client.move(3)
-    world.run(1)
-    uploaded(world)
-    start(world)
-    uploaded(world, HOME, place(0.5, 0))
-    world.run(0.2)
-    assert world.state(2) == (S.CANCELLED, R.REPLACED)
-
-
 def test_a_start_while_it_is_being_cancelled_is_refused_and_then_it_is_another(
     world: World,
 ) -> None:
@@ -508,28 +387,6 @@ def test_a_start_while_it_is_being_cancelled_is_refused_and_then_it_is_another(
     assert start(world) == (TEMPORARILY_REJECTED, R.QUEUE_PAUSED)
     world.until_state(1, S.CANCELLED)
     assert start(world) == (ACCEPTED, 2)
-
-
-def test_in_a_paused_queue_a_started_mission_runs_alone(world: World) -> None:
-    world.client.pause()
-    world.client.move(5)
-    uploaded(world, HOME, place(0.5, 0.5))
-    start(world)
-    world.until_state(2, S.COMPLETED)
-    world.run(5)
-    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.OPERATOR)
-
-
-def test_auto_goes_on_with_a_mission_of_the_task_server_too(world: World) -> None:
-    uploaded(world, place(3, 0), target=(1, 191))
-    world.until_state(1, S.EXECUTING)
-    world.run(1)
-    world.client.mode(HOLD)
-    world.run(3)
-    sent = world.client.mode(AUTO)
-    world.until_state(1, S.COMPLETED)
-    assert sent.answer == (ACCEPTED, 1)
-    assert "mode10" not in world.observer.sent_since(0)
 
 
 @pytest.mark.parametrize("how", ["moving", "sticks"])
@@ -571,40 +428,11 @@ def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: st
     world.until_state(1, S.COMPLETED, within=60)
 
 
-def test_a_start_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:
-    store = LateStore(delay=0.0)
-    world = make_world(store=store)
-    uploaded(world)
-    store.delay = 5.0
-    sent = world.client.command(START, target=(1, 1))
-    world.run(1)
-    assert sent.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
-    assert world.state(1)[0] is S.BLOCKED
-    store.delay = 0.0
-    world.run(6)
-    assert start(world) == (ACCEPTED, 1)
-
-
 @pytest.mark.parametrize("kind", [3, 77, 255])
 def test_a_plan_of_a_strange_kind_is_refused(world: World, kind: int) -> None:
     upload = Upload(world.client, (), kind=kind)
     world.until(lambda: upload.result is not None, within=3)
     assert upload.result == 3
-
-
-def test_a_start_of_another_rover_does_not_make_one_meant_again(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    uploaded(world, HOME, place(0.3, 0))
-    other = Upload(world.client, (HOME, place(0.5, 4)), target=(2, 1))
-    world.until(lambda: other.result == 0, within=5)
-    assert start(world) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED)
-    world.run(3)
-    world.client.command(START, target=(2, 1))
-    world.run(1)
-    answer = start(world)
-    assert answer is not None
-    assert answer[1] > 2, "the mission that is over is another task"
 
 
 def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
@@ -616,25 +444,3 @@ def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
     world.run(5)
     words = "Rover 1 has its own mission on board (2 items): its mission mode runs that"
     assert world.client.texts().count(words) == 1
-
-
-@pytest.mark.parametrize("by_command", [True, False])
-def test_an_item_chosen_of_a_finished_plan_stays_shown_and_begins_the_next_start(
-    world: World, by_command: bool
-) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(3)
-    world.client.received.clear()
-    if by_command:
-        world.client.command(SET_CURRENT, 2, target=(1, 1))
-    else:
-        world.client.send(set_current(2))
-    world.run(3)
-    shown = {(each.seq, each.state) for each in currents(world.client)}
-    assert shown == {(2, NOT_STARTED)}
-    assert world.client.texts() == ["The mission will start with item 2"]
-    assert start(world) == (ACCEPTED, 2)
-    world.until_state(2, S.COMPLETED, within=60)
-    assert set(reached(world.client)) == {2, 3}, "item 1 is left out"

@@ -87,19 +87,6 @@ def stored(world: World) -> int:
     return len(download.items)
 
 
-def test_a_rover_asks_as_its_autopilot_does(make_world: MakeWorld) -> None:
-    for persona, kind in ((ARDUPILOT, "MISSION_REQUEST"), (PROMPT_PX4, "MISSION_REQUEST_INT")):
-        world = make_world(persona=persona)
-        world.client.send(common.MAVLink_mission_count_message(1, 1, 2))
-        world.run(0.1)
-        asked = [m.get_type() for m in all_requests(world)]
-        assert asked == [kind]
-
-
-def all_requests(world: World) -> list[common.MAVLink_message]:
-    return world.client.of_type("MISSION_REQUEST") + world.client.of_type("MISSION_REQUEST_INT")
-
-
 def test_a_download_is_answered_in_the_form_in_which_it_is_asked_for(world: World) -> None:
     client = DroneKit(world.client, PLACES)
     world.until(lambda: len(client.sent) == len(PLACES), within=2)

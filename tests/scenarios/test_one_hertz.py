@@ -11,7 +11,7 @@ from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
-from tests.kit.client import ACCEPTED, AUTO, HOLD, set_mode
+from tests.kit.client import HOLD, set_mode
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -78,38 +78,6 @@ def test_continue_soon_after_stop_lets_the_next_task_run(world: World, after: fl
     assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
 
 
-def test_continue_before_stop_is_confirmed_still_sees_it_through(world: World) -> None:
-    world.operator_mode(Mode.AUTO)
-    world.operator_arm(True)
-    world.run(3.0)
-    world.client.stop()
-    world.run(0.2)
-    world.client.proceed()
-    world.until(world.stands, within=4)
-    world.until(lambda: world.control() == "IDLE", within=4)
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
-@pytest.mark.parametrize("deed", ["STOP", "HOLD"])
-def test_an_old_hold_is_not_taken_for_the_answer(world: World, deed: str) -> None:
-    """HOLD was seen; AUTO was set since, and the next heartbeat has not shown it yet."""
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(2.5)
-    assert world.client.command(176, 1, AUTO, target=(1, 1)) is not None
-    world.run(0.1)
-    lost = world.lose_next_towards("rover1", 2)  # zero and HOLD
-    if deed == "STOP":
-        world.client.stop()
-    else:
-        world.client.command(176, 1, HOLD, target=(1, 1))
-    world.until(world.stands, within=6)
-    world.run(3.0)
-    assert lost == []
-    assert world.stands()
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
 @pytest.mark.parametrize("who", ["client", "operator"])
 def test_a_rover_disarmed_while_driving_does_not_drive_off_when_armed_again(
     world: World, who: str
@@ -129,15 +97,6 @@ def test_a_rover_disarmed_while_driving_does_not_drive_off_when_armed_again(
     assert world.state(1) == (S.PAUSED, R.OPERATOR if who == "client" else R.TAKEOVER)
 
 
-def test_a_rover_armed_by_hand_while_its_mode_is_asked_for_is_not_driven(world: World) -> None:
-    world.client.move(1.0)
-    world.until_state(1, S.STARTING)
-    world.operator_arm(True)
-    world.run(4.0)
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-    assert near_pose(world.pose(), (0.0, 0.0, 0.0))
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_tasks_are_done_over_a_bad_net(make_world: MakeWorld, seed: int) -> None:
     bad = Conditions(delay=0.005, jitter=0.08, loss=0.1, duplication=0.05)
@@ -148,20 +107,6 @@ def test_tasks_are_done_over_a_bad_net(make_world: MakeWorld, seed: int) -> None
     world.client.rotate(45, repeats=patient, nonce=2)
     world.until_idle(tasks=2)
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
-
-
-def test_while_stopped_only_what_asks_and_what_disarms_passes(world: World) -> None:
-    world.client.stop()
-    world.run(2.0)
-    for command in (218, 262, 252, 222, 183, 187, 32, 33, 43000, 300, 2600, 185, 246):
-        sent = world.client.command(command, 1, target=(1, 1))
-        world.run(0.6)
-        assert sent.ack is not None
-        assert (sent.ack.result, sent.ack.result_param2) == (1, R.STOPPED), command
-    disarm = world.client.command(400, 0, target=(1, 1))
-    world.run(0.6)
-    assert disarm.ack is not None
-    assert disarm.ack.result == ACCEPTED
 
 
 @pytest.mark.parametrize("system_id", [0, 250])

@@ -63,16 +63,6 @@ def test_the_end_is_the_same_with_any_pattern_of_pauses(make_world: MakeWorld, s
     assert near_pose(world.pose(), (2.0 + diagonal, diagonal, -135.0), metres=0.04)
 
 
-def test_pausing_an_empty_queue_keeps_what_is_submitted_then(world: World) -> None:
-    paused = world.client.pause()
-    world.client.move(1)
-    world.run(2)
-    assert paused.answer == (ACCEPTED, 0)
-    assert world.state(1) == (S.QUEUED, R.NONE)
-    world.client.proceed()
-    world.until_idle(tasks=1)
-
-
 @pytest.mark.parametrize("persona", [ARDUPILOT, PX4])
 @pytest.mark.parametrize("has_driven", [False, True])
 def test_pausing_an_idle_armed_rover_keeps_what_is_submitted_then(
@@ -107,20 +97,6 @@ def test_neither_0_nor_1_is_denied(world: World) -> None:
         world.client.command(PAUSE_CONTINUE, value)
     world.run(0.1)
     assert world.client.acks_of(PAUSE_CONTINUE) == [(DENIED, R.BAD_PARAMETER)] * 4
-
-
-def test_continue_while_driving_changes_nothing(world: World) -> None:
-    world.client.move(1)
-    world.until_state(1, S.EXECUTING)
-    for _ in range(30):
-        world.client.proceed()
-        world.run(0.013)
-    world.until_idle(tasks=1)
-    assert world.history(1) == [
-        (S.STARTING, R.NONE),
-        (S.EXECUTING, R.NONE),
-        (S.COMPLETED, R.NONE),
-    ]
 
 
 def test_a_pause_while_starting_resumes(world: World) -> None:

@@ -66,22 +66,6 @@ def test_a_preemptive_task_interrupts_whatever_its_priority_but_not_a_firm_one(
     assert near_pose(world.pose(), (4.0, 0.0, 0.0), metres=0.03, angle=1.5)
 
 
-def test_a_stop_kills_the_one_that_runs_and_keeps_the_interrupted_one(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(settings=GAP)
-    world.client.move(2, priority=1)
-    world.run(3)
-    world.client.rotate(90, priority=9)
-    world.until_state(2, S.EXECUTING)
-    world.client.stop()
-    world.run(3)
-    assert [world.state(i)[0] for i in (1, 2)] == [S.PAUSED, S.KILLED]
-    world.client.proceed()
-    world.until_idle(tasks=2)
-    assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=1.5)
-
-
 @pytest.mark.parametrize("goal", ["move", "back", "rotate", "turns"])
 @pytest.mark.parametrize("seed", range(tries(2, long=20)))
 def test_whatever_interrupts_it_ends_where_it_would_have_ended(

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 from pymavlink.generator.mavcrc import x25crc
 
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim import offboard, steering
@@ -18,7 +18,7 @@ from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
 from rover_sim.realism import EXACT, Drive
-from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED
+from tests.kit.client import ACCEPTED, DENIED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
 from tests.kit.world import MODE_COMMAND, World, at, is_at, near_pose
@@ -81,11 +81,6 @@ class TestDriving:
         assert not world.rover.autopilot.armed
         assert world.rover.autopilot.mode is Mode.HOLD
 
-    def test_a_move_ends_where_it_was_to_end(self, world: World) -> None:
-        world.client.move(2.0)
-        world.until_idle(tasks=1)
-        assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=2)
-
     @pytest.mark.parametrize(("north", "east"), [(2, 0), (-2, 0), (0, 1.5), (-1, -1), (0.3, 0)])
     def test_a_place_is_driven_to_without_turning_on_the_spot_first(
         self, world: World, north: float, east: float
@@ -93,12 +88,6 @@ class TestDriving:
         go_to(world, north, east)
         world.until_idle(tasks=1)
         assert is_at(world, north, east)
-
-    def test_a_heading_at_the_end_is_left_out(self, world: World) -> None:
-        go_to(world, 2.0, 0.0, yaw=1.5)
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
-        assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=5)
 
     @every
     def test_a_plan_is_driven(self, make_world: MakeWorld, persona: Persona) -> None:
@@ -123,25 +112,6 @@ class TestDriving:
         world.client.proceed()
         world.until_idle(tasks=1)
         assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.03, angle=2)
-
-    def test_one_that_was_pre_empted_comes_back_to_its_line(self, make_world: MakeWorld) -> None:
-        queueing = Queueing(preemption_gap=3, preemption_rest=0.3)
-        world = make_world(persona=PROMPT_PX4, settings=Settings(queueing=queueing))
-        world.client.move(3.0, priority=1)
-        world.until(lambda: world.truth.north > 1.0, within=20)
-        world.client.command_int(WAYPOINT, **at(1.0, 2.0), frame=6)
-        world.until_idle(tasks=2)
-        assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
-        assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.05, angle=3)
-
-    def test_one_that_turns_at_a_rate_does_what_others_do(self, make_world: MakeWorld) -> None:
-        persona = replace(PROMPT_PX4, honours_yaw_rate=True)
-        world = make_world(persona=persona, settings=Settings(yaw_rate="honoured"))
-        world.client.move(-1.0)
-        world.run(0.05)
-        world.client.rotate(90)
-        world.until_idle(tasks=2)
-        assert near_pose(world.pose(), (-1.0, 0.0, 90.0), metres=0.04, angle=1)
 
     @pytest.mark.parametrize("radius", [0.5, 1.5, 3.0])
     def test_a_place_within_its_turning_circle_ends_the_task(
@@ -170,17 +140,6 @@ class TestTurning:
         assert world.state(1)[0] is S.COMPLETED
         assert near_pose(world.pose(), (0.0, 0.0, angle), metres=0.02, angle=1)
 
-    @pytest.mark.parametrize(("heading", "yaw"), [(90.0, 90.0), (-161.0, 30.0)])
-    def test_to_a_heading(self, make_world: MakeWorld, heading: float, yaw: float) -> None:
-        world = make_world(persona=PX4)
-        world.run(2.0)
-        world.client.rotate(heading)
-        world.until_idle(tasks=1)
-        world.client.command(YAW, yaw)
-        world.until_idle(tasks=2)
-        assert world.state(2)[0] is S.COMPLETED
-        assert near_pose(world.pose(), (0.0, 0.0, yaw), metres=0.02, angle=1)
-
 
 class TestMovingBackwards:
     """It does not reverse: a differential one turns round, drives, and turns back."""
@@ -198,29 +157,6 @@ class TestMovingBackwards:
         assert near_pose(world.pose(), (north, east, heading), metres=0.05, angle=2)
         assert "Task 1 queued: move -1 m" in world.client.texts()
         assert any("it turns round, drives, turns back" in t for t in world.client.texts())
-
-    @pytest.mark.parametrize("after", [1.5, 4.0, 7.0])
-    def test_paused_in_each_part_it_goes_on_where_it_was(
-        self, make_world: MakeWorld, after: float
-    ) -> None:
-        world = make_world(persona=PX4)
-        world.run(2.0)
-        world.client.move(-1.0)
-        world.until_state(1, S.EXECUTING, within=10)
-        world.run(after)
-        world.client.pause()
-        world.run(3.0)
-        world.client.proceed()
-        world.until_idle(tasks=1, within=60)
-        assert world.state(1)[0] is S.COMPLETED
-        assert near_pose(world.pose(), (-1.0, 0.0, 0.0), metres=0.06, angle=3)
-
-    def test_in_a_plan_too(self, world: World) -> None:
-        world.run(2.0)
-        items = [Item(MOVE, param1=-1.0, frame=2, param4=0.0), Item(WAYPOINT, **at(1, 0))]
-        upload = Upload(world.client, items)
-        world.until(lambda: upload.result is not None, within=5)
-        assert upload.result == 0
 
     def test_what_lies_behind_the_fence_is_not_driven_to(self, world: World) -> None:
         world.run(2.0)
@@ -277,19 +213,6 @@ class TestWhatItCannotDo:
         assert world.tasks() == ()
 
     @pytest.mark.parametrize(
-        ("item", "result"),
-        [
-            (Item(DRIVE, param1=-0.5, param3=2.0, frame=2, param4=0.0), 6),  # INVALID_PARAM1
-        ],
-    )
-    def test_is_refused_in_a_plan_at_its_item(self, world: World, item: Item, result: int) -> None:
-        upload = Upload(
-            world.client, [Item(WAYPOINT, **at(1, 0)), item, Item(WAYPOINT, **at(2, 0))]
-        )
-        world.until(lambda: upload.result is not None, within=5)
-        assert (upload.result, upload.requests) == (result, [0, 1])
-
-    @pytest.mark.parametrize(
         ("command", "params", "words"),
         [
             (MOVE, (-1.0,), "reverse"),
@@ -309,11 +232,6 @@ class TestWhatItCannotDo:
         assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
         assert any(words in text for text in world.client.texts())
 
-    def test_of_a_waypoint_only_the_heading_is_left_out(self, world: World) -> None:
-        upload = Upload(world.client, [Item(WAYPOINT, **at(1, 0), param4=90.0)])
-        world.until(lambda: upload.result is not None, within=5)
-        assert upload.result == 0
-
 
 class TestStop:
     @every
@@ -327,24 +245,6 @@ class TestStop:
         assert world.stands()
         assert world.rover.autopilot.mode is Mode.HOLD
         assert world.control() == "IDLE"
-
-    @each
-    def test_ends_what_another_station_sent_it_to_in_hold(
-        self, make_world: MakeWorld, persona: Persona
-    ) -> None:
-        world = make_world(persona=persona)
-        world.rover.autopilot.parameters["RO_SPEED_LIM"] = 1.0
-        world.operator_arm(True)
-        other = world.net.link("other station")
-        place = common.MAVLink_command_int_message(
-            1, 1, 6, REPOSITION, 0, 0, -1, 1, 0, nan, *at(30.0, 0.0).values(), 0
-        )
-        other.send("rover1", place.pack(common.MAVLink(None, 255, 190)))
-        world.run(3)
-        assert not world.stands()
-        world.client.stop()
-        world.run(4)
-        assert world.stands()
 
     def test_disarms_a_generic_rover_that_does_not_hear_of_hold(
         self, make_world: MakeWorld
@@ -415,23 +315,6 @@ class TestOneThatWouldDriveByItselfWithoutUs:
         assert why(world) == R.LOSS_FAILSAFE
         assert any("waits: it might drive on without setpoints" in t for t in world.client.texts())
         assert not world.rover.autopilot.armed
-
-    def test_what_is_to_run_at_once_is_refused(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world, Settings(guided="now"))
-        sent = world.client.command_int(
-            REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=6, target=(1, 1)
-        )
-        world.run(0.5)
-        assert sent.answer == (TEMPORARILY_REJECTED, R.LOSS_FAILSAFE)
-        assert any("mav-tasks probe --set-failsafe" in text for text in world.client.texts())
-
-    def test_is_driven_when_it_is_mended(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world)
-        world.client.move(1)
-        world.run(1)
-        world.client.send(set_action(5))
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
 
     def test_is_driven_all_the_same_where_that_is_accepted(self, make_world: MakeWorld) -> None:
         world = self.make(make_world, Settings(loss_failsafe="accept"))

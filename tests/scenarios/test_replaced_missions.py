@@ -76,28 +76,6 @@ def test_paused_edited_uploaded_and_started(world: World, halt: str, by: str) ->
     assert is_at(world, -2.0, 0.0)
 
 
-def test_one_that_comes_to_a_stop_still_leaves_no_pause_behind_when_it_is_replaced(
-    world: World,
-) -> None:
-    ask(world, HOLD, PX4_HOLD)
-    world.run(0.1)
-    upload(world, -2.0)
-    ask(world, AUTO, MISSION)
-    world.until(lambda: world.state(2)[0] is S.COMPLETED, within=60)
-    assert is_at(world, -2.0, 0.0)
-    assert world.paused() is R.NONE
-
-
-def test_a_resume_names_no_mission_that_was_replaced(world: World) -> None:
-    ask(world, HOLD, PX4_HOLD)
-    world.run(0.1)
-    upload(world, -2.0)
-    world.client.proceed()
-    world.run(0.1)
-    assert [text for text in world.client.texts() if text.startswith("Queue resumed")]
-    assert not [text for text in world.client.texts() if "task 1 is next" in text]
-
-
 def test_one_that_drives_is_told_of_and_ends_when_the_new_one_starts(world: World) -> None:
     upload(world, -2.0)
     told = [text for text in world.client.texts() if text.startswith("Task 2 ready to start")]

@@ -52,23 +52,6 @@ def test_a_mode_that_is_set_by_message(make_world: MakeWorld, persona: Persona) 
         assert shown(world).custom_mode == number
 
 
-@MAKES
-def test_arming(make_world: MakeWorld, persona: Persona) -> None:
-    world = away_from_a_beat(make_world(persona=persona))
-    for armed in (True, False):
-        world.client.arm(armed)
-        world.run(SOON)
-        assert bool(shown(world).base_mode & 128) is armed
-
-
-def test_a_rover_is_taken_without_waiting_for_its_second(make_world: MakeWorld) -> None:
-    world = away_from_a_beat(make_world(persona=ARDUPILOT))
-    at = world.now
-    world.client.move(1.0)
-    world.until(lambda: world.truth.forward_speed > 0.05, within=3)
-    assert world.now - at < 0.8  # mode, zero, arming, zeros and the first of its speed
-
-
 def refusing(persona: Persona) -> Persona:
     """A make that sends no heartbeat on request."""
 

@@ -114,18 +114,6 @@ def test_without_its_key_it_is_lost_and_stands(make_world: MakeWorld) -> None:
     assert world.stands()
 
 
-def test_the_server_s_own_packets_are_no_second_controller_s(make_world: MakeWorld) -> None:
-    """Who overhears them sends them back, and has no key."""
-    world = signed_world(make_world)
-    sent = sent_to_rover(world)
-    move = world.client.move(1.0)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    overheard = Packets(VEHICLE_LINK, [("attacker", data) for data in sent[-40:]])
-    world.server.pump.handle(overheard, now=world.now)
-    world.until_idle(tasks=1)
-    assert world.state(move.task_id)[0] is S.COMPLETED
-
-
 def test_a_stop_reaches_it_though_its_key_was_revoked(make_world: MakeWorld) -> None:
     """It is not believed any more; but it hears nobody else, and must not be left driving."""
     world = signed_world(make_world)
@@ -135,19 +123,6 @@ def test_a_stop_reaches_it_though_its_key_was_revoked(make_world: MakeWorld) -> 
     world.client.stop()
     world.until(lambda: world.rover.autopilot.mode is Mode.HOLD, within=1.0)
     world.until(world.stands, within=2.0)
-
-
-def test_with_another_secret_of_that_name_it_is_that_one_which_counts(
-    make_world: MakeWorld,
-) -> None:
-    world = signed_world(make_world)
-    sent = sent_to_rover(world)
-    another = Key("rovers", OTHER.secret)
-    world.server.pump.handle(KeysChanged((another,)), now=world.now)
-    world.run(1.5)
-    packets = [packet for data in sent for packet in split_datagram(data)]
-    assert packets
-    assert all(is_signed_with(packet, another.secret) for packet in packets)
 
 
 def test_its_record_is_replayed_with_the_secrets_and_only_so(

@@ -10,12 +10,10 @@ from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallCloc
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings, Signing
-from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long, heartbeat
-from tests.kit.store import LateStore, PromptSqliteStore
+from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long
+from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
-from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
 ALICE = Key("alice", bytes(range(32)), "operator")
@@ -101,14 +99,6 @@ def test_without_a_key_ring_signatures_are_taken_off(world: World) -> None:
     assert [task.submitter.key for task in world.tasks()] == [""]
 
 
-def test_the_key_of_rovers_is_no_client_s(world: World) -> None:
-    put(world, ALICE, ROVERS)
-    sent = signing(world, ROVERS).pause()
-    world.run(0.3)
-    assert sent.ack is None
-    assert counts(world)[1] >= 1
-
-
 @pytest.mark.parametrize("place", [8, 20, -13, -10, -1])
 def test_a_packet_that_was_changed_is_nobody_s(world: World, place: int) -> None:
     put(world, ALICE)
@@ -160,29 +150,6 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
 
-@pytest.fixture
-def kept(make_world: MakeWorld, path: Path) -> World:
-    """Return a world whose server keeps everything on a disk."""
-    return make_world(store=PromptSqliteStore(path, wall_offset=UTC))
-
-
-@pytest.mark.parametrize("well", [True, False])
-def test_nor_by_a_server_that_was_started_since(kept: World, path: Path, well: bool) -> None:
-    world = put(kept, ALICE)
-    client = signing(world, ALICE)
-    raw, task = recorded(world, client)
-    restart(world, path, well=well)
-    attacker = world.add_client("attacker")
-    attacker.heartbeats = False
-    attacker.send_raw(raw)
-    world.run(0.3)
-    assert [each.id for each in world.tasks()] == [task]
-    assert counts(world)[2] == 1
-    again = client.move(0.5)  # whose time goes on
-    world.run(0.3)
-    assert again.task_id == task + 1
-
-
 def restart(world: World, path: Path, *, well: bool, keys: tuple[Key, ...] = (ALICE,)) -> None:
     store = world.server.store
     world.end_server()
@@ -210,17 +177,6 @@ def test_a_sender_heard_for_the_first_time_may_be_a_minute_behind(world: World) 
     assert counts(world)[2] >= 1
 
 
-def test_a_sender_whose_clock_hardly_goes_on_is_heard_all_the_same(world: World) -> None:
-    """As a script of pymavlink's is: its time begins when it starts, and counts packets."""
-    put(world, ALICE)
-    client = signing(world, ALICE)
-    world.run(3 * MINUTE)
-    sent = client.move(1.0)
-    world.run(0.3)
-    assert sent.result == ACCEPTED
-    assert believes_all(client)
-
-
 def test_a_sender_who_is_ahead_is_answered_in_his_own_time(world: World) -> None:
     """Or else he would take the answers for old ones. Nobody else's time is changed by him."""
     put(world, ALICE, BOB)
@@ -232,17 +188,6 @@ def test_a_sender_who_is_ahead_is_answered_in_his_own_time(world: World) -> None
     assert [each.result for each in sent] == [ACCEPTED] * 2
     for client in (ahead, other):
         assert believes_all(client)
-
-
-def test_two_links_of_one_sender_have_times_of_their_own(world: World) -> None:
-    put(world, ALICE)
-    one, two = world.add_client("one"), world.add_client("two")
-    one.sign(ALICE.secret, utc=UTC + world.now, link_id=1)
-    two.sign(ALICE.secret, utc=UTC + world.now - 10.0, link_id=2)
-    world.run(1.0)
-    sent = one.move(1.0), two.rotate(5.0)
-    world.run(0.3)
-    assert [each.result for each in sent] == [ACCEPTED] * 2
 
 
 def test_a_revoked_key_is_nobody_s_at_once(world: World) -> None:
@@ -257,28 +202,6 @@ def test_a_revoked_key_is_nobody_s_at_once(world: World) -> None:
     assert [each.ack is not None for each in sent] == [False, False, True]
     assert [task.submitter.key for task in world.tasks()] == ["bob"]
     assert len(client.received) - heard <= 2, "what was on its way"
-
-
-def test_a_revoked_key_is_not_taken_for_no_signature(world: World) -> None:
-    put(world, REVOKED, takes_unsigned=True)
-    sent = signing(world, ALICE).move(1.0)
-    world.run(0.3)
-    assert sent.ack is None
-
-
-def test_who_asked_is_who_had_signed_whatever_comes_after(make_world: MakeWorld) -> None:
-    store = LateStore()
-    world = put(make_world(store=store), ALICE, BOB)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    store.delay = 5.0
-    client.move(1.0)
-    world.run(0.1)
-    client.sign(BOB.secret, utc=UTC + world.now)
-    client.send(heartbeat())
-    world.run(1.0)
-    (refused,) = world.events(SubmissionRefused)
-    assert refused.actor.endswith(" signed alice")
 
 
 def setup_message(secret: bytes) -> object:

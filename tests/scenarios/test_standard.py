@@ -18,7 +18,6 @@ from tests.scenarios.conftest import MakeWorld
 WAYPOINT, LOITER_TIME, RETURN, TAKEOFF, DELAY = 16, 19, 20, 22, 93
 YAW, SPEED, REPOSITION, YAW_SPEED = 115, 178, 192, 213
 GLOBAL, LOCAL, GLOBAL_RELATIVE_INT = 0, 1, 6
-RELEASE = 54013
 
 
 @pytest.mark.parametrize("target", [(1, 1), (1, 191), (1, 0)])
@@ -52,27 +51,6 @@ def test_go_to_in_three_forms_is_one_task(world: World) -> None:
     world.run(0.3)
     assert [s.answer for s in (again, local)] == [(ACCEPTED, 1)] * 2
     assert len(world.tasks()) == 1
-
-
-def test_each_form_is_answered_though_none_is_stored_yet(world: World) -> None:
-    place = at(2.0, 0.5)
-    sent = [
-        world.client.command_int(command, **place, frame=GLOBAL, target=target)
-        for command in (REPOSITION, WAYPOINT)
-        for target in ((1, 1), (1, 191))
-    ]
-    world.run(0.3)
-    assert [each.answer for each in sent] == [(ACCEPTED, 1)] * 4
-    assert len(world.tasks()) == 1
-
-
-def test_without_a_place_it_is_a_pause(world: World) -> None:
-    world.client.move(2)
-    world.run(2)
-    sent = world.client.command(REPOSITION, -1, 1, 0, nan, nan, nan, nan, target=(1, 1))
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 1)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
 def test_go_to_now_runs_at_once_and_the_other_goes_on_when_continued(
@@ -112,14 +90,6 @@ def test_return_drives_home(world: World, how: str) -> None:
     assert world.rover.autopilot.mode is Mode.HOLD
     assert is_at(world, 0.0, 0.0)
     assert world.paused() is R.NONE, "nothing waits"
-
-
-def test_return_interrupts_what_runs(world: World) -> None:
-    world.client.move(3)
-    world.run(4)
-    world.client.mode(RTL)
-    world.until_state(2, S.COMPLETED)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
 def test_a_client_that_wants_auto_gets_it_and_that_is_a_takeover(world: World) -> None:
@@ -218,36 +188,6 @@ def test_another_origin_holds_what_runs(world: World) -> None:
     world.run(0.2)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     world.until(world.stands, within=3)
-
-
-def test_the_remainder_of_a_way_to_a_place_in_a_lost_frame_is_not_driven(world: World) -> None:
-    world.client.command_int(REPOSITION, -1, 1, 0, nan, x=30_000, y=0, frame=LOCAL)
-    world.until(lambda: world.truth.north > 1.0, within=20)
-    moved = common.MAVLink_gps_global_origin_message(-353_600_000, 1_491_600_000, 0)
-    world.from_vehicle_side(moved.pack(common.MAVLink(None, 1, 1)), peer="rover1")
-    world.until_state(1, S.HELD, within=10)
-    world.run(3)
-    remainder = world.client.command(RELEASE, 1, 1)
-    world.run(0.2)
-    assert remainder.answer == (DENIED, R.WRONG_STATE)
-    again = world.client.command(RELEASE, 1, 0)
-    world.run(0.2)
-    assert again.answer == (ACCEPTED, 1)
-
-
-def test_while_stopped_they_wait(world: World) -> None:
-    world.client.stop()
-    world.run(1)
-    world.client.command(RETURN, target=(1, 1))
-    world.run(0.6)
-    world.client.command_int(REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=0, target=(1, 1))
-    world.run(0.6)
-    rtl = world.client.mode(RTL)
-    world.run(2)
-    assert rtl.result == 1
-    assert [world.state(i)[0] for i in (1, 2)] == [S.QUEUED, S.QUEUED]
-    assert world.stands()
-    assert world.rover.autopilot.mode is Mode.HOLD
 
 
 def test_a_clients_default_priority_is_that_of_its_standard_commands(

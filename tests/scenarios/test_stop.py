@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import VEHICLE_LINK
-from mav_tasks.links.memory import Conditions, MemoryNet
+from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -25,10 +24,9 @@ from tests.kit.client import (
     rc_override,
     set_mode,
     setpoint,
-    sticks,
 )
 from tests.kit.store import LateStore
-from tests.kit.world import MODE_COMMAND, World
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 HEARTBEAT, POSITION = 0, 32
@@ -120,17 +118,6 @@ def test_system_0_stops_every_rover(make_world: MakeWorld) -> None:
     assert [t.state for t in world.tasks()] == [S.KILLED, S.KILLED]
 
 
-def test_one_rover_is_stopped_and_the_other_drives_on(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.move(5, speed=1.0, target=(1, 191))
-    world.client.move(5, speed=1.0, target=(2, 191))
-    world.run(3)
-    world.client.stop(target=(1, 191))
-    world.until(lambda: world.stands(1), within=BRAKING)
-    world.until_idle(tasks=2)
-    assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
-
-
 def test_stop_with_an_empty_queue_and_twice(world: World) -> None:
     first, second = world.client.stop(), world.client.stop()
     world.until(lambda: stands_in_hold(world), within=2)
@@ -176,21 +163,6 @@ def test_stop_while_the_rover_does_not_answer_our_requests(world: World, phase: 
     assert world.truth.north == 0.0
 
 
-def test_stop_while_a_clients_arming_is_in_flight_and_another_waits(world: World) -> None:
-    operator, other = world.add_client("operator"), world.add_client("other")
-    world.run(0.1)
-    world.fault(Faults(deaf=True))
-    arms = [operator.arm(), other.arm()]
-    world.run(0.1)
-    stop = world.client.stop()
-    world.run(0.05)
-    world.fault(Faults())
-    world.run(3)
-    assert stop.result == ACCEPTED
-    assert [arm.result for arm in arms] == [TEMPORARILY_REJECTED, TEMPORARILY_REJECTED]
-    assert not world.rover.autopilot.armed
-
-
 @pytest.mark.parametrize("mode", [AUTO, RTL])
 @pytest.mark.parametrize("seed", range(4))
 def test_stop_overtaken_by_a_clients_mode_request(
@@ -208,33 +180,6 @@ def test_stop_overtaken_by_a_clients_mode_request(
     assert stands_in_hold(world)
     world.run(3)
     assert world.pose() == where
-
-
-@pytest.mark.parametrize("mode", [AUTO, GUIDED])
-@pytest.mark.parametrize("late", [1.0, 3.0])
-def test_a_mode_request_from_before_stop_that_comes_when_all_is_over_is_undone(
-    world: World, mode: int, late: float
-) -> None:
-    held: list[bytes] = []
-
-    def holds_up(source: str, target: str, data: bytes) -> bool:
-        if target != "rover1" or data[7] != MODE_COMMAND or held:
-            return False
-        held.append(data)
-        return True
-
-    world.operator_arm(True)
-    world.run(1)
-    world.watched.loses = holds_up
-    world.client.mode(mode)
-    world.run(0.05)
-    world.client.stop()
-    world.run(late)
-    assert stands_in_hold(world)
-    MemoryNet.send(world.watched, VEHICLE_LINK, "rover1", held[0])  # it left before: not judged
-    world.run(BRAKING)
-    assert mode in [beat.custom_mode for beat in world.client.of_type("HEARTBEAT")]
-    assert stands_in_hold(world)
 
 
 MOTION_OF_CLIENTS = [
@@ -337,18 +282,6 @@ def test_no_command_that_moves_passes_while_stopped(
     assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
 
 
-def test_hold_by_a_client_does_not_end_a_stop_that_is_under_way(world: World) -> None:
-    drive(world)
-    world.fault(Faults(refuse_mode=True))
-    world.client.stop()
-    world.run(0.5)
-    world.client.mode(4)
-    world.run(0.5)
-    world.fault(Faults())
-    world.until(lambda: stands_in_hold(world), within=BRAKING)
-    assert world.paused() is R.STOPPED
-
-
 @pytest.mark.parametrize("silence", [4.0, 4.1, 4.2])  # HOLD is sent every 0.25 s
 def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World, silence: float) -> None:
     drive(world)
@@ -388,14 +321,6 @@ def test_a_stop_is_not_confirmed_by_a_rover_whose_heartbeats_do_not_come(world: 
     world.until(lambda: stands_in_hold(world), within=2)
 
 
-def test_when_only_we_cannot_hear_it_the_rover_is_stopped_all_the_same(world: World) -> None:
-    drive(world)
-    world.fault(Faults(silent=True))
-    world.run(4)
-    world.client.stop()
-    world.until(lambda: world.stands() and world.rover.autopilot.mode is Mode.HOLD, within=BRAKING)
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_stop_through_a_lossy_net(make_world: MakeWorld, seed: int) -> None:
     bad = Conditions(delay=0.005, jitter=0.1, loss=0.3, duplication=0.1)
@@ -419,36 +344,3 @@ def test_stop_does_not_wait_for_the_store(make_world: MakeWorld) -> None:
     stop = world.client.stop()
     world.until(lambda: stop.ack, within=0.1)
     world.until(lambda: stands_in_hold(world), within=BRAKING)
-
-
-def test_a_repeat_of_an_older_continue_does_not_release_a_newer_stop(world: World) -> None:
-    """The first copy was acted on, its ack was lost, and meanwhile somebody pressed STOP."""
-    operator = world.add_client("operator")
-    world.client.move(20)
-    world.until_state(1, S.EXECUTING)
-    world.client.pause()
-    world.run(1)
-    proceed = world.client.proceed()
-    world.run(0.3)
-    operator.stop()
-    world.run(0.2)
-    again = world.client.proceed()
-    world.run(1)
-    assert (proceed.result, again.result) == (ACCEPTED, TEMPORARILY_REJECTED)
-    assert world.paused() is R.STOPPED
-    world.run(4)
-    world.client.proceed()  # meant so
-    world.run(0.5)
-    assert world.paused() is R.NONE
-
-
-def test_sticks_reach_the_rover_again_after_continue(world: World) -> None:
-    world.client.stop()
-    world.run(1)
-    world.client.send(sticks(500))
-    world.client.proceed()
-    world.run(0.1)
-    reached = [packet.kind for packet in world.observer.reached].count(69)
-    world.client.send(sticks(500))
-    world.run(0.1)
-    assert (reached, [packet.kind for packet in world.observer.reached].count(69)) == (0, 1)

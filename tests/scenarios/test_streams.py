@@ -105,19 +105,6 @@ def test_who_drove_and_is_gone_leaves_no_velocity_behind_and_must_ask_again(
     assert world.truth.forward_speed > 0.4
 
 
-def test_a_client_that_goes_while_a_task_drives_changes_nothing(streams: World) -> None:
-    world = streams
-    world.client.mode(GUIDED)
-    world.client.move(1)
-    world.until_state(1, S.EXECUTING)
-    world.client.send(setpoint(0.5))
-    before = len(world.observer.reached)
-    tell(world, PeerChanged(CLIENT_LINK, "client", up=False))
-    assert len(world.observer.reached) == before
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-
-
 def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(streams: World) -> None:
     world, sent = streams, list[Outgoing]()
     send = world.server.pump._send
@@ -159,24 +146,6 @@ def test_a_rover_whose_connection_breaks_goes_on_when_it_is_back(
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
     assert near_pose(world.pose(), (3.0, 0.0, 0.0))
-
-
-def test_a_client_that_comes_back_from_elsewhere_commands_at_once(streams: World) -> None:
-    world = streams
-    world.client.move(2)
-    world.until_state(1, S.EXECUTING)
-    world.client.heartbeats = False
-    tell(world, PeerChanged(CLIENT_LINK, "client", up=False))
-    sent_at = world.now
-    world.run(1)
-    assert all(packet.at <= sent_at + 0.01 for packet in world.client.received)
-    again = world.add_client("again")
-    tell(world, PeerChanged(CLIENT_LINK, "again", up=True))
-    world.run(0.2)
-    stop = again.stop()
-    world.until(world.stands, within=3)
-    assert stop.answer == (ACCEPTED, 1)
-    assert world.state(1) == (S.KILLED, R.STOP)
 
 
 def test_a_congested_client_gets_answers_and_no_telemetry_and_the_other_all(

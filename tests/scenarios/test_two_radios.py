@@ -100,26 +100,6 @@ def test_a_radio_on_which_nothing_reaches_the_rover_is_left_too(make_fleet: Make
     assert near_pose(fleet.pose_of(1), (1.0, 0.0, 0.0))
 
 
-def test_two_good_radios_are_not_used_in_turns(make_fleet: MakeFleet) -> None:
-    fleet = with_two(make_fleet)
-    fleet.run(20)
-    silence(fleet, "b")
-    fleet.run(10)
-    silence(fleet)
-    fleet.run(10)
-    assert notes(fleet) == []
-    assert [each.text for each in fleet.events(VehicleSeen)].count("is now at b") == 0
-
-
-def test_a_rover_that_was_silent_on_both_is_heard_again_on_either(make_fleet: MakeFleet) -> None:
-    fleet = with_two(make_fleet)
-    silence(fleet, "a", "b")
-    fleet.run(10)
-    silence(fleet, "a")
-    fleet.client.move(1, target=(1, 191))
-    fleet.until_state(1, S.COMPLETED)
-
-
 def test_a_rover_that_restarts_at_once_at_another_place_is_heard_again(
     make_fleet: MakeFleet,
 ) -> None:

@@ -2,18 +2,15 @@
 
 import pytest
 
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, Mode, Persona
+from rover_sim.personas import ARDUPILOT, Persona
 from tests.kit.client import (
     ACCEPTED,
     GUIDED,
     HOLD,
     RTL,
-    TEMPORARILY_REJECTED,
     Sent,
     setpoint,
-    sticks,
 )
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import OFFBOARD, PROMPT_PX4, RETURN, ask_mode
@@ -99,24 +96,6 @@ def test_a_return_ends_disarmed_whoever_armed_the_rover(
 
 
 @BOTH
-def test_a_return_from_a_task_that_waits_to_go_on_ends_disarmed_too(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world = armed_by_client(make_world, persona)
-    world.client.move(3.0)
-    world.until_state(1, S.EXECUTING, within=10)
-    world.run(2)
-    returns(world, persona)
-    world.run(HANDED_BACK)
-    assert not world.rover.autopilot.armed
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
-    world.client.proceed()
-    world.until_state(1, S.COMPLETED, within=30)
-    world.run(HANDED_BACK)
-    assert not world.rover.autopilot.armed, "the server armed it for the rest"
-
-
-@BOTH
 def test_a_mission_whose_last_item_is_the_return_ends_disarmed(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -151,18 +130,6 @@ def test_takeoff_and_land_are_both_accepted_and_land_disarms(
 
 
 @BOTH
-def test_land_waits_for_what_is_being_driven(make_world: MakeWorld, persona: Persona) -> None:
-    world = armed_by_client(make_world, persona)
-    world.client.move(2.0)
-    world.until_state(1, S.EXECUTING, within=10)
-    assert land(world).result == ACCEPTED
-    world.until_state(1, S.COMPLETED, within=20)
-    assert world.rover.autopilot.armed
-    world.run(HANDED_BACK)
-    assert not world.rover.autopilot.armed
-
-
-@BOTH
 def test_land_ends_what_its_client_drives_by_setpoints(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -175,13 +142,3 @@ def test_land_ends_what_its_client_drives_by_setpoints(
     land(world)
     world.run(HANDED_BACK)
     assert (world.stands(), world.rover.autopilot.armed) == (True, False)
-
-
-def test_land_takes_the_rover_out_of_nobodys_hands(world: World) -> None:
-    world.operator_mode(Mode.MANUAL)
-    world.operator_arm(True)
-    world.client.stream(sticks(z=600), rate=10)
-    world.run(1.5)
-    assert land(world).result == TEMPORARILY_REJECTED
-    world.run(1)
-    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.MANUAL, True)

@@ -14,13 +14,11 @@ from rover_sim.faults import Faults
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode, Persona
 from tests.kit import px4
-from tests.kit.client import MOVE
 from tests.kit.world import PROMPT, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_fence import INCLUSION, box, fenced
 
 DRIVE, REPOSITION, RELEASE = 54002, 192, 54013
-AGAIN, REMAINDER = 0, 1
 SLOW, FAST = 0.5, 2.0  # m/s
 #: m from where it was that it drives at the most: half a metre the wrong way, and what it takes to
 #: stop from the speed that it has by then
@@ -146,20 +144,6 @@ def test_a_heading_that_steering_cannot_make_up_for_is_found_a_metre_beside_the_
     assert 1.0 < furthest < beside
 
 
-def test_a_heading_a_little_wrong_is_made_up_for(make_world: MakeWorld) -> None:
-    """The line is the one that the heading meant: nobody can know better."""
-    world = make_world()
-    world.fault(Faults(heading_error=radians(30)))
-    world.run(0.5)
-    world.client.move(6)
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-    north, east, _ = world.pose()
-    assert hypot(north, east) == pytest.approx(6.0, abs=0.05)
-    beside = abs(east * cos(radians(30)) - north * sin(radians(30)))
-    assert beside < 0.6
-
-
 @pytest.mark.parametrize("turned", [180, -90, 60])
 @pytest.mark.parametrize("goal", GOALS)
 def test_a_heading_that_jumps_holds_the_task_at_once(
@@ -194,16 +178,6 @@ def test_a_jump_below_2_m_is_a_correction_that_is_driven_by(
     north, east = jump
     assert near_pose(world.pose(), (20 - north, -east, 90.0), metres=0.05)
     assert top < SLOW + 0.05
-
-
-def test_a_jump_back_by_more_than_a_metre_is_no_progress_and_ends_the_task(world: World) -> None:
-    driving(world, "move", SLOW)
-    way = Way(world)
-    world.fault(Faults(position_jump=(-1.9, 0.0)))
-    world.until(lambda: is_over(world), within=20)
-    assert world.state(1) == (S.FAILED, R.STUCK)
-    nothing_follows(world)
-    assert way.furthest < BLIND_AT_SPEED[SLOW]
 
 
 STANDING = [("ardupilot", goal, speed) for goal in ("move", "drive") for speed in (SLOW, FAST)]
@@ -283,16 +257,6 @@ def test_a_heading_that_stands_while_it_turns_ends_the_turn_after_a_radian(world
     assert 0.5 < turned < 1.7
 
 
-def test_a_heading_that_stands_while_it_drives_a_curve_is_found(world: World) -> None:
-    world.fault(Faults(heading_frozen=True))
-    world.client.command(DRIVE, SLOW, 30, 60)  # a circle of 1 m
-    way = Way(world)
-    world.until(lambda: is_over(world), within=20)
-    assert world.state(1) == (S.HELD, R.OFF_TRACK)
-    nothing_follows(world)
-    assert way.furthest < 2.1
-
-
 @pytest.mark.parametrize("speed", [SLOW, FAST])
 def test_a_wrong_heading_leads_over_a_fence_no_further_than_anywhere(
     world: World, speed: float
@@ -306,17 +270,3 @@ def test_a_wrong_heading_leads_over_a_fence_no_further_than_anywhere(
     assert world.state(1) in ((S.HELD, R.OFF_TRACK), (S.HELD, R.FENCE))
     nothing_follows(world)
     assert world.truth.north < WRONG[speed]
-
-
-def test_released_on_a_wrong_heading_it_gets_no_further_each_time(world: World) -> None:
-    world.fault(Faults(heading_error=pi))
-    world.run(0.5)
-    world.client.command(MOVE, 20.0)
-    for answer in (REMAINDER, AGAIN, None):
-        way = Way(world)
-        world.until_state(1, S.EXECUTING)
-        world.until_state(1, S.HELD)
-        nothing_follows(world)
-        assert way.furthest < WRONG[SLOW]
-        if answer is not None:
-            world.client.command(RELEASE, 1, answer)
