@@ -14,6 +14,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ARM, MOVE, SET_MODE
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.volume import some
@@ -31,7 +32,7 @@ WAYPOINT, RELEASE, REQUEST, VERSION = 16, 54013, 512, 148
 PARAMETER = 20  # PARAM_REQUEST_READ
 LOITER = 17  # MAV_CMD_NAV_LOITER_UNLIM
 
-directions = pytest.mark.parametrize(("old", "new"), DIRECTIONS, ids=lambda name: name)
+directions = for_each("old, new", DIRECTIONS)
 
 
 class Swapped:
@@ -166,7 +167,7 @@ CASES = [(state, word) for state in STATES for word in ("nothing", "STOP")] + [
 
 
 @directions
-@pytest.mark.parametrize(("state", "word"), some(CASES, *range(0, len(CASES), 3)))
+@for_each("state, word", some(CASES, *range(0, len(CASES), 3)))
 def test_nothing_of_the_old_ones_control_reaches_the_new_one(
     make_world: MakeWorld, old: str, new: str, state: Callable[[World], None], word: str
 ) -> None:
@@ -222,12 +223,8 @@ def notes_of(world: World) -> list[str]:
     return [note.text for note in world.events(VehicleNoted)]
 
 
-@pytest.mark.parametrize(
-    ("persona", "forged"),
-    [(PROMPT, PX4), (PROMPT_PX4, ARDUPILOT)],
-    ids=["ardupilot", "px4"],
-)
-@pytest.mark.parametrize("kind", [ROVER, COPTER])
+@for_each("persona, forged", [(PROMPT, PX4), (PROMPT_PX4, ARDUPILOT)])
+@for_each("kind", [ROVER, COPTER])
 def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
     make_world: MakeWorld, persona: Persona, forged: int, kind: int
 ) -> None:
@@ -269,11 +266,7 @@ def test_stop_reaches_both_of_two_that_alternate(make_world: MakeWorld) -> None:
     assert world.rover.autopilot.mode is Mode.HOLD
 
 
-@pytest.mark.parametrize(
-    ("autopilot", "words"),
-    [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})],
-    ids=["ardupilot", "px4"],
-)
+@for_each("autopilot, words", [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})])
 def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
     world: World, autopilot: int, words: set[tuple[int, float, float]]
 ) -> None:

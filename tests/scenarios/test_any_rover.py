@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import pytest
-
 from mav_tasks.engine.commands.assignments import GRACE
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
@@ -12,6 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, ACK, DENIED, MOVE, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
 from tests.kit.store import PromptSqliteStore
@@ -237,8 +236,8 @@ def server_again(world: World, store: PromptSqliteStore) -> None:
     world.start_server(store, store.load())
 
 
-@pytest.mark.parametrize("restarts", [False, True], ids=["", "restarted"])
-@pytest.mark.parametrize("halt", ["stop", "pause", "hold", "disarm", "manual"])
+@for_each("restarts", [False, True])
+@for_each("halt", ["stop", "pause", "hold", "disarm", "manual"])
 def test_the_task_of_an_idle_rover_that_a_person_halts_stays(
     make_world: MakeWorld, tmp_path: Any, halt: str, restarts: bool
 ) -> None:

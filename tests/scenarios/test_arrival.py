@@ -2,17 +2,16 @@
 
 from functools import partial
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState
 from tests.kit.bodies import Sticky
+from tests.kit.cases import for_each
 from tests.scenarios.conftest import MakeWorld
 
 S = TaskState
 
 
-@pytest.mark.parametrize("least", [0.02, 0.1])
-@pytest.mark.parametrize("rolling", [0.9, 0.3, 0.2])
+@for_each("least", [0.02, 0.1])
+@for_each("rolling", [0.9, 0.3, 0.2])
 def test_moves_end_as_near_as_the_rover_can_and_none_is_stuck(
     make_world: MakeWorld, least: float, rolling: float
 ) -> None:

@@ -6,7 +6,6 @@ from dataclasses import replace
 from math import inf, nan
 from random import Random
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.clients.flood_gate import STRANGERS
@@ -17,6 +16,7 @@ from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -90,7 +90,7 @@ def garbage(random: Random) -> bytes:
             return bytes(packet)
 
 
-@pytest.mark.parametrize("link", [CLIENT_LINK, VEHICLE_LINK])
+@for_each("link", [CLIENT_LINK, VEHICLE_LINK])
 def test_10000_bad_datagrams_change_nothing_and_are_counted(
     make_world: MakeWorld, link: str
 ) -> None:
@@ -121,7 +121,7 @@ def test_10000_bad_datagrams_change_nothing_and_are_counted(
     assert world.rover.autopilot.armed is False
 
 
-@pytest.mark.parametrize("seed", range(4))
+@for_each("seed", range(4))
 def test_valid_packets_full_of_nonsense_raise_nothing(world: World, seed: int) -> None:
     """Every message of the base set, with random contents and a good CRC, on both sides."""
     random = Random(seed)
@@ -147,8 +147,8 @@ def test_valid_packets_full_of_nonsense_raise_nothing(world: World, seed: int) -
 OURS = (54000, 54001, 54003, 193, 176, 400, 510, 511, 512, 20, 192, 300)
 
 
-@pytest.mark.parametrize("command", OURS)
-@pytest.mark.parametrize("component", [0, 1, 191])
+@for_each("command", OURS)
+@for_each("component", [0, 1, 191])
 def test_no_number_in_a_command_raises(world: World, command: int, component: int) -> None:
     odd = (nan, inf, -inf, -1.0, 1e30, -1e30, 0.5, 65536.0, 54000.0, 2.0**31, 2.0**63)
     for index in range(7):
@@ -178,8 +178,8 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize("form", ["LONG", "INT"])
-@pytest.mark.parametrize(("command", "index", "name", "value"), CASES)
+@for_each("form", ["LONG", "INT"])
+@for_each("command, index, name, value", CASES)
 def test_a_bad_parameter_is_denied_and_named(
     world: World, form: str, command: int, index: int, name: str, value: float
 ) -> None:
@@ -195,7 +195,7 @@ def test_a_bad_parameter_is_denied_and_named(
     assert world.tasks() == ()
 
 
-@pytest.mark.parametrize("command", [MOVE, ROTATE])
+@for_each("command", [MOVE, ROTATE])
 def test_nan_is_not_given_and_zero_is_nothing_to_do(world: World, command: int) -> None:
     given = world.client.command(command, 1.0, nan, nan, nan, nan, nan, nan)
     world.run(0.1)

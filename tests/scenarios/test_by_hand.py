@@ -2,7 +2,6 @@
 
 from math import inf, nan
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
@@ -11,6 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -37,7 +37,7 @@ def taken_by_hand(world: World) -> None:
     world.rover.autopilot.operator_sticks(0.5, 0.2)
 
 
-@pytest.mark.parametrize("how", ["cancel", "clear", "cancel before"])
+@for_each("how", ["cancel", "clear", "cancel before"])
 def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, how: str) -> None:
     driving(world)
     if how == "cancel before":
@@ -101,7 +101,7 @@ def test_a_disarm_ends_a_clients_stream_at_once(make_world: MakeWorld) -> None:
     assert "move" not in world.observer.sent_since(late)
 
 
-@pytest.mark.parametrize("value", [nan, inf])
+@for_each("value", [nan, inf])
 def test_a_position_that_is_none_is_passed_over(world: World, value: float) -> None:
     driving(world, 5.0)
     last = world.client.of_type("GLOBAL_POSITION_INT")[-1]
@@ -118,8 +118,8 @@ def test_a_position_that_is_none_is_passed_over(world: World, value: float) -> N
     assert world.stands()
 
 
-@pytest.mark.parametrize(
-    ("command", "params"),
+@for_each(
+    "command, params",
     [
         (CANCEL, (nan, 0)),
         (RELEASE, (1, nan)),

@@ -8,6 +8,7 @@ from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, GUIDED, HOLD, RTL, heartbeat, setpoint
 from tests.kit.world import World, at, is_at, put_home
 from tests.scenarios.conftest import MakeWorld
@@ -24,7 +25,7 @@ def takes_control(world: World) -> None:
     world.run(0.5)
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.05, 0.3, 1.2])
+@for_each("gap", [0.0, 0.05, 0.3, 1.2])
 def test_our_mode_asked_for_right_after_hold_is_not_undone(
     make_world: MakeWorld, gap: float
 ) -> None:
@@ -76,7 +77,7 @@ def test_an_operators_heartbeats_reach_the_rover(world: World) -> None:
     assert (255, 190) in sources, "its own failsafe must see the operator"
 
 
-@pytest.mark.parametrize(("flags", "target"), [(1, 191), (0, 1)])
+@for_each("flags, target", [(1, 191), (0, 1)])
 def test_a_go_to_is_now_only_at_the_autopilot_with_a_change_of_mode(
     make_world: MakeWorld, flags: int, target: int
 ) -> None:
@@ -123,7 +124,7 @@ def test_that_a_rover_is_to_stand_is_passed_on_however_late(world: World) -> Non
     assert world.stands()  # its own time-out would be later
 
 
-@pytest.mark.parametrize("seconds", [1.0, 4.0])
+@for_each("seconds", [1.0, 4.0])
 def test_tasks_wait_as_long_as_is_set_after_a_clients_setpoints(
     make_world: MakeWorld, seconds: float
 ) -> None:

@@ -1,13 +1,12 @@
 """Handing the rover back, and the orderly end of the server."""
 
-import pytest
-
 from mav_tasks.engine.inputs import Shutdown
 from mav_tasks.tasks.events import ServerStopped
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import TEMPORARILY_REJECTED
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -28,7 +27,7 @@ def test_an_empty_queue_hands_the_rover_back_and_the_stream_ends(world: World) -
     assert world.observer.sent_since(at) == []
 
 
-@pytest.mark.parametrize("after", [k * 0.003 for k in range(14)])
+@for_each("after", [k * 0.003 for k in range(14)])
 def test_the_next_task_right_after_the_hand_back_works(world: World, after: float) -> None:
     """Submitted while HOLD, disarming, or what follows is on its way, in steps of 3 ms."""
     world.client.move(0.3)
@@ -85,9 +84,7 @@ def test_submissions_are_refused_and_nothing_begins_on_the_way_out(world: World)
     assert world.state(2)[0] is S.QUEUED
 
 
-@pytest.mark.parametrize(
-    ("persona", "words"), [(ARDUPILOT, ("zero", "HOLD")), (PX4, ("HOLD", "zero"))]
-)
+@for_each("persona, words", [(ARDUPILOT, ("zero", "HOLD")), (PX4, ("HOLD", "zero"))])
 def test_last_words_are_there_exactly_while_a_rover_is_engaged(
     make_world: MakeWorld, persona: Persona, words: tuple[str, ...]
 ) -> None:
@@ -101,7 +98,7 @@ def test_last_words_are_there_exactly_while_a_rover_is_engaged(
     assert seen == {(True, words), (False, ())}
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4])
+@for_each("persona", [ARDUPILOT, PX4])
 def test_last_words_stop_a_driving_rover(make_world: MakeWorld, persona: Persona) -> None:
     world = make_world(persona=persona)
     world.client.move(20, speed=1.0)

@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -76,7 +77,7 @@ def test_hold_and_a_pause_reach_every_rover(fleet: Fleet, component: int) -> Non
     assert len(answers(fleet.other, PAUSE_CONTINUE)) == 4
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda persona: persona.name)
+@for_each("persona", [ARDUPILOT, PX4])
 def test_modes_and_capabilities_are_answered(make_world: MakeWorld, persona: Persona) -> None:
     world = make_world(persona=persona)
     if persona is PX4:

@@ -2,13 +2,12 @@
 
 from random import Random
 
-import pytest
-
 from mav_tasks.engine.inputs import Shutdown
 from mav_tasks.setting_keys.shapes import Number
 from mav_tasks.settings import BOUNDED, KEYS, ServerSettings, Settings
 from rover_sim.faults import Faults
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT
 from tests.scenarios.conftest import MakeWorld
@@ -33,8 +32,8 @@ def at_the_ends(random: Random) -> Settings:
     return settings.engine
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda persona: persona.name)
+@for_each("seed", range(4))
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_stop_stops_and_the_end_too(make_world: MakeWorld, persona: Persona, seed: int) -> None:
     settings = at_the_ends(Random(seed))
     world = make_world(seed=seed, persona=persona, settings=settings)

@@ -1,6 +1,5 @@
 """The fence: what it forbids at submission, at the start, and while driving; rally points."""
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
@@ -9,6 +8,7 @@ from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL
 from tests.kit.mission import Download, Item, Upload, currents
 from tests.kit.world import World, at, is_at
@@ -68,7 +68,7 @@ def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
     assert currents(world.client)[-1].fence_id == download.opaque_id
 
 
-@pytest.mark.parametrize(
+@for_each(
     "items",
     [
         YARD[:2],
@@ -88,7 +88,7 @@ def test_a_fence_that_is_none_is_refused_and_the_one_before_stays(
     assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
 
 
-@pytest.mark.parametrize("command", [CIRCLE_IN, CIRCLE_OUT])
+@for_each("command", [CIRCLE_IN, CIRCLE_OUT])
 def test_a_circle_of_radius_0_is_none_as_mavsdk_has_it(world: World, command: int) -> None:
     no_circle = Item(command, x=0, y=0, param1=0.0, frame=0)
     assert fenced(world, *YARD, no_circle) == 0
@@ -100,8 +100,8 @@ def test_a_circle_of_radius_0_is_none_as_mavsdk_has_it(world: World, command: in
     assert len(download.items) == len(YARD) + 1
 
 
-@pytest.mark.parametrize(
-    ("items", "why"),
+@for_each(
+    "items, why",
     [
         (
             [Item(CIRCLE_IN, **at(0, 0), param1=-1.0, frame=0)],
@@ -144,7 +144,7 @@ def test_a_move_that_would_leave_it_fails_before_it_begins(world: World) -> None
     assert world.state(2)[0] is S.COMPLETED
 
 
-@pytest.mark.parametrize("speed", [0.5, 2.0, -2.0])
+@for_each("speed", [0.5, 2.0, -2.0])
 def test_what_has_no_end_is_stopped_before_the_boundary(world: World, speed: float) -> None:
     fenced(world, *YARD)
     world.client.command(DRIVE, speed, 0, 30, 0, 0, 0, 5)
@@ -155,7 +155,7 @@ def test_what_has_no_end_is_stopped_before_the_boundary(world: World, speed: flo
     assert world.stands()
 
 
-@pytest.mark.parametrize("fresh", [0.3, 1.0])
+@for_each("fresh", [0.3, 1.0])
 def test_a_rover_that_falls_silent_before_the_boundary_stops_before_it(
     fresh: float,
 ) -> None:
@@ -182,7 +182,7 @@ def test_a_rover_outside_may_come_back_in(world: World) -> None:
     assert is_at(world, 1, 0)
 
 
-@pytest.mark.parametrize("how", ["command", "mode"])
+@for_each("how", ["command", "mode"])
 def test_a_return_goes_to_the_nearest_rally_point(world: World, how: str) -> None:
     world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
     points = [Item(RALLY, **at(*p)) for p in ((2, 2), (2, -1), (-2, 0))]
@@ -202,7 +202,7 @@ def on_board(world: World, kind: int = FENCE) -> list[tuple[int, int, int]]:
     return [(item.command, item.x, item.y) for item in stored]
 
 
-@pytest.mark.parametrize(("loss", "tries"), [(0.0, 1), (0.05, 4)])
+@for_each("loss, tries", [(0.0, 1), (0.05, 4)])
 def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float, tries: int) -> None:
     """Of two losses in one upload the rover asks again too late for the client, one time in six."""
     world = make_world(conditions=Conditions(delay=0.01, loss=loss))

@@ -7,6 +7,7 @@ from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, ROTATE
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -91,7 +92,7 @@ def test_a_client_that_is_gone_every_second_second_loses_no_task_and_doubles_non
     assert stop.result == ACCEPTED
 
 
-@pytest.mark.parametrize("seed", range(3))
+@for_each("seed", range(3))
 def test_what_is_reordered_and_doubled_changes_nothing(make_world: MakeWorld, seed: int) -> None:
     """A fifth of a second of disorder at 20 Hz: everything is overtaken by what came later."""
     net = Conditions(delay=0.002, jitter=0.2, duplication=0.5)

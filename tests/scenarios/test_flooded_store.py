@@ -5,10 +5,9 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.settings import Limits, Roles, Settings
 from mav_tasks.tasks.events import TaskModified, VehicleSpeedSet
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, FakeClient, Sent, command_long
 from tests.kit.databases import tables
 from tests.kit.world import World
@@ -78,7 +77,7 @@ def flooded(make_world: MakeWorld, flood: Callable[[FakeClient], None], role: st
     return world
 
 
-@pytest.mark.parametrize("flood", FLOODS)
+@for_each("flood", FLOODS)
 def test_a_flood_writes_so_much_an_hour_and_no_more(
     make_world: MakeWorld, tmp_path: Path, flood: Callable[[FakeClient], None]
 ) -> None:

@@ -2,13 +2,13 @@
 
 from itertools import count
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import MemoryLink
 from mav_tasks.settings import Clients, Limits, Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -87,7 +87,7 @@ def test_strangers_drive_nobody_out_and_their_stop_counts(make_world: MakeWorld)
     assert any(data[7] == 77 for _, data in link.receive(100)), "it is answered, too"
 
 
-@pytest.mark.parametrize("kind", ["commands", "uploads", "requests", "parameters", "noise"])
+@for_each("kind", ["commands", "uploads", "requests", "parameters", "noise"])
 def test_what_others_are_served_and_what_is_remembered(make_world: MakeWorld, kind: str) -> None:
     """A rover is driven meanwhile: no setpoint is missing (the observer looks), STOP stops it."""
     world = make_world(settings=Settings(roles=Roles(safety=Limits(rate=20.0))))

@@ -10,6 +10,7 @@ from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -171,7 +172,7 @@ def test_parameters_can_be_listed_through_the_server(world: World) -> None:
     assert [silent.gaps((1, 1)), world.client.gaps((1, 1))] == [0, 0]
 
 
-@pytest.mark.parametrize("component", [1, 191])
+@for_each("component", [1, 191])
 def test_the_protocol_version_is_answered(world: World, component: int) -> None:
     asked = world.client.command(REQUEST, 300, target=(1, component))
     world.run(0.1)
@@ -240,7 +241,7 @@ def test_disarm_never_waits(world: World) -> None:
     assert not world.rover.autopilot.armed
 
 
-@pytest.mark.parametrize("result", [7, 8, 9, 200])
+@for_each("result", [7, 8, 9, 200])
 def test_a_result_that_crashes_clients_is_not_passed_on(world: World, result: int) -> None:
     world.lose_acks()
     sent = world.client.command(31000, target=(1, 1))
@@ -307,8 +308,8 @@ def test_messages_of_our_dialect_go_only_to_clients_that_use_it(world: World) ->
     assert len(world.client.statuses(1)) > 10
 
 
-@pytest.mark.parametrize(
-    ("command", "params"),
+@for_each(
+    "command, params",
     [
         (192, (-1, 1, 0, nan, -35.36325, 149.16524)),
         (SET_MODE, (1, RTL)),
@@ -329,7 +330,7 @@ def test_what_a_stock_client_may_send_brings_it_nothing_that_it_cannot_read(
     assert not [p for p in stock.received if p.message_id in OUR_MESSAGES]
 
 
-@pytest.mark.parametrize("how", ["nonce", "NaN", "asked", "streamed", "queue"])
+@for_each("how", ["nonce", "NaN", "asked", "streamed", "queue"])
 def test_who_knows_our_dialect_is_told_of_its_tasks(world: World, how: str) -> None:
     client = world.add_client("stock", reads_dialect=False)
     world.run(1.2)
@@ -424,7 +425,7 @@ def test_a_clients_stream_makes_tasks_wait(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-@pytest.mark.parametrize("field", ["vx", "yaw_rate", "x"])
+@for_each("field", ["vx", "yaw_rate", "x"])
 def test_a_setpoint_that_is_not_finite_never_reaches_the_rover(world: World, field: str) -> None:
     world.operator_arm(True)
     world.run(0.2)

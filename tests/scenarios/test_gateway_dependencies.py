@@ -10,6 +10,7 @@ from mav_tasks.engine.commands.dependency_questions import WITHIN
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, FakeClient, Sent
 from tests.kit.gateways.engines import LOOK, FleetWorld, Gateway
 from tests.kit.gateways.order import early_starts
@@ -146,7 +147,7 @@ def test_a_halt_that_comes_before_the_answer_of_the_database_counts(pair: Pair) 
     assert sent.answer[1] == R.STALE
 
 
-@pytest.mark.parametrize("n", some(range(8), 0, 2, 3, 5))
+@for_each("n", some(range(8), 0, 2, 3, 5))
 def test_an_end_in_the_moment_of_a_takeover_is_not_missed(tmp_path: Path, n: int) -> None:
     """The gateway of the waiting task dies around the end of the one that it waits for."""
     pair = Pair(tmp_path, names=("server", "b", "c"), seed=n)

@@ -11,6 +11,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, FakeClient
 from tests.kit.gateways.engines import FleetWorld, Gateway
 from tests.kit.gateways.traces import count
@@ -126,7 +127,7 @@ def test_what_is_not_stored_keeps_the_rover(reach: Reach) -> None:
     reach.world.until(lambda: reach.is_at(reach.other), within=5)
 
 
-@pytest.mark.parametrize("far", [False, True])
+@for_each("far", [False, True])
 def test_a_stop_while_the_rover_changes_hands_is_in_force_afterwards(
     tmp_path: Path, *, far: bool
 ) -> None:

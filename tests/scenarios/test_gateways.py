@@ -16,6 +16,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.signing_lead import STEP
 from mav_tasks.tasks.task import Task
 from rover_sim.personas import PX4, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     GUIDED,
@@ -145,7 +146,7 @@ def test_stop_at_any_gateway_stops_the_rover(fleet: Fleet, *, everybody: bool) -
     assert after.halt_epochs[1] >= epoch
 
 
-@pytest.mark.parametrize("everybody", [False, True])
+@for_each("everybody", [False, True])
 def test_a_stop_while_nobody_has_the_rover_is_in_force_as_soon_as_somebody_has(
     tmp_path: Path, *, everybody: bool
 ) -> None:
@@ -310,8 +311,8 @@ def test_a_short_loss_of_the_database_stops_the_rover_and_the_task_goes_on(fleet
     assert abs(fleet.world.truth.north - 5.0) < 0.1
 
 
-@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
-@pytest.mark.parametrize("away", [2.5, 6.0])
+@for_each("persona", [PX4, PROMPT_PX4])
+@for_each("away", [2.5, 6.0])
 def test_a_task_goes_on_after_the_failsafe_that_the_end_of_the_lease_caused(
     tmp_path: Path, away: float, persona: Persona
 ) -> None:
@@ -346,7 +347,7 @@ def test_a_client_that_drives_is_stopped_when_the_lease_ends(fleet: Fleet) -> No
     assert abs(fleet.world.truth.north - north) < 0.05
 
 
-@pytest.mark.parametrize("moved", [False, True])
+@for_each("moved", [False, True])
 def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
     tmp_path: Path, *, moved: bool
 ) -> None:
@@ -380,7 +381,7 @@ def test_a_rover_that_was_disarmed_between_two_gateways_waits_for_a_person(tmp_p
     fleet.world.check()
 
 
-@pytest.mark.parametrize("on_takeover", ["hold", "resume"])
+@for_each("on_takeover", ["hold", "resume"])
 def test_a_gateway_that_ends_hands_its_rover_and_tasks_over(
     tmp_path: Path, on_takeover: str
 ) -> None:

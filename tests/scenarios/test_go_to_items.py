@@ -3,10 +3,10 @@
 from math import inf, nan
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.world import World, at, is_at
 
@@ -58,8 +58,8 @@ def test_beside_do_reposition_it_is_the_same_task(world: World) -> None:
     assert len(world.tasks()) == 1
 
 
-@pytest.mark.parametrize(
-    ("message", "result", "says"),
+@for_each(
+    "message, result, says",
     [
         (go_there(1, 1, command=20), UNSUPPORTED, "command 20 is not a place"),
         (go_there(1, 1, x=95.0), INVALID_X, "95.0"),

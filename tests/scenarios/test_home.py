@@ -7,6 +7,7 @@ import pytest
 
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.store import PromptSqliteStore
@@ -77,7 +78,7 @@ def test_a_return_at_once_after_the_arming_knows_the_new_home(
     assert far_from(world, 3.0, 0.0) < NEAR
 
 
-@pytest.mark.parametrize("phase", [0.0, 1.6])
+@for_each("phase", [0.0, 1.6])
 def test_a_return_begins_nowhere_before_the_home_of_its_arming_is_known(
     make_world: MakeWorld, phase: float
 ) -> None:

@@ -1,6 +1,5 @@
 """What somebody may try who reaches the port, or has a key for less: each was possible once."""
 
-import pytest
 from pymavlink.dialects.v20 import ardupilotmega as ardupilot
 from pymavlink.dialects.v20 import common
 
@@ -12,6 +11,7 @@ from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -74,7 +74,7 @@ def connected(world: World, key: Key) -> FakeClient:
     return client
 
 
-@pytest.mark.parametrize("role", ["observer", ""])
+@for_each("role", ["observer", ""])
 def test_a_key_that_may_less_now_may_less_at_once(world: World, role: str) -> None:
     """Also on a connection that stays: "" is of vehicles, and no client's any more."""
     put(world, ALICE)
@@ -122,7 +122,7 @@ def test_a_flood_of_go_to_items_fills_neither_disk_nor_net(with_roles: MakeRoles
     assert len(observer.texts()) <= 30
 
 
-@pytest.mark.parametrize("message", ["ping", "timesync", "mission request", "mission ack"])
+@for_each("message", ["ping", "timesync", "mission request", "mission ack"])
 def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
     with_roles: MakeRoles, message: str
 ) -> None:
@@ -148,9 +148,7 @@ def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
     assert 1 <= len(towards) <= 20
 
 
-@pytest.mark.parametrize(
-    ("persona", "mode"), [(PROMPT, AUTO), (PROMPT_PX4, MISSION)], ids=["at once", "when armed"]
-)
+@for_each("persona, mode", [(PROMPT, AUTO), (PROMPT_PX4, MISSION)])
 def test_a_plan_that_is_started_again_keeps_to_the_limits_of_who_starts_it(
     make_world: MakeWorld, persona: Persona, mode: int
 ) -> None:
@@ -199,8 +197,8 @@ BOUNDING = {
 }
 
 
-@pytest.mark.parametrize("what", BOUNDING)
-@pytest.mark.parametrize("who", [OPERATOR, 255])
+@for_each("what", BOUNDING)
+@for_each("who", [OPERATOR, 255])
 def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
     make_world: MakeWorld, what: str, who: int
 ) -> None:

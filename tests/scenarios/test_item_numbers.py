@@ -5,6 +5,7 @@ import pytest
 from mav_tasks.tasks.events import StepReached, TaskAdvanced
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Persona
+from tests.kit.cases import for_each
 from tests.kit.mission import Item, Upload
 from tests.kit.world import at
 from tests.scenarios.conftest import MakeWorld
@@ -22,7 +23,7 @@ WAYS = [
 ]
 
 
-@pytest.mark.parametrize(("persona", "before", "component"), WAYS)
+@for_each("persona, before, component", WAYS)
 def test_a_refusal_names_the_row_of_the_file(
     make_world: MakeWorld, persona: Persona, before: list[Item], component: int
 ) -> None:
@@ -33,7 +34,7 @@ def test_a_refusal_names_the_row_of_the_file(
     assert any("item 2 is 300.0 km away" in text for text in world.client.texts())
 
 
-@pytest.mark.parametrize(("persona", "before", "component"), WAYS)
+@for_each("persona, before, component", WAYS)
 def test_status_and_log_count_as_the_file_does(
     make_world: MakeWorld, persona: Persona, before: list[Item], component: int
 ) -> None:
@@ -55,8 +56,8 @@ def test_status_and_log_count_as_the_file_does(
     assert any("plan of 2 items" in each.text for each in world.client.statuses(1))
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda persona: persona.name)
-@pytest.mark.parametrize("seq", [0, 1])
+@for_each("persona", [ARDUPILOT, PX4])
+@for_each("seq", [0, 1])
 def test_without_a_mission_it_says_that_there_is_none(
     make_world: MakeWorld, persona: Persona, seq: int
 ) -> None:

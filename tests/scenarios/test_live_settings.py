@@ -1,7 +1,5 @@
 """Settings that change while the server runs: each has effect, on what is there already, too."""
 
-import pytest
-
 from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.settings import (
     Clients,
@@ -12,6 +10,7 @@ from mav_tasks.settings import (
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
+from tests.kit.cases import for_each
 from tests.kit.client import FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -46,7 +45,7 @@ def test_a_lower_limit_slows_down_at_once(world: World) -> None:
     assert world.state(1)[0] is S.EXECUTING
 
 
-@pytest.mark.parametrize(("limit", "is_lost"), [(1.5, True), (20.0, False)])
+@for_each("limit, is_lost", [(1.5, True), (20.0, False)])
 def test_a_rover_is_lost_after_the_new_time(world: World, limit: float, is_lost: bool) -> None:
     """Nothing comes from it any more that would make the server look again."""
     world.fault(Faults(silent=True))
@@ -77,7 +76,7 @@ def test_telemetry_comes_at_the_new_rate_to_who_is_there(world: World) -> None:
         assert least <= count(world.client, 32) - before <= most
 
 
-@pytest.mark.parametrize("claim", [True, False])
+@for_each("claim", [True, False])
 def test_whether_standard_commands_become_tasks_is_as_said_now(
     make_world: MakeWorld, claim: bool
 ) -> None:

@@ -19,6 +19,7 @@ from rover_sim.body import Pose
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -297,7 +298,7 @@ TROUBLED = [
 ]
 
 
-@pytest.mark.parametrize(("where", "trouble"), TROUBLED)
+@for_each("where, trouble", TROUBLED)
 def test_what_befalls_one_rover_changes_nothing_for_another(where: str, trouble: str) -> None:
     """To the last bit and the same moment: each vehicle ticks in a rhythm of its own.
 
@@ -327,7 +328,7 @@ def test_a_second_controller_on_one_link_takes_only_the_rovers_of_that_link(
 
 
 # What is for system 0 is heard by all behind an endpoint, so that all of them must be allowed it.
-@pytest.mark.parametrize("other", ["drives", "is stopped", "is not armed"])
+@for_each("other", ["drives", "is stopped", "is not armed"])
 def test_a_setpoint_for_all_does_not_reach_who_may_not_have_it_behind_the_same_radio(
     other: str,
 ) -> None:
@@ -443,7 +444,7 @@ def beside_a_twin(where: str, *, is_there: bool) -> tuple[Fleet, Vehicle]:
     return fleet, twin
 
 
-@pytest.mark.parametrize("where", TWINS)
+@for_each("where", TWINS)
 def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes_on(
     where: str,
 ) -> None:
@@ -471,7 +472,7 @@ def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes
 MOVABLE: Layout = {"one": {"a": (1,), "b": (2,)}, "two": {"c": (3,), "new": ()}}
 
 
-@pytest.mark.parametrize("silence", [0.0, 4.0])
+@for_each("silence", [0.0, 4.0])
 def test_a_rover_that_comes_back_on_another_link_is_driven_there_and_no_more_at_the_old_place(
     make_fleet: MakeFleet, silence: float
 ) -> None:

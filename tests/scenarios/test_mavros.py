@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.events import SubmissionRefused, VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, ARM, AUTO, DENIED, GUIDED, HOLD, IDS
 from tests.kit.mavros import Mavros
 from tests.kit.mavros import heartbeat as onboard_heartbeat
@@ -121,7 +122,7 @@ def test_one_on_the_rovers_side_keeps_its_address(make_world: MakeWorld) -> None
     assert not [text for text in other.client.texts() if "address" in text]
 
 
-@pytest.mark.parametrize("halt", [HOLD, None], ids=["HOLD", "disarm"])
+@for_each("halt", [HOLD, None])
 def test_it_arms_right_after_its_own_halt(make_world: MakeWorld, halt: int | None) -> None:
     """Each arming of mavros says that it is a repeat, and none is."""
     world = make_world()

@@ -17,6 +17,7 @@ from mav_tasks.tasks.events import TaskModified, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import TaskId, Terms
 from rover_sim.personas import PX4, Persona
+from tests.kit.cases import for_each
 from tests.kit.store import LateStore
 from tests.kit.world import PROMPT, World
 
@@ -81,7 +82,7 @@ def test_a_task_is_counted_from_its_submission_to_its_end(world: World) -> None:
     assert intervals.total == pytest.approx(0.05 * intervals.count, rel=0.01)
 
 
-@pytest.mark.parametrize("persona", [PROMPT, PX4], ids=lambda persona: persona.name)
+@for_each("persona", [PROMPT, PX4])
 def test_a_stop_is_timed_until_the_setpoint_and_until_it_stands(
     make_world: MakeWorld, persona: Persona
 ) -> None:

@@ -12,6 +12,7 @@ from mav_tasks.links.memory import Conditions
 from mav_tasks.services.mission_item import unpacked
 from mav_tasks.tasks.goal import Plan
 from mav_tasks.tasks.task import Task
+from tests.kit.cases import for_each
 from tests.kit.mission import TIMEOUT, Download, Item, Upload
 from tests.kit.quiet import QuietWorld
 from tests.kit.world import World, at
@@ -101,7 +102,7 @@ def places(task: Task) -> list[int]:
 # whole
 
 
-@pytest.mark.parametrize("target", [AUTOPILOT, SERVER])
+@for_each("target", [AUTOPILOT, SERVER])
 def test_5000_items_go_up_and_come_back(make_world: MakeWorld, target: tuple[int, int]) -> None:
     world = make_world()
     plan = survey(Random(5), 5000)

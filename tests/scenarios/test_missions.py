@@ -2,7 +2,6 @@
 
 from math import nan
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import PeerChanged
@@ -11,6 +10,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -114,8 +114,8 @@ def test_it_comes_back_as_it_was(world: World) -> None:
         assert message.pack(mav)[10:] == sent.pack(mav)[10:]
 
 
-@pytest.mark.parametrize(
-    ("bad", "result"),
+@for_each(
+    "bad, result",
     [
         (Item(MODE, frame=2), 3),
         (Item(WAYPOINT, x=910000000, y=5), 10),
@@ -175,7 +175,7 @@ def test_two_wishes_to_start_are_one_and_later_it_is_another_task(world: World) 
     assert currents(world.client)[-1].mission_id == 2
 
 
-@pytest.mark.parametrize("how", ["command", "message"])
+@for_each("how", ["command", "message"])
 def test_hold_pauses_it_and_auto_goes_on(world: World, how: str) -> None:
     uploaded(world)
     start(world)
@@ -194,7 +194,7 @@ def test_hold_pauses_it_and_auto_goes_on(world: World, how: str) -> None:
     assert reached(world.client) == [1, 2, 3]
 
 
-@pytest.mark.parametrize(("what", "reason"), [("STOP", R.STOPPED), ("disarmed", R.DISARMED)])
+@for_each("what, reason", [("STOP", R.STOPPED), ("disarmed", R.DISARMED)])
 def test_after_a_stop_or_while_it_may_not_be_armed_a_start_is_refused(
     world: World, what: str, reason: R
 ) -> None:
@@ -213,7 +213,7 @@ def test_a_start_without_a_plan_is_refused(world: World) -> None:
     assert start(world) == (DENIED, R.NOT_FOUND)
 
 
-@pytest.mark.parametrize("how", ["command", "message"])
+@for_each("how", ["command", "message"])
 def test_another_item_is_gone_on_with(world: World, how: str) -> None:
     uploaded(world)
     start(world)
@@ -314,8 +314,8 @@ def test_without_the_claim_missions_are_the_rovers_own(make_world: MakeWorld) ->
     assert acks(world.client)
 
 
-@pytest.mark.parametrize("wait", [0.0, 1.5])
-@pytest.mark.parametrize("persona", [ARDUPILOT, None])
+@for_each("wait", [0.0, 1.5])
+@for_each("persona", [ARDUPILOT, None])
 def test_a_script_that_arms_and_starts_is_obeyed_as_by_an_autopilot(
     make_world: MakeWorld, wait: float, persona: Persona | None
 ) -> None:
@@ -343,7 +343,7 @@ def ordered(world: World, since: float = 0.0) -> list[float]:
     ]
 
 
-@pytest.mark.parametrize("what", ["STOP", "disarm"])
+@for_each("what", ["STOP", "disarm"])
 def test_nothing_more_is_ordered_after_a_stop_or_a_takeover(world: World, what: str) -> None:
     uploaded(world, HOME, place(1, 0), servo(5, 1100), servo(5, 1900), servo(6), place(6, 0))
     start(world)
@@ -389,7 +389,7 @@ def test_a_start_while_it_is_being_cancelled_is_refused_and_then_it_is_another(
     assert start(world) == (ACCEPTED, 2)
 
 
-@pytest.mark.parametrize("how", ["moving", "sticks"])
+@for_each("how", ["moving", "sticks"])
 def test_nobody_is_taken_the_sticks_from_by_a_start(world: World, how: str) -> None:
     uploaded(world)
     world.operator_arm(True)
@@ -407,7 +407,7 @@ def test_nobody_is_taken_the_sticks_from_by_a_start(world: World, how: str) -> N
     assert world.observer.sent_since(at_start) in ([], ["MANUAL_CONTROL"])
 
 
-@pytest.mark.parametrize("what", ["clear", "empty upload", "fence"])
+@for_each("what", ["clear", "empty upload", "fence"])
 def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: str) -> None:
     store = LateStore(delay=0.0)
     world = make_world(store=store)
@@ -428,7 +428,7 @@ def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: st
     world.until_state(1, S.COMPLETED, within=60)
 
 
-@pytest.mark.parametrize("kind", [3, 77, 255])
+@for_each("kind", [3, 77, 255])
 def test_a_plan_of_a_strange_kind_is_refused(world: World, kind: int) -> None:
     upload = Upload(world.client, (), kind=kind)
     world.until(lambda: upload.result is not None, within=3)

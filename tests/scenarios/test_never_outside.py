@@ -4,8 +4,6 @@ from collections.abc import Callable
 from math import cos, nan, pi, sin
 from random import Random
 
-import pytest
-
 from mav_tasks.engine.missions.fence_items import fence_of
 from mav_tasks.links.memory import Conditions
 from mav_tasks.services.mission_item import Item as StoredItem
@@ -14,6 +12,7 @@ from mav_tasks.tasks.driving.fence import LocalFence
 from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.client import DRIVE, MOVE
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
@@ -91,8 +90,8 @@ def tasks(world: World, random: Random) -> list[Callable[[], object]]:
     ]
 
 
-@pytest.mark.parametrize("seed", range(tries(3, long=30)))
-@pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
+@for_each("seed", range(tries(3, long=30)))
+@for_each("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC])
 def test_no_rover_is_ever_outside(make_world: MakeWorld, persona: Persona, seed: int) -> None:
     random = Random(seed)
     net = Conditions(delay=random.choice((0.002, 0.05)), loss=random.choice((0.0, 0.05)))

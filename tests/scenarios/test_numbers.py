@@ -1,9 +1,9 @@
 """Sequence numbers towards clients over a restart of the rover: no loss that is none."""
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from rover_sim.faults import Faults
+from tests.kit.cases import for_each
 from tests.kit.world import World
 
 ROVER = (1, 1)
@@ -20,8 +20,8 @@ def says(world: World, *numbers: int) -> None:
         world.run(0.05)
 
 
-@pytest.mark.parametrize(
-    ("silence", "first", "lost"),
+@for_each(
+    "silence, first, lost",
     [
         (LONG, 0, 0),
         (LONG, 3, 0),  # the first ones were sent before the link was up

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import pytest
 from pymavlink.dialects.v20 import common
 
+from tests.kit.cases import for_each
 from tests.kit.client import (
     AUTO,
     GUIDED,
@@ -125,7 +126,7 @@ def test_news_of_hold_in_the_step_in_which_a_client_asks_for_it_is_no_takeover()
     story.moves(0.0).sends(mode_request(HOLD)).later(0.05).moves(0.0).observer.check()
 
 
-@pytest.mark.parametrize(("mode", "later"), [(AUTO, 0.0), (HOLD, 0.01)])
+@for_each("mode, later", [(AUTO, 0.0), (HOLD, 0.01)])
 def test_news_of_another_mode_or_of_another_step_is_a_takeover(mode: int, later: float) -> None:
     story = Story().driving().later(0.05).in_batches()
     story.asks(mode_request(HOLD)).later(later).rover(mode, armed=True)
@@ -291,7 +292,7 @@ PASSED = [
 ]
 
 
-@pytest.mark.parametrize("sin", SINS)
+@for_each("sin", SINS)
 def test_each_sin_is_caught(sin: str) -> None:
     words, tell = SINS[sin]
     story = Story()
@@ -300,7 +301,7 @@ def test_each_sin_is_caught(sin: str) -> None:
         story.observer.check()
 
 
-@pytest.mark.parametrize("message", PASSED, ids=lambda m: m.get_type())
+@for_each("message", PASSED)
 def test_whatever_moves_and_passes_after_a_stop_is_caught(message: object) -> None:
     story = Story().rover(HOLD, armed=True).asks(command_long(STOP))
     story.sends(mode_request(HOLD)).moves(0.0).later(0.5).sends(message, CLIENT)

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode
 from rover_sim.realism import EXACT, Drive
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, setpoint
 from tests.kit.px4 import HOLD, OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
 from tests.kit.world import World
@@ -53,8 +54,8 @@ def test_drives_the_rover_from_when_it_is_asked_for_until_hold(world: World) -> 
     assert world.stands(), "the stream goes on, and is not passed"
 
 
-@pytest.mark.parametrize("drive", [Drive.EXACT, Drive.REAL])
-@pytest.mark.parametrize("again", [False, True], ids=["once", "each again"])
+@for_each("drive", [Drive.EXACT, Drive.REAL])
+@for_each("again", [False, True])
 def test_the_recipe_of_stream_mode_and_arming_drives(
     make_world: MakeWorld, drive: Drive, *, again: bool
 ) -> None:

@@ -7,6 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from rover_sim.personas import ARDUPILOT, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import FakeClient, Received
 from tests.kit.mission import MISSION_ACK, REQUEST, REQUEST_INT, Ack, Download
 from tests.kit.px4 import PROMPT_PX4
@@ -60,9 +61,9 @@ class DroneKit:
 PLACES = [(0.0, 0.0), (20.0, 0.0), (20.0, 20.0)]
 
 
-@pytest.mark.parametrize("system", [0, 1])
-@pytest.mark.parametrize(
-    ("persona", "knows", "within"),
+@for_each("system", [0, 1])
+@for_each(
+    "persona, knows, within",
     [
         (ARDUPILOT, REQUEST, 0.2),
         (ARDUPILOT, REQUEST_INT, 0.5),

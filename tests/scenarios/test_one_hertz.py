@@ -11,6 +11,7 @@ from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import HOLD, set_mode
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -97,7 +98,7 @@ def test_a_rover_disarmed_while_driving_does_not_drive_off_when_armed_again(
     assert world.state(1) == (S.PAUSED, R.OPERATOR if who == "client" else R.TAKEOVER)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@for_each("seed", range(8))
 def test_tasks_are_done_over_a_bad_net(make_world: MakeWorld, seed: int) -> None:
     bad = Conditions(delay=0.005, jitter=0.08, loss=0.1, duplication=0.05)
     world = make_world(seed=seed, conditions=bad, persona=ARDUPILOT, shows_on_request=False)
@@ -128,8 +129,8 @@ def test_mode_requests_by_the_old_message_are_heeded_too(world: World) -> None:
     assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
-@pytest.mark.parametrize("after", [0.0, 0.05, 0.2, 0.6])
+@for_each("persona", [ARDUPILOT, PX4])
+@for_each("after", [0.0, 0.05, 0.2, 0.6])
 def test_what_was_armed_and_not_seen_yet_when_it_is_cancelled_is_disarmed(
     make_world: MakeWorld, persona: Persona, after: float
 ) -> None:

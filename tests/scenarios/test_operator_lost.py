@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
-import pytest
-
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.scenarios.conftest import MakeWorld
 
@@ -45,7 +44,7 @@ def test_a_script_without_heartbeats_is_no_operator(make_world: MakeWorld) -> No
     assert (sent.answer, world.state(1)[0]) == ((ACCEPTED, 1), S.COMPLETED)
 
 
-@pytest.mark.parametrize("settings", [Settings(), PAUSE])
+@for_each("settings", [Settings(), PAUSE])
 def test_what_waits_waits_only_by_that_setting(make_world: MakeWorld, settings: Settings) -> None:
     world = make_world(settings=settings)
     world.client.command(54000, 1.0, 0, 0, 0, 0, LIMIT + 3, 5)

@@ -1,9 +1,8 @@
 """A client's own stop, HOLD, return, "go to" or mission ends what it drives by setpoints."""
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -47,8 +46,8 @@ def ask(client: FakeClient, persona: Persona, what: str) -> Sent:
     return ask_mode(client, modes[what])
 
 
-@pytest.mark.parametrize("persona", [AP, PX], ids=lambda persona: persona.name)
-@pytest.mark.parametrize("first", ["", "hold"])
+@for_each("persona", [AP, PX])
+@for_each("first", ["", "hold"])
 def test_a_return_is_taken_at_once_and_ends_the_clients_setpoints(
     make_world: MakeWorld, persona: Persona, first: str
 ) -> None:
@@ -67,7 +66,7 @@ def test_a_return_is_taken_at_once_and_ends_the_clients_setpoints(
     assert abs(world.truth.north) < 0.2 < far
 
 
-@pytest.mark.parametrize("persona", [AP, PX], ids=lambda persona: persona.name)
+@for_each("persona", [AP, PX])
 def test_a_go_to_begins_at_once_and_without_a_failsafe(
     make_world: MakeWorld, persona: Persona
 ) -> None:

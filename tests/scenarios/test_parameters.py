@@ -13,6 +13,7 @@ from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
+from tests.kit.cases import for_each
 from tests.kit.client import FakeClient
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World
@@ -53,9 +54,7 @@ def errors(client: FakeClient) -> list[tuple[str, int]]:
     return [(each.param_id, each.error) for each in client.of_type("PARAM_ERROR")]
 
 
-@pytest.mark.parametrize(
-    ("component", "ours", "the_rovers"), [(0, True, True), (1, False, True), (191, True, False)]
-)
+@for_each("component, ours, the_rovers", [(0, True, True), (1, False, True), (191, True, False)])
 def test_a_list_is_of_who_is_asked(
     world: World, component: int, ours: bool, the_rovers: bool
 ) -> None:
@@ -132,8 +131,8 @@ def test_a_change_has_effect_and_everybody_is_told(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-@pytest.mark.parametrize(
-    ("message", "says"),
+@for_each(
+    "message, says",
     [
         (put("TSK_SPEED", 50.0), "TSK_SPEED 50: not in 0.05..10"),
         (put("TSK_SPEED", nan), "TSK_SPEED nan: not in 0.05..10"),

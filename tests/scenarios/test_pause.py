@@ -4,11 +4,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, PAUSE_CONTINUE, ROTATE, set_mode
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -21,7 +20,7 @@ PAUSES: dict[str, Callable[[World], object]] = {
 }
 
 
-@pytest.mark.parametrize("way", PAUSES)
+@for_each("way", PAUSES)
 def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str) -> None:
     world.client.move(3)
     world.until_state(1, S.EXECUTING)
@@ -43,7 +42,7 @@ def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str
     assert near_pose(world.pose(), (3.0, 0.0, 20.0))
 
 
-@pytest.mark.parametrize("seed", range(8))
+@for_each("seed", range(8))
 def test_the_end_is_the_same_with_any_pattern_of_pauses(make_world: MakeWorld, seed: int) -> None:
     world = make_world(seed=seed)
     random = Random(seed)
@@ -63,8 +62,8 @@ def test_the_end_is_the_same_with_any_pattern_of_pauses(make_world: MakeWorld, s
     assert near_pose(world.pose(), (2.0 + diagonal, diagonal, -135.0), metres=0.04)
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4])
-@pytest.mark.parametrize("has_driven", [False, True])
+@for_each("persona", [ARDUPILOT, PX4])
+@for_each("has_driven", [False, True])
 def test_pausing_an_idle_armed_rover_keeps_what_is_submitted_then(
     make_world: MakeWorld, persona: Persona, has_driven: bool
 ) -> None:

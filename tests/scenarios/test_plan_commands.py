@@ -12,6 +12,7 @@ from mav_tasks.settings import Roles, Settings, VehicleProfile
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.car import Car
+from tests.kit.cases import for_each
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World, at, is_at
@@ -140,7 +141,7 @@ def test_what_is_to_be_driven_backwards_is(
     assert hypot(world.truth.north - 1, world.truth.east) < 0.2
 
 
-@pytest.mark.parametrize(("params", "until"), [((0, 12, 0, 9), 9.0), ((-1, -1, -1, 8), 8.0)])
+@for_each("params, until", [((0, 12, 0, 9), 9.0), ((-1, -1, -1, 8), 8.0)])
 def test_it_stands_until_a_time_of_day(
     make_world: MakeWorld, params: tuple[float, ...], until: float
 ) -> None:
@@ -150,9 +151,7 @@ def test_it_stands_until_a_time_of_day(
     assert until < moved_at < until + 2
 
 
-@pytest.mark.parametrize(
-    ("persona", "wish", "speed"), [(PROMPT, 0.0, 0.3), (PROMPT_PX4, -1.0, 0.5)]
-)
+@for_each("persona, wish, speed", [(PROMPT, 0.0, 0.3), (PROMPT_PX4, -1.0, 0.5)])
 def test_no_speed_means_what_it_means_to_the_autopilot(
     make_world: MakeWorld, persona: Persona, wish: float, speed: float
 ) -> None:

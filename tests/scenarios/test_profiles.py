@@ -3,14 +3,13 @@
 from dataclasses import replace
 from functools import partial
 
-import pytest
-
 from mav_tasks.probe.profile import profile_of
 from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.bodies import WeakBrakes
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE
 from tests.kit.probing import ProbeWorld
 from tests.kit.px4 import PROMPT_PX4
@@ -77,8 +76,8 @@ def test_a_px4_that_was_measured_to_turn_is_turned(make_world: MakeWorld) -> Non
     assert any("uses the profile of 2026-11-20" in text for text in world.client.texts())
 
 
-@pytest.mark.parametrize(
-    ("change_of", "words"),
+@for_each(
+    "change_of, words",
     [
         ({"uid": "2"}, "ignores the profile: it is of another rover"),
         ({"firmware": "1.14.0 99c40407"}, "ignores the profile: it is of firmware 1.14.0 99c40407"),
@@ -113,7 +112,7 @@ def test_an_ardupilot_that_does_not_turn_on_the_spot_is_steered_by_course(
     assert near_pose(world.pose(), (1, 0, 0), metres=0.05)
 
 
-@pytest.mark.parametrize("ask", [(ROTATE, 90.0), (115, 90.0, 0.0, 1.0, 0.0)])
+@for_each("ask", [(ROTATE, 90.0), (115, 90.0, 0.0, 1.0, 0.0)])
 def test_a_car_is_not_turned_on_the_spot_and_its_client_reads_why(
     make_world: MakeWorld, ask: tuple[float, ...]
 ) -> None:

@@ -18,6 +18,7 @@ from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
 from rover_sim.realism import EXACT, Drive
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
@@ -30,7 +31,7 @@ NO_PLACE = 0x7FFFFFFF
 
 ALL = [PX4, GENERIC, PROMPT_PX4, PROMPT_GENERIC]
 
-every = pytest.mark.parametrize("persona", ALL, ids=lambda p: f"{p.name}-{p.announces_changes}")
+every = for_each("persona", ALL)
 each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
 
 
@@ -144,7 +145,7 @@ class TestTurning:
 class TestMovingBackwards:
     """It does not reverse: a differential one turns round, drives, and turns back."""
 
-    @pytest.mark.parametrize("heading", [0.0, 120.0])
+    @for_each("heading", [0.0, 120.0])
     def test_it_ends_behind_with_the_heading_that_it_had(
         self, make_world: MakeWorld, heading: float
     ) -> None:
@@ -173,7 +174,7 @@ class TestMovingBackwards:
 class TestStanding:
     """A real PX4 takes zero velocity for "to the north or south" (1.17, SITL)."""
 
-    @pytest.mark.parametrize("frame", [Frame.DIFFERENTIAL, Frame.ACKERMANN])
+    @for_each("frame", [Frame.DIFFERENTIAL, Frame.ACKERMANN])
     def test_a_move_begins_and_ends_with_the_heading_that_it_had(
         self, make_world: MakeWorld, frame: Frame
     ) -> None:
@@ -212,8 +213,8 @@ class TestWhatItCannotDo:
         assert any(words in text for text in world.client.texts())
         assert world.tasks() == ()
 
-    @pytest.mark.parametrize(
-        ("command", "params", "words"),
+    @for_each(
+        "command, params, words",
         [
             (MOVE, (-1.0,), "reverse"),
             (ROTATE, (90.0,), "turn on the spot"),

@@ -14,6 +14,7 @@ from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, TEMPORARILY_REJECTED
 from tests.kit.px4 import HOLD, PROMPT_PX4, SET_MODE, ask_mode
 from tests.kit.store import PromptSqliteStore
@@ -37,7 +38,7 @@ def is_mode_request(data: bytes) -> bool:
     return data[7] == MODE_COMMAND and data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
 
 
-@pytest.mark.parametrize("lost", [1.0, 5.0])
+@for_each("lost", [1.0, 5.0])
 def test_a_server_that_is_started_again_leaves_it_standing(
     make_world: MakeWorld, tmp_path: Path, lost: float
 ) -> None:
@@ -58,8 +59,8 @@ def test_a_server_that_is_started_again_leaves_it_standing(
     assert world.paused() is R.RESTARTED
 
 
-@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
-@pytest.mark.parametrize("lost", [1.0, 5.0])
+@for_each("persona", [PX4, PROMPT_PX4])
+@for_each("lost", [1.0, 5.0])
 def test_once_a_takeover_is_told_it_does_not_drive_on(
     make_world: MakeWorld, lost: float, persona: Persona
 ) -> None:

@@ -1,9 +1,8 @@
 """A click on the map of QGroundControl, in all the forms in which it comes: one task, no popup."""
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.qgc.joined import degrees, each_version, join
 from tests.kit.qgc.party import QgcParty
@@ -30,10 +29,8 @@ class TestGoTo:
         party.check()
 
 
-@pytest.mark.parametrize(
-    ("persona", "profile"), [(PROMPT, V4), (ARDUPILOT, MASTER)], ids=["prompt-v4", "1 Hz-master"]
-)
-@pytest.mark.parametrize("before", [Mode.MANUAL, Mode.HOLD, Mode.GUIDED])
+@for_each("persona, profile", [(PROMPT, V4), (ARDUPILOT, MASTER)])
+@for_each("before", [Mode.MANUAL, Mode.HOLD, Mode.GUIDED])
 def test_a_go_to_of_ardupilot_in_all_its_forms_is_one_task(
     make_world: MakeWorld, persona: Persona, profile: Profile, before: Mode
 ) -> None:

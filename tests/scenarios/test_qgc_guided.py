@@ -7,6 +7,7 @@ import pytest
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.qgc.joined import (
     degrees,
     each_guided,
@@ -72,7 +73,7 @@ class TestAlsoWhileDriving:
         assert party.qgc.screen.complaints == []
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
+@for_each("persona", [ARDUPILOT, PX4])
 def test_a_mode_is_shown_at_once_also_of_a_rover_that_shows_it_once_a_second(
     make_world: MakeWorld, persona: Persona
 ) -> None:

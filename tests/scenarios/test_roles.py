@@ -11,6 +11,7 @@ from mav_tasks.tasks.events import QueuePaused, SubmissionRefused, TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -332,7 +333,7 @@ def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str
     assert world.rover.autopilot.mode is Mode.MANUAL
 
 
-@pytest.mark.parametrize("who", [(250, 191), (1, 1)])
+@for_each("who", [(250, 191), (1, 1)])
 def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
     make_world: MakeWorld, who: tuple[int, int]
 ) -> None:

@@ -14,6 +14,7 @@ from mav_tasks.tasks.lifecycle import TERMINAL, WAITING
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
 from tests.kit.store import LateStore, PromptSqliteStore
@@ -139,8 +140,8 @@ def test_a_cron_expression_sets_the_start_by_the_wall_clock(world: World) -> Non
     assert following.terms.start_utc == UTC + 4 * DAY
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
+@for_each(
+    "text, words",
     [("61 9 * * *", "bad minute"), ("0 9 * * * Mars/X", "time zone"), ("0 9 30 2 *", "day-of-m")],
 )
 def test_an_invalid_expression_changes_nothing(world: World, text: str, words: str) -> None:
@@ -152,7 +153,7 @@ def test_an_invalid_expression_changes_nothing(world: World, text: str, words: s
     assert world.task(task).terms == before
 
 
-@pytest.mark.parametrize("period", [9, 0.5, 1e9, float("nan"), -60])
+@for_each("period", [9, 0.5, 1e9, float("nan"), -60])
 def test_an_invalid_period_is_refused(world: World, period: float) -> None:
     submit(world)
     sent = world.client.command(MODIFY, 1, EVERY, period)
@@ -194,7 +195,7 @@ def test_cancel_ends_one_run_and_the_series_goes_on(world: World) -> None:
     assert [each.terms.start_at for each in waiting(world)] == [start + 120]
 
 
-@pytest.mark.parametrize("named", ["first", "present"])
+@for_each("named", ["first", "present"])
 def test_cancelling_the_series_ends_it_by_the_id_of_any_run(world: World, named: str) -> None:
     task = every(world, 20)
     world.run(45)
@@ -210,7 +211,7 @@ def test_cancelling_the_series_ends_it_by_the_id_of_any_run(world: World, named:
     assert again.answer == (DENIED, R.WRONG_STATE)
 
 
-@pytest.mark.parametrize("state", [S.SCHEDULED, S.QUEUED, S.EXECUTING])
+@for_each("state", [S.SCHEDULED, S.QUEUED, S.EXECUTING])
 def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     """Hours after it, and long after a resume, nothing may start by itself."""
     task = every(world, 30, distance=2.0, delay=10 if state is S.SCHEDULED else 0)
@@ -235,7 +236,7 @@ def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     assert waiting(world) == []
 
 
-@pytest.mark.parametrize("everything", [False, True])
+@for_each("everything", [False, True])
 def test_a_cleared_queue_repeats_nothing(world: World, everything: bool) -> None:
     driven, _later = every(world, 30, distance=3.0), every(world, 30, delay=20)
     world.until_state(driven, S.EXECUTING)

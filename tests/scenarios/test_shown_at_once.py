@@ -3,17 +3,14 @@
 from dataclasses import replace
 from typing import Any
 
-import pytest
-
 from rover_sim.commands import CommandParts, CommandTable
 from rover_sim.personas import ARDUPILOT, GENERIC, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, heartbeat, set_mode
 from tests.kit.world import World, asks_for_heartbeat
 from tests.scenarios.conftest import MakeWorld
 
-MAKES = pytest.mark.parametrize(
-    "persona", [ARDUPILOT, PX4, GENERIC], ids=lambda persona: persona.name
-)
+MAKES = for_each("persona", [ARDUPILOT, PX4, GENERIC])
 SOON = 0.1  # s; beats are a second apart
 
 
@@ -42,7 +39,7 @@ def test_a_mode_that_is_set_by_command(make_world: MakeWorld, persona: Persona) 
         assert shown(world).custom_mode == number
 
 
-@pytest.mark.parametrize("persona", [PX4, GENERIC], ids=lambda persona: persona.name)
+@for_each("persona", [PX4, GENERIC])
 def test_a_mode_that_is_set_by_message(make_world: MakeWorld, persona: Persona) -> None:
     world = away_from_a_beat(make_world(persona=persona))
     for mode in (Mode.MANUAL, Mode.HOLD):
@@ -64,7 +61,7 @@ def refusing(persona: Persona) -> Persona:
     return replace(persona, commands=commands)
 
 
-@pytest.mark.parametrize("refuses", [True, False], ids=["refused", "silent"])
+@for_each("refuses", [True, False])
 def test_one_that_shows_nothing_on_request_is_not_asked_for_ever(
     make_world: MakeWorld, refuses: bool
 ) -> None:

@@ -18,6 +18,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -61,7 +62,7 @@ def test_all_that_drives_it_is_signed_with_its_key(make_world: MakeWorld) -> Non
     assert all(packet.is_signed and is_signed_with(packet, ROVERS.secret) for packet in packets)
 
 
-@pytest.mark.parametrize("forged", ["unsigned", "another key"])
+@for_each("forged", ["unsigned", "another key"])
 def test_nobody_else_is_taken_for_it(make_world: MakeWorld, forged: str) -> None:
     """Neither who pretends to be armed and elsewhere, nor who knows a key of clients."""
     world = signed_world(make_world)

@@ -11,6 +11,7 @@ from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings, Signing
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
@@ -56,7 +57,7 @@ def believes_all(client: FakeClient) -> bool:
     return client.verified > 10 and not client.disbelieved
 
 
-@pytest.mark.parametrize("link_id", [0, 1, 255])
+@for_each("link_id", [0, 1, 255])
 def test_a_signed_command_is_done_and_all_that_comes_back_is_signed(
     world: World, link_id: int
 ) -> None:
@@ -99,7 +100,7 @@ def test_without_a_key_ring_signatures_are_taken_off(world: World) -> None:
     assert [task.submitter.key for task in world.tasks()] == [""]
 
 
-@pytest.mark.parametrize("place", [8, 20, -13, -10, -1])
+@for_each("place", [8, 20, -13, -10, -1])
 def test_a_packet_that_was_changed_is_nobody_s(world: World, place: int) -> None:
     put(world, ALICE)
     client = signing(world, ALICE)
@@ -230,8 +231,8 @@ def test_setup_signing_with_a_known_key_has_the_server_sign(world: World) -> Non
     assert not any(map(is_signed, world.client.received))
 
 
-@pytest.mark.parametrize(
-    ("secret", "setup", "words"),
+@for_each(
+    "secret, setup, words",
     [
         (BOB.secret, "known", "signing refused: this server has no such key for clients"),
         (ROVERS.secret, "known", "signing refused: this server has no such key for clients"),

@@ -11,6 +11,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, AUTO, DENIED, RTL, set_mode
 from tests.kit.world import World, at, is_at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
@@ -20,8 +21,8 @@ YAW, SPEED, REPOSITION, YAW_SPEED = 115, 178, 192, 213
 GLOBAL, LOCAL, GLOBAL_RELATIVE_INT = 0, 1, 6
 
 
-@pytest.mark.parametrize("target", [(1, 1), (1, 191), (1, 0)])
-@pytest.mark.parametrize("frame", [GLOBAL, 5, GLOBAL_RELATIVE_INT])
+@for_each("target", [(1, 1), (1, 191), (1, 0)])
+@for_each("frame", [GLOBAL, 5, GLOBAL_RELATIVE_INT])
 def test_go_to_drives_to_the_place(world: World, target: tuple[int, int], frame: int) -> None:
     sent = world.client.command_int(
         REPOSITION, -1, 1, 0, nan, **at(1.5, -2.0), frame=frame, target=target
@@ -74,7 +75,7 @@ def test_go_to_now_runs_at_once_and_the_other_goes_on_when_continued(
     assert near_pose(world.pose(), (3.3, 0.0, 0.0), metres=0.04)
 
 
-@pytest.mark.parametrize("how", ["command", "mode", "old mode message"])
+@for_each("how", ["command", "mode", "old mode message"])
 def test_return_drives_home(world: World, how: str) -> None:
     put_home(world, 0.0, 0.0)
     world.client.move(1.0)
@@ -100,8 +101,8 @@ def test_a_client_that_wants_auto_gets_it_and_that_is_a_takeover(world: World) -
     assert world.paused() is R.TAKEOVER
 
 
-@pytest.mark.parametrize(
-    ("params", "yaw"),
+@for_each(
+    "params, yaw",
     [((90, 20, 0, 0), 90.0), ((90, 0, -1, 0), 90.0), ((30, 0, 1, 1), 30.0), ((30, 0, -1, 1), -30)],
 )
 def test_a_heading_is_turned_to(
@@ -154,8 +155,8 @@ def test_the_speed_is_changed_of_what_runs_and_of_what_comes(world: World) -> No
     assert world.truth.forward_speed == pytest.approx(0.5, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("command", "params", "kw", "named"),
+@for_each(
+    "command, params, kw, named",
     [
         (REPOSITION, (-1, 1, 0, nan), {"x": 910_000_000, "y": 0, "frame": 0}, "latitude"),
         (REPOSITION, (-1, 1, 0, nan), {"x": 1, "y": 1_900_000_000, "frame": 0}, "longitude"),

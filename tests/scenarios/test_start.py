@@ -2,13 +2,12 @@
 
 from itertools import pairwise
 
-import pytest
-
 from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -24,7 +23,7 @@ def shown(world: World, task_id: int) -> tuple[int, int]:
     return world.client.statuses(task_id)[-1].why
 
 
-@pytest.mark.parametrize("arming", ["auto", "server"])
+@for_each("arming", ["auto", "server"])
 def test_the_server_arms_where_it_may(make_world: MakeWorld, arming: str) -> None:
     world = make_world(settings=Settings(arming=arming))
     world.client.move(0.3)
@@ -46,7 +45,7 @@ def test_with_arming_by_the_operator_a_task_waits_for_it(make_world: MakeWorld) 
     assert world.rover.autopilot.armed
 
 
-@pytest.mark.parametrize("mode", [Mode.AUTO, Mode.RTL, Mode.GUIDED, Mode.MANUAL])
+@for_each("mode", [Mode.AUTO, Mode.RTL, Mode.GUIDED, Mode.MANUAL])
 def test_an_armed_rover_in_a_mode_that_is_not_ours_is_waited_for(world: World, mode: Mode) -> None:
     world.operator_arm(True)
     world.operator_mode(mode)
@@ -88,8 +87,8 @@ def test_for_a_silent_rover_a_task_waits(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-@pytest.mark.parametrize(
-    ("faults", "reason"),
+@for_each(
+    "faults, reason",
     [(Faults(refuse_arm=True), R.ARM_REFUSED), (Faults(refuse_mode=True), R.MODE_REFUSED)],
 )
 def test_a_refusal_fails_the_task_in_about_a_second_and_the_queue_goes_on(

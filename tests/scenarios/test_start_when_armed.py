@@ -5,6 +5,7 @@ import pytest
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, set_mode
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, RETURN, ask_mode
@@ -137,7 +138,7 @@ def test_a_mission_that_was_called_off_does_not_start(
     assert len(world.tasks()) == 1, "nor does another task of it"
 
 
-@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
+@for_each("persona", [PX4, PROMPT_PX4])
 def test_a_person_who_arms_to_drive_by_hand_keeps_the_rover(
     make_world: MakeWorld, persona: Persona
 ) -> None:

@@ -3,13 +3,12 @@
 from dataclasses import replace
 from functools import partial
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.realism import EXACT, Drive, Wire
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, sticks
 from tests.kit.observer import SERVER
 from tests.kit.world import PROMPT, World
@@ -48,8 +47,8 @@ def stands_after(world: World) -> float:
     return moved - began
 
 
-@pytest.mark.parametrize(
-    ("frame", "when", "within"),
+@for_each(
+    "frame, when, within",
     [
         (Frame.SKID, "starting", 1.5),
         (Frame.SKID, "driving", 1.5),

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
@@ -11,6 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -60,7 +60,7 @@ def stands_in_hold(world: World) -> bool:
     return world.stands() and world.rover.autopilot.mode is Mode.HOLD and world.control() == "IDLE"
 
 
-@pytest.mark.parametrize("component", [0, 1, 191, 154])
+@for_each("component", [0, 1, 191, 154])
 def test_a_driving_rover_is_stopped_and_its_task_killed(world: World, component: int) -> None:
     drive(world)
     stop = world.client.stop(target=(1, component))
@@ -86,7 +86,7 @@ def test_the_queue_goes_on_after_continue(world: World) -> None:
     assert world.state(2) == (S.COMPLETED, R.NONE)
 
 
-@pytest.mark.parametrize("mode", [Mode.AUTO, Mode.RTL])
+@for_each("mode", [Mode.AUTO, Mode.RTL])
 def test_a_rover_that_drives_by_itself_is_stopped(world: World, mode: Mode) -> None:
     drive_by_itself(world, mode)
     stop = world.client.stop()
@@ -132,7 +132,7 @@ def test_stop_with_an_empty_queue_and_twice(world: World) -> None:
     world.until_state(1, S.COMPLETED)
 
 
-@pytest.mark.parametrize("delay", [k * 0.002 for k in range(12)])
+@for_each("delay", [k * 0.002 for k in range(12)])
 def test_stop_while_starting(world: World, delay: float) -> None:
     """From before the mode is asked for until the first motion, in steps of 2 ms."""
     world.client.move(5)
@@ -144,7 +144,7 @@ def test_stop_while_starting(world: World, delay: float) -> None:
     assert (world.truth.north, world.paused()) == (0.0, R.STOPPED)
 
 
-@pytest.mark.parametrize("phase", ["ASKING_MODE", "ASKING_ARM"])
+@for_each("phase", ["ASKING_MODE", "ASKING_ARM"])
 def test_stop_while_the_rover_does_not_answer_our_requests(world: World, phase: str) -> None:
     world.client.move(5)
     if phase == "ASKING_MODE":
@@ -163,8 +163,8 @@ def test_stop_while_the_rover_does_not_answer_our_requests(world: World, phase: 
     assert world.truth.north == 0.0
 
 
-@pytest.mark.parametrize("mode", [AUTO, RTL])
-@pytest.mark.parametrize("seed", range(4))
+@for_each("mode", [AUTO, RTL])
+@for_each("seed", range(4))
 def test_stop_overtaken_by_a_clients_mode_request(
     make_world: MakeWorld, mode: int, seed: int
 ) -> None:
@@ -217,7 +217,7 @@ MOVING_COMMANDS: list[Callable[[World], object]] = [
 ]
 
 
-@pytest.mark.parametrize("message", MOTION_OF_CLIENTS, ids=lambda m: m.get_type())
+@for_each("message", MOTION_OF_CLIENTS)
 def test_no_motion_message_passes_while_stopped(world: World, message: object) -> None:
     world.operator_arm(True)
     world.client.mode(GUIDED)
@@ -229,8 +229,8 @@ def test_no_motion_message_passes_while_stopped(world: World, message: object) -
     assert stands_in_hold(world)
 
 
-@pytest.mark.parametrize("number", [65, 81, 91, 92, 93, 420])
-@pytest.mark.parametrize("is_stopped", [True, False])
+@for_each("number", [65, 81, 91, 92, 93, 420])
+@for_each("is_stopped", [True, False])
 def test_what_may_be_an_input_of_the_rover_passes_neither_after_stop_nor_beside_a_task(
     world: World, number: int, *, is_stopped: bool
 ) -> None:
@@ -246,7 +246,7 @@ def test_what_may_be_an_input_of_the_rover_passes_neither_after_stop_nor_beside_
     assert number not in passed
 
 
-@pytest.mark.parametrize("message", OTHER_WAYS, ids=lambda m: m.get_type())
+@for_each("message", OTHER_WAYS)
 def test_other_ways_to_the_rover_are_closed_after_stop(world: World, message: Any) -> None:
     passed = world.passed_on((255, 190))
     world.client.send(message)
@@ -260,7 +260,7 @@ def test_other_ways_to_the_rover_are_closed_after_stop(world: World, message: An
     assert message.get_msgId() not in passed
 
 
-@pytest.mark.parametrize("message", QUESTIONS, ids=lambda m: m.get_type())
+@for_each("message", QUESTIONS)
 def test_what_asks_or_is_set_for_later_passes_in_spite_of_stop(world: World, message: Any) -> None:
     passed = world.passed_on((255, 190))
     world.client.stop()
@@ -270,7 +270,7 @@ def test_what_asks_or_is_set_for_later_passes_in_spite_of_stop(world: World, mes
     assert message.get_msgId() in passed
 
 
-@pytest.mark.parametrize("send", MOVING_COMMANDS)
+@for_each("send", MOVING_COMMANDS)
 def test_no_command_that_moves_passes_while_stopped(
     world: World, send: Callable[[World], object]
 ) -> None:
@@ -282,7 +282,7 @@ def test_no_command_that_moves_passes_while_stopped(
     assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
 
 
-@pytest.mark.parametrize("silence", [4.0, 4.1, 4.2])  # HOLD is sent every 0.25 s
+@for_each("silence", [4.0, 4.1, 4.2])  # HOLD is sent every 0.25 s
 def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World, silence: float) -> None:
     drive(world)
     world.fault(Faults(silent=True, deaf=True))
@@ -321,7 +321,7 @@ def test_a_stop_is_not_confirmed_by_a_rover_whose_heartbeats_do_not_come(world: 
     world.until(lambda: stands_in_hold(world), within=2)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@for_each("seed", range(8))
 def test_stop_through_a_lossy_net(make_world: MakeWorld, seed: int) -> None:
     bad = Conditions(delay=0.005, jitter=0.1, loss=0.3, duplication=0.1)
     world = make_world(seed=seed, conditions=bad)

@@ -10,6 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -227,7 +228,7 @@ def test_sticks_at_rest_are_no_takeover(driving: World) -> None:
     world.until_state(1, S.COMPLETED)
 
 
-@pytest.mark.parametrize("arming", ["server", "operator"])
+@for_each("arming", ["server", "operator"])
 def test_other_setpoints_make_waiting_tasks_wait(make_world: MakeWorld, arming: str) -> None:
     world = make_world(settings=Settings(arming=arming))
     world.operator_mode(Mode.HOLD)

@@ -2,9 +2,8 @@
 
 import re
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -91,7 +90,7 @@ def test_who_only_listens_hears_of_the_end_however_long_it_takes(world: World) -
     assert not any("quiet" in who for who in world.server.engine.snapshot(now=world.now).clients)
 
 
-@pytest.mark.parametrize(("how", "why"), [("pause", "queue paused"), ("stop", "STOP in force")])
+@for_each("how, why", [("pause", "queue paused"), ("stop", "STOP in force")])
 def test_who_queues_behind_a_pause_is_told_that_nothing_runs(
     world: World, how: str, why: str
 ) -> None:

@@ -17,6 +17,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.timing import Timing
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, REQUEST
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import SETPOINT, World
@@ -120,7 +121,7 @@ def test_the_interval_for_which_a_task_is_held_is_in_its_event(world: World) -> 
     world.until(world.stands, within=3)
 
 
-@pytest.mark.parametrize("task_id", [7, -1, 0.5, float("nan"), 2**24, 0])
+@for_each("task_id", [7, -1, 0.5, float("nan"), 2**24, 0])
 def test_of_what_is_not_there_nothing_is_shown(world: World, task_id: float) -> None:
     sent = world.client.command(REQUEST, TASK_TIMING, task_id)
     world.run(0.1)

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
@@ -10,6 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.body import Pose
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.fleet import Fleet, Layout
 from tests.kit.world import near_pose, twin_of
@@ -42,7 +42,7 @@ def silence(fleet: Fleet, *ways: str) -> None:
     fleet.watched.loses = lambda source, target, _data: source in ways or target in ways
 
 
-@pytest.mark.parametrize("layout", [TWO_LINKS, ONE_LINK], ids=["two links", "one link"])
+@for_each("layout", [TWO_LINKS, ONE_LINK])
 def test_when_one_radio_dies_the_task_goes_on_by_the_other_within_a_second(
     make_fleet: MakeFleet, layout: Layout
 ) -> None:
@@ -115,7 +115,7 @@ def test_a_rover_that_restarts_at_once_at_another_place_is_heard_again(
     assert "is now at b" in [each.text for each in fleet.events(VehicleSeen)]
 
 
-@pytest.mark.parametrize("switched_on", ["later", "at the same time"])
+@for_each("switched_on", ["later", "at the same time"])
 def test_a_stranger_with_the_id_is_never_driven_whatever_it_says(
     make_fleet: MakeFleet, switched_on: str
 ) -> None:

@@ -6,6 +6,7 @@ from mav_tasks.engine.inputs import WallClock
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, MOVE
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -71,7 +72,7 @@ def test_a_utc_start_is_exact_and_moves_with_the_clock_and_nothing_else_does(wor
     world.until_idle(tasks=2)
 
 
-@pytest.mark.parametrize("step", [DAY, -DAY, 2.0, -2.0])
+@for_each("step", [DAY, -DAY, 2.0, -2.0])
 def test_a_step_of_the_clock_changes_no_motion_no_delay_and_no_deadline(
     world: World, step: float
 ) -> None:
@@ -123,8 +124,8 @@ def test_a_task_is_as_urgent_as_who_waits_for_it(world: World) -> None:
     assert order_of_start(world) == [running, needed, immediate, usual]
 
 
-@pytest.mark.parametrize(
-    ("prop", "value", "answer"),
+@for_each(
+    "prop, value, answer",
     [
         (PRIORITY, 11, (DENIED, R.BAD_PARAMETER)),
         (RUN_AFTER, 3, (DENIED, R.CYCLE)),

@@ -5,6 +5,7 @@ import pytest
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.qgc.joined import degrees, join, place
 from tests.kit.qgc.party import QgcParty
@@ -19,8 +20,8 @@ WARNING = 4  # this severity and smaller ones are red
 FAR = degrees(20, 0)
 ROUND = Plan(place(0, 0), [place(3, 0), place(3, 1)])
 
-one = pytest.mark.parametrize("persona", [PROMPT], ids=lambda each: each.name)
-both = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda each: each.name)
+one = for_each("persona", [PROMPT])
+both = for_each("persona", [PROMPT, PROMPT_PX4])
 
 
 def texts(party: QgcParty, *, since: float, worst: int = WARNING) -> list[str]:
@@ -96,7 +97,7 @@ def test_an_emergency_stop_ends_a_go_to_and_the_next_click_drives(
 
 
 @both
-@pytest.mark.parametrize("button", ["emergency stop", "disarm"])
+@for_each("button", ["emergency stop", "disarm"])
 def test_a_plan_goes_on_by_the_station_own_button(
     make_world: MakeWorld, persona: Persona, button: str
 ) -> None:
@@ -114,7 +115,7 @@ def test_a_plan_goes_on_by_the_station_own_button(
 
 
 @both
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO, Mode.HOLD], ids=lambda mode: mode.name)
+@for_each("mode", [Mode.MANUAL, Mode.AUTO, Mode.HOLD])
 def test_return_drives_from_any_mode_and_leaves_the_queue_running(
     make_world: MakeWorld, persona: Persona, mode: Mode
 ) -> None:
@@ -153,7 +154,7 @@ def test_start_drives_from_manual_before_what_waits_there(
 
 
 @both
-@pytest.mark.parametrize("taken", ["hold", "manual at the rover"])
+@for_each("taken", ["hold", "manual at the rover"])
 def test_hold_and_a_click_replace_the_click_before(
     make_world: MakeWorld, persona: Persona, taken: str
 ) -> None:

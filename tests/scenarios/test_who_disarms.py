@@ -1,9 +1,8 @@
 """When the server disarms a rover: who armed it, and who has said that it has done with it."""
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     GUIDED,
@@ -17,13 +16,13 @@ from tests.kit.px4 import OFFBOARD, PROMPT_PX4, RETURN, ask_mode
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
-BOTH = pytest.mark.parametrize("persona", [ARDUPILOT, PROMPT_PX4], ids=lambda each: each.name)
+BOTH = for_each("persona", [ARDUPILOT, PROMPT_PX4])
 START, WAYPOINT, RETURN_ITEM, LAND, TAKEOFF = 300, 16, 20, 21, 22
 HANDED_BACK = 6.0  # s after a task, in which the server has HOLD shown and disarms
 
 
 @BOTH
-@pytest.mark.parametrize("at", [S.STARTING, S.EXECUTING])
+@for_each("at", [S.STARTING, S.EXECUTING])
 def test_a_rover_that_a_client_arms_while_a_task_drives_stays_armed(
     make_world: MakeWorld, persona: Persona, at: S
 ) -> None:

@@ -3,9 +3,8 @@
 from math import nan
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import AUTO, RTL, FakeClient
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at
@@ -31,8 +30,8 @@ def said(client: FakeClient) -> dict[str, int]:
     return {m.text: m.severity for m in client.of_type("STATUSTEXT") if not m.chunk_seq}
 
 
-@pytest.mark.parametrize(
-    ("how", "why"),
+@for_each(
+    "how, why",
     [("pause", ", or set Hold and click again (queue paused)"), ("stop", " (STOP in force)")],
 )
 def test_a_go_to_that_waits_for_a_button_is_a_warning_that_names_it(
@@ -62,7 +61,7 @@ def test_who_called_a_task_off_is_said(world: World) -> None:
     assert {"Task 2 cancelled by a ground station", "Task 1 cancelled"} <= set(world.client.texts())
 
 
-@pytest.mark.parametrize("mode", [RTL, AUTO])
+@for_each("mode", [RTL, AUTO])
 def test_a_mode_that_is_refused_is_one_box_and_one_text_however_often_it_is_asked_for(
     world: World, mode: int
 ) -> None:

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, hypot, nan, pi, radians, sin
 
-import pytest
-
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -14,6 +12,7 @@ from rover_sim.faults import Faults
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode, Persona
 from tests.kit import px4
+from tests.kit.cases import for_each
 from tests.kit.world import PROMPT, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_fence import INCLUSION, box, fenced
@@ -85,7 +84,7 @@ OPPOSITE = [
 ACROSS = [(90.0, make, "move", FAST) for make in MAKES] + [(-90.0, "ardupilot", "drive", FAST)]
 
 
-@pytest.mark.parametrize(("error", "make", "goal", "speed"), OPPOSITE + ACROSS)
+@for_each("error, make, goal, speed", OPPOSITE + ACROSS)
 def test_a_wrong_heading_is_found_within_half_a_metre(
     make_world: MakeWorld, error: float, make: str, goal: str, speed: float
 ) -> None:
@@ -102,7 +101,7 @@ def test_a_wrong_heading_is_found_within_half_a_metre(
     assert any("check its heading" in text for text in world.client.texts())
 
 
-@pytest.mark.parametrize("speed", [SLOW, FAST])
+@for_each("speed", [SLOW, FAST])
 def test_wheels_that_turn_the_wrong_way_are_found_within_half_a_metre(
     make_world: MakeWorld, speed: float
 ) -> None:
@@ -122,7 +121,7 @@ def test_wheels_that_turn_the_wrong_way_are_found_within_half_a_metre(
     assert way.furthest < WRONG[speed]
 
 
-@pytest.mark.parametrize(("speed", "beside"), [(SLOW, 1.3), (FAST, 2.2)])
+@for_each("speed, beside", [(SLOW, 1.3), (FAST, 2.2)])
 def test_a_heading_that_steering_cannot_make_up_for_is_found_a_metre_beside_the_line(
     make_world: MakeWorld, speed: float, beside: float
 ) -> None:
@@ -144,8 +143,8 @@ def test_a_heading_that_steering_cannot_make_up_for_is_found_a_metre_beside_the_
     assert 1.0 < furthest < beside
 
 
-@pytest.mark.parametrize("turned", [180, -90, 60])
-@pytest.mark.parametrize("goal", GOALS)
+@for_each("turned", [180, -90, 60])
+@for_each("goal", GOALS)
 def test_a_heading_that_jumps_holds_the_task_at_once(
     world: World, goal: str, turned: float
 ) -> None:
@@ -160,7 +159,7 @@ def test_a_heading_that_jumps_holds_the_task_at_once(
     assert way.furthest < 0.3
 
 
-@pytest.mark.parametrize("jump", [(1.9, 0.0), (-0.9, 0.0), (0.0, 1.9)])
+@for_each("jump", [(1.9, 0.0), (-0.9, 0.0), (0.0, 1.9)])
 def test_a_jump_below_2_m_is_a_correction_that_is_driven_by(
     world: World, jump: tuple[float, float]
 ) -> None:
@@ -183,7 +182,7 @@ def test_a_jump_below_2_m_is_a_correction_that_is_driven_by(
 STANDING = [("ardupilot", goal, speed) for goal in ("move", "drive") for speed in (SLOW, FAST)]
 
 
-@pytest.mark.parametrize(("make", "goal", "speed"), [*STANDING, ("px4", "drive", FAST)])
+@for_each("make, goal, speed", [*STANDING, ("px4", "drive", FAST)])
 def test_a_position_that_stands_from_the_beginning_ends_the_task_after_a_metre(
     make_world: MakeWorld, make: str, goal: str, speed: float
 ) -> None:
@@ -199,8 +198,8 @@ def test_a_position_that_stands_from_the_beginning_ends_the_task_after_a_metre(
     assert way.furthest < BLIND[speed]
 
 
-@pytest.mark.parametrize("speed", [SLOW, FAST])
-@pytest.mark.parametrize("goal", ["move", "drive"])
+@for_each("speed", [SLOW, FAST])
+@for_each("goal", ["move", "drive"])
 def test_a_rover_that_says_that_it_stands_while_it_drives_is_stopped_after_a_metre(
     make_world: MakeWorld, speed: float, goal: str
 ) -> None:
@@ -224,8 +223,8 @@ LOSSES = {
 }
 
 
-@pytest.mark.parametrize("speed", [SLOW, FAST])
-@pytest.mark.parametrize("what", LOSSES)
+@for_each("speed", [SLOW, FAST])
+@for_each("what", LOSSES)
 def test_what_is_lost_stops_it_within_so_many_metres(
     make_world: MakeWorld, what: str, speed: float
 ) -> None:
@@ -257,7 +256,7 @@ def test_a_heading_that_stands_while_it_turns_ends_the_turn_after_a_radian(world
     assert 0.5 < turned < 1.7
 
 
-@pytest.mark.parametrize("speed", [SLOW, FAST])
+@for_each("speed", [SLOW, FAST])
 def test_a_wrong_heading_leads_over_a_fence_no_further_than_anywhere(
     world: World, speed: float
 ) -> None:

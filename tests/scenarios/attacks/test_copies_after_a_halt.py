@@ -9,11 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, PAUSE_CONTINUE, FakeClient, command_long
 from tests.kit.mission import Item
 from tests.kit.px4 import REPOSITION
@@ -39,9 +39,9 @@ def go_to(north: float) -> object:
     )
 
 
-@pytest.mark.parametrize("copies", [3, 4])
-@pytest.mark.parametrize("way", ["command", "item"])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("copies", [3, 4])
+@for_each("way", ["command", "item"])
+@for_each("halt", HALTS)
 def test_copies_of_what_runs_at_once_undo_no_newer_halt(
     make_world: MakeWorld, halt: str, way: str, copies: int
 ) -> None:

@@ -5,13 +5,12 @@ A float32 names 16,777,215 of them exactly: 47 hours at the rate that a submitte
 
 from struct import pack, unpack
 
-import pytest
-
 from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import MAX_TASK_ID
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, MOVE, REQUEST, TASK_STATUS
 from tests.kit.world import World
 
@@ -36,7 +35,7 @@ def after_so_many(world: World, count: int) -> World:
     return world
 
 
-@pytest.mark.parametrize("count", [LAST_EXACT, TEN_YEARS, MAX_TASK_ID])
+@for_each("count", [LAST_EXACT, TEN_YEARS, MAX_TASK_ID])
 def test_tasks_are_taken_after_as_many_as_there_may_ever_be(world: World, count: int) -> None:
     after_so_many(world, count)
     first, second = world.client.move(0.3, nonce=1), world.client.move(0.2, nonce=2)

@@ -12,6 +12,7 @@ import pytest
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, GUIDED, HOLD, command_long
 from tests.kit.world import World
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
@@ -127,8 +128,8 @@ def test_a_pause_stops_what_a_client_has_armed_just_now(world: World) -> None:
     assert mode_of(world) is Mode.HOLD
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
-@pytest.mark.parametrize("late", [2.0, 2.6, 3.0, 3.4])
+@for_each("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+@for_each("late", [2.0, 2.6, 3.0, 3.4])
 def test_an_arming_that_shows_only_with_the_next_heartbeat(
     make_world: MakeWorld, late: float, phase: float
 ) -> None:

@@ -14,6 +14,7 @@ from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.client import DRIVE, SET_INTERVAL
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
@@ -59,14 +60,14 @@ GROWS: dict[str, Delay] = {
 }
 
 
-@pytest.mark.parametrize(
-    ("growth", "begins"),
+@for_each(
+    "growth, begins",
     [
         *((growth, 8.0) for growth in GROWS),
         *(("and shrinks", 8.0 + n / 2) for n in some(range(1, 8), 0, 2, 5)),
     ],
 )
-@pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_a_delay_that_grows_leads_nobody_over_a_fence(
     make_world: MakeWorld, persona: Persona, growth: str, begins: float
 ) -> None:
@@ -79,7 +80,7 @@ def test_a_delay_that_grows_leads_nobody_over_a_fence(
     assert 2 < reached < 40
 
 
-@pytest.mark.parametrize("load", ["an observer's rates", "other traffic"])
+@for_each("load", ["an observer's rates", "other traffic"])
 def test_a_radio_that_is_full_leads_nobody_over_a_fence(make_world: MakeWorld, load: str) -> None:
     world = make_world(settings=BRISK)
     world.net.buffers[DOWN] = Radio(bytes_per_second=BAUD, buffer=BUFFER)

@@ -6,13 +6,12 @@ own words among them, may still come for some seconds; so may what a rover has s
 
 from struct import unpack_from
 
-import pytest
-
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, FakeClient, command_long
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
@@ -49,7 +48,7 @@ def mend(world: World) -> None:
     world.watched.loses = lambda *_: False
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@for_each("halt", ["HOLD", "pause"])
 def test_a_mode_that_comes_twice(world: World, halt: str) -> None:
     person = world.add_client("person")
     away_from_home(world)
@@ -106,8 +105,8 @@ def test_a_px4_that_a_place_moves_in_hold_is_held_before_its_next_heartbeat(
     assert stays(world, 3)
 
 
-@pytest.mark.parametrize("phase", some([0.0, 0.2, 0.4, 0.6, 0.8], 0, 3))
-@pytest.mark.parametrize("late", [2.8, 3.0, 3.2, 3.4])
+@for_each("phase", some([0.0, 0.2, 0.4, 0.6, 0.8], 0, 3))
+@for_each("late", [2.8, 3.0, 3.2, 3.4])
 def test_a_mode_that_shows_only_with_the_next_heartbeat(
     make_world: MakeWorld, late: float, phase: float
 ) -> None:
@@ -150,7 +149,7 @@ def test_our_own_mode(world: World) -> None:
     assert mode_of(world) is Mode.HOLD
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@for_each("halt", ["HOLD", "pause"])
 def test_the_way_to_the_rover_is_lost_for_longer_than_hold_was_asked_for(
     world: World, halt: str
 ) -> None:
@@ -168,7 +167,7 @@ def test_the_way_to_the_rover_is_lost_for_longer_than_hold_was_asked_for(
     assert mode_of(world) is Mode.HOLD
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "everything"])
+@for_each("halt", ["HOLD", "everything"])
 def test_a_submission_that_its_senders_halt_has_overtaken(world: World, halt: str) -> None:
     late = world.client.packed(command_long(MOVE, 3, 0, 0, 7.0, 0, 0, 5, target=(1, 191)))
     world.client.send(command_long(512, 148))  # has the next number
@@ -181,7 +180,7 @@ def test_a_submission_that_its_senders_halt_has_overtaken(world: World, halt: st
     assert stays(world, 4)
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "everything"])
+@for_each("halt", ["HOLD", "everything"])
 def test_an_upload_that_has_begun_before_a_halt(world: World, halt: str) -> None:
     held: list[int] = []
     world.watched.loses = lambda _s, target, data: (
@@ -201,7 +200,7 @@ def test_an_upload_that_has_begun_before_a_halt(world: World, halt: str) -> None
 # a person at the rover
 
 
-@pytest.mark.parametrize("what", ["takes it", "disarms it"])
+@for_each("what", ["takes it", "disarms it"])
 def test_a_person_has_it_while_a_kill_stops_it(world: World, what: str) -> None:
     world.client.move(20, speed=0.8)
     world.client.move(5, speed=0.5)

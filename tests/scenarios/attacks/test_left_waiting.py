@@ -20,6 +20,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     GUIDED,
@@ -102,7 +103,7 @@ def started_under_a_pause(world: World, delay: float) -> None:
     assert started.result == ACCEPTED
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("halt", HALTS)
 def test_a_plan_that_was_started_does_not_begin_after_a_halt(world: World, halt: str) -> None:
     person = world.add_client("person")
     started_under_a_pause(world, 25)
@@ -114,7 +115,7 @@ def test_a_plan_that_was_started_does_not_begin_after_a_halt(world: World, halt:
     assert going.result == ACCEPTED
 
 
-@pytest.mark.parametrize("hears", [True, False])
+@for_each("hears", [True, False])
 def test_disarming_ends_what_waits_for_a_silent_rover(world: World, hears: bool) -> None:
     """Whether it was carried out nobody knows until the rover is heard again."""
     person = world.add_client("person")
@@ -134,7 +135,7 @@ def test_disarming_ends_what_waits_for_a_silent_rover(world: World, hears: bool)
     assert world.paused() is R.OPERATOR
 
 
-@pytest.mark.parametrize("halt", ["disarm", "pause", "switch"])
+@for_each("halt", ["disarm", "pause", "switch"])
 def test_a_mission_does_not_begin_at_an_arming_after_a_halt(
     make_world: MakeWorld, halt: str
 ) -> None:
@@ -152,7 +153,7 @@ def test_a_mission_does_not_begin_at_an_arming_after_a_halt(
     assert stays(world, 8)
 
 
-@pytest.mark.parametrize("halt", ["disarm", "switch"])
+@for_each("halt", ["disarm", "switch"])
 def test_a_stream_does_not_drive_on_when_the_rover_may_move_again(world: World, halt: str) -> None:
     """Both at the rover itself: no client has said anything."""
     world.client.mode(GUIDED)
@@ -175,7 +176,7 @@ def test_a_stream_does_not_drive_on_when_the_rover_may_move_again(world: World, 
     assert world.truth.forward_speed > 0.3, "its client has asked for the mode again"
 
 
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.GUIDED])
+@for_each("mode", [Mode.MANUAL, Mode.GUIDED])
 def test_a_rover_that_somebody_drove_and_parked_stays_there(world: World, mode: Mode) -> None:
     """In GUIDED by another radio than ours."""
     world.client.arm()
@@ -208,7 +209,7 @@ def restarted(world: World, path: Path) -> None:
     world.start_server(later, later.load())
 
 
-@pytest.mark.parametrize("who", ["client", "person at the rover"])
+@for_each("who", ["client", "person at the rover"])
 def test_what_somebody_has_disarmed_is_not_armed_by_the_next_run(
     make_world: MakeWorld, tmp_path: Path, who: str
 ) -> None:
@@ -234,7 +235,7 @@ def test_what_somebody_has_disarmed_is_not_armed_by_the_next_run(
     world.until_state(2, S.COMPLETED, within=60)
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause", "STOP"])
+@for_each("halt", ["HOLD", "pause", "STOP"])
 def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
     make_world: MakeWorld, halt: str
 ) -> None:

@@ -9,6 +9,7 @@ import pytest
 from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.restored import Restored
+from tests.kit.cases import for_each
 from tests.kit.world import World
 
 NONCE = 5
@@ -31,14 +32,14 @@ def test_an_old_nonce_does_not_swallow_an_equal_task(world: World) -> None:
 
 
 @pytest.mark.volume
-@pytest.mark.parametrize("late", [20.0, KEPT - 30.0])
+@for_each("late", [20.0, KEPT - 30.0])
 def test_a_late_copy_is_still_the_same_task(world: World, late: float) -> None:
     first = done(world)
     world.run(late)
     assert done(world) == first
 
 
-@pytest.mark.parametrize(("away", "task_id"), [(20.0, 1), (KEPT + 60.0, 2)])
+@for_each("away, task_id", [(20.0, 1), (KEPT + 60.0, 2)])
 def test_after_a_restart_too(world: World, away: float, task_id: int) -> None:
     assert done(world) == 1
     task = world.task(1)

@@ -4,11 +4,10 @@ Attack D4: after 20 s of standstill a continue came after a newer STOP, sticks a
 of 20 s ago reached the rover, and a submission was driven that its client had given up on.
 """
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     GUIDED,
@@ -50,7 +49,7 @@ def moved(world: World, seconds: float) -> float:
     return abs(world.pose()[0] - north) + abs(world.pose()[1] - east)
 
 
-@pytest.mark.parametrize("halt", ["STOP", "HOLD"])
+@for_each("halt", ["STOP", "HOLD"])
 def test_a_continue_from_before_a_stop_does_not_go_on_after_it(world: World, halt: str) -> None:
     person = world.add_client("person")
     world.client.move(20)
@@ -78,8 +77,8 @@ def test_a_halt_in_the_backlog_counts(world: World) -> None:
     assert moved(world, 3) < 0.001
 
 
-@pytest.mark.parametrize(
-    ("mode", "words"),
+@for_each(
+    "mode, words",
     [
         (Mode.MANUAL, [sticks(0, 0, 800)] * 50),
         (Mode.MANUAL, [rc_override(1500, 1500, 1900)] * 5),
@@ -87,7 +86,6 @@ def test_a_halt_in_the_backlog_counts(world: World) -> None:
         (Mode.HOLD, [command_long(SET_MODE, 1, GUIDED, target=(1, 1)), *[setpoint(1.0)] * 20]),
         (Mode.GUIDED, [setpoint(1.0)] * 20),
     ],
-    ids=["sticks", "radio", "manual", "guided", "set-points"],
 )
 def test_old_sticks_modes_and_set_points_do_not_move_an_armed_rover(
     world: World, mode: Mode, words: list[object]

@@ -6,11 +6,10 @@ its copies come and by whatever way; the person who means it sends it anew, and 
 
 from collections.abc import Callable
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -61,7 +60,7 @@ def driven_since(world: World, seconds: float) -> float:
     return abs(after[0] - before[0]) + abs(after[1] - before[1])
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("halt", HALTS)
 def test_copies_of_a_continue_undo_no_newer_halt(world: World, halt: str) -> None:
     """D1: what a script repeats for 10 s is older than what a person has done in between."""
     script, person = world.add_client("script", system_id=245), world.add_client("person")
@@ -83,8 +82,8 @@ def test_copies_of_a_continue_undo_no_newer_halt(world: World, halt: str) -> Non
         assert set(script.acks_of(PAUSE_CONTINUE)[-15:]) == {STALE}
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause", "disarm", "mode switch"])
-@pytest.mark.parametrize("way", ["MISSION_START", "DO_SET_MODE", "SET_MODE"])
+@for_each("halt", ["HOLD", "pause", "disarm", "mode switch"])
+@for_each("way", ["MISSION_START", "DO_SET_MODE", "SET_MODE"])
 def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str) -> None:
     """D1: ground stations repeat the start of a mission, and the mode for it, without an answer."""
     station, person = world.client, world.add_client("person")
@@ -106,8 +105,8 @@ def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str)
     assert driven_since(world, 2) < 0.001
 
 
-@pytest.mark.parametrize("apart", [0.0, 0.02, 5.0])
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+@for_each("apart", [0.0, 0.02, 5.0])
+@for_each("halt", ["STOP", "HOLD", "pause"])
 def test_a_continue_that_its_senders_own_halt_has_overtaken_does_not_count(
     world: World, halt: str, apart: float
 ) -> None:
@@ -139,7 +138,7 @@ def test_halts_of_one_moment_come_first_whatever_link_they_came_on(world: World)
         assert world.paused() is R.STOPPED
 
 
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "disarm"])
+@for_each("halt", ["STOP", "HOLD", "disarm"])
 def test_what_mavsdk_repeats_by_itself_does_not_undo_its_own_halt(world: World, halt: str) -> None:
     """Its repetitions have a number of their own, and no count."""
     client = world.client
@@ -160,7 +159,7 @@ def test_what_mavsdk_repeats_by_itself_does_not_undo_its_own_halt(world: World, 
 # people are not locked out
 
 
-@pytest.mark.parametrize("drives", [AUTO, GUIDED])
+@for_each("drives", [AUTO, GUIDED])
 def test_a_mode_that_drives_counts_at_once_after_the_hold_of_the_same_client(
     world: World, drives: int
 ) -> None:

@@ -6,6 +6,7 @@ from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, HOLD
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -32,7 +33,7 @@ def held_and_paused(world: World, how: str) -> None:
     world.run(5)
 
 
-@pytest.mark.parametrize("how", PAUSES)
+@for_each("how", PAUSES)
 def test_it_waits_for_the_continue_and_then_goes_on(world: World, how: str) -> None:
     held_and_paused(world, how)
     before = world.pose()
@@ -46,7 +47,7 @@ def test_it_waits_for_the_continue_and_then_goes_on(world: World, how: str) -> N
     world.until_state(1, S.EXECUTING, within=5)
 
 
-@pytest.mark.parametrize("how", PAUSES)
+@for_each("how", PAUSES)
 def test_the_next_halt_takes_it_back(world: World, how: str) -> None:
     held_and_paused(world, how)
     world.client.command(RELEASE, 1, AGAIN)

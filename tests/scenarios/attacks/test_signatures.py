@@ -12,6 +12,7 @@ from mav_tasks.engine.inputs import KeysChanged
 from mav_tasks.mavlink.signing import timestamp_at
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
@@ -81,7 +82,7 @@ def ahead(world: World, seconds: float) -> FakeClient:
     return client
 
 
-@pytest.mark.parametrize("seconds", [90.0, HOUR, YEAR])
+@for_each("seconds", [90.0, HOUR, YEAR])
 def test_a_clock_ahead_shuts_nobody_out(world: World, seconds: float) -> None:
     put(world, ALICE, BOB)
     refused = ahead(world, seconds)

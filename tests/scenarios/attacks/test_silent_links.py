@@ -2,10 +2,9 @@
 
 from collections.abc import Callable
 
-import pytest
-
 from mav_tasks.settings import Settings
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, RTL, command_long
 from tests.kit.world import PROMPT, World, put_home
 from tests.scenarios.attacks.test_late_arming import mode_of
@@ -18,9 +17,9 @@ def cut(world: World) -> None:
     world.watched.loses = lambda source, target, _: "rover1" in (source, target)
 
 
-@pytest.mark.parametrize("claim", [True, False])
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
-@pytest.mark.parametrize("seconds", [4.0, 6.0, 45.0])
+@for_each("claim", [True, False])
+@for_each("halt", ["HOLD", "pause"])
+@for_each("seconds", [4.0, 6.0, 45.0])
 def test_a_halt_during_a_gap_counts_when_it_ends(
     make_world: Callable[..., World], halt: str, claim: bool, seconds: float
 ) -> None:
@@ -42,7 +41,7 @@ def test_a_halt_during_a_gap_counts_when_it_ends(
     assert mode_of(world) is Mode.HOLD
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PROMPT], ids=["at 1 Hz", "prompt"])
+@for_each("persona", [ARDUPILOT, PROMPT])
 def test_one_that_drives_home_during_a_gap_is_stopped_after_it(
     make_world: Callable[..., World], persona: object
 ) -> None:

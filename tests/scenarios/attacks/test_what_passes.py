@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import DENIED, TEMPORARILY_REJECTED, FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -105,8 +106,8 @@ def test_a_message_that_does_more_than_move_is_of_safety_alone(
     assert message.get_msgId() in passed, "who is in charge of safety may"
 
 
-@pytest.mark.parametrize("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT, FLASH])
-@pytest.mark.parametrize("component", [0, 1, 99])
+@for_each("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT, FLASH])
+@for_each("component", [0, 1, 99])
 def test_nobody_tests_or_services_a_rover_that_a_task_drives(
     world: World, number: int, component: int
 ) -> None:
@@ -121,7 +122,7 @@ def test_nobody_tests_or_services_a_rover_that_a_task_drives(
     assert world.state(1)[0] is S.EXECUTING
 
 
-@pytest.mark.parametrize("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT])
+@for_each("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT])
 def test_one_that_nothing_drives_is_tested_disarmed_but_not_under_stop(
     world: World, number: int
 ) -> None:

@@ -13,6 +13,7 @@ from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.px4 import HOLD, PROMPT_PX4, REPOSITION, ask_mode
 from tests.kit.world import World, at
@@ -29,7 +30,7 @@ def drive_by_hand(world: World) -> None:
     world.run(20)
 
 
-@pytest.mark.parametrize("when", ["before", "meanwhile"])
+@for_each("when", ["before", "meanwhile"])
 def test_a_rover_that_a_person_parks_does_not_drive_off_with_what_waits(
     world: World, when: str
 ) -> None:
@@ -72,7 +73,7 @@ def test_a_go_to_of_another_behind_the_same_router_does_not_undo_a_hold(
     assert [task.goal for task in world.tasks()][1:], "the goal itself is queued"
 
 
-@pytest.mark.parametrize("way", ["put back", "turned round"])
+@for_each("way", ["put back", "turned round"])
 def test_a_rover_that_was_taken_and_parked_unheard_does_not_go_on_by_itself(
     world: World, way: str
 ) -> None:

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -42,8 +43,8 @@ def go_to(north: float, east: float, target: tuple[int, int] = (1, 1)) -> Any:
     )
 
 
-@pytest.mark.parametrize("what", ["return", "go to"])
-@pytest.mark.parametrize("claim", [True, False])
+@for_each("what", ["return", "go to"])
+@for_each("claim", [True, False])
 def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
     make_world: MakeWorld, what: str, claim: bool
 ) -> None:
@@ -72,8 +73,8 @@ def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
     assert world.rover.autopilot.mode in (Mode.RTL, Mode.GUIDED), "it was meant"
 
 
-@pytest.mark.parametrize("way", ["command", "message", "elsewhere"])
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@for_each("way", ["command", "message", "elsewhere"])
+@for_each("halt", ["HOLD", "pause"])
 def test_what_the_net_to_the_rover_delivers_after_a_halt_does_not_undo_it(
     world: World, halt: str, way: str
 ) -> None:
