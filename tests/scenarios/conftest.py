@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import pytest
 
+from tests.kit.cases import anew
 from tests.kit.fleet import Fleet, Layout
 from tests.kit.joint.agreement import Agreement
 from tests.kit.needs import Needs
@@ -49,7 +50,7 @@ def make_world(monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeWorld]:
         pytest.fail(f"the model of joint control does not know of this:\n{told}")
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     """Return a world in which nothing is unusual."""
     return make_world()

@@ -15,6 +15,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.parameters import INT16, Parameter
 from rover_sim.personas import Persona
 from tests.kit.car import Car
+from tests.kit.cases import anew, for_each
 from tests.kit.client import DENIED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_PX4, go_to
@@ -27,14 +28,14 @@ WAYPOINT, RETURN, PAUSE, START = 16, 20, 193, 300
 PROFILES = {"ardupilot": ARDUPILOT_PROFILE, "px4": replace(PX4_PROFILE, yaw_rate="")}
 
 Drive = Callable[..., World]
-each = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+each = for_each("persona", [PROMPT, PROMPT_PX4])
 
 
 def car_profile(persona: Persona) -> VehicleProfile:
     return replace(PROFILES[persona.name], turning="steered", turning_radius=RADIUS)
 
 
-@pytest.fixture
+@anew
 def make_car(make_world: MakeWorld) -> Drive:
     def make(persona: Persona, **settings_: Any) -> World:
         body = partial(Car, radius=RADIUS)

@@ -28,6 +28,7 @@ from mav_tasks.settings import Limits, Roles, Settings
 from mav_tasks.store import MemoryStore
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
+from tests.kit.cases import anew, for_each
 
 MakeWorld = Callable[..., RoverWorld]
 S = TaskState
@@ -51,7 +52,7 @@ def make_world() -> Iterator[MakeWorld]:
         world.close()
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> RoverWorld:
     """Return a world with one rover."""
     return make_world()
@@ -176,10 +177,8 @@ def test_every_handle_learns_its_end_when_the_server_is_killed(
     assert len(world.server.tasks) == 4
 
 
-@pytest.mark.parametrize(
-    "goal",
-    [Move(1e39), Drive(1.0, 0.0, 1e300), [Wait(1e39)], GoTo(LocalPlace(1, 1), speed=1e300)],
-    ids=["command", "double", "plan", "speed"],
+@for_each(
+    "goal", [Move(1e39), Drive(1.0, 0.0, 1e300), [Wait(1e39)], GoTo(LocalPlace(1, 1), speed=1e300)]
 )
 def test_a_number_that_cannot_be_sent_is_said_and_hurts_nothing_else(
     world: RoverWorld, goal: Any
@@ -193,7 +192,7 @@ def test_a_number_that_cannot_be_sent_is_said_and_hurts_nothing_else(
     assert len(world.server.tasks) == 1
 
 
-@pytest.mark.parametrize("nonce", [-1, 2**30, 1.5])
+@for_each("nonce", [-1, 2**30, 1.5])
 def test_what_is_no_nonce_is_said_before_anything_is_sent(world: RoverWorld, nonce: Any) -> None:
     with world.sync_client() as client, pytest.raises(ValueError, match="nonce"):
         client.submit([Move(1.0)], nonce=nonce)
@@ -338,7 +337,7 @@ def test_after_the_store_was_lost_old_handles_end_and_new_ones_are_new(world: Ro
     world.run(script())
 
 
-@pytest.mark.parametrize("name", ["done", "updates", "texts", "status", "done_later"])
+@for_each("name", ["done", "updates", "texts", "status", "done_later"])
 def test_whoever_waits_is_told_when_the_client_is_closed(world: RoverWorld, name: str) -> None:
     async def script() -> None:
         async with world.client() as client:
@@ -458,8 +457,8 @@ def test_a_task_that_repeats_is_followed_and_ended_through_the_library(world: Ro
     world.run(script())
 
 
-@pytest.mark.parametrize(
-    ("terms", "words"),
+@for_each(
+    "terms, words",
     [
         ({"every": 5.0}, "expected 10 s"),
         ({"every": 10.5}, "whole seconds"),

@@ -7,18 +7,19 @@ import pytest
 from mav_tasks.tasks.events import TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, FAILED, TEMPORARILY_REJECTED
 from tests.kit.store import LateStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 
-@pytest.fixture
+@anew
 def store() -> LateStore:
     return LateStore()
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld, store: LateStore) -> World:
     return make_world(store=store)
 
@@ -103,8 +104,8 @@ def test_a_blocked_store_does_not_keep_a_driving_rover_from_its_end(
     assert world.state(1)[0] is S.COMPLETED
 
 
-@pytest.mark.parametrize(("delay", "told_after"), [(0.2, 0.2), (inf, 0.4)])
-@pytest.mark.parametrize("by", ["kill", "STOP"])
+@for_each("delay, told_after", [(0.2, 0.2), (inf, 0.4)])
+@for_each("by", ["kill", "STOP"])
 def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(
     world: World, store: LateStore, by: str, delay: float, told_after: float
 ) -> None:

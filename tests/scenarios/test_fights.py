@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
@@ -15,12 +14,13 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.body import Body, Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import HOLD, MANUAL, MOVE, PAUSE_CONTINUE
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     world.client.move(4)
     world.until(lambda: world.truth.forward_speed > 0.4, within=10)
@@ -52,7 +52,7 @@ class OtherStation:
             self._link.send("rover1", message.pack(self._mav))
 
 
-@pytest.mark.parametrize("modes", [(HOLD,), (MANUAL,), (MANUAL, HOLD)])
+@for_each("modes", [(HOLD,), (MANUAL,), (MANUAL, HOLD)])
 def test_nobody_fights_for_the_mode_with_another_station(
     driving: World, modes: tuple[int, ...]
 ) -> None:
@@ -173,7 +173,7 @@ def change_to(state: S, events: Sequence[Event]) -> list[TaskChanged]:
     return [each for each in events if isinstance(each, TaskChanged) and each.new is state]
 
 
-@pytest.mark.parametrize("backwards", [1_000_000, 0])
+@for_each("backwards", [1_000_000, 0])
 def test_a_time_of_day_that_goes_back_at_the_rover_changes_nothing(
     driving: World, backwards: int
 ) -> None:

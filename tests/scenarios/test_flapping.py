@@ -1,13 +1,11 @@
 """Links that come and go all the time, and a net that changes the order of what it carries."""
 
-import pytest
-
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, MOVE, ROTATE
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -26,7 +24,7 @@ def flaps(world: World, names: set[str], *, down: float, up: float) -> None:
     world.watched.loses = loses
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     """A rover on its way, 4 m."""
     world.client.move(LENGTH)

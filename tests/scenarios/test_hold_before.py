@@ -2,18 +2,17 @@
 
 from math import nan
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, set_mode
 from tests.kit.px4 import HOLD, PROMPT_GENERIC, PROMPT_PX4, REPOSITION, ask_mode, go_to
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world(persona=PROMPT_PX4)
 
@@ -40,7 +39,7 @@ class TestAHoldBeforeAGoTo:
         assert modes == [Mode.GUIDED, Mode.HOLD]
         assert world.stands()
 
-    @pytest.mark.parametrize("ask", ["DO_SET_MODE", "SET_MODE", "twice"])
+    @for_each("ask", ["DO_SET_MODE", "SET_MODE", "twice"])
     def test_is_undone_by_it_and_the_mode_is_never_changed(self, world: World, ask: str) -> None:
         asked_at = driving(world).now
         if ask == "SET_MODE":
@@ -68,8 +67,8 @@ class TestAHoldBeforeAGoTo:
         assert world.state(1) == (S.PAUSED, R.OPERATOR)
         assert world.paused() is R.OPERATOR
 
-    @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-    @pytest.mark.parametrize("wish", ["stop", "pause", "hold of another"])
+    @for_each("order", [(0, 1), (1, 0)])
+    @for_each("wish", ["stop", "pause", "hold of another"])
     def test_undoes_only_the_pause_of_its_own_hold(
         self, world: World, wish: str, order: tuple[int, int]
     ) -> None:

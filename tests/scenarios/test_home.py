@@ -3,11 +3,9 @@
 from math import hypot, nan
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.store import PromptSqliteStore
@@ -20,7 +18,7 @@ RTL, PX4_RETURN = 11, 4 << 16 | 5 << 24
 NEAR = 0.2  # m
 HERE = Item(SET_HOME, frame=2, param1=1)
 
-both = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+both = for_each("persona", [PROMPT, PROMPT_PX4])
 
 
 def far_from(world: World, north: float, east: float) -> float:
@@ -51,7 +49,7 @@ def arm(world: World) -> None:
     world.run(1.0)
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
@@ -98,7 +96,7 @@ def test_a_return_begins_nowhere_before_the_home_of_its_arming_is_known(
 
 
 @both
-@pytest.mark.parametrize("place", [None, (1.0, 3.0)], ids=["here", "there"])
+@for_each("place", [None, (1.0, 3.0)])
 def test_a_plan_sets_the_home_that_its_return_drives_to(
     make_world: MakeWorld, persona: Persona, path: Path, place: tuple[float, float] | None
 ) -> None:

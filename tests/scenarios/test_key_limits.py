@@ -15,6 +15,7 @@ from mav_tasks.settings import Limits
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.geo import DEFAULT_ORIGIN
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -71,13 +72,13 @@ def signing(world: World, key: Key, *, name: str = "agent", system_id: int = 77)
     return client
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     """Where a store is."""
     return tmp_path / "tasks.db"
 
 
-@pytest.fixture
+@anew
 def limited(world: World) -> Callable[..., FakeClient]:
     """Return a factory of a client whose key has these limits; BOSS is an operator's key."""
 
@@ -126,7 +127,7 @@ def way(world: World, tasks: int) -> tuple[float, float]:
 # speed
 
 
-@pytest.mark.parametrize(
+@for_each(
     "send",
     [
         lambda agent: agent.move(1.0, speed=0.2),
@@ -194,7 +195,7 @@ BEYOND: dict[str, Callable[[World, FakeClient], object]] = {
 }
 
 
-@pytest.mark.parametrize("what", WITHIN)
+@for_each("what", WITHIN)
 def test_a_way_within_the_limit_is_driven(
     world: World, limited: Callable[..., FakeClient], what: str
 ) -> None:
@@ -206,7 +207,7 @@ def test_a_way_within_the_limit_is_driven(
     assert metres == pytest.approx(3.0, abs=0.2)
 
 
-@pytest.mark.parametrize("what", BEYOND)
+@for_each("what", BEYOND)
 def test_a_longer_way_is_refused_in_words(
     world: World, limited: Callable[..., FakeClient], what: str
 ) -> None:
@@ -280,7 +281,7 @@ def restarted(world: World, path: Path, *keys: Key) -> None:
     opened(world, *keys)
 
 
-@pytest.mark.parametrize(
+@for_each(
     "send",
     [
         lambda agent: agent.arm(),
@@ -290,7 +291,7 @@ def restarted(world: World, path: Path, *keys: Key) -> None:
         lambda agent: agent.command(SPEED, 1, 2.0, target=(1, 100)),
     ],
 )
-@pytest.mark.parametrize("limits", [{"max_speed": 0.5}, {"max_distance": 3.0}])
+@for_each("limits", [{"max_speed": 0.5}, {"max_distance": 3.0}])
 def test_a_bounded_key_drives_by_tasks_alone(
     world: World,
     limited: Callable[..., FakeClient],

@@ -12,6 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.world import World, near_pose
 
 HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
@@ -19,7 +20,7 @@ SETPOINT, COMMAND = 84, 76
 ARM_DISARM, SET_MODE = common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_DO_SET_MODE
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     """A world in which a task drives and another waits."""
     world.client.move(4)
@@ -42,7 +43,7 @@ LOSSES = {
 }
 
 
-@pytest.mark.parametrize("what", LOSSES)
+@for_each("what", LOSSES)
 def test_the_rover_stops_and_resumes_by_itself_after_2_s_of_good_data(
     driving: World, what: str
 ) -> None:
@@ -66,7 +67,7 @@ def test_the_rover_stops_and_resumes_by_itself_after_2_s_of_good_data(
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 
-@pytest.mark.parametrize("what", LOSSES)
+@for_each("what", LOSSES)
 def test_after_30_s_it_fails_and_the_queue_pauses(driving: World, what: str) -> None:
     world = driving
     faults, _, within = LOSSES[what]
@@ -131,7 +132,7 @@ def test_a_lost_task_does_not_resume_on_a_disarmed_rover(driving: World) -> None
     assert not world.rover.autopilot.armed
 
 
-@pytest.mark.parametrize("jump", [(2.5, 0.0), (0.0, -30.0), (50.0, 0.0)])
+@for_each("jump", [(2.5, 0.0), (0.0, -30.0), (50.0, 0.0)])
 def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float, float]) -> None:
     world = driving
     world.fault(Faults(position_jump=jump))
@@ -177,7 +178,7 @@ def test_a_reboot_that_only_the_rovers_clock_tells_of_holds_the_task_too(driving
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
-@pytest.mark.parametrize("late", [0.55, 1.0, 2.5])
+@for_each("late", [0.55, 1.0, 2.5])
 def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: float) -> None:
     world = driving
     world.observer.expects_gaps = True

@@ -6,7 +6,6 @@ from itertools import pairwise
 from math import cos, degrees, radians, sin
 from typing import Any, NamedTuple
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
@@ -19,7 +18,7 @@ from rover_sim.body import Pose
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -521,7 +520,7 @@ def test_a_rover_that_calls_by_itself_gets_our_heartbeats_also_after_its_link_wa
 # what is shown
 
 
-@pytest.fixture
+@anew
 def waiting(make_fleet: MakeFleet) -> Fleet:
     """Two rovers behind one radio and one elsewhere, each with one task running and many waiting.
 

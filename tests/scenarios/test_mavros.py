@@ -1,12 +1,12 @@
 """mavros with its defaults, whose address is the server's own inside the rover's system."""
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.events import SubmissionRefused, VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from tests.kit.cases import for_each
+from rover_sim.personas import Persona
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, ARM, AUTO, DENIED, GUIDED, HOLD, IDS
 from tests.kit.mavros import Mavros
 from tests.kit.mavros import heartbeat as onboard_heartbeat
@@ -20,15 +20,16 @@ WAYPOINT = 16
 HOME = Item(WAYPOINT, **at(0, 0))
 
 
-@pytest.fixture(params=[PROMPT, PROMPT_PX4], ids=lambda persona: persona.name)
-def world(make_world: MakeWorld, request: pytest.FixtureRequest) -> World:
-    return make_world(persona=request.param)
+@anew
+def world(make_world: MakeWorld, persona: Persona) -> World:
+    return make_world(persona=persona)
 
 
 def is_ardupilot(world: World) -> bool:
     return world.observer.ways is ARDUPILOT_WAYS
 
 
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_stock_mavros_is_served(world: World) -> None:
     mavros = Mavros(world)
     world.run(17)
@@ -52,6 +53,7 @@ def test_stock_mavros_is_served(world: World) -> None:
     assert world.events(SubmissionRefused) == []
 
 
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_its_setpoints_drive(world: World) -> None:
     mavros = Mavros(world)
     world.run(2)

@@ -16,6 +16,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.personas import Mode, Persona
 from tests.kit.car import Car
+from tests.kit.cases import anew, for_each
 from tests.kit.gateways.engines import FleetWorld
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.store import PromptSqliteStore
@@ -35,11 +36,11 @@ CARS = {
 OTHERS = {"ArduPilot": PROMPT, "PX4": PROMPT_PX4}
 EVERY = {**OTHERS, **CARS}
 
-personas = pytest.mark.parametrize("persona", EVERY.values(), ids=EVERY.keys())
+personas = for_each("persona", EVERY.values())
 others = pytest.mark.parametrize("persona", OTHERS.values(), ids=OTHERS.keys())
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
@@ -155,8 +156,8 @@ def test_who_switches_it_to_manual_meanwhile_has_it(make_world: MakeWorld, path:
 
 
 @personas
-@pytest.mark.parametrize("streams", [True, False], ids=["with streams", "without"])
-@pytest.mark.parametrize("on_takeover", ["hold", "resume"])
+@for_each("streams", [True, False])
+@for_each("on_takeover", ["hold", "resume"])
 def test_a_gateway_that_gets_it_brakes_it_in_the_same_way(
     tmp_path: Path, persona: Persona, on_takeover: str, *, streams: bool
 ) -> None:

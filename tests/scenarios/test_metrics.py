@@ -17,7 +17,7 @@ from mav_tasks.tasks.events import TaskModified, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.task import TaskId, Terms
 from rover_sim.personas import PX4, Persona
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.store import LateStore
 from tests.kit.world import PROMPT, World
 
@@ -53,7 +53,7 @@ def tasks(collector: Collector) -> dict[tuple[object, ...], Any]:
     return samples(collector, f.TASKS)
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world()
 

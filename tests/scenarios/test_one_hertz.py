@@ -3,7 +3,6 @@
 The last HEARTBEAT may be a second old, so what it shows can be from before our last request.
 """
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
@@ -11,7 +10,7 @@ from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import HOLD, set_mode
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -19,7 +18,7 @@ from tests.scenarios.conftest import MakeWorld
 CANCEL = 54010
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world(persona=ARDUPILOT, shows_on_request=False)
 
@@ -35,7 +34,7 @@ def test_three_tasks_are_driven_and_the_rover_is_handed_back(world: World) -> No
     assert world.rover.autopilot.mode is Mode.HOLD
 
 
-@pytest.mark.parametrize("pause", [0.0, 0.1, 0.3, 0.5, 0.9, 1.3])
+@for_each("pause", [0.0, 0.1, 0.3, 0.5, 0.9, 1.3])
 def test_a_task_right_after_the_last_is_no_takeover(world: World, pause: float) -> None:
     world.client.move(0.3)
     world.until(lambda: world.state(1)[0] is S.COMPLETED, within=20)
@@ -46,8 +45,8 @@ def test_a_task_right_after_the_last_is_no_takeover(world: World, pause: float) 
     assert world.events(QueuePaused) == []
 
 
-@pytest.mark.parametrize("after", [0.1, 0.3, 0.5, 1.3])
-@pytest.mark.parametrize("how", ["pause", "hold"])
+@for_each("after", [0.1, 0.3, 0.5, 1.3])
+@for_each("how", ["pause", "hold"])
 def test_continue_soon_after_a_pause_goes_on_to_the_same_end(
     world: World, how: str, after: float
 ) -> None:
@@ -65,7 +64,7 @@ def test_continue_soon_after_a_pause_goes_on_to_the_same_end(
     assert [e.reason for e in world.events(QueuePaused)] == [R.OPERATOR]
 
 
-@pytest.mark.parametrize("after", [0.1, 0.3, 0.5, 1.5])
+@for_each("after", [0.1, 0.3, 0.5, 1.5])
 def test_continue_soon_after_stop_lets_the_next_task_run(world: World, after: float) -> None:
     world.client.move(20)
     world.until_state(1, S.EXECUTING)
@@ -79,7 +78,7 @@ def test_continue_soon_after_stop_lets_the_next_task_run(world: World, after: fl
     assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
 
 
-@pytest.mark.parametrize("who", ["client", "operator"])
+@for_each("who", ["client", "operator"])
 def test_a_rover_disarmed_while_driving_does_not_drive_off_when_armed_again(
     world: World, who: str
 ) -> None:
@@ -110,7 +109,7 @@ def test_tasks_are_done_over_a_bad_net(make_world: MakeWorld, seed: int) -> None
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
 
 
-@pytest.mark.parametrize("system_id", [0, 250])
+@for_each("system_id", [0, 250])
 def test_a_heartbeat_of_everybody_or_of_ourselves_makes_no_vehicle(
     world: World, system_id: int
 ) -> None:

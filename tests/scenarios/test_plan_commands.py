@@ -12,7 +12,7 @@ from mav_tasks.settings import Roles, Settings, VehicleProfile
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.car import Car
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World, at, is_at
@@ -97,7 +97,7 @@ def turned_round(track: list[Seen], north: float, east: float, *, within: float)
 MakeRover = Callable[[Persona, VehicleProfile | None], World]
 
 
-@pytest.fixture
+@anew
 def make_rover(make_world: MakeWorld) -> MakeRover:
     def make(persona: Persona, profile: VehicleProfile | None) -> World:
         if profile is None:
@@ -108,10 +108,9 @@ def make_rover(make_world: MakeWorld) -> MakeRover:
     return make
 
 
-@pytest.mark.parametrize(
-    ("persona", "profile", "radius"),
+@for_each(
+    "persona, profile, radius",
     [(PROMPT, None, 1.5), (PROMPT, ARDUPILOT_CAR, -2.0), (PROMPT_PX4, None, -1.5)],
-    ids=["ardupilot", "ardupilot car", "px4"],
 )
 def test_a_circle_is_driven_as_a_circle(
     make_rover: MakeRover, persona: Persona, profile: VehicleProfile | None, radius: float
@@ -124,7 +123,7 @@ def test_a_circle_is_driven_as_a_circle(
     assert hypot(world.truth.north - 3, world.truth.east) == pytest.approx(abs(radius), abs=0.25)
 
 
-@pytest.mark.parametrize("profile", [None, ARDUPILOT_CAR], ids=["skid", "car"])
+@for_each("profile", [None, ARDUPILOT_CAR])
 def test_what_is_to_be_driven_backwards_is(
     make_rover: MakeRover, profile: VehicleProfile | None
 ) -> None:

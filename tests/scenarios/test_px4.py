@@ -18,7 +18,7 @@ from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
 from rover_sim.realism import EXACT, Drive
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED
 from tests.kit.mission import Item, Upload, reached
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
@@ -35,16 +35,12 @@ every = for_each("persona", ALL)
 each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world(persona=PROMPT_PX4)
 
 
-@pytest.mark.parametrize(
-    ("modes", "shown"),
-    [(1 << 14 | 0b10000, 1 << 14 | 0b11000), (0b101, 0b101), (None, None)],
-    ids=["Hold is possible", "Hold is not", "zeros are left out"],
-)
+@for_each("modes, shown", [(1 << 14 | 0b10000, 1 << 14 | 0b11000), (0b101, 0b101), (None, None)])
 def test_its_checks_allow_a_mission_wherever_they_allow_hold(
     world: World, modes: int | None, shown: int | None
 ) -> None:
@@ -82,7 +78,7 @@ class TestDriving:
         assert not world.rover.autopilot.armed
         assert world.rover.autopilot.mode is Mode.HOLD
 
-    @pytest.mark.parametrize(("north", "east"), [(2, 0), (-2, 0), (0, 1.5), (-1, -1), (0.3, 0)])
+    @for_each("north, east", [(2, 0), (-2, 0), (0, 1.5), (-1, -1), (0.3, 0)])
     def test_a_place_is_driven_to_without_turning_on_the_spot_first(
         self, world: World, north: float, east: float
     ) -> None:
@@ -114,7 +110,7 @@ class TestDriving:
         world.until_idle(tasks=1)
         assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.03, angle=2)
 
-    @pytest.mark.parametrize("radius", [0.5, 1.5, 3.0])
+    @for_each("radius", [0.5, 1.5, 3.0])
     def test_a_place_within_its_turning_circle_ends_the_task(
         self, world: World, monkeypatch: pytest.MonkeyPatch, radius: float
     ) -> None:
@@ -133,7 +129,7 @@ class TestDriving:
 class TestTurning:
     """A differential rover turns on the spot to the course of a set-point of 1 mm/s."""
 
-    @pytest.mark.parametrize("angle", [90.0, -45.0, 170.0, -270.0, 400.0])
+    @for_each("angle", [90.0, -45.0, 170.0, -270.0, 400.0])
     def test_by_an_angle(self, world: World, angle: float) -> None:
         world.run(2.0)  # until it has said that it can
         world.client.rotate(angle)
@@ -196,8 +192,8 @@ class TestStanding:
 
 
 class TestWhatItCannotDo:
-    @pytest.mark.parametrize(
-        ("command", "params", "words"),
+    @for_each(
+        "command, params, words",
         [
             (DRIVE, (-0.5, 0.0, 2.0), "reverse"),
             (DRIVE, (0.5, 10.0, 2.0), "yaw rate"),
@@ -271,7 +267,7 @@ class TestStop:
 
 
 class TestPausing:
-    @pytest.mark.parametrize(
+    @for_each(
         "pause",
         [
             lambda w: w.client.command(REPOSITION, -1, 1, 0, nan, nan, nan, nan, target=(1, 1)),
@@ -279,7 +275,6 @@ class TestPausing:
                 REPOSITION, -1, 1, 0, nan, x=NO_PLACE, y=NO_PLACE, frame=6, target=(1, 1)
             ),
         ],
-        ids=["COMMAND_LONG", "COMMAND_INT"],
     )
     def test_a_go_to_without_a_place_is_one(
         self, world: World, pause: Callable[[World], object]

@@ -16,8 +16,8 @@ def armed(world: World, party: QgcParty) -> None:
     world.until(lambda: "go to" in party.operator.offers, within=3)
 
 
-@each_version
 class TestGoTo:
+    @each_version
     def test_of_px4_is_one_task(self, make_world: MakeWorld, profile: Profile) -> None:
         world = make_world(persona=PROMPT_PX4)
         party = join(world, profile)

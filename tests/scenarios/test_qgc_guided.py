@@ -34,9 +34,9 @@ def driving(world: World, profile: Profile) -> QgcParty:
     return party
 
 
-@each_version
-@each_guided
 class TestWhileDriving:
+    @each_version
+    @each_guided
     def test_pause_stops_it_and_an_action_goes_on(
         self, make_world: MakeWorld, persona: Persona, profile: Profile
     ) -> None:
@@ -58,6 +58,7 @@ class TestWhileDriving:
 
 @each_pair
 class TestAlsoWhileDriving:
+    @each_pair
     def test_the_mode_menu_is_obeyed(
         self, make_world: MakeWorld, persona: Persona, profile: Profile
     ) -> None:

@@ -2,12 +2,11 @@
 
 from math import hypot
 
-import pytest
-
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.mission import ITEM_INT, REQUEST, REQUEST_INT
 from tests.kit.qgc.joined import each_guided, each_make, each_version, join, place, slowest_ack
 from tests.kit.qgc.party import QgcParty
@@ -120,7 +119,7 @@ def test_a_bad_item_is_named(make_world: MakeWorld, persona: Persona) -> None:
 
 
 @each_version
-@pytest.mark.parametrize("lost", [(ITEM_INT,), (REQUEST, REQUEST_INT)], ids=["item", "request"])
+@for_each("lost", [(ITEM_INT,), (REQUEST, REQUEST_INT)])
 def test_what_is_lost_of_an_upload_is_asked_for_again_in_time(
     make_world: MakeWorld, profile: Profile, lost: tuple[int, ...]
 ) -> None:

@@ -12,6 +12,7 @@ from mav_tasks.tasks.events import TaskProgressed
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, TEMPORARILY_REJECTED, command_long
 from tests.kit.mission import Download, Item, Upload, reached
 from tests.kit.store import PromptSqliteStore
@@ -27,12 +28,12 @@ TO_LAUNCH = 20  # the command
 STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld, path: Path) -> World:
     store = PromptSqliteStore(path, wall_offset=UTC)
     settings = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
@@ -95,7 +96,7 @@ def test_what_ran_is_held_and_the_rover_is_put_to_hold(world: World, path: Path)
     assert world.pose() == where
 
 
-@pytest.mark.parametrize("how", [AGAIN, REMAINDER, SKIP])
+@for_each("how", [AGAIN, REMAINDER, SKIP])
 def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, how: int) -> None:
     world.client.move(5.0)
     world.run(0.1)
@@ -188,7 +189,7 @@ def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
-@pytest.mark.parametrize("is_restarted", [False, True])
+@for_each("is_restarted", [False, True])
 def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
     world: World, path: Path, *, is_restarted: bool
 ) -> None:
@@ -208,8 +209,8 @@ def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
     world.until_state(1, S.COMPLETED)
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
-@pytest.mark.parametrize("ends", [1, 2])
+@for_each("halt", ["HOLD", "pause"])
+@for_each("ends", [1, 2])
 def test_a_rover_that_was_told_to_stand_just_before_a_kill_is_told_again(
     world: World, path: Path, halt: str, ends: int
 ) -> None:
@@ -230,7 +231,7 @@ def test_a_rover_that_was_told_to_stand_just_before_a_kill_is_told_again(
     assert stays(world, 3)
 
 
-@pytest.mark.parametrize("answers_lost", [0, 1, 1000])
+@for_each("answers_lost", [0, 1, 1000])
 def test_another_rover_of_the_same_id_runs_nothing_unasked(
     world: World, path: Path, answers_lost: int
 ) -> None:
@@ -254,7 +255,7 @@ def test_another_rover_of_the_same_id_runs_nothing_unasked(
     assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.RESTARTED)
 
 
-@pytest.mark.parametrize(("idle", "paused"), [(60.0, R.NONE), (700.0, R.RESTARTED)])
+@for_each("idle, paused", [(60.0, R.NONE), (700.0, R.RESTARTED)])
 def test_after_a_good_end_waiting_tasks_go_on_unless_it_was_long_ago(
     world: World, path: Path, idle: float, paused: R
 ) -> None:
@@ -371,7 +372,7 @@ def test_after_a_kill_the_progress_of_the_last_second_is_known(world: World, pat
     assert kept == []  # by this server
 
 
-@pytest.mark.parametrize("is_frame_lost", [False, True])
+@for_each("is_frame_lost", [False, True])
 def test_the_remainder_after_an_orderly_end_is_right_within_5_cm(
     world: World, path: Path, is_frame_lost: bool
 ) -> None:

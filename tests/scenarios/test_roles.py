@@ -11,7 +11,7 @@ from mav_tasks.tasks.events import QueuePaused, SubmissionRefused, TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -57,7 +57,7 @@ NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
 MakeRoles = Callable[..., World]
 
 
-@pytest.fixture
+@anew
 def with_roles(make_world: MakeWorld) -> MakeRoles:
     """Return a factory of worlds in which addresses have roles, with limits."""
 
@@ -121,7 +121,7 @@ REFUSED: dict[str, Callable[[FakeClient], Sent]] = {
 }
 
 
-@pytest.mark.parametrize("what", REFUSED)
+@for_each("what", REFUSED)
 def test_an_observer_changes_nothing(with_roles: MakeRoles, what: str) -> None:
     world = with_roles()
     task = active(world, 4.0)
@@ -188,9 +188,9 @@ def test_an_observer_sees_everything(with_roles: MakeRoles) -> None:
     assert download.is_done
 
 
-@pytest.mark.parametrize("who", [OBSERVER, SUBMITTER])
-@pytest.mark.parametrize(
-    ("stop", "state"),
+@for_each("who", [OBSERVER, SUBMITTER])
+@for_each(
+    "stop, state",
     [
         (lambda c: c.stop(), S.KILLED),
         (lambda c: c.stop(target=(0, 0)), S.KILLED),
@@ -199,7 +199,6 @@ def test_an_observer_sees_everything(with_roles: MakeRoles) -> None:
         (lambda c: c.arm(False), S.PAUSED),
         (lambda c: c.send(set_mode(HOLD)), S.PAUSED),
     ],
-    ids=["STOP", "STOP all", "pause", "HOLD", "disarm", "SET_MODE"],
 )
 def test_what_only_stops_a_rover_everybody_may(
     with_roles: MakeRoles, who: int, stop: Callable[[FakeClient], Any], state: S
@@ -311,7 +310,7 @@ def test_a_plan_is_started_and_replaced_by_its_owner_or_an_operator(with_roles: 
     assert answer(world, started) == (ACCEPTED, started.task_id)
 
 
-@pytest.mark.parametrize("by", ["operator", "the rover's own switch"])
+@for_each("by", ["operator", "the rover's own switch"])
 def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str) -> None:
     world = with_roles()
     submitter, operator = join(world, SUBMITTER), join(world, OPERATOR)
@@ -348,7 +347,7 @@ def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
     assert not passed.intersection((MISSION_ACK, PING, 21))
 
 
-@pytest.mark.parametrize(("opcode", "passes"), [(1, True), (2, False), (4, True), (7, False)])
+@for_each("opcode, passes", [(1, True), (2, False), (4, True), (7, False)])
 def test_an_observer_reads_files_and_ends_nobody_else_s_sessions(
     with_roles: MakeRoles, opcode: int, *, passes: bool
 ) -> None:

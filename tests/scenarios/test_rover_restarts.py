@@ -10,22 +10,18 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import PX4, Mode, Persona
 from tests.kit import px4
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED, Sent
 from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
 POSITION = 32
-MAKES = {"ardupilot": PROMPT, "px4": px4.PROMPT_PX4}
+MAKES = [PROMPT, px4.PROMPT_PX4]
 UP = 6.0  # s, until a rover that restarts has shown everything
 
 
-@pytest.fixture(params=MAKES)
-def persona(request: pytest.FixtureRequest) -> Persona:
-    return MAKES[request.param]
-
-
-@pytest.fixture
+@anew
 def driving(make_world: MakeWorld, persona: Persona) -> World:
     """A world in which a task drives and another waits."""
     world = make_world(persona=persona)
@@ -52,6 +48,7 @@ def proceed(world: World) -> Sent:
     return sent
 
 
+@for_each("persona", MAKES)
 def test_it_is_told_what_to_do(driving: World) -> None:
     world = driving
     restart(world)
@@ -65,7 +62,8 @@ def test_it_is_told_what_to_do(driving: World) -> None:
     ) in texts
 
 
-@pytest.mark.parametrize("how", [AGAIN, REMAINDER])
+@for_each("persona", MAKES)
+@for_each("how", [AGAIN, REMAINDER])
 def test_release_and_continue(driving: World, how: int) -> None:
     world = driving
     restart(world)
@@ -81,6 +79,7 @@ def test_release_and_continue(driving: World, how: int) -> None:
     assert world.state(2)[0] is S.COMPLETED
 
 
+@for_each("persona", MAKES)
 def test_skip_and_continue(driving: World) -> None:
     world = driving
     restart(world)
@@ -92,7 +91,8 @@ def test_skip_and_continue(driving: World) -> None:
     assert [task.state for task in world.tasks()] == [S.CANCELLED, S.COMPLETED]
 
 
-@pytest.mark.parametrize("order", ["release first", "continue between"])
+@for_each("persona", MAKES)
+@for_each("order", ["release first", "continue between"])
 def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str) -> None:
     world = driving
     world.fault(Faults(withheld=frozenset({POSITION})))
@@ -111,6 +111,7 @@ def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str)
     world.until_state(1, S.COMPLETED)
 
 
+@for_each("persona", MAKES)
 def test_a_release_that_waits_too_long_is_to_be_given_again(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -142,7 +143,8 @@ HALTS = {
 }
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("persona", MAKES)
+@for_each("halt", HALTS)
 def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
     world = driving
     world.fault(Faults(withheld=frozenset({POSITION})))
@@ -159,7 +161,8 @@ def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
     assert world.state(1)[0] in (S.HELD, S.KILLED, S.CANCELLED)
 
 
-@pytest.mark.parametrize("is_first", [True, False])
+@for_each("persona", MAKES)
+@for_each("is_first", [True, False])
 def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_first: bool) -> None:
     world = driving
     if is_first:
@@ -183,6 +186,7 @@ def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_fir
     assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
 
 
+@for_each("persona", MAKES)
 def test_nothing_to_continue_is_told_with_what_to_do(driving: World) -> None:
     world = driving
     restart(world)
@@ -214,7 +218,7 @@ def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
 EVERYTHING, ALL_BUT_HEARTBEATS = frozenset(range(300)), frozenset(range(1, 300))
 
 
-@pytest.fixture
+@anew
 def idle(make_world: MakeWorld, persona: Persona) -> World:
     """A world in which the rover has driven a task, and stands disarmed in HOLD."""
     world = make_world(persona=persona)
@@ -225,8 +229,9 @@ def idle(make_world: MakeWorld, persona: Persona) -> World:
     return world
 
 
-@pytest.mark.parametrize("unheard", [0.0, 2.2, 6.0])
-@pytest.mark.parametrize("unstamped", [0.0, 1.2, 4.5])
+@for_each("persona", MAKES)
+@for_each("unheard", [0.0, 2.2, 6.0])
+@for_each("unstamped", [0.0, 1.2, 4.5])
 def test_a_rover_that_restarts_between_two_tasks_is_driven(
     idle: World, unheard: float, unstamped: float
 ) -> None:
@@ -242,7 +247,8 @@ def test_a_rover_that_restarts_between_two_tasks_is_driven(
     world.until_state(2, S.COMPLETED, within=40)
 
 
-@pytest.mark.parametrize("moment", ["before it", "after it"])
+@for_each("persona", MAKES)
+@for_each("moment", ["before it", "after it"])
 def test_a_rover_that_a_person_disarmed_stays_so_across_its_restart(
     idle: World, moment: str
 ) -> None:
@@ -267,7 +273,8 @@ def test_a_rover_that_a_person_disarmed_stays_so_across_its_restart(
     world.until_state(2, S.COMPLETED, within=30)
 
 
-@pytest.mark.parametrize("restarts", ["before it", "after it", "long after it", "never"])
+@for_each("persona", MAKES)
+@for_each("restarts", ["before it", "after it", "long after it", "never"])
 def test_a_mode_that_a_person_sets_on_a_disarmed_rover_is_no_restart(
     idle: World, restarts: str
 ) -> None:

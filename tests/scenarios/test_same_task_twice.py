@@ -1,11 +1,9 @@
 """A command that comes again, by a lost ack or by intention: protocol.md section 4."""
 
-import pytest
-
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -19,7 +17,7 @@ from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 
-@pytest.fixture
+@anew
 def paused(world: World) -> World:
     """A world in which tasks only pile up."""
     world.client.pause()
@@ -56,7 +54,7 @@ def test_a_nonce_names_a_task_for_good(paused: World) -> None:
     ]
 
 
-@pytest.mark.parametrize(("after", "task_id"), [(2.4, 1), (9.9, 1), (10.1, 2)])
+@for_each("after, task_id", [(2.4, 1), (9.9, 1), (10.1, 2)])
 def test_confirmation_above_0_is_a_repeat_for_10_s(
     paused: World, after: float, task_id: int
 ) -> None:
@@ -67,7 +65,7 @@ def test_confirmation_above_0_is_a_repeat_for_10_s(
     assert again.task_id == task_id
 
 
-@pytest.mark.parametrize(("after", "task_id"), [(2.4, 1), (2.6, 2)])
+@for_each("after, task_id", [(2.4, 1), (2.6, 2)])
 def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, task_id: int) -> None:
     paused.client.move(1)
     paused.run(after)

@@ -14,7 +14,7 @@ from mav_tasks.tasks.lifecycle import TERMINAL, WAITING
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
 from tests.kit.store import LateStore, PromptSqliteStore
@@ -28,7 +28,7 @@ HOUR, DAY = 3600, 86_400
 GOES_ON = Settings(on_restart="continue")
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
@@ -289,7 +289,7 @@ def test_that_a_task_repeats_is_acknowledged_once_it_is_stored(make_world: MakeW
 # restarts
 
 
-@pytest.mark.parametrize("well", [False, True])
+@for_each("well", [False, True])
 def test_a_restart_between_two_runs_changes_nothing(
     make_world: MakeWorld, path: Path, well: bool
 ) -> None:
@@ -306,7 +306,7 @@ def test_a_restart_between_two_runs_changes_nothing(
     check_each_series_once(world)
 
 
-@pytest.mark.parametrize("away", [20.0, 200.0])
+@for_each("away", [20.0, 200.0])
 def test_times_that_passed_in_an_outage_are_left_out(
     make_world: MakeWorld, path: Path, away: float
 ) -> None:

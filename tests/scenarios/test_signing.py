@@ -3,7 +3,6 @@
 from pathlib import Path
 from shutil import copy
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
@@ -11,7 +10,7 @@ from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings, Signing
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
@@ -146,7 +145,7 @@ def test_a_replayed_command_is_not_done_again(world: World) -> None:
     assert not attacker.received
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 

@@ -1,11 +1,9 @@
 """PX4's way to start a mission: the mode and arming, in either order."""
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, set_mode
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, RETURN, ask_mode
@@ -15,7 +13,7 @@ from tests.scenarios.conftest import MakeWorld
 WAYPOINT, CANCEL, CLEAR = 16, 54010, 54011
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     """A rover at which a plan waits."""
     world = make_world(persona=PROMPT_PX4)
@@ -50,7 +48,7 @@ def mark(world: World, by: str) -> None:
         assert sent.answer == (ACCEPTED, 1)
 
 
-@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
+@for_each("by", ["DO_SET_MODE", "SET_MODE"])
 def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
     mark(world, by)
     assert shown(world) == MISSION, "at once"
@@ -64,7 +62,7 @@ def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
     assert shown(world) != MISSION
 
 
-@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
+@for_each("by", ["DO_SET_MODE", "SET_MODE"])
 def test_armed_before_the_mode_starts(world: World, by: str) -> None:
     world.client.arm()
     world.run(0.3)
@@ -86,7 +84,7 @@ def test_armed_too_late_does_not_start(world: World) -> None:
     assert shown(world) == HOLD
 
 
-@pytest.mark.parametrize("other", ["STOP", "pause", "HOLD", "another mode", "hold of another"])
+@for_each("other", ["STOP", "pause", "HOLD", "another mode", "hold of another"])
 def test_another_wish_removes_the_mark(world: World, other: str) -> None:
     ask_mode(world.client, MISSION)
     world.run(0.5)
@@ -123,7 +121,7 @@ def test_a_return_is_shown_and_driven(world: World) -> None:
     assert near_pose(world.pose(), (0.0, 0.0, 180.0), metres=0.05, angle=5)
 
 
-@pytest.mark.parametrize("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])
+@for_each("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])
 def test_a_mission_that_was_called_off_does_not_start(
     world: World, call_off: tuple[int, ...]
 ) -> None:

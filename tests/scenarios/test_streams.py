@@ -18,6 +18,7 @@ from mav_tasks.links.base import Peer
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
 from tests.kit.world import COMMAND_ID, MODE_COMMAND, World, at, near_pose
@@ -52,7 +53,7 @@ def cut_anywhere(world: World, name: str, side: LinkSide, peers: tuple[str, ...]
         tell(world, PeerChanged(name, peer, up=True))
 
 
-@pytest.fixture
+@anew
 def streams(make_world: MakeWorld) -> World:
     """A world in which both links of the server are streams."""
     world = make_world()
@@ -127,7 +128,7 @@ def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(streams: Wor
     assert {outgoing.data[7] for outgoing in firsts} == {MODE_COMMAND}
 
 
-@pytest.mark.parametrize("seconds", [0.5, 5.0])
+@for_each("seconds", [0.5, 5.0])
 def test_a_rover_whose_connection_breaks_goes_on_when_it_is_back(
     streams: World, seconds: float
 ) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
@@ -10,7 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -52,7 +51,7 @@ WAYS: dict[str, Callable[[World], object]] = {
 }
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     """A world in which a task drives and another waits."""
     world.client.move(4)
@@ -63,7 +62,7 @@ def driving(world: World) -> World:
     return world
 
 
-@pytest.mark.parametrize("way", WAYS)
+@for_each("way", WAYS)
 def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) -> None:
     world = driving
     at = world.now
@@ -81,7 +80,7 @@ def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) ->
     assert world.client.statuses(1)[-1].why == (S.PAUSED, R.TAKEOVER)
 
 
-@pytest.mark.parametrize("way", WAYS)
+@for_each("way", WAYS)
 def test_continue_resumes_to_the_exact_end_on_the_original_line(driving: World, way: str) -> None:
     world = driving
     WAYS[way](world)
@@ -112,7 +111,7 @@ def test_pushed_off_its_line_by_more_than_a_metre_it_is_held(driving: World) -> 
     assert world.stands()
 
 
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO, Mode.RTL])
+@for_each("mode", [Mode.MANUAL, Mode.AUTO, Mode.RTL])
 def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, mode: Mode) -> None:
     world = driving
     world.operator_mode(mode)
@@ -130,8 +129,8 @@ def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, 
     world.until_idle(tasks=2)
 
 
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO])
-@pytest.mark.parametrize("kill", [0, 1])
+@for_each("mode", [Mode.MANUAL, Mode.AUTO])
+@for_each("kill", [0, 1])
 def test_to_call_the_task_off_does_not_take_the_rover_out_of_anothers_hands(
     driving: World, mode: Mode, kill: int
 ) -> None:

@@ -7,9 +7,8 @@ again.
 
 from collections.abc import Callable
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     HOLD,
@@ -36,7 +35,7 @@ HALTS: dict[str, Callable[[FakeClient], Sent]] = {
 }
 
 
-@pytest.fixture
+@anew
 def other(world: World) -> FakeClient:
     """Another station than the one that halts."""
     return world.add_client("other", system_id=245)
@@ -51,9 +50,9 @@ def paused_while_driving(world: World) -> None:
     world.run(4)
 
 
-@pytest.mark.parametrize("late", [2.0, 6.0, 15.0])
-@pytest.mark.parametrize("before", some([0.1, 0.5, 0.8], 0, 2))
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("late", [2.0, 6.0, 15.0])
+@for_each("before", some([0.1, 0.5, 0.8], 0, 2))
+@for_each("halt", HALTS)
 def test_what_left_within_the_second_before_a_halt(
     world: World, other: FakeClient, halt: str, before: float, late: float
 ) -> None:
@@ -73,8 +72,8 @@ def test_what_left_within_the_second_before_a_halt(
     assert world.paused() is not R.NONE
 
 
-@pytest.mark.parametrize("first", ["pause", "HOLD", "STOP", "cancel"])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("first", ["pause", "HOLD", "STOP", "cancel"])
+@for_each("halt", HALTS)
 def test_a_second_copy_of_an_older_halt_takes_no_later_ones_place(
     world: World, other: FakeClient, halt: str, first: str
 ) -> None:
@@ -99,8 +98,8 @@ def test_a_second_copy_of_an_older_halt_takes_no_later_ones_place(
     assert stays(world, 5)
 
 
-@pytest.mark.parametrize(("rate", "late"), [(25, 6.5), (10, 14.0)])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("rate, late", [(25, 6.5), (10, 14.0)])
+@for_each("halt", HALTS)
 def test_what_its_senders_eight_bits_call_far_ahead(
     world: World, other: FakeClient, halt: str, rate: float, late: float
 ) -> None:
@@ -117,8 +116,8 @@ def test_what_its_senders_eight_bits_call_far_ahead(
     assert stays(world, 4)
 
 
-@pytest.mark.parametrize("gap", [0.5, 2.0])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("gap", [0.5, 2.0])
+@for_each("halt", HALTS)
 def test_the_same_packet_from_another_port(
     world: World, other: FakeClient, halt: str, gap: float
 ) -> None:
@@ -136,7 +135,7 @@ def test_the_same_packet_from_another_port(
     assert world.paused() is not R.NONE
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "everything"])
+@for_each("halt", ["HOLD", "everything"])
 def test_a_submission_that_had_left_before_somebody_elses_halt(
     world: World, other: FakeClient, halt: str
 ) -> None:

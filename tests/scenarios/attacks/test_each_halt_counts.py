@@ -8,10 +8,9 @@ that waited for arming, outlived a change of the position reference and the last
 
 from dataclasses import replace
 
-import pytest
-
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -37,7 +36,7 @@ HALTS = {
 }
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     world.client.move(30)
     world.client.move(5)
@@ -45,8 +44,8 @@ def driving(world: World) -> World:
     return world
 
 
-@pytest.mark.parametrize("halt", ["pause", "HOLD", "STOP"])
-@pytest.mark.parametrize("apart", [0.02, 0.1, 0.19])
+@for_each("halt", ["pause", "HOLD", "STOP"])
+@for_each("apart", [0.02, 0.1, 0.19])
 def test_a_continue_from_between_two_quick_halts_is_older_than_the_second(
     driving: World, halt: str, apart: float
 ) -> None:
@@ -67,7 +66,7 @@ def uncounted(client: FakeClient, message: Message) -> None:
     client.send(message)
 
 
-@pytest.mark.parametrize("halt", ["pause", "HOLD", "disarm"])
+@for_each("halt", ["pause", "HOLD", "disarm"])
 def test_a_halt_of_one_that_does_not_count_its_packets_is_carried_out_each_time(
     driving: World, halt: str
 ) -> None:

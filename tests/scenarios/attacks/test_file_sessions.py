@@ -1,9 +1,9 @@
 """A session of file transfer is ended by its number, whoever says it: not while somebody writes."""
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Roles, Settings
+from tests.kit.cases import anew, for_each
 from tests.kit.client import FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -13,7 +13,7 @@ TERMINATE, OPEN_TO_READ, READ, WRITE = 1, 4, 5, 7
 OBSERVER, SAFETY = 9, 13  # system ids
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     roles = Roles(unsigned="safety", addresses={"9/190": "observer"})
     return make_world(settings=Settings(roles=roles))
@@ -30,7 +30,7 @@ def request(client: FakeClient, opcode: int) -> None:
     client.send(common.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
 
 
-@pytest.mark.parametrize("why", ["it has ended", "it was given up", "nobody writes"])
+@for_each("why", ["it has ended", "it was given up", "nobody writes"])
 def test_an_observer_ends_what_it_reads(world: World, why: str) -> None:
     writer, observer = join(world, SAFETY), join(world, OBSERVER)
     if why != "nobody writes":

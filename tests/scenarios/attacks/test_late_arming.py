@@ -7,12 +7,10 @@ answered that it is disarmed, drove off.
 
 from struct import unpack_from
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, GUIDED, HOLD, command_long
 from tests.kit.world import World
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
@@ -59,7 +57,7 @@ def mode_of(world: World) -> Mode:
     return world.rover.autopilot.mode
 
 
-@pytest.fixture
+@anew
 def waiting(world: World) -> World:
     """A rover that a client has disarmed, and a task that waits for its arming."""
     world.operator_mode(Mode.HOLD)

@@ -4,12 +4,11 @@ Fault C1: a client's "continue" arrived before another client's STOP, but its li
 millisecond later. The STOP was acknowledged, and the rover drove on.
 """
 
-import pytest
-
 from mav_tasks.engine.inputs import Packets
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -51,7 +50,7 @@ HALTS = {
 }
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     """Return a world whose rover has driven the first metres of a mission, and is paused."""
     world = make_world(more_links=(SECOND,)).ready()
@@ -82,8 +81,8 @@ def driven_since(world: World, seconds: float) -> float:
     return abs(after[0] - before[0]) + abs(after[1] - before[1])
 
 
-@pytest.mark.parametrize("halt", HALTS)
-@pytest.mark.parametrize("word", GO_WORDS)
+@for_each("halt", HALTS)
+@for_each("word", GO_WORDS)
 def test_an_older_word_of_another_link_undoes_no_halt(world: World, word: str, halt: str) -> None:
     person, script = world.add_client("person"), world.add_client("script", system_id=245)
     now = world.now
@@ -97,7 +96,7 @@ def test_an_older_word_of_another_link_undoes_no_halt(world: World, word: str, h
     assert world.paused() is not R.NONE
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("halt", HALTS)
 def test_a_newer_word_of_another_link_counts_however_late_it_is_read(
     world: World, halt: str
 ) -> None:

@@ -7,10 +7,9 @@ from pathlib import Path
 from shutil import copy
 from struct import unpack_from
 
-import pytest
-
 from mav_tasks.settings import Settings
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, HOLD, MOVE, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
@@ -22,15 +21,15 @@ from tests.scenarios.conftest import MakeWorld
 UTC = 1.8e9  # s, when the worlds begin
 SETPOINT, MODE, DISARM = 84, 176, 400
 COMMANDS, NUMBER = (75, 76), 38
-ENDS = pytest.mark.parametrize("ends", ["well", "killed"])
+ENDS = for_each("ends", ["well", "killed"])
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld, path: Path) -> World:
     return make_world(store=PromptSqliteStore(path, wall_offset=UTC))
 
@@ -63,7 +62,7 @@ def returning(world: World) -> None:
 
 
 @ENDS
-@pytest.mark.parametrize("halt", ["HOLD", "pause", "HOLD, then disarm"])
+@for_each("halt", ["HOLD", "pause", "HOLD, then disarm"])
 def test_a_halt_that_has_not_come_is_asked_for_again(
     world: World, path: Path, halt: str, ends: str
 ) -> None:
@@ -83,7 +82,7 @@ def test_a_halt_that_has_not_come_is_asked_for_again(
 
 
 @ENDS
-@pytest.mark.parametrize("on_restart", ["pause", "continue"])
+@for_each("on_restart", ["pause", "continue"])
 def test_an_arming_that_comes_late_after_it(
     make_world: MakeWorld, path: Path, ends: str, on_restart: str
 ) -> None:
@@ -116,7 +115,7 @@ def test_an_arming_that_comes_late_after_it(
 
 
 @ENDS
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+@for_each("halt", ["STOP", "HOLD", "pause"])
 def test_our_own_mode_and_set_point_that_come_late_after_it(
     world: World, path: Path, halt: str, ends: str
 ) -> None:
@@ -152,7 +151,7 @@ def test_our_own_mode_and_set_point_that_come_late_after_it(
 
 
 @ENDS
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+@for_each("halt", ["STOP", "HOLD", "pause"])
 def test_a_halt_after_it_lets_no_older_continue_through(
     world: World, path: Path, halt: str, ends: str
 ) -> None:

@@ -2,8 +2,8 @@
 
 from mav_tasks.settings import Settings
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
-from tests.kit.pairs import every_pair
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World
 from tests.scenarios.attacks.test_late_arming import mode_of
@@ -14,7 +14,7 @@ from tests.scenarios.conftest import MakeWorld
 
 CANCEL, CLEAR, SET_MODE, ARM = 54010, 54011, 176, 400
 COMMAND_ACK = 77
-MAKES = {"ap": PROMPT, "ap 1 Hz": ARDUPILOT, "px4": PROMPT_PX4, "px4 1 Hz": PX4}
+MAKES = [PROMPT, ARDUPILOT, PROMPT_PX4, PX4]
 BOTH = [True, False]
 
 
@@ -25,7 +25,10 @@ def driving(world: World, distance: float = 20.0) -> None:
     world.run(2)
 
 
-@every_pair(persona=MAKES, both_ways=BOTH, seconds=[1.3, 1.6, 2.2], phase=[0.0, 0.25, 0.5, 0.75])
+@for_each("persona", MAKES)
+@for_each("both_ways", BOTH)
+@for_each("seconds", [1.3, 1.6, 2.2])
+@for_each("phase", [0.0, 0.25, 0.5, 0.75])
 def test_who_takes_it_during_a_short_gap_keeps_it(
     make_world: MakeWorld, persona: Persona, seconds: float, both_ways: bool, phase: float
 ) -> None:
@@ -45,12 +48,10 @@ def test_who_takes_it_during_a_short_gap_keeps_it(
     assert abs(world.truth.forward_speed) < 0.05
 
 
-@every_pair(
-    persona=MAKES,
-    shows_on_request=BOTH,
-    word=["a task", "a continue", "the next task"],
-    phase=[0.0, 0.2, 0.4, 0.6, 0.8],
-)
+@for_each("persona", MAKES)
+@for_each("shows_on_request", BOTH)
+@for_each("word", ["a task", "a continue", "the next task"])
+@for_each("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
 def test_who_takes_it_just_before_we_do_keeps_it(
     make_world: MakeWorld, persona: Persona, shows_on_request: bool, word: str, phase: float
 ) -> None:
@@ -74,12 +75,10 @@ def test_who_takes_it_just_before_we_do_keeps_it(
     assert mode_of(world) is Mode.MANUAL
 
 
-@every_pair(
-    persona={"px4 1 Hz": PX4, "px4": PROMPT_PX4},
-    word=["a task", "a continue"],
-    after=[0.25, 0.45, 0.65, 0.85, 1.05],
-    phase=[0.0, 0.35, 0.7],
-)
+@for_each("persona", [PX4, PROMPT_PX4])
+@for_each("word", ["a task", "a continue"])
+@for_each("after", [0.25, 0.45, 0.65, 0.85, 1.05])
+@for_each("phase", [0.0, 0.35, 0.7])
 def test_who_takes_it_while_zeros_lead_in_keeps_it(
     make_world: MakeWorld, persona: Persona, word: str, after: float, phase: float
 ) -> None:
@@ -99,7 +98,10 @@ def test_who_takes_it_while_zeros_lead_in_keeps_it(
     assert mode_of(world) is Mode.MANUAL
 
 
-@every_pair(persona=MAKES, shows_on_request=BOTH, seconds=[4.0, 8.0, 20.0], phase=[0.0, 0.3, 0.6])
+@for_each("persona", MAKES)
+@for_each("shows_on_request", BOTH)
+@for_each("seconds", [4.0, 8.0, 20.0])
+@for_each("phase", [0.0, 0.3, 0.6])
 def test_who_drives_and_parks_it_unheard_before_we_take_it_keeps_it(
     make_world: MakeWorld, persona: Persona, shows_on_request: bool, seconds: float, phase: float
 ) -> None:
@@ -125,12 +127,10 @@ def test_who_drives_and_parks_it_unheard_before_we_take_it_keeps_it(
     assert not world.rover.autopilot.armed
 
 
-@every_pair(
-    persona={"px4": PROMPT_PX4, "px4 1 Hz": PX4},
-    shows_on_request=BOTH,
-    halt=["pause", "cancel"],
-    after=[0.02, 0.1, 0.3, 0.6],
-)
+@for_each("persona", [PROMPT_PX4, PX4])
+@for_each("shows_on_request", BOTH)
+@for_each("halt", ["pause", "cancel"])
+@for_each("after", [0.02, 0.1, 0.3, 0.6])
 def test_a_halt_while_it_is_being_taken_stops_its_way_to_a_place(
     make_world: MakeWorld, persona: Persona, shows_on_request: bool, halt: str, after: float
 ) -> None:
@@ -157,12 +157,10 @@ def test_a_halt_while_it_is_being_taken_stops_its_way_to_a_place(
     assert abs(world.truth.forward_speed) < 0.05
 
 
-@every_pair(
-    persona={"ap": ARDUPILOT, "px4": PX4},
-    answers=[1, 3],
-    after=[0.05, 0.15, 0.3],
-    phase=[0.0, 0.25, 0.5, 0.75],
-)
+@for_each("persona", [ARDUPILOT, PX4])
+@for_each("answers", [1, 3])
+@for_each("after", [0.05, 0.15, 0.3])
+@for_each("phase", [0.0, 0.25, 0.5, 0.75])
 def test_who_takes_it_while_the_answer_to_our_mode_is_lost_keeps_it(
     make_world: MakeWorld, persona: Persona, answers: int, after: float, phase: float
 ) -> None:

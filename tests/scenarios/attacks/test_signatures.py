@@ -6,13 +6,11 @@ while its task drives.
 
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.engine.inputs import KeysChanged
 from mav_tasks.mavlink.signing import timestamp_at
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
@@ -99,7 +97,7 @@ def test_a_clock_ahead_shuts_nobody_out(world: World, seconds: float) -> None:
     assert world.paused() is R.STOPPED
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Roles, Settings
+from tests.kit.cases import anew, for_each
 from tests.kit.client import FakeClient, Received
 from tests.kit.mission import MISSION_ACK, REQUEST, REQUEST_INT, Ack, Item, Upload
 from tests.kit.world import World, at
@@ -61,7 +61,7 @@ class SlowUpload:
             self.acks.append((now, Ack.of(packet.payload).result))
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world(settings=Settings(roles=Roles(unsigned="safety", addresses=ROLES)))
 
@@ -77,7 +77,7 @@ def result(world: World, upload: Upload) -> int | None:
     return upload.result
 
 
-@pytest.mark.parametrize("target", [(1, 1), (1, 191)])
+@for_each("target", [(1, 1), (1, 191)])
 def test_a_slow_submitter_keeps_no_operator_s_mission_out(
     world: World, target: tuple[int, int]
 ) -> None:

@@ -8,13 +8,12 @@ towards a PX4 that had left before its own sender's HOLD, or was a copy from bef
 from math import nan
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
-from tests.kit.cases import for_each
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -137,7 +136,7 @@ def test_a_pause_stops_what_somebody_has_taken_since_its_task_was_paused(world: 
     assert stays(world, 3)
 
 
-@pytest.fixture
+@anew
 def px4(make_world: MakeWorld) -> World:
     world = make_world(persona=PROMPT_PX4)
     world.client.move(20, speed=0.5)
