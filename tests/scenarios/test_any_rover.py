@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from mav_tasks.engine.commands.assignments import GRACE
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -16,6 +15,8 @@ from tests.kit.mission import Item, Upload
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
+
+GRACE = 5.0  # s, in which a rover that is lost keeps its tasks
 
 ANY = (250, 191)
 LOST = 3.5  # s; see Watch.heartbeat_lost

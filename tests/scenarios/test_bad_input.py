@@ -8,7 +8,6 @@ from random import Random
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.clients.flood_gate import STRANGERS
 from mav_tasks.engine.snapshot import Snapshot
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.settings import Clients, Settings
@@ -29,6 +28,8 @@ from tests.kit.client import (
 )
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
+
+STRANGERS = 500.0  # datagrams a second that the server looks at, of all that are no clients
 
 
 def state_of(world: World) -> Snapshot:

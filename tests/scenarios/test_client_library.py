@@ -25,7 +25,6 @@ from mav_tasks import (
 )
 from mav_tasks.errors import ClientError, MavTasksError
 from mav_tasks.settings import Limits, Roles, Settings
-from mav_tasks.store import MemoryStore
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
 from tests.kit.cases import anew, for_each
@@ -299,40 +298,6 @@ def test_a_resume_undoes_no_halt_that_came_since_what_was_seen(world: RoverWorld
             assert (await person.queue()).paused is TaskReason.STOPPED
             await person.resume()
             assert (await person.queue()).paused is None
-
-    world.run(script())
-
-
-def begin_anew(world: RoverWorld, *, next_id: int = 1) -> None:
-    """Kill the server and start it on an empty store: its ids begin at 1 again, or later."""
-    world.server.kill()
-    world.server._store, world.server._server = MemoryStore(), None
-    world.server._earlier = []
-    world.server._is_killed = False
-    world.server.start()
-    assert world.server._server is not None
-    world.server._server.engine._registry.restore((), next_id=next_id)
-
-
-def test_after_the_store_was_lost_old_handles_end_and_new_ones_are_new(world: RoverWorld) -> None:
-    async def script() -> None:
-        async with world.client() as client:
-            ended = await client.submit(short(1))
-            await ended.done()
-            lost = await client.submit(Move(5.0), delay=1000.0)
-            assert (ended.id, lost.id) == (1, 2)
-            waiting = asyncio.create_task(end_of(lost))
-            await asyncio.sleep(0.1)
-            begin_anew(world)
-            await asyncio.sleep(4.0)
-            began = world.now
-            first, second = await client.submit(short(3)), await client.submit(short(4))
-            assert world.now - began < 2.0
-            assert (first.id, second.id) == (1, 2)
-            assert first is not ended
-            assert second is not lost
-            assert await end_of(first) is await end_of(second) is S.COMPLETED
-            assert await waiting is S.UNKNOWN
 
     world.run(script())
 

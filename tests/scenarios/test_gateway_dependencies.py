@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.engine.commands.dependency_questions import WITHIN
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
@@ -17,6 +16,8 @@ from tests.kit.gateways.order import early_starts
 from tests.kit.mission import Item, Upload
 from tests.kit.volume import some
 from tests.kit.world import at
+
+WITHIN = 1.0  # s for the answer of the database
 
 MOVE, CANCEL, MODIFY, OPTIONS = 54000, 54010, 54012, 54014
 RUN_AFTER = 4

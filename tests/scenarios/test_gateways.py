@@ -7,13 +7,11 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.clients.signatures import FENCE_LINK_ID
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.mavlink.signing import Key, signed, timestamp_at
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.signing_lead import STEP
 from mav_tasks.tasks.task import Task
 from rover_sim.personas import PX4, Persona
 from tests.kit.cases import for_each
@@ -29,6 +27,8 @@ from tests.kit.client import (
 from tests.kit.gateways.engines import FleetWorld, Gateway
 from tests.kit.px4 import PROMPT_PX4
 from tests.scenarios.test_takeover import packed
+
+FENCE_LINK_ID, STEP = 254, 3.0  # of what a new gateway signs; s that it is ahead
 
 #: s without a holder after a process has ended, and after one fell silent (the issue's goals)
 AFTER_DEATH, AFTER_SILENCE = 0.3, 1.5

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks import Client, GoTo, LocalPlace, Move, Refused, TaskReason, TaskState, Wait
-from mav_tasks.engine.commands import translate
+from mav_tasks import Client, GoTo, LocalPlace, Move, TaskReason, TaskState, Wait
 from mav_tasks.settings import Settings
 from rover_sim.faults import Faults
 from rover_sim.testing.options import RoverOptions
@@ -118,22 +117,6 @@ def test_history_outlives_a_restart_also_before_the_rover_is_heard(make_world: M
             assert history[0].ended_ago == pytest.approx(60.0, abs=5.0)
 
     world.run(after())
-
-
-@pytest.mark.patches_core
-def test_an_older_server_is_noticed(make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch) -> None:
-    world = make_world()
-    monkeypatch.setattr(translate, "is_of_finished", lambda _command: False)
-
-    async def script() -> None:
-        async with world.client() as client:
-            assert await client.history() == ()  # nothing has ended: no server could tell more
-            await cancelled(client, 2)
-            await client.submit(Move(1.0))
-            with pytest.raises(Refused, match="older than this client"):
-                await client.history()
-
-    world.run(script())
 
 
 def test_a_waiting_task_starts_and_ends_about_when_it_was_foreseen(make_world: MakeWorld) -> None:

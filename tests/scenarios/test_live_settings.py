@@ -56,14 +56,6 @@ def test_a_rover_is_lost_after_the_new_time(world: World, limit: float, is_lost:
     assert bool(silent) is is_lost
 
 
-def test_standing_still_is_told_by_the_new_limits(world: World) -> None:
-    engine = world.server.engine
-    vehicle = next(iter(engine._vehicles.all))
-    assert vehicle.view(world.now).still
-    change(world, Settings(watch=Watch(still_time=1e6)))
-    assert not vehicle.view(world.now).still
-
-
 def test_telemetry_comes_at_the_new_rate_to_who_is_there(world: World) -> None:
     for settings, least, most in (
         (Settings(clients=Clients(stream_interval=1.0)), 4, 6),

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import cos, degrees, nan, radians, remainder, sin, tau
+from math import cos, degrees, nan, radians, sin
 from struct import pack, unpack
 
 import pytest
@@ -12,8 +12,6 @@ from pymavlink.generator.mavcrc import x25crc
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim import offboard, steering
-from rover_sim.estimate import Estimate
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
@@ -109,21 +107,6 @@ class TestDriving:
         world.client.proceed()
         world.until_idle(tasks=1)
         assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.03, angle=2)
-
-    @for_each("radius", [0.5, 1.5, 3.0])
-    def test_a_place_within_its_turning_circle_ends_the_task(
-        self, world: World, monkeypatch: pytest.MonkeyPatch, radius: float
-    ) -> None:
-        def as_a_car(estimate: Estimate, yaw: float, speed: float) -> steering.Demand:
-            if speed == 0.0:
-                return steering.STOP
-            most = abs(estimate.forward_speed) / radius
-            wanted = 2.4 * remainder(yaw - estimate.yaw, tau)
-            return steering.Demand(speed, max(-most, min(most, wanted)))
-
-        monkeypatch.setattr(offboard, "turn_then_drive", as_a_car)
-        go_to(world, 0.0, 0.5)
-        world.until(lambda: world.state(1)[0] in (S.COMPLETED, S.FAILED), within=300)
 
 
 class TestTurning:

@@ -56,7 +56,6 @@ class TestWhileDriving:
         assert party.qgc.screen.complaints == []
 
 
-@each_pair
 class TestAlsoWhileDriving:
     @each_pair
     def test_the_mode_menu_is_obeyed(

@@ -5,7 +5,7 @@ from shutil import copy
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, SettingsChanged, WallClock
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings, Signing
@@ -29,7 +29,7 @@ def put(world: World, *keys: Key, takes_unsigned: bool = False, setup: str = "kn
     server, now = world.server, world.now
     settings = Settings(signing=Signing(setup=setup))
     if settings != Settings():
-        world.server.engine._apply(settings)
+        server.pump.handle(SettingsChanged(settings), now=now)
     server.pump.handle(WallClock(UTC), now=now)
     server.pump.handle(KeysChanged(keys), now=now)
     server.pump.handle(LinkChanged(CLIENT_LINK, LinkSide.CLIENTS, up=False), now=now)

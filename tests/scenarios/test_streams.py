@@ -10,7 +10,6 @@ from mav_tasks.engine.inputs import (
     Input,
     LinkChanged,
     LinkSide,
-    Outgoing,
     PeerChanged,
 )
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
@@ -21,12 +20,11 @@ from rover_sim.faults import Faults
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
-from tests.kit.world import COMMAND_ID, MODE_COMMAND, World, at, near_pose
+from tests.kit.world import World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 SEED = 31
 ATTITUDE, POSITION, HEARTBEAT = 30, 32, 0
-SET_MODE = 176  # the command
 
 
 def tell(world: World, item: Input) -> None:
@@ -104,28 +102,6 @@ def test_who_drove_and_is_gone_leaves_no_velocity_behind_and_must_ask_again(
     world.client.mode(GUIDED)
     world.run(2)
     assert world.truth.forward_speed > 0.4
-
-
-def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(streams: World) -> None:
-    world, sent = streams, list[Outgoing]()
-    send = world.server.pump._send
-
-    def see(outgoing: Outgoing) -> None:
-        sent.append(outgoing)
-        send(outgoing)
-
-    world.server.pump._send = see
-    world.client.move(3)
-    world.until_state(1, S.EXECUTING)
-    world.run(1)
-    assert not any(outgoing.is_first for outgoing in sent)
-    words = world.server.engine.emergency_stop_packets
-    assert [outgoing.is_first for outgoing in words] == [False, True]  # zero, HOLD
-    world.client.stop()
-    world.until(world.stands, within=3)
-    firsts = [outgoing for outgoing in sent if outgoing.is_first]
-    assert firsts[0].data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
-    assert {outgoing.data[7] for outgoing in firsts} == {MODE_COMMAND}
 
 
 @for_each("seconds", [0.5, 5.0])

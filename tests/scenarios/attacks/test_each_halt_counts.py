@@ -62,7 +62,7 @@ def test_a_continue_from_between_two_quick_halts_is_older_than_the_second(
 
 def uncounted(client: FakeClient, message: Message) -> None:
     """Send a message as a script does that gives all its packets the number 0."""
-    client._mav.seq = 0
+    client.count_anew()
     client.send(message)
 
 

@@ -22,7 +22,7 @@ HOUR, YEAR = 3600.0, 365 * 86_400.0
 
 def at_time(client: FakeClient, utc: float) -> FakeClient:
     """Have a client's clock say this."""
-    client._mav.signing.timestamp = timestamp_at(utc)
+    client.set_clock(timestamp_at(utc))
     return client
 
 
