@@ -9,12 +9,10 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
-from mav_tasks.services.mission_item import unpacked
-from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.task import Task
 from tests.kit.cases import for_each
 from tests.kit.mission import TIMEOUT, Download, Item, Upload
 from tests.kit.quiet import QuietWorld
+from tests.kit.volume import tries
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -93,12 +91,6 @@ def received(download: Download) -> list[bytes]:
     return [payload(message, mav) for message in download.items]
 
 
-def places(task: Task) -> list[int]:
-    """Return x of each item of a task's plan."""
-    assert isinstance(task.goal, Plan)
-    return [item.x for item in unpacked(task.goal.source)]
-
-
 # whole
 
 
@@ -117,27 +109,26 @@ def test_5000_items_go_up_and_come_back(make_world: MakeWorld, target: tuple[int
 @pytest.mark.slow
 def test_at_20_percent_loss_a_plan_is_there_whole_or_not_at_all() -> None:
     ends: Counter[str] = Counter()
-    for seed in range(100):
+    for seed in range(tries(30, long=1000)):
         random = Random(seed)
         world = QuietWorld(seed=seed)
         before, plan = survey(random, 50), survey(random, 50, number=1)
         assert uploaded(world, before, AUTOPILOT).result == 0
-        heard = len(world.wire.acks)
+        heard, had = len(world.wire.acks), len(world.tasks())
         world.net.conditions = bad_net(random, loss=0.2)
         upload = uploaded(world, plan, AUTOPILOT)
         world.net.conditions = GOOD
         world.run(SETTLED)
         kept = downloaded(world)
-        wanted = [item.x for item in plan]
-        same = [task for task in world.tasks() if places(task) == wanted]
         if kept == payloads(plan):
-            assert len(same) == 1, f"seed {seed}"
+            assert len(world.tasks()) == had + 1, f"seed {seed}"
             assert world.wire.acks[heard:][-1][1].result == 0, f"seed {seed}"
             assert 49 in upload.requests, f"seed {seed}"
             ends[f"done; for the client {ENDS[upload.result or 0]}"] += 1
         else:
             assert kept == payloads(before), f"seed {seed}"
-            assert (upload.result in (TIMEOUT, 15), same) == (True, []), f"seed {seed}"
+            assert upload.result in (TIMEOUT, 15), f"seed {seed}"
+            assert len(world.tasks()) == had, f"seed {seed}"
             ends["done at neither end"] += 1
     print(f"seeds 0 to 99: {dict(ends)}")
     assert ends["done; for the client done"] > 50
