@@ -3,7 +3,7 @@
 from typing import Any
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
+from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -84,15 +84,6 @@ def test_the_nearest_free_rover_goes_to_a_place(make_world: MakeWorld) -> None:
     assert abs(world.rovers[2].truth.east - 5.0) < 0.1
 
 
-def test_a_far_free_rover_is_better_than_a_near_busy_one(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    busy = world.client.move(10.0, target=(2, 191))
-    world.until(lambda: world.state(1)[0] is S.EXECUTING, within=10)
-    upload = go_to(world, 0.0, 3.5)
-    assert busy.result == ACCEPTED
-    assert rover_of(world, upload.opaque_id) == 1
-
-
 def test_a_refusal_names_why_each_rover_cannot(make_world: MakeWorld) -> None:
     world = make_world(rovers=3)
     world.client.stop(target=(1, 191))
@@ -111,16 +102,6 @@ def test_a_refusal_names_why_each_rover_cannot(make_world: MakeWorld) -> None:
     plan = go_to(world, 0.0, 1.0)
     assert plan.result != 0
     assert len(world.events(SubmissionRefused)) == 2
-
-
-def test_places_that_depend_on_the_rover_are_refused(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    local = world.client.command_int(WAYPOINT, x=1000, y=0, frame=1, target=ANY)
-    home = Upload(world.client, [Item(20)], target=ANY)
-    world.run(1.0)
-    assert local.answer == (DENIED, R.BAD_FRAME)
-    assert home.result == 5  # MAV_MISSION_INVALID
-    assert not world.events(TaskSubmitted)
 
 
 def test_the_status_of_a_task_can_be_requested_without_its_rover(make_world: MakeWorld) -> None:
@@ -267,17 +248,6 @@ def test_a_task_that_has_begun_never_moves(make_world: MakeWorld) -> None:
     world.run(30.0)
     assert rover_of(world, task) == 1
     assert len(world.events(TaskAssigned)) == 1
-
-
-def test_the_dependents_of_a_moved_task_wait_for_it(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = queued_behind(world, 2)
-    after = world.client.command(MOVE, 0.3, 0, 0, 5, task, 0, 5, target=(1, 191))
-    world.run(0.2)
-    world.rovers[1].autopilot.set_faults(Faults(silent=True))
-    world.until(lambda: rover_of(world, task) == 1, within=15)
-    world.until_state(after.task_id, S.COMPLETED, within=90)
-    assert world.state(task)[0] is S.COMPLETED
 
 
 def test_a_restarted_server_knows_where_the_task_went(make_world: MakeWorld, tmp_path: Any) -> None:

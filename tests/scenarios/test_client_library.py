@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from datetime import timedelta
 from random import Random
 from typing import Any
 
@@ -24,7 +23,7 @@ from mav_tasks import (
     Wait,
 )
 from mav_tasks.errors import ClientError, MavTasksError
-from mav_tasks.settings import Limits, Roles, Settings
+from mav_tasks.settings import Settings
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
 from tests.kit.cases import anew, for_each
@@ -191,13 +190,6 @@ def test_a_number_that_cannot_be_sent_is_said_and_hurts_nothing_else(
     assert len(world.server.tasks) == 1
 
 
-@for_each("nonce", [-1, 2**30, 1.5])
-def test_what_is_no_nonce_is_said_before_anything_is_sent(world: RoverWorld, nonce: Any) -> None:
-    with world.sync_client() as client, pytest.raises(ValueError, match="nonce"):
-        client.submit([Move(1.0)], nonce=nonce)
-    assert not world.server.tasks
-
-
 def copied(world: RoverWorld) -> None:
     """From now on let each packet come twice, the second one a little later."""
     world.lossy_link(duplication=1.0, jitter=0.05)
@@ -333,24 +325,6 @@ def test_whoever_waits_is_told_when_the_client_is_closed(world: RoverWorld, name
     world.run(script())
 
 
-def test_a_start_at_a_time_of_day_can_be_submitted_again_with_its_nonce(
-    world: RoverWorld,
-) -> None:
-    at = world.utc + timedelta(seconds=90)
-
-    async def script() -> None:
-        async with world.client() as client:
-            with world.lossy_link(loss=1.0), pytest.raises(NoAnswer) as caught:
-                await client.submit(short(1), at=at)
-            first = await client.submit(short(1), at=at, nonce=caught.value.nonce)
-            await asyncio.sleep(3.0)
-            again = await client.submit(short(1), at=at, nonce=caught.value.nonce)
-            assert again.id == first.id
-
-    world.run(script())
-    assert len(world.server.tasks) == 1
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_a_queue_is_told_whole_and_in_its_order_over_a_bad_link(
     make_world: MakeWorld, seed: int
@@ -364,39 +338,6 @@ def test_a_queue_is_told_whole_and_in_its_order_over_a_bad_link(
             world.lossy_link(loss=0.2, duplication=0.2, jitter=0.05)
             queue = await client.queue()
             assert [task.id for task in queue.waiting] == ids
-
-    world.run(script())
-
-
-def test_who_submits_faster_than_he_may_only_waits(make_world: MakeWorld) -> None:
-    limits = Limits(rate=2.0)  # of which ten may come at once
-    world = make_world(settings=Settings(roles=Roles(safety=limits)))
-
-    async def script() -> None:
-        async with world.client() as client:
-            active = asyncio.get_running_loop().time()
-            tasks = [await client.submit(short(n)) for n in range(16)]
-            assert asyncio.get_running_loop().time() - active > 2.0
-            assert [task.id for task in tasks] == list(range(1, 17))
-
-    world.run(script())
-
-
-def test_a_label_is_shown_and_survives_a_crash(world: RoverWorld) -> None:
-    async def script() -> None:
-        async with world.client() as client:
-            task = await client.submit(Wait(60.0), label="Hof Süd, gate 3")
-            status = await task.refresh()
-            assert status.label == "Hof Süd, gate 3"
-            assert status.words.startswith("wait 60 s 'Hof Süd, gate 3': ")
-            world.server.kill()
-            world.server.start()
-            await client.found()
-            assert (await task.refresh()).label == "Hof Süd, gate 3"
-            await task.modify(label="gate 4")
-            assert (await task.refresh()).label == "gate 4"
-            await task.modify(label="")
-            assert (await task.refresh()).label == ""
 
     world.run(script())
 

@@ -125,14 +125,3 @@ def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(
     assert world.client.statuses(1)[-1].state == S.KILLED
     not_kept = by == "kill" and delay == inf
     assert sent.answer == ((FAILED, R.STORE_UNAVAILABLE) if not_kept else (ACCEPTED, 1))
-
-
-def test_the_state_that_is_asked_for_waits_for_nothing(world: World, store: LateStore) -> None:
-    world.client.move(2, nonce=1)
-    world.until_state(1, S.EXECUTING)
-    store.delay = inf
-    world.client.stop()
-    world.run(0.05)
-    world.client.request_status(1)
-    world.run(0.05)
-    assert world.client.statuses(1)[-1].state == S.KILLED

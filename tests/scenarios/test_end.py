@@ -39,14 +39,6 @@ def test_the_next_task_right_after_the_hand_back_works(world: World, after: floa
     assert not world.rover.autopilot.armed
 
 
-def test_between_two_tasks_the_rover_stays_ours(world: World) -> None:
-    world.client.move(0.3)
-    world.client.rotate(20)
-    world.until_idle(tasks=2)
-    names = [name for name in world.observer.sent_since(0) if name in ("GUIDED", "HOLD", "arm")]
-    assert names == ["GUIDED", "arm", "HOLD"]
-
-
 def test_the_orderly_end_is_zero_and_hold(world: World) -> None:
     world.client.move(20, speed=1.0)
     world.client.rotate(10)

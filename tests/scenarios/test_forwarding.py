@@ -33,7 +33,6 @@ from tests.kit.world import SETPOINT, World
 from tests.scenarios.conftest import MakeWorld
 
 ATTITUDE, POSITION = 30, 32
-DATA_STREAM, PARAM_VALUE = 66, 22
 OUR_MESSAGES = range(54000, 54050)
 CLEAR = 54011
 
@@ -154,34 +153,6 @@ def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
     assert world.state(1)[0] is S.COMPLETED
 
 
-def test_a_request_for_data_streams_does_not_reach_the_rover(world: World) -> None:
-    other = world.add_client("other", system_id=245)
-    world.client.send(data_stream(ALL_STREAMS, 1))
-    world.run(3)
-    assert DATA_STREAM not in [packet.kind for packet in world.observer.reached]
-    assert rate(other, POSITION, world.now - 2, world.now) > 8
-
-
-def test_parameters_can_be_listed_through_the_server(world: World) -> None:
-    silent = world.add_client("other", system_id=7)
-    world.run(0.1)
-    world.client.send(common.MAVLink_param_request_list_message(1, 1))
-    world.run(1)
-    values = world.client.of_type("PARAM_VALUE")
-    assert len({v.param_id for v in values}) == values[0].param_count
-    assert [silent.gaps((1, 1)), world.client.gaps((1, 1))] == [0, 0]
-
-
-@for_each("component", [1, 191])
-def test_the_protocol_version_is_answered(world: World, component: int) -> None:
-    asked = world.client.command(REQUEST, 300, target=(1, component))
-    world.run(0.1)
-    versions = list(world.client.of_id(300))
-    assert asked.answer == (ACCEPTED, 0)
-    assert [p.source for p in versions] == [(1, component)]
-    assert versions[0].payload == bytes((200, 0, 100, 0, 200))  # 2.00, 1.00, 2.00, cut zeros
-
-
 def test_every_request_for_a_message_is_answered(world: World) -> None:
     known = world.client.command(REQUEST, 148, target=(1, 1))
     world.run(0.1)
@@ -251,19 +222,6 @@ def test_a_result_that_crashes_clients_is_not_passed_on(world: World, result: in
     world.from_vehicle_side(packed(ack, 1, 1), peer="rover1")
     world.run(0.1)
     assert sent.answer == (UNSUPPORTED, 0)
-
-
-def test_in_progress_is_not_passed_on_and_what_follows_is(world: World) -> None:
-    world.lose_acks()
-    sent = world.client.command(31000, target=(1, 1))
-    world.run(0.05)
-    world.watched.loses = lambda *_: False
-    for result in (5, 5, 0):
-        ack = common.MAVLink_command_ack_message(31000, result, 0, 0, 255, 190)
-        world.from_vehicle_side(packed(ack, 1, 1), peer="rover1")
-        world.run(0.05)
-    assert [a.result for a in world.client.acks] == [ACCEPTED]
-    assert sent.result == ACCEPTED
 
 
 # task status
@@ -388,21 +346,6 @@ def test_a_clients_setpoints_do_not_reach_a_rover_that_is_not_armed(world: World
     world.operator_arm(True)
     world.run(2)
     assert world.stands()
-
-
-def test_a_clients_stream_does_not_drive_the_instant_a_task_ends(world: World) -> None:
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(0.5)
-    world.client.mode(GUIDED)
-    world.run(0.2)
-    world.client.move(0.5)
-    world.until_state(1, S.EXECUTING)
-    world.client.stream(setpoint(0.5), rate=20)
-    world.until_idle(tasks=1)
-    where = world.pose()
-    world.run(3)
-    assert world.pose() == where
 
 
 def test_a_clients_stream_makes_tasks_wait(world: World) -> None:

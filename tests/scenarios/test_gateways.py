@@ -239,18 +239,6 @@ def test_a_stop_at_another_gateway_while_the_database_hangs_is_in_force_before_a
     assert abs(fleet.world.truth.north - where) < 0.05
 
 
-def test_ids_are_unique_over_the_fleet(fleet: Fleet) -> None:
-    earlier = fleet.submit(0.3)
-    fleet.world.kill(fleet.first.name)
-    assert fleet.world.holder() is fleet.other
-    fleet.world.run(3.0)
-    sent = fleet.clients[fleet.other.name].move(0.3)
-    fleet.world.run(0.2)
-    assert sent.result == ACCEPTED
-    assert sent.task_id != earlier
-    assert len({task.id for task in fleet.world.shared.tasks()}) == 2
-
-
 def test_a_gateway_that_stands_still_sends_nothing_when_it_goes_on(fleet: Fleet) -> None:
     task = fleet.submit(5.0)
     fleet.drives(task)

@@ -72,31 +72,6 @@ def test_finished_tasks_are_listed_newest_first_with_the_age_of_their_end(
     world.run(script())
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_a_long_history_is_told_whole_over_a_bad_link(make_world: MakeWorld, seed: int) -> None:
-    world = make_world(seed=seed)
-
-    async def script() -> None:
-        async with world.client() as client:
-            ids = await cancelled(client, 40)
-            world.lossy_link(loss=0.2, duplication=0.2, jitter=0.05)
-            assert [task.id for task in await client.history(limit=35)] == ids[:35]
-
-    world.run(script())
-
-
-def test_each_rover_has_a_history_of_its_own(make_world: MakeWorld) -> None:
-    world = make_world(count=2)
-
-    async def script() -> None:
-        async with world.client() as client:
-            ids = await cancelled(client, 2, vehicle=2)
-            assert await client.history(vehicle=1) == ()
-            assert [task.id for task in await client.history(vehicle=2)] == ids
-
-    world.run(script())
-
-
 def test_history_outlives_a_restart_also_before_the_rover_is_heard(make_world: MakeWorld) -> None:
     world = make_world()
 

@@ -7,7 +7,6 @@ from mav_tasks.engine.inputs import KeysChanged, PeerChanged, SettingsChanged
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Clients, Limits, Roles, Settings
-from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
@@ -102,24 +101,6 @@ def test_requests_are_counted_whoever_else_signs_at_the_same_endpoint(world: Wor
         client.send_raw(beat)
     world.run(0.3)
     assert len(world.tasks()) <= 7
-
-
-def go_to_item(north: float) -> object:
-    where = place(north)
-    return common.MAVLink_mission_item_int_message(
-        1, 1, 0, 6, 16, 2, 1, 0, 0, 0, 0, where["x"], where["y"], 0, 0
-    )
-
-
-def test_a_flood_of_go_to_items_fills_neither_disk_nor_net(with_roles: MakeRoles) -> None:
-    world = with_roles()
-    observer = join(world, OBSERVER)
-    observer.received.clear()
-    for _ in range(600):
-        observer.send(go_to_item(2.0))
-    world.run(1.0)
-    assert 1 <= len(world.events(SubmissionRefused)) <= 45
-    assert len(observer.texts()) <= 30
 
 
 @for_each("message", ["ping", "timesync", "mission request", "mission ack"])

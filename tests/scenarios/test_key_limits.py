@@ -9,8 +9,6 @@ import pytest
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.recording.reading import read
-from mav_tasks.recording.replay import Replay
 from mav_tasks.settings import Limits
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -370,15 +368,3 @@ def test_a_name_that_is_given_again_does_not_own_the_tasks_of_the_old_key(
     assert answer(world, new.command(CANCEL, 2)) == NOT_ALLOWED
     assert answer(world, first.move(1.0, nonce=7)) == (ACCEPTED, 3)
     assert answer(world, first.command(CANCEL, 2)) == (ACCEPTED, 2)
-
-
-def test_a_record_keeps_the_limits_of_keys(make_world: MakeWorld, tmp_path: Path) -> None:
-    world, key = make_world(records=tmp_path), agents(Limits(("move",), max_speed=0.1, quota=1))
-    agent = signing(opened(world, BOSS, key), key)
-    assert answer(world, agent.move(0.3)) == (ACCEPTED, 1)
-    assert answer(world, agent.move(0.3, speed=0.5)) == NOT_ALLOWED
-    way(world, 1)
-    (record,) = map(read, world.end_records())
-    replay = Replay(record, secrets={each.fingerprint: each.secret for each in (BOSS, key)})
-    assert len(list(replay.events())) > 5
-    assert replay.difference is None

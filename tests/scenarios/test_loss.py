@@ -95,18 +95,6 @@ def test_no_motion_on_data_older_than_0_3_s(driving: World) -> None:
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 
-def test_a_position_frozen_at_rest_fails_as_stuck_before_it_gets_far(world: World) -> None:
-    world.fault(Faults(position_frozen=True))
-    world.client.move(10)
-    world.run(0.1)
-    world.client.rotate(10)
-    world.run(15)
-    assert world.state(1) == (S.FAILED, R.STUCK)
-    assert world.paused() is R.STUCK
-    assert world.truth.north < 2.0
-    assert world.stands()
-
-
 def test_a_lost_task_does_not_resume_while_paused_by_an_operator(driving: World) -> None:
     world = driving
     world.fault(Faults(withheld=frozenset({POSITION})))
@@ -237,15 +225,3 @@ def test_what_came_while_the_server_stood_still_is_not_taken_for_fresh(driving: 
     world.run(0.2)
     assert world.state(1)[0] is S.EXECUTING
     assert set(world.observer.sent_since(at)) == {"zero"}
-
-
-def test_a_held_task_keeps_its_queue_and_continue_says_so(driving: World) -> None:
-    world = driving
-    world.fault(Faults(position_jump=(5.0, 0.0)))
-    world.run(3)
-    refused = world.client.proceed()
-    world.run(0.1)
-    assert refused.answer == (common.MAV_RESULT_DENIED, R.WRONG_STATE)
-    world.client.request_status(2)
-    world.run(0.1)
-    assert world.client.statuses(2)[-1].why == (S.QUEUED, R.HELD_AHEAD)

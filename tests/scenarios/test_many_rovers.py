@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import cache, partial
-from itertools import pairwise
 from math import cos, degrees, radians, sin
 from typing import Any, NamedTuple
 
@@ -25,7 +24,6 @@ from tests.kit.client import (
     DENIED,
     GUIDED,
     MOVE,
-    REQUEST,
     ROTATE,
     TASK_STATUS,
     TEMPORARILY_REJECTED,
@@ -55,7 +53,6 @@ TEN: Layout = {
     "mixed": {"f": (8, 9), "g": (10,), "h": (11,)},
 }
 FIVE: Layout = {"own": {"a": (1,)}, "shared": {"b": (2,), "c": (3,)}, "radio": {"d": (4, 5)}}
-THREE: Layout = {"one": {"a": (1,)}, "two": {"b": (2,)}, "three": {"c": (3,)}}
 TWO: Layout = {"one": {"a": (1,)}, "two": {"b": (2,)}}
 
 
@@ -398,24 +395,6 @@ def test_stop_for_all_reaches_every_link_in_one_step_and_is_latched_for_each(
 # dependencies across links
 
 
-def test_tasks_run_after_each_other_across_links(make_fleet: MakeFleet) -> None:
-    fleet = make_fleet(THREE)
-    targets = [1, 2, 3, 1]
-    after = 0
-    for number in targets:
-        sent = fleet.client.command(MOVE, 0.4, 0, 0, 0, after, target=(number, 191))
-        fleet.run(0.05)
-        after = sent.task_id
-    fleet.other.rotate(40, target=(3, 191))  # one that waits for nothing
-    fleet.until_idle(tasks=5)
-    for first, second in pairwise(range(1, 5)):
-        wait = fleet.when(second, S.STARTING) - fleet.when(first, S.COMPLETED)
-        assert 0.0 <= wait < 0.05
-    assert fleet.when(5, S.COMPLETED) < fleet.when(3, S.STARTING)
-    assert near_pose(fleet.pose_of(1), (0.8, 0.0, 0.0))
-    assert {task.state for task in fleet.tasks()} == {S.COMPLETED}
-
-
 # places
 
 
@@ -503,20 +482,6 @@ def test_a_rover_that_comes_back_on_another_link_is_driven_there_and_no_more_at_
     assert fleet.state(2)[0] is S.COMPLETED
 
 
-def test_a_rover_that_calls_by_itself_gets_our_heartbeats_also_after_its_link_was_down(
-    make_fleet: MakeFleet,
-) -> None:
-    fleet = make_fleet(TWO, dials_in=("one",))
-    fleet.link_down("one")
-    fleet.run(2)
-    fleet.link_up("one")
-    since = fleet.now
-    fleet.run(5)
-    sent = fleet.watched.towards["a"]
-    beats = [t for t, d in sent if t >= since and d[7] == HEARTBEAT and (d[5], d[6]) == SERVER]
-    assert len(beats) >= 4
-
-
 # what is shown
 
 
@@ -538,27 +503,6 @@ def waiting(make_fleet: MakeFleet) -> Fleet:
     assert [len(fleet.tasks_of(n)) for n in (1, 2, 3)] == [23, 6, 6]
     fleet.run(1)
     return fleet
-
-
-def ids_of(fleet: Fleet, number: int) -> set[int]:
-    return {task.id for task in fleet.tasks_of(number)}
-
-
-def test_a_page_of_one_rovers_tasks_has_none_of_another(waiting: Fleet) -> None:
-    fleet = waiting
-    pages = [(1, 0, 16), (1, 16, 6), (2, 0, 5), (3, 0, 5), (3, 5, 0), (1, 5, 16)]
-    for number, first, count in pages:
-        for client in (fleet.client, fleet.other):
-            before = len(list(client.of_id(TASK_STATUS)))
-            client.command(REQUEST, TASK_STATUS, 0, first, target=(number, 191))
-            fleet.run(0.1)
-            page = list(client.of_id(TASK_STATUS))[before:]
-            assert {packet.source for packet in page} <= {(number, 191)}
-            shown = [TaskStatus.of(packet.payload).task_id for packet in page]
-            assert len(set(shown)) == len(shown) == count
-            assert set(shown) <= ids_of(fleet, number)
-            running = fleet.tasks_of(number)[0].id
-            assert running not in shown
 
 
 def test_a_task_of_another_rover_is_not_touched_and_never_shown_as_ones_own(

@@ -9,24 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.in_memory import VEHICLE_LINK
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.personas import Mode, Persona
 from tests.kit.car import Car
 from tests.kit.cases import anew, for_each
-from tests.kit.gateways.engines import FleetWorld
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_restart import REMAINDER, UTC, release, restart
 
-COMMAND_LONG = 76
-SET_INTERVAL = (511).to_bytes(2, "little")  # where COMMAND_LONG has its command
-POSITIONS = (30, 32)  # ATTITUDE, LOCAL_POSITION_NED
 AWAY = 0.4  # s, of a server that a supervisor starts again at once
 
 CARS = {
@@ -37,7 +31,6 @@ OTHERS = {"ArduPilot": PROMPT, "PX4": PROMPT_PX4}
 EVERY = {**OTHERS, **CARS}
 
 personas = for_each("persona", EVERY.values())
-others = pytest.mark.parametrize("persona", OTHERS.values(), ids=OTHERS.keys())
 
 
 @anew
@@ -62,19 +55,6 @@ def phase_of(world: World) -> str:
     """Return the phase of the server's control, "" before it has met the rover."""
     found = world.server.engine.snapshot(now=world.now).vehicles
     return found[0].control if found else ""
-
-
-class AskedFor:
-    """Loses the positions on one link until a message is requested there."""
-
-    def __init__(self, link: str) -> None:
-        self._link = link
-        self._is_asked = False
-
-    def __call__(self, source: str, target: str, data: bytes) -> bool:
-        if source == self._link and data[7] == COMMAND_LONG and data[38:40] == SET_INTERVAL:
-            self._is_asked = True
-        return target == self._link and not self._is_asked and data[7] in POSITIONS
 
 
 class Met:
@@ -153,36 +133,3 @@ def test_who_switches_it_to_manual_meanwhile_has_it(make_world: MakeWorld, path:
     assert phase_of(world) == "IDLE"
     assert world.rover.autopilot.mode is Mode.MANUAL
     assert "HOLD" not in world.observer.sent_since(at + 1.1)  # after its next heartbeat
-
-
-@personas
-@for_each("streams", [True, False])
-@for_each("on_takeover", ["hold", "resume"])
-def test_a_gateway_that_gets_it_brakes_it_in_the_same_way(
-    tmp_path: Path, persona: Persona, on_takeover: str, *, streams: bool
-) -> None:
-    """A real ArduPilot streams positions on each link only if they were requested there."""
-    body = partial(Car, radius=1.2)
-    settings = Settings(on_takeover=on_takeover)
-    world = FleetWorld(tmp_path, persona=persona, body=body, settings=settings)
-    clients = {"server": world.client}
-    clients["b"] = world.add_client("client b", system_id=254, server="b:clients")
-    first = world.holder()
-    world.run(4.0)
-    others = [name for name in world.gateways if name != first.name]
-    if not streams and persona.autopilot == PROMPT.autopilot:
-        world.watched.loses = AskedFor(VEHICLE_LINK.replace("server", others[0]))
-    clients[first.name].move(20, speed=1.0)
-    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
-    world.kill(first.name)
-    at, north = world.now, world.truth.north
-    world.until(lambda: abs(world.truth.forward_speed) < 0.15, within=3)
-    took = [now for each in world.gateways.values() for now, _ in each.got if now > at]
-    assert len(took) == 1
-    assert world.truth.north - north < (took[0] - at) + 0.9
-    assert in_control_mode(world)  # HOLD has not stopped it
-    world.until(lambda: world.stands() and not in_control_mode(world), within=3)
-    if on_takeover == "resume":
-        world.until(lambda: world.truth.forward_speed > 0.9, within=10)
-        world.until(lambda: abs(world.truth.north - 20.0) < 0.2 and world.stands(), within=40)
-    world.check()

@@ -17,14 +17,12 @@ from tests.kit.client import (
     DENIED,
     HOLD,
     TEMPORARILY_REJECTED,
-    FakeClient,
     set_mode,
     sticks,
 )
 from tests.kit.mission import Download, Item, Upload, acks, currents, reached
-from tests.kit.px4 import PROMPT_PX4
 from tests.kit.store import LateStore
-from tests.kit.world import World, at, is_at, near_pose
+from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, DELAY, SPEED, JUMP, SERVO, MODE, OPTIONS = 16, 93, 178, 177, 183, 176, 54014
@@ -74,23 +72,6 @@ def test_a_plan_waits_until_it_is_started_and_is_driven(world: World) -> None:
     assert is_at(world, 0.0, 1.5)
     last = currents(world.client)[-1]
     assert (last.seq, last.total, last.state, last.mission_id) == (3, 4, COMPLETE, 1)
-
-
-def test_the_end_is_told_some_times_for_who_has_missed_it(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(10)
-    assert reached(world.client) == [1, 2, 3, 3, 3, 3, 3, 3]
-
-
-def test_at_the_task_server_it_is_queued_at_once_and_so_is_the_next(world: World) -> None:
-    first = uploaded(world, place(1, 0), place(1, 1), target=(1, 191))
-    second = uploaded(world, place(0, 0), target=(1, 191))
-    assert (first.opaque_id, second.opaque_id) == (1, 2)
-    world.until_state(2, S.COMPLETED, within=60)
-    assert world.state(1)[0] is S.COMPLETED
-    assert is_at(world, 0.0, 0.0)
 
 
 def test_the_same_plan_again_a_moment_later_is_the_same_task(world: World) -> None:
@@ -258,14 +239,6 @@ def test_clearing_takes_away_what_waits_and_not_what_is_driven(world: World) -> 
     world.until_state(2, S.COMPLETED, within=60)
 
 
-def test_a_plan_of_home_alone_is_none(world: World) -> None:
-    uploaded(world)
-    again = uploaded(world, HOME)
-    assert (again.result, again.opaque_id) == (0, 0)
-    assert world.state(1) == (S.CANCELLED, R.CLEARED)
-    assert start(world) == (DENIED, R.NOT_FOUND)
-
-
 def test_a_second_client_is_denied_while_the_first_one_uploads(world: World) -> None:
     other = world.add_client("other")
     world.run(1)
@@ -274,36 +247,6 @@ def test_a_second_client_is_denied_while_the_first_one_uploads(world: World) -> 
     world.until(lambda: first.result is not None, within=5)
     assert (first.result, second.result) == (0, 14)
     assert len(world.tasks()) == 1
-
-
-def test_options_are_those_of_the_whole_plan(world: World) -> None:
-    options = Item(OPTIONS, param1=9, param2=30.0, param3=60.0, param4=0, frame=2)
-    uploaded(world, options, place(0.5, 0, hold=0.1), target=(1, 191))
-    task = world.task(1)
-    assert (task.priority, task.state) == (9, S.SCHEDULED)
-    assert task.terms.deadline is not None
-
-
-def test_what_the_rover_will_not_do_of_a_plan_is_told_and_the_plan_goes_on(world: World) -> None:
-    uploaded(world, HOME, place(1, 0), Item(PICTURE, frame=2, param4=0.0), place(1.5, 0, hold=0.1))
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert "Rover 1 refused command 2000 of the plan (result 3)" in world.client.texts()
-
-
-def test_moves_and_turns_can_be_items(world: World) -> None:
-    move = Item(MOVE, param1=1.0, param4=0, frame=2)
-    turn = Item(54001, param1=90.0, param4=0, frame=2)
-    uploaded(world, move, turn, target=(1, 191))
-    world.until_state(1, S.COMPLETED, within=60)
-    assert near_pose(world.pose(), (1.0, 0.0, 90.0), metres=0.04)
-
-
-def test_what_the_rover_says_about_missions_is_not_shown(world: World) -> None:
-    uploaded(world)
-    world.run(5)
-    assert {current.mission_id for current in currents(world.client)} <= {0, 1}
-    assert currents(world.client)[-1].total == 4
 
 
 def test_without_the_claim_missions_are_the_rovers_own(make_world: MakeWorld) -> None:
@@ -433,14 +376,3 @@ def test_a_plan_of_a_strange_kind_is_refused(world: World, kind: int) -> None:
     upload = Upload(world.client, (), kind=kind)
     world.until(lambda: upload.result is not None, within=3)
     assert upload.result == 3
-
-
-def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    direct = FakeClient(world.net, "direct", server="rover1")
-    world.join(direct)
-    upload = Upload(direct, (place(1, 0), place(2, 0)))
-    world.until(lambda: upload.result is not None, within=5)
-    world.run(5)
-    words = "Rover 1 has its own mission on board (2 items): its mission mode runs that"
-    assert world.client.texts().count(words) == 1

@@ -3,15 +3,13 @@
 The last HEARTBEAT may be a second old, so what it shows can be from before our last request.
 """
 
-from pymavlink.dialects.v20 import common
-
 from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
-from tests.kit.client import HOLD, set_mode
+from tests.kit.client import HOLD
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -107,25 +105,6 @@ def test_tasks_are_done_over_a_bad_net(make_world: MakeWorld, seed: int) -> None
     world.client.rotate(45, repeats=patient, nonce=2)
     world.until_idle(tasks=2)
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
-
-
-@for_each("system_id", [0, 250])
-def test_a_heartbeat_of_everybody_or_of_ourselves_makes_no_vehicle(
-    world: World, system_id: int
-) -> None:
-    mav = common.MAVLink(None, srcSystem=system_id, srcComponent=1)
-    world.from_vehicle_side(common.MAVLink_heartbeat_message(10, 3, 1, 4, 4, 3).pack(mav))
-    world.run(1.0)
-    assert [v.system_id for v in world.server.engine.snapshot(now=world.now).vehicles] == [1]
-
-
-def test_mode_requests_by_the_old_message_are_heeded_too(world: World) -> None:
-    world.client.move(2.0)
-    world.until_state(1, S.EXECUTING)
-    world.run(1.0)
-    world.client.send(set_mode(HOLD))
-    world.until(world.stands, within=4)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
 @for_each("persona", [ARDUPILOT, PX4])

@@ -186,28 +186,6 @@ def test_what_is_not_stored_in_time_is_not_set(make_world: MakeWorld) -> None:
     assert [event.value for event in world.events(ParameterSet)] == [0.8, None]
 
 
-def kept(world: World) -> dict[str, float | None]:
-    """What a restart would find."""
-    return {event.name: event.value for event in world.events(ParameterSet)}
-
-
-def test_what_is_told_is_what_is_kept_though_an_earlier_wish_came_to_nothing(
-    make_world: MakeWorld,
-) -> None:
-    store = LateStore()
-    world = make_world(store=store)
-    store.delay = 5.0
-    world.client.send(put("TSK_SPEED", 0.8))
-    world.run(0.3)
-    world.client.send(put("TSK_SPEED", 0.4))
-    world.run(0.2)
-    assert errors(world.client) == [("TSK_SPEED", NOT_ALLOWED)]
-    store.delay = 0.0
-    world.run(0.2)
-    assert told(world.client)[-1] == ("TSK_SPEED", 0.4)
-    assert kept(world) == {"TSK_SPEED": 0.4}
-
-
 def test_it_comes_before_what_is_configured(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(driving=Driving(speed=0.3)))
     world.client.send(ask(191, "TSK_SPEED"))

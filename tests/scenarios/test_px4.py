@@ -1,8 +1,7 @@
 """PX4 and generic rovers: armed in HOLD, driven by velocities over ground; what they cannot do."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from math import cos, degrees, nan, radians, sin
+from math import cos, degrees, radians, sin
 from struct import pack, unpack
 
 import pytest
@@ -19,13 +18,12 @@ from rover_sim.realism import EXACT, Drive
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED
 from tests.kit.mission import Item, Upload, reached
-from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
+from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, SET_MODE, go_to
 from tests.kit.world import MODE_COMMAND, World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 MOVE, ROTATE, DRIVE = 54000, 54001, 54002
 WAYPOINT, YAW, YAW_SPEED, START = 16, 115, 213, 300
-NO_PLACE = 0x7FFFFFFF
 
 ALL = [PX4, GENERIC, PROMPT_PX4, PROMPT_GENERIC]
 
@@ -97,17 +95,6 @@ class TestDriving:
         assert reached(world.client) == [0, 1, 2, 3], "no item is home"
         assert is_at(world, 0.0, 0.0)
 
-    def test_on_a_task_that_is_paused_it_goes_on_exactly(self, world: World) -> None:
-        world.client.move(3.0)
-        world.until(lambda: world.truth.north > 1.0, within=20)
-        world.client.pause()
-        world.run(3)
-        assert world.stands()
-        assert world.rover.autopilot.mode is Mode.HOLD
-        world.client.proceed()
-        world.until_idle(tasks=1)
-        assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.03, angle=2)
-
 
 class TestTurning:
     """A differential rover turns on the spot to the course of a set-point of 1 mm/s."""
@@ -137,17 +124,6 @@ class TestMovingBackwards:
         assert near_pose(world.pose(), (north, east, heading), metres=0.05, angle=2)
         assert "Task 1 queued: move -1 m" in world.client.texts()
         assert any("it turns round, drives, turns back" in t for t in world.client.texts())
-
-    def test_what_lies_behind_the_fence_is_not_driven_to(self, world: World) -> None:
-        world.run(2.0)
-        corners = [(-0.5, -3.0), (3.0, -3.0), (3.0, 3.0), (-0.5, 3.0)]
-        fence = [Item(5001, **at(*corner), param1=4, param4=0, frame=0) for corner in corners]
-        upload = Upload(world.client, fence, kind=1)
-        world.until(lambda: upload.result is not None, within=5)
-        world.client.move(-1.0)
-        world.run(6.0)
-        assert world.state(1)[1] in (R.OUTSIDE_FENCE, R.FENCE)
-        assert near_pose(world.pose(), (0.0, 0.0, 0.0), metres=0.05, angle=5)
 
 
 class TestStanding:
@@ -249,27 +225,6 @@ class TestStop:
         assert world.control() == "IDLE"
 
 
-class TestPausing:
-    @for_each(
-        "pause",
-        [
-            lambda w: w.client.command(REPOSITION, -1, 1, 0, nan, nan, nan, nan, target=(1, 1)),
-            lambda w: w.client.command_int(
-                REPOSITION, -1, 1, 0, nan, x=NO_PLACE, y=NO_PLACE, frame=6, target=(1, 1)
-            ),
-        ],
-    )
-    def test_a_go_to_without_a_place_is_one(
-        self, world: World, pause: Callable[[World], object]
-    ) -> None:
-        world.client.move(3)
-        world.until_state(1, S.EXECUTING)
-        pause(world)
-        world.run(0.1)
-        assert world.client.acks_of(REPOSITION) == [(ACCEPTED, 1)]
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-
-
 class TestOneThatWouldDriveByItselfWithoutUs:
     """By its offboard-loss failsafe: nobody could stop it if the server went away."""
 
@@ -294,12 +249,6 @@ class TestOneThatWouldDriveByItselfWithoutUs:
         assert why(world) == R.LOSS_FAILSAFE
         assert any("waits: it might drive on without setpoints" in t for t in world.client.texts())
         assert not world.rover.autopilot.armed
-
-    def test_is_driven_all_the_same_where_that_is_accepted(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world, Settings(loss_failsafe="accept"))
-        world.client.move(1)
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
 
     def test_one_that_never_says_what_it_does_is_driven_after_it_was_asked_for_a_while(
         self, make_world: MakeWorld

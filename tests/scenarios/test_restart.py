@@ -294,31 +294,6 @@ def test_a_submission_is_known_again(world: World, path: Path) -> None:
     assert new.task_id == 3
 
 
-def test_the_speed_that_was_set_and_a_modified_task_are_kept(world: World, path: Path) -> None:
-    world.client.pause()
-    world.client.move(4)
-    world.run(0.2)
-    world.client.command(54012, 1, 1, 9)
-    world.client.command(178, 1, 0.9, -1)
-    world.run(0.3)
-    restart(world, path)
-    assert world.task(1).priority == 9
-    world.client.proceed()
-    world.run(3)
-    assert world.truth.forward_speed > 0.55
-
-
-def test_a_place_on_earth_is_driven_to_after_a_restart(world: World, path: Path) -> None:
-    world.client.pause()
-    x, y = -353_632_484, 149_165_2370
-    world.client.command_int(192, -1, 1, 0, float("nan"), x=x, y=y, frame=0)
-    world.run(0.3)
-    restart(world, path)
-    world.client.proceed()
-    world.until_idle(tasks=1)
-    assert world.pose()[0] == pytest.approx(1.51, abs=0.04)
-
-
 def upload(
     world: World, items: Sequence[Item], *, kind: int = 0, target: tuple[int, int] = (1, 1)
 ) -> None:

@@ -28,7 +28,6 @@ from tests.kit.client import (
     TEMPORARILY_REJECTED,
     FakeClient,
     Sent,
-    command_long,
     set_mode,
     setpoint,
     sticks,
@@ -347,19 +346,6 @@ def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
     assert not passed.intersection((MISSION_ACK, PING, 21))
 
 
-@for_each("opcode, passes", [(1, True), (2, False), (4, True), (7, False)])
-def test_an_observer_reads_files_and_ends_nobody_else_s_sessions(
-    with_roles: MakeRoles, opcode: int, *, passes: bool
-) -> None:
-    world = with_roles()
-    observer = join(world, OBSERVER)
-    passed = world.passed_on((OBSERVER, 190))
-    payload = [0, 0, 0, opcode] + [0] * 247
-    observer.send(common.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
-    world.run(0.2)
-    assert bool(passed) is passes
-
-
 def test_what_bounds_a_rover_is_of_safety_alone(with_roles: MakeRoles) -> None:
     world = with_roles()
     operator = join(world, OPERATOR)
@@ -396,13 +382,3 @@ def test_requests_that_are_too_many_are_refused_but_for_stop(with_roles: MakeRol
     assert world.paused() is R.STOPPED
     world.run(1.0)
     assert answer(world, submitter.move(1.5)) is not None
-
-
-def test_a_flood_of_refusals_fills_neither_disk_nor_net(with_roles: MakeRoles) -> None:
-    world = with_roles()
-    observer = join(world, OBSERVER)
-    for _ in range(600):
-        observer.send(command_long(54000, 1.0))
-    world.run(1.0)
-    assert len(world.events(SubmissionRefused)) <= 45
-    assert len(observer.texts()) <= 30

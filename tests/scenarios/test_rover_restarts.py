@@ -11,7 +11,7 @@ from rover_sim.faults import Faults
 from rover_sim.personas import PX4, Mode, Persona
 from tests.kit import px4
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, DENIED, Sent
+from tests.kit.client import ACCEPTED, Sent
 from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -77,18 +77,6 @@ def test_release_and_continue(driving: World, how: int) -> None:
     assert proceed(world).result == ACCEPTED
     world.until_idle(tasks=2)
     assert world.state(2)[0] is S.COMPLETED
-
-
-@for_each("persona", MAKES)
-def test_skip_and_continue(driving: World) -> None:
-    world = driving
-    restart(world)
-    assert release(world, SKIP).result == ACCEPTED
-    world.run(3)
-    assert not world.rover.autopilot.armed
-    assert proceed(world).result == ACCEPTED
-    world.until_idle(tasks=2)
-    assert [task.state for task in world.tasks()] == [S.CANCELLED, S.COMPLETED]
 
 
 @for_each("persona", MAKES)
@@ -184,16 +172,6 @@ def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_fir
     assert proceed(world).result == ACCEPTED
     world.until_idle(tasks=2)
     assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
-
-
-@for_each("persona", MAKES)
-def test_nothing_to_continue_is_told_with_what_to_do(driving: World) -> None:
-    world = driving
-    restart(world)
-    proceed(world)
-    world.run(4)
-    assert proceed(world).answer == (DENIED, R.WRONG_STATE)
-    assert any("release it (again" in text for text in world.client.texts())
 
 
 def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(

@@ -16,9 +16,8 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Sent
-from tests.kit.mission import Item, Upload
 from tests.kit.store import LateStore, PromptSqliteStore
-from tests.kit.world import World, at
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
@@ -114,18 +113,6 @@ def test_runs_follow_each_other_without_drift_and_each_is_a_task(world: World) -
     assert noted(world) == []
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
-def test_a_day_of_hourly_runs(make_world: MakeWorld) -> None:
-    """Most of the time nothing happens; so an hour has a minute here, and a run drives less."""
-    world = make_world()
-    every(world, 30, distance=0.1)
-    world.run(24 * 30.0)
-    made = runs(world)
-    assert len(made) == 25
-    assert [each.state for each in made[:-1]] == [S.COMPLETED] * 24
-
-
 def test_a_cron_expression_sets_the_start_by_the_wall_clock(world: World) -> None:
     set_clock(world, UTC)
     task = submit(world)
@@ -160,22 +147,6 @@ def test_an_invalid_period_is_refused(world: World, period: float) -> None:
     world.run(0.05)
     assert sent.answer == (DENIED, R.BAD_PARAMETER)
     assert world.task(1).terms.repeat == ""
-
-
-def test_a_run_in_a_paused_queue_waits_and_none_comes_behind_it(world: World) -> None:
-    task = every(world, 20, delay=10)
-    world.client.pause()
-    world.run(70)
-    assert [each.id for each in runs(world)] == [task]
-    assert world.state(task)[0] is S.QUEUED
-    world.client.proceed()
-    world.until_state(task, S.COMPLETED)
-    world.run(0.1)
-    (following,) = waiting(world)
-    assert following.terms.start_at == pytest.approx(world.task(task).terms.start_at + 80)  # type: ignore[operator]
-    assert noted(world) == [
-        f"left out 3 runs while task 1 waited or ran; task {following.id} is next"
-    ]
 
 
 def test_cancel_ends_one_run_and_the_series_goes_on(world: World) -> None:
@@ -236,17 +207,6 @@ def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     assert waiting(world) == []
 
 
-@for_each("everything", [False, True])
-def test_a_cleared_queue_repeats_nothing(world: World, everything: bool) -> None:
-    driven, _later = every(world, 30, distance=3.0), every(world, 30, delay=20)
-    world.until_state(driven, S.EXECUTING)
-    world.client.command(CLEAR, float(everything))
-    world.until_state(driven, S.CANCELLED if everything else S.COMPLETED, within=20)
-    world.run(60)
-    assert waiting(world) == []
-    assert len(runs(world)) == 2
-
-
 def test_a_deadline_counts_from_each_start_and_its_end_is_one_run_only(world: World) -> None:
     task = every(world, 30, delay=5)
     world.client.command(MODIFY, task, DEADLINE, 4)
@@ -259,15 +219,6 @@ def test_a_deadline_counts_from_each_start_and_its_end_is_one_run_only(world: Wo
     world.run(10)
     assert world.state(following.id) == (S.EXPIRED, R.DEADLINE)
     assert len(waiting(world)) == 1
-
-
-def test_a_staged_plan_cannot_repeat(world: World) -> None:
-    places = [Item(16, **at(north, 0)) for north in (0, 0, 3)]
-    upload = Upload(world.client, places)
-    world.until(lambda: upload.result == 0, within=5)
-    sent = world.client.command(MODIFY, 1, EVERY, 60)
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.WRONG_STATE)
 
 
 def test_that_a_task_repeats_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:

@@ -2,17 +2,13 @@
 
 from pathlib import Path
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Packets
-from mav_tasks.errors import RecordError
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.mavlink.signing import Key, is_signed_with
-from mav_tasks.recording.reading import read
-from mav_tasks.recording.replay import Replay
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -124,26 +120,3 @@ def test_a_stop_reaches_it_though_its_key_was_revoked(make_world: MakeWorld) -> 
     world.client.stop()
     world.until(lambda: world.rover.autopilot.mode is Mode.HOLD, within=1.0)
     world.until(world.stands, within=2.0)
-
-
-def test_its_record_is_replayed_with_the_secrets_and_only_so(
-    make_world: MakeWorld, tmp_path: Path
-) -> None:
-    world = signed_world(make_world, records=tmp_path)
-    world.client.move(1.0)
-    world.until_idle(tasks=1)
-    (path,) = world.end_records()
-    data = path.read_bytes()
-    assert ROVERS.secret not in data
-    assert ROVERS.secret.hex().encode() not in data
-    record = read(path)
-    whole = Replay(record, secrets={key.fingerprint: key.secret for key in (ROVERS, OTHER)})
-    assert len(list(whole.events())) > 3
-    assert whole.difference is None
-    with pytest.raises(RecordError, match=r"signed with key rovers \(.*its secret is missing"):
-        list(Replay(record).events())
-    wrong = Replay(
-        record, secrets=dict.fromkeys((ROVERS.fingerprint, OTHER.fingerprint), b"x" * 32)
-    )
-    list(wrong.events())
-    assert wrong.difference is not None

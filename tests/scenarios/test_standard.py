@@ -1,6 +1,5 @@
 """The commands that stock clients send without knowing of tasks become tasks all the same."""
 
-from dataclasses import replace
 from math import nan
 from typing import Any
 
@@ -189,23 +188,6 @@ def test_another_origin_holds_what_runs(world: World) -> None:
     world.run(0.2)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     world.until(world.stands, within=3)
-
-
-def test_a_clients_default_priority_is_that_of_its_standard_commands(
-    make_world: MakeWorld,
-) -> None:
-    priorities = {"255/190": 7, "245/190": 2, "245/190@script": 9}
-    clients = replace(Settings().clients, priorities=priorities)
-    world = make_world(settings=replace(Settings(), clients=clients))
-    others = [world.add_client(name, system_id=245) for name in ("script", "another")]
-    world.add_client("nobody", system_id=7).command(DELAY, 1.0)
-    for client in (world.client, *others):
-        world.run(0.1)
-        client.command(DELAY, 1.0)
-    world.run(0.1)
-    world.client.command(54000, 1.0, 0, 0, 0, 0, 0, nan)
-    world.run(0.1)
-    assert [task.priority for task in world.tasks()] == [5, 7, 9, 2, 5]
 
 
 def test_a_place_beyond_all_reach_is_refused(world: World) -> None:

@@ -29,7 +29,6 @@ from tests.kit.store import LateStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
-HEARTBEAT, POSITION = 0, 32
 BRAKING = 3.5  # s, from the speeds driven here to a stand
 
 
@@ -303,22 +302,6 @@ def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World, silence:
     assert world.observer.sent_since(at)[:2] == ["HOLD", "zero"]
     world.fault(Faults())
     world.until(lambda: stands_in_hold(world), within=BRAKING)
-
-
-def test_a_stop_is_not_confirmed_by_a_rover_whose_heartbeats_do_not_come(world: World) -> None:
-    """HOLD was seen; whether it still is in HOLD when it is seen to stand nobody knows."""
-    drive(world)
-    world.fault(Faults(withheld=frozenset({POSITION})))
-    world.client.stop()
-    world.run(1.5)
-    world.fault(Faults(withheld=frozenset({HEARTBEAT, POSITION})))
-    world.run(4)
-    world.fault(Faults(withheld=frozenset({HEARTBEAT})))
-    world.run(2)
-    assert world.stands()
-    assert world.control() == "STOPPING"
-    world.fault(Faults())
-    world.until(lambda: stands_in_hold(world), within=2)
 
 
 @for_each("seed", range(8))

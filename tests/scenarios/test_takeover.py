@@ -186,21 +186,6 @@ def test_a_client_that_disarms_pauses_as_by_hold(driving: World) -> None:
     assert world.rover.autopilot.mode is Mode.HOLD
 
 
-def test_an_operator_who_switches_to_hold_while_we_ask_for_our_mode_is_obeyed(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world()
-    world.fault(Faults(refuse_mode=True))
-    world.client.move(1)
-    world.until(lambda: world.control() == "ASKING_MODE", within=1)
-    world.operator_mode(Mode.HOLD)  # from MANUAL
-    world.run(0.02)
-    world.fault(Faults())
-    world.run(3)
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
 def test_a_lost_task_does_not_resume_by_itself_after_an_operator_had_the_rover(
     driving: World,
 ) -> None:

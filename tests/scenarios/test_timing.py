@@ -16,8 +16,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
-from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, REQUEST
+from tests.kit.client import ACCEPTED, REQUEST
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import SETPOINT, World
 from tests.scenarios.conftest import MakeWorld
@@ -118,14 +117,6 @@ def test_the_interval_for_which_a_task_is_held_is_in_its_event(world: World) -> 
     assert held.longest >= 0.8
     assert held.late == 1
     world.until(world.stands, within=3)
-
-
-@for_each("task_id", [7, -1, 0.5, float("nan"), 2**24, 0])
-def test_of_what_is_not_there_nothing_is_shown(world: World, task_id: float) -> None:
-    sent = world.client.command(REQUEST, TASK_TIMING, task_id)
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.NOT_FOUND)
-    assert list(world.client.of_id(TASK_TIMING)) == []
 
 
 def test_a_restart_forgets_no_figures(make_world: MakeWorld, tmp_path: Path) -> None:

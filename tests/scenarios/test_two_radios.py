@@ -100,21 +100,6 @@ def test_a_radio_on_which_nothing_reaches_the_rover_is_left_too(make_fleet: Make
     assert near_pose(fleet.pose_of(1), (1.0, 0.0, 0.0))
 
 
-def test_a_rover_that_restarts_at_once_at_another_place_is_heard_again(
-    make_fleet: MakeFleet,
-) -> None:
-    """A simulated autopilot gets another port; a restart takes it less than a second."""
-    fleet = make_fleet(TWO_LINKS)
-    fleet.run(6)
-    fleet.radios["a"].vehicles.clear()
-    fleet.run(0.5)
-    again = twin_of(1, start=Pose(north=0.5), now=fleet.now, is_same=True)
-    fleet.radios["b"].vehicles.append(again)
-    fleet.run(15)
-    assert not any("shares its id" in text for text in notes(fleet))
-    assert "is now at b" in [each.text for each in fleet.events(VehicleSeen)]
-
-
 @for_each("switched_on", ["later", "at the same time"])
 def test_a_stranger_with_the_id_is_never_driven_whatever_it_says(
     make_fleet: MakeFleet, switched_on: str

@@ -137,22 +137,6 @@ def test_return_drives_from_any_mode_and_leaves_the_queue_running(
     party.check()
 
 
-@one
-def test_start_drives_from_manual_before_what_waits_there(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = joined(make_world, persona, ROUND)
-    choose(world, party, Mode.MANUAL)
-    arm(world, party)
-    party.operator.action(MOVE, -2.0, component=191)
-    world.run(2)
-    party.operator.go_on()
-    world.until_state(1, S.COMPLETED, within=60)
-    assert is_at(world, 3.0, 1.0)
-    assert world.state(2)[0] is S.QUEUED
-    party.check()
-
-
 @both
 @for_each("taken", ["hold", "manual at the rover"])
 def test_hold_and_a_click_replace_the_click_before(
@@ -221,22 +205,4 @@ def test_start_and_return_drive_beside_a_held_task_and_one_warning_names_it(
     assert [text for text in texts(party, since=at) if "task 2" in text] == [
         'Rover 1 keeps task 2 on hold: press "Held: remainder", "Held: again" or "Held: skip"'
     ]
-    assert texts(party, since=at, worst=3) == []
-
-
-@both
-def test_start_finishes_the_plan_that_a_late_server_holds(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    """It is what "Continue the mission from the current waypoint" says."""
-    world, party = driving_plan(make_world, persona)
-    world.observer.expects_gaps = True
-    world.suspend_server(3.0)
-    world.until(lambda: world.state(1) == (S.HELD, R.LATE), within=10)
-    world.run(4)
-    at = world.now
-    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
-    world.until_state(1, S.COMPLETED, within=60)
-    assert is_at(world, 3.0, 1.0)
-    assert len(world.tasks()) == 1
     assert texts(party, since=at, worst=3) == []

@@ -9,13 +9,13 @@ from collections.abc import Callable
 import pytest
 
 from mav_tasks.in_memory import VEHICLE_LINK
-from mav_tasks.links.memory import Queue, Radio
+from mav_tasks.links.memory import Queue
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.cases import for_each
-from tests.kit.client import DRIVE, SET_INTERVAL
+from tests.kit.client import DRIVE
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.volume import some
@@ -24,9 +24,6 @@ from tests.scenarios.conftest import MakeWorld
 
 FENCE, CORNER = 1, 5001
 DOWN, UP = ("rover1", VEHICLE_LINK), (VEHICLE_LINK, "rover1")
-BAUD = 57_600 / 10  # bytes/s: eight bits, a start and a stop bit
-BUFFER = 16 * 1024  # bytes
-TELEMETRY = (1, 22, 24, 30, 32, 33, 36, 42, 62, 65, 74, 85, 147, 241, 242, 245)
 BRISK = Settings(driving=Driving(acceleration=1.0))
 
 Delay = Callable[[float], float]
@@ -78,29 +75,6 @@ def test_a_delay_that_grows_leads_nobody_over_a_fence(
     reached = drive_at(world, 2.0, seconds=90)
     print(f"{growth}: reached {reached:.3f} m of 40 m")
     assert 2 < reached < 40
-
-
-@for_each("load", ["an observer's rates", "other traffic"])
-def test_a_radio_that_is_full_leads_nobody_over_a_fence(make_world: MakeWorld, load: str) -> None:
-    world = make_world(settings=BRISK)
-    world.net.buffers[DOWN] = Radio(bytes_per_second=BAUD, buffer=BUFFER)
-    world.net.buffers[UP] = Radio(bytes_per_second=BAUD, buffer=BUFFER)
-    fenced(world, 30)
-    world.run(5)
-    world.client.command(DRIVE, 2.0, 0, 300, 0, 0, 0, 5)
-    world.until(lambda: abs(world.truth.north) > 8, within=20)
-    observer = world.add_client("observer", system_id=77)
-    farthest, end = 0.0, world.now + 60
-    for number in TELEMETRY if load.startswith("an") else ():
-        observer.command(SET_INTERVAL, number, 20_000, target=(1, 1))
-    while world.now < end:
-        world.run(0.05)
-        if not load.startswith("an"):
-            world.net.send(*DOWN, bytes(250))  # 5 kB/s beside the telemetry
-        farthest = max(farthest, abs(world.truth.north))
-    print(f"{load}: reached {farthest:.1f} m of 30 m")
-    assert world.stands()
-    assert 8 < farthest < 30
 
 
 def test_what_comes_in_time_again_drives_on_to_the_exact_end(make_world: MakeWorld) -> None:

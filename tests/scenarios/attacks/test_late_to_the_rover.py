@@ -7,7 +7,6 @@ own words among them, may still come for some seconds; so may what a rover has s
 from struct import unpack_from
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
@@ -198,22 +197,3 @@ def test_an_upload_that_has_begun_before_a_halt(world: World, halt: str) -> None
 
 
 # a person at the rover
-
-
-@for_each("what", ["takes it", "disarms it"])
-def test_a_person_has_it_while_a_kill_stops_it(world: World, what: str) -> None:
-    world.client.move(20, speed=0.8)
-    world.client.move(5, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.7, within=20)
-    world.client.command(CANCEL, 1, 1)
-    world.run(0.2)
-    if what == "takes it":
-        world.operator_mode(Mode.MANUAL)
-        world.run(4)
-        assert mode_of(world) is Mode.MANUAL
-    else:
-        world.operator_arm(False)
-        world.run(4)
-        assert not world.rover.autopilot.armed
-    assert world.paused() is R.TAKEOVER
-    assert world.state(2)[0] is S.QUEUED

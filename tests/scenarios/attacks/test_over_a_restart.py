@@ -5,7 +5,6 @@ What had left before the halt may still come, to the new server as well as to th
 
 from pathlib import Path
 from shutil import copy
-from struct import unpack_from
 
 from mav_tasks.settings import Settings
 from rover_sim.personas import Mode
@@ -19,8 +18,6 @@ from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_fr
 from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
-SETPOINT, MODE, DISARM = 84, 176, 400
-COMMANDS, NUMBER = (75, 76), 38
 ENDS = for_each("ends", ["well", "killed"])
 
 
@@ -112,42 +109,6 @@ def test_an_arming_that_comes_late_after_it(
     world.run(1.2)
     world.bring_late(caught[0])
     assert stays(world, 14)
-
-
-@ENDS
-@for_each("halt", ["STOP", "HOLD", "pause"])
-def test_our_own_mode_and_set_point_that_come_late_after_it(
-    world: World, path: Path, halt: str, ends: str
-) -> None:
-    person = world.add_client("person")
-    modes: list[bytes] = []
-    set_points: list[bytes] = []
-
-    def sees(_source: str, target: str, data: bytes) -> bool:
-        if target == "rover1" and data[7] in COMMANDS:
-            is_mode = unpack_from("<H", data + bytes(40), NUMBER)[0] == MODE
-            modes.extend([data] if is_mode else [])
-        if target == "rover1" and data[7] == SETPOINT:
-            set_points.append(data)
-        return False
-
-    world.watched.loses = sees
-    world.client.move(20, speed=1.0)
-    world.until(lambda: world.truth.forward_speed > 0.5, within=20)
-    halted = {"STOP": person.stop, "pause": person.pause}.get(halt, lambda: person.mode(HOLD))()
-    mode, set_point = modes[0], set_points[-3]
-    world.run(1.0)
-    mend(world)
-    assert halted.result == ACCEPTED
-    restart(world, path, ends=ends)
-    world.run(1.2)
-    world.bring_late(mode)
-    world.run(0.05)
-    world.bring_late(set_point)
-    north = world.truth.north
-    world.run(6)
-    assert abs(world.truth.north - north) < 0.5
-    assert mode_of(world) is Mode.HOLD
 
 
 @ENDS

@@ -27,8 +27,6 @@ BUDGET = 0.7 * CAPACITY  # of it, for what is streamed
 OWN = 3_300.0  # bytes/s, that the server asks for by itself, and heartbeats
 #: all that ArduPilot streams
 STREAMED = (1, 24, 26, 27, 29, 30, 32, 33, 36, 62, 65, 74, 116, 125, 129, 147, 152, 163, 178, 193)
-ATTITUDE = 30
-PARAM_REQUEST_LIST, PARAM_VALUE = 21, 22
 FASTEST = 20_000  # µs
 
 
@@ -150,44 +148,6 @@ def test_when_it_has_left_everything_is_as_before(make_world: MakeWorld) -> None
     after = meter.hertz(10.0)
     print(f"packets/s: {before:.0f} before, {raised:.0f} with it, {after:.0f} after it")
     assert after == pytest.approx(before, rel=0.02)
-
-
-def test_an_observer_takes_nothing_from_an_operators_wish(make_world: MakeWorld) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    meter = Meter(world)
-    operator = join(world, OPERATOR)
-    operator.command(SET_INTERVAL, ATTITUDE, 1e6 / 35, target=(1, 1))
-    world.run(5.0)
-    before = meter.hertz(10.0, ATTITUDE)
-    assert before > 30
-    wish_for_all(world, join(world, OBSERVER))
-    assert meter.hertz(10.0, ATTITUDE) >= before - 0.2
-
-
-def list_of(client: FakeClient) -> None:
-    client.send(common.MAVLink_param_request_list_message(1, 1))
-
-
-def lists_towards(meter: Meter) -> int:
-    return sum(data[7] == PARAM_REQUEST_LIST for data in meter.went)
-
-
-def test_an_observers_parameter_list_does_not_fill_the_radio_of_a_rover_that_drives(
-    make_world: MakeWorld,
-) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    observer, operator = join(world, OBSERVER), join(world, OPERATOR)
-    task = world.client.move(5.0)
-    world.run(0.2)
-    world.until_state(task.task_id, S.EXECUTING)
-    meter = Meter(world)
-    list_of(observer)
-    world.run(1.0)
-    assert lists_towards(meter) == 0
-    assert any("slow link" in text for text in observer.texts()), observer.texts()
-    list_of(operator)
-    world.run(1.0)
-    assert lists_towards(meter) == 1
 
 
 def test_questions_of_an_observer_do_not_fill_a_radio(make_world: MakeWorld) -> None:

@@ -4,18 +4,15 @@ A packet held back, one meant for another server, a clock that is ahead, a key t
 while its task drives.
 """
 
-from pathlib import Path
-
 from mav_tasks.engine.inputs import KeysChanged
 from mav_tasks.mavlink.signing import timestamp_at
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.cases import anew, for_each
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
-from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_signing import ALICE, BOB, REVOKED, UTC, put, restart, signing
+from tests.scenarios.test_signing import ALICE, BOB, REVOKED, UTC, put, signing
 
 HOUR, YEAR = 3600.0, 365 * 86_400.0
 
@@ -97,11 +94,6 @@ def test_a_clock_ahead_shuts_nobody_out(world: World, seconds: float) -> None:
     assert world.paused() is R.STOPPED
 
 
-@anew
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "tasks.sqlite3"
-
-
 # S5
 
 
@@ -125,18 +117,3 @@ def test_a_task_of_a_revoked_key_drives_no_further(world: World) -> None:
     assert told in operator.texts()
     operator.proceed()
     world.until(lambda: world.state(driven.task_id)[0] is S.EXECUTING, within=10)
-
-
-def test_nor_does_it_drive_where_the_key_was_revoked_while_the_server_was_away(
-    make_world: MakeWorld, path: Path
-) -> None:
-    world = put(make_world(store=PromptSqliteStore(path, wall_offset=UTC)), ALICE, BOB)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    client.command(MOVE, 1.0, 0, 0, 0, 0, 10.0, 5)  # in 10 s
-    world.run(0.5)
-    restart(world, path, well=True, keys=(REVOKED, BOB))
-    world.run(15.0)
-    assert world.state(1)[0] is S.QUEUED
-    assert world.paused() is R.OPERATOR
-    assert world.truth.north == 0.0

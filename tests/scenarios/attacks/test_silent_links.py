@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 from mav_tasks.settings import Settings
-from rover_sim.personas import ARDUPILOT, Mode
+from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, RTL, command_long
-from tests.kit.world import PROMPT, World, put_home
+from tests.kit.world import World
 from tests.scenarios.attacks.test_late_arming import mode_of
 from tests.scenarios.attacks.test_late_to_the_rover import mend
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home
@@ -39,30 +39,3 @@ def test_a_halt_during_a_gap_counts_when_it_ends(
     mend(world)
     world.run(4)
     assert mode_of(world) is Mode.HOLD
-
-
-@for_each("persona", [ARDUPILOT, PROMPT])
-def test_one_that_drives_home_during_a_gap_is_stopped_after_it(
-    make_world: Callable[..., World], persona: object
-) -> None:
-    world = make_world(persona=persona)
-    person = world.add_client("person")
-    world.client.move(40, speed=2.0)
-    world.run(40)
-    world.client.arm()
-    world.run(2)
-    put_home(world, 0, 0)
-    world.run(1)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(1.5)
-    cut(world)
-    world.run(0.5)
-    said = person.mode(HOLD)
-    world.run(5)
-    assert said.result == ACCEPTED
-    assert abs(world.truth.forward_speed) > 0.5
-    mend(world)
-    world.run(2)
-    assert mode_of(world) is Mode.HOLD
-    world.run(8)
-    assert abs(world.truth.forward_speed) < 0.05

@@ -121,21 +121,6 @@ def test_a_person_at_the_rover_has_it_all_the_same(world: World) -> None:
     assert world.rover.autopilot.mode is Mode.MANUAL
 
 
-def test_a_pause_stops_what_somebody_has_taken_since_its_task_was_paused(world: World) -> None:
-    world.client.move(20)
-    world.until(lambda: world.truth.north > 3, within=40)
-    world.client.pause()
-    world.run(3)
-    world.operator_mode(Mode.RTL)
-    world.run(1.5)
-    assert world.truth.forward_speed > 0.3 or not world.stands()
-    paused = world.client.pause()
-    world.run(4)
-    assert paused.result == ACCEPTED
-    assert world.rover.autopilot.mode is Mode.HOLD
-    assert stays(world, 3)
-
-
 @anew
 def px4(make_world: MakeWorld) -> World:
     world = make_world(persona=PROMPT_PX4)
