@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
