@@ -17,9 +17,9 @@ ABOUT = Item(OPTIONS, frame=2, param1=5)
 
 #: each way to upload the same file: what comes before its items, to which component
 WAYS = [
-    pytest.param(ARDUPILOT, [HOME], 1, id="ardupilot"),
+    (ARDUPILOT, [HOME], 1),
     pytest.param(PX4, [], 1, id="px4"),
-    pytest.param(ARDUPILOT, [], 191, id="task server"),
+    (ARDUPILOT, [], 191),
 ]
 
 
