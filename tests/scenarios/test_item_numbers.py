@@ -1,7 +1,5 @@
 """The items of a mission have the numbers of its file everywhere: from 1, and home is 0."""
 
-import pytest
-
 from mav_tasks.tasks.events import StepReached, TaskAdvanced
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Persona
@@ -18,7 +16,7 @@ ABOUT = Item(OPTIONS, frame=2, param1=5)
 #: each way to upload the same file: what comes before its items, to which component
 WAYS = [
     (ARDUPILOT, [HOME], 1),
-    pytest.param(PX4, [], 1, id="px4"),
+    (PX4, [], 1),
     (ARDUPILOT, [], 191),
 ]
 
