@@ -131,7 +131,7 @@ def test_stop_with_an_empty_queue_and_twice(world: World) -> None:
     world.until_state(1, S.COMPLETED)
 
 
-@for_each("delay", [k * 0.002 for k in range(12)])
+@for_each("delay", [k * 0.002 for k in range(0, 12, 3)])
 def test_stop_while_starting(world: World, delay: float) -> None:
     """From before the mode is asked for until the first motion, in steps of 2 ms."""
     world.client.move(5)
@@ -163,7 +163,7 @@ def test_stop_while_the_rover_does_not_answer_our_requests(world: World, phase: 
 
 
 @for_each("mode", [AUTO, RTL])
-@for_each("seed", range(4))
+@for_each("seed", range(2))
 def test_stop_overtaken_by_a_clients_mode_request(
     make_world: MakeWorld, mode: int, seed: int
 ) -> None:
@@ -304,13 +304,13 @@ def test_a_silent_rover_is_stopped_when_it_is_heard_again(world: World, silence:
     world.until(lambda: stands_in_hold(world), within=BRAKING)
 
 
-@for_each("seed", range(8))
+@for_each("seed", range(3))
 def test_stop_through_a_lossy_net(make_world: MakeWorld, seed: int) -> None:
     bad = Conditions(delay=0.005, jitter=0.1, loss=0.3, duplication=0.1)
     world = make_world(seed=seed, conditions=bad)
     world.client.move(20, repeats=REPEATS, nonce=1)
     world.run(4)
-    world.client.stop(repeats=tuple(k * 0.2 for k in range(12)))
+    world.client.stop(repeats=tuple(k * 0.2 for k in range(0, 12, 3)))
     world.until(lambda: stands_in_hold(world), within=9)  # or four heartbeats in a row are lost
     world.run(3)
     where = world.pose()

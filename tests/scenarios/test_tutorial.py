@@ -38,7 +38,7 @@ def test_of_those_that_wait_a_later_one_overtakes_if_it_is_more_urgent(world: Wo
     assert finished == [1, 3, 2]
 
 
-@for_each("seed", range(tries(10, long=100)))
+@for_each("seed", range(tries(4, long=100)))
 def test_all_of_it_is_done_in_order_over_a_bad_net(make_world: MakeWorld, seed: int) -> None:
     world = make_world(seed=seed, conditions=BAD_NET)
     first = world.client.move(0.6, priority=3, repeats=PATIENT, nonce=1)

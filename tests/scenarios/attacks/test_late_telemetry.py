@@ -18,7 +18,6 @@ from tests.kit.cases import for_each
 from tests.kit.client import DRIVE
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.volume import some
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -57,20 +56,14 @@ GROWS: dict[str, Delay] = {
 }
 
 
-@for_each(
-    "growth, begins",
-    [
-        *((growth, 8.0) for growth in GROWS),
-        *(("and shrinks", 8.0 + n / 2) for n in some(range(1, 8), 0, 2, 5)),
-    ],
-)
+@for_each("growth", GROWS)
 @for_each("persona", [PROMPT, PROMPT_PX4])
 def test_a_delay_that_grows_leads_nobody_over_a_fence(
-    make_world: MakeWorld, persona: Persona, growth: str, begins: float
+    make_world: MakeWorld, persona: Persona, growth: str
 ) -> None:
     world = make_world(settings=BRISK, persona=persona)
     fenced(world, 40)
-    begin = world.now + begins
+    begin = world.now + 8.0
     world.net.buffers[DOWN] = Queue(lambda now: GROWS[growth](now - begin))
     reached = drive_at(world, 2.0, seconds=90)
     print(f"{growth}: reached {reached:.3f} m of 40 m")
