@@ -310,7 +310,7 @@ def test_stop_through_a_lossy_net(make_world: MakeWorld, seed: int) -> None:
     world = make_world(seed=seed, conditions=bad)
     world.client.move(20, repeats=REPEATS, nonce=1)
     world.run(4)
-    world.client.stop(repeats=tuple(k * 0.2 for k in range(0, 12, 3)))
+    world.client.stop(repeats=tuple(k * 0.2 for k in range(12)))
     world.until(lambda: stands_in_hold(world), within=9)  # or four heartbeats in a row are lost
     world.run(3)
     where = world.pose()
