@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import (
@@ -420,3 +421,67 @@ def test_keys_are_not_set_through_the_server(world: World) -> None:
 
 
 # files
+
+
+# what clients are told unasked
+
+
+def states(client: FakeClient, task_id: int) -> list[int]:
+    return [status.state for status in client.statuses(task_id)]
+
+
+def test_who_has_asked_about_a_task_is_told_of_each_change(world: World) -> None:
+    first = world.client.move(0.5)
+    second = world.client.rotate(20.0)
+    world.until(lambda: second.ack, within=2)
+    other = world.add_client("other", system_id=244)
+    world.run(1.5)
+    assert other.statuses() == []
+
+    other.request_status(second.task_id)
+    world.until_idle(tasks=2)
+
+    assert states(other, first.task_id) == []
+    seen = list(dict.fromkeys(states(other, second.task_id)))
+    assert seen == [S.QUEUED, S.EXECUTING, S.COMPLETED]
+
+
+# sequence numbers over a restart of the rover
+
+
+ROVER = (1, 1)
+
+
+LONG, SHORT = 3.0, 0.5  # s of silence: of a restart, and of a link
+
+
+def says(world: World, *numbers: int) -> None:
+    """Let the rover send heartbeats with these numbers."""
+    rover = common.MAVLink(None, *ROVER)
+    for number in numbers:
+        rover.seq = number
+        message = common.MAVLink_heartbeat_message(10, 3, 81, 4, 4, 3)
+        world.from_vehicle_side(message.pack(rover), peer="rover1")
+        world.run(0.05)
+
+
+@for_each(
+    "silence, first, lost",
+    [
+        (LONG, 0, 0),
+        (LONG, 3, 0),  # the first ones were sent before the link was up
+        (SHORT, 0, 150),
+        (LONG, 140, 34),  # of a link that was down, and no restart
+    ],
+)
+def test_only_a_restart_of_the_rover_is_no_loss(
+    world: World, silence: float, first: int, lost: int
+) -> None:
+    world.fault(Faults(silent=True))
+    world.run(0.5)
+    says(world, 103, 104)
+    world.client.received.clear()
+    says(world, 105)
+    world.run(silence)
+    says(world, first, first + 1, first + 2)
+    assert world.client.gaps(ROVER) == lost
