@@ -3,7 +3,7 @@
 from typing import Any
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned
+from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -102,6 +102,16 @@ def test_a_refusal_names_why_each_rover_cannot(make_world: MakeWorld) -> None:
     plan = go_to(world, 0.0, 1.0)
     assert plan.result != 0
     assert len(world.events(SubmissionRefused)) == 2
+
+
+def test_places_that_depend_on_the_rover_are_refused(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    local = world.client.command_int(WAYPOINT, x=1000, y=0, frame=1, target=ANY)
+    home = Upload(world.client, [Item(20)], target=ANY)
+    world.run(1.0)
+    assert local.answer == (DENIED, R.BAD_FRAME)
+    assert home.result == 5  # MAV_MISSION_INVALID
+    assert not world.events(TaskSubmitted)
 
 
 def test_the_status_of_a_task_can_be_requested_without_its_rover(make_world: MakeWorld) -> None:

@@ -104,6 +104,16 @@ def test_a_blocked_store_does_not_keep_a_driving_rover_from_its_end(
     assert world.state(1)[0] is S.COMPLETED
 
 
+def test_nobody_is_told_of_a_task_that_is_not_durable(world: World, store: LateStore) -> None:
+    store.delay = 0.3
+    world.client.move(1)
+    world.run(0.28)
+    assert (world.client.texts()[1:], world.client.statuses()) == ([], [])
+    world.run(0.1)
+    assert world.client.texts()[1] == "Task 1 queued: move 1 m"
+    assert [s.task_id for s in world.client.statuses()][:1] == [1]
+
+
 @for_each("delay, told_after", [(0.2, 0.2), (inf, 0.4)])
 @for_each("by", ["kill", "STOP"])
 def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(

@@ -173,6 +173,17 @@ def test_a_rover_that_falls_silent_before_the_boundary_stops_before_it(
     assert world.stands()
 
 
+def test_a_way_that_a_new_fence_forbids_is_stopped(world: World) -> None:
+    world.client.move(20)
+    world.until_state(1, S.EXECUTING)
+    world.run(2)
+    fenced(world, *YARD)
+    world.until_state(1, S.HELD)
+    world.run(3)
+    assert world.state(1) == (S.HELD, R.FENCE)
+    assert world.truth.north < 3.0
+
+
 def test_a_rover_outside_may_come_back_in(world: World) -> None:
     world.client.move(4)
     world.until_idle(tasks=1)

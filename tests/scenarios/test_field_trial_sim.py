@@ -11,6 +11,7 @@ from rover_sim.field_trial.rows import Row, Verdict, table
 from rover_sim.field_trial.rows_run import run_rows
 from rover_sim.field_trial.session import Session
 from rover_sim.frames import Frame
+from tests.kit.cases import for_each
 from tests.kit.trial_ground import MAKES, Make, TrialGround
 
 #: by default, and what each kind of rover can do
@@ -46,7 +47,7 @@ def trial(make: str, row: str) -> list[Row]:
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize(("make", "row"), CASES)
+@for_each("make, row", CASES)
 def test_a_rover_as_it_is_holds_the_table(make: str, row: str) -> None:
     rows = trial(make, row)
     assert rows

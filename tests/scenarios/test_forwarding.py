@@ -201,6 +201,21 @@ def test_no_answer_in_0_4_s_is_a_rejection_and_the_late_ack_is_dropped(world: Wo
     assert len(world.client.acks) == 1
 
 
+def test_the_late_ack_of_one_client_is_not_given_to_another(world: World) -> None:
+    twin = world.add_client("twin")
+    world.run(0.1)
+    lost = world.lose_acks()
+    world.client.command(31000, target=(1, 1))
+    world.run(0.41)
+    world.watched.loses = lambda *_: False
+    second = twin.command(31000, target=(1, 1))
+    world.net.send("rover1", VEHICLE_LINK, lost[0])
+    world.run(0.05)
+    assert second.ack is None
+    world.run(0.6)
+    assert [len(c.acks) for c in (world.client, twin)] == [1, 1]
+
+
 def test_disarm_never_waits(world: World) -> None:
     twin = world.add_client("twin")
     world.operator_arm(True)

@@ -13,7 +13,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
-from rover_sim.personas import PX4, Persona
+from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
@@ -239,6 +239,40 @@ def test_a_stop_at_another_gateway_while_the_database_hangs_is_in_force_before_a
     assert abs(fleet.world.truth.north - where) < 0.05
 
 
+@for_each("is_answered", [False, True])
+def test_a_stop_that_no_gateway_could_obey_is_in_force_when_its_gateway_is_back(
+    tmp_path: Path, *, is_answered: bool
+) -> None:
+    """Nobody else hears the rover: the same gateway gets it again, in another life."""
+    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
+    fleet.world.watched.to_clients.clear()
+    fleet.world.cut(fleet.other.name)
+    fleet.world.run(6.0)
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    far = fleet.clients[fleet.other.name]
+    if is_answered:  # and resumed since: it is not owed any more
+        sent = far.stop()
+        fleet.world.run(1.0)
+        assert sent.result == ACCEPTED
+        fleet.client.proceed()
+        fleet.world.run(5.0)
+        task = fleet.submit(5.0)
+        fleet.drives(task)
+    reach(fleet, fleet.first, is_reached=False)
+    fleet.world.run(2.0)
+    if not is_answered:
+        far.stop()
+    fleet.world.run(8.0)
+    assert fleet.world.database.holder(1) is None
+    reach(fleet, fleet.first, is_reached=True)
+    assert fleet.world.holder() is fleet.first
+    fleet.world.run(10.0)
+    assert (fleet.task(task).state is S.KILLED) is not is_answered
+    stopped = {} if is_answered else {1: R.STOPPED}
+    assert fleet.world.shared.part(frozenset({1})).paused == stopped
+
+
 def test_a_gateway_that_stands_still_sends_nothing_when_it_goes_on(fleet: Fleet) -> None:
     task = fleet.submit(5.0)
     fleet.drives(task)
@@ -316,6 +350,23 @@ def test_a_task_goes_on_after_the_failsafe_that_the_end_of_the_lease_caused(
     fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=40)
     assert abs(fleet.world.truth.north - 5.0) < 0.2
     fleet.world.check()
+
+
+def test_who_sets_hold_while_the_lease_is_lost_keeps_the_rover(tmp_path: Path) -> None:
+    fleet = Fleet(tmp_path, persona=PROMPT_PX4)
+    task = fleet.submit(5.0)
+    fleet.drives(task)
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = False
+    fleet.world.run(0.9)  # before its failsafe
+    fleet.world.operator_mode(Mode.HOLD)
+    fleet.world.run(5.0)
+    for it in fleet.world.gateways.values():
+        it.is_reached = it.store.is_reached = True
+    where = fleet.world.truth.north
+    fleet.world.run(10.0)
+    assert fleet.task(task).state is S.PAUSED
+    assert abs(fleet.world.truth.north - where) < 0.1
 
 
 def test_a_client_that_drives_is_stopped_when_the_lease_ends(fleet: Fleet) -> None:

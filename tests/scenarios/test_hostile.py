@@ -3,7 +3,7 @@
 from pymavlink.dialects.v20 import ardupilotmega as ardupilot
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import KeysChanged, PeerChanged, SettingsChanged
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, PeerChanged, SettingsChanged
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Clients, Limits, Roles, Settings
@@ -84,6 +84,19 @@ def test_a_key_that_may_less_now_may_less_at_once(world: World, role: str) -> No
     sent = client.move(2.0)
     assert answer(world, sent) == ((DENIED, R.NOT_ALLOWED) if role else None)
     assert len(world.tasks()) == 1
+
+
+def test_a_link_s_own_key_that_is_of_vehicles_now_is_no_client_s(world: World) -> None:
+    put(world, ALICE)
+    for up in (False, True):
+        change = LinkChanged(CLIENT_LINK, LinkSide.CLIENTS, up=up, key="alice")
+        world.server.pump.handle(change, now=world.now)
+    client = connected(world, ALICE)
+    vehicles = Key("alice", ALICE.secret, "")
+    world.server.pump.handle(KeysChanged((vehicles, BOB)), now=world.now)
+    world.run(2.0)
+    assert answer(world, client.move(2.0)) is None
+    assert world.tasks() == ()
 
 
 def test_requests_are_counted_whoever_else_signs_at_the_same_endpoint(world: World) -> None:
@@ -199,6 +212,13 @@ def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
     client.send(message)
     world.run(0.2)
     assert (message.get_msgId() in towards) == (who != OPERATOR)
+
+
+def test_switching_the_fence_off_as_a_switch_does_is_of_safety(with_roles: MakeRoles) -> None:
+    world = with_roles()
+    operator = join(world, OPERATOR)
+    fence = operator.command(218, 11, 0, target=(1, 1))  # DO_AUX_FUNCTION
+    assert answer(world, fence) == (DENIED, R.NOT_ALLOWED)
 
 
 def test_what_a_revoked_key_drives_stands(world: World) -> None:

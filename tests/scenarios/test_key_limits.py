@@ -332,6 +332,15 @@ def test_number_and_kinds_are_the_keys_own(
     assert len(world.tasks()) == 3
 
 
+def test_commands_to_the_rover_are_an_operators(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited()
+    relay = of_ours(RELAY, 0, 1)
+    assert uploaded(world, agent, *places(1.0), relay).result == MISSION_DENIED
+    assert world.tasks() == ()
+
+
 # changes, owners, nonces
 
 
@@ -368,3 +377,23 @@ def test_a_name_that_is_given_again_does_not_own_the_tasks_of_the_old_key(
     assert answer(world, new.command(CANCEL, 2)) == NOT_ALLOWED
     assert answer(world, first.move(1.0, nonce=7)) == (ACCEPTED, 3)
     assert answer(world, first.command(CANCEL, 2)) == (ACCEPTED, 2)
+
+
+def test_a_key_owns_its_tasks_from_any_endpoint(
+    world: World, limited: Callable[..., FakeClient]
+) -> None:
+    agent = limited()
+    boss = signing(world, BOSS, name="boss")
+    assert answer(world, boss.move(20.0)) == (ACCEPTED, 1)
+    assert answer(world, agent.move(1.0)) == (ACCEPTED, 2)
+    elsewhere = signing(world, agents(), name="elsewhere", system_id=99)
+    assert answer(world, elsewhere.command(CANCEL, 2)) == (ACCEPTED, 2)
+
+
+def test_a_nonce_belongs_to_its_key(world: World, limited: Callable[..., FakeClient]) -> None:
+    agent = limited(max_speed=0.1, max_distance=1.0)
+    boss = signing(world, BOSS, name="boss", system_id=77)  # the same address
+    assert answer(world, boss.move(12.0, speed=1.6, nonce=4711)) == (ACCEPTED, 1)
+    assert answer(world, agent.move(12.0, speed=1.6, nonce=4711)) == NOT_ALLOWED
+    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)
+    assert answer(world, agent.move(1.0, nonce=4711)) == (ACCEPTED, 2)

@@ -371,6 +371,20 @@ def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: st
     world.until_state(1, S.COMPLETED, within=60)
 
 
+def test_a_start_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:
+    store = LateStore(delay=0.0)
+    world = make_world(store=store)
+    uploaded(world)
+    store.delay = 5.0
+    sent = world.client.command(START, target=(1, 1))
+    world.run(1)
+    assert sent.answer == (TEMPORARILY_REJECTED, R.STORE_UNAVAILABLE)
+    assert world.state(1)[0] is S.BLOCKED
+    store.delay = 0.0
+    world.run(6)
+    assert start(world) == (ACCEPTED, 1)
+
+
 @for_each("kind", [3, 77, 255])
 def test_a_plan_of_a_strange_kind_is_refused(world: World, kind: int) -> None:
     upload = Upload(world.client, (), kind=kind)

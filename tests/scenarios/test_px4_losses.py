@@ -59,6 +59,19 @@ def test_a_server_that_is_started_again_leaves_it_standing(
     assert world.paused() is R.RESTARTED
 
 
+@for_each("lost", [1.0, 5.0])
+def test_a_server_whose_machine_slept_leaves_it_standing(
+    make_world: MakeWorld, lost: float
+) -> None:
+    world = driving(make_world, persona=PX4, lost=lost)
+    world.observer.expects_gaps = True
+    world.suspend_server(lost + 3.5)
+    assert world.stands()
+    where = world.truth.north
+    world.run(lost + 4)
+    assert abs(world.truth.north - where) < 0.2
+
+
 @for_each("persona", [PX4, PROMPT_PX4])
 @for_each("lost", [1.0, 5.0])
 def test_once_a_takeover_is_told_it_does_not_drive_on(

@@ -292,6 +292,38 @@ def test_a_submitter_does_not_exceed_its_limits(with_roles: MakeRoles) -> None:
     assert answer(world, world.client.rotate(10.0, priority=10)), "nobody else is bound by it"
 
 
+def test_its_tasks_drive_no_faster_whoever_sets_the_speed(with_roles: MakeRoles) -> None:
+    world = with_roles(submitter=Limits(max_speed=0.2))
+    submitter, operator = join(world, SUBMITTER), join(world, OPERATOR)
+    task = active(world, 2.0, who=submitter)
+    operator.command(CHANGE_SPEED, 1, 1.5)
+    fastest = 0.0
+
+    def look(_now: float) -> None:
+        nonlocal fastest
+        fastest = max(fastest, world.truth.forward_speed)
+
+    world.watch(look)
+    world.until_state(task, S.COMPLETED)
+    assert 0.15 < fastest < 0.25
+
+
+def test_a_plan_is_bound_by_the_same_limits(with_roles: MakeRoles) -> None:
+    world = with_roles(submitter=Limits(tasks=("goto",), max_speed=0.5))
+    submitter = join(world, SUBMITTER)
+    one = Item(WAYPOINT, **place(2.0))
+    assert upload(world, submitter, one, target=(1, 191)) == 0
+    assert upload(world, submitter, one, one, target=(1, 191)) != 0
+    fast = Item(CHANGE_SPEED, param1=1, param2=0.9, param4=0.0, frame=2)
+    assert upload(world, submitter, fast, one, target=(1, 191)) != 0
+    relay = Item(RELAY, param1=0, param2=1, param4=0.0, frame=2)
+    refused = Upload(submitter, (relay, one), target=(1, 191))
+    world.run(2.0)
+    assert (refused.result, refused.opaque_id) == (MISSION_DENIED, R.NOT_ALLOWED)
+    assert any("contains rover commands" in text for text in submitter.texts())
+    assert len(world.tasks()) == 1
+
+
 def test_a_plan_is_started_and_replaced_by_its_owner_or_an_operator(with_roles: MakeRoles) -> None:
     world = with_roles()
     submitter, other = join(world, SUBMITTER), join(world, OTHER)
@@ -331,6 +363,20 @@ def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str
     assert world.rover.autopilot.mode is Mode.MANUAL
 
 
+def test_a_submitter_makes_no_task_pre_emptive(with_roles: MakeRoles) -> None:
+    world = with_roles()
+    submitter = join(world, SUBMITTER)
+    running = active(world, 3.0)
+    waiting = submitter.move(1.0)
+    world.run(0.2)
+    sent = submitter.command(MODIFY, waiting.task_id, PREEMPTIVE, 1)
+    assert answer(world, sent) == NOT_ALLOWED
+    assert "may not make a task pre-emptive; operator may" in " ".join(submitter.texts())
+    assert world.state(running)[0] is S.EXECUTING
+    assert answer(world, world.client.command(MODIFY, waiting.task_id, PREEMPTIVE, 1))
+    world.until_state(waiting.task_id, S.EXECUTING)
+
+
 @for_each("who", [(250, 191), (1, 1)])
 def test_nothing_is_passed_on_as_if_the_server_or_a_rover_had_said_it(
     make_world: MakeWorld, who: tuple[int, int]
@@ -362,6 +408,18 @@ def test_what_bounds_a_rover_is_of_safety_alone(with_roles: MakeRoles) -> None:
     world.client.send(common.MAVLink_param_set_message(1, 191, b"TSK_SPEED", 0.7, 9))
     world.run(0.5)
     assert world.server.engine.parameters == {"TSK_SPEED": pytest.approx(0.7)}
+
+
+def test_to_run_at_once_is_for_operators(with_roles: MakeRoles) -> None:
+    world = with_roles(guided="now")
+    submitter, operator = join(world, SUBMITTER), join(world, OPERATOR)
+    world.client.move(20.0)
+    world.run(3.0)
+    go = (-1, 1, 0, 0)
+    sent = submitter.command_int(192, *go, target=(1, 1), frame=6, **at(1.0, 0.0))
+    assert answer(world, sent) == NOT_ALLOWED
+    sent = operator.command_int(192, *go, target=(1, 1), frame=6, **at(1.0, 0.0))
+    assert answer(world, sent) == (ACCEPTED, sent.task_id)
 
 
 def test_requests_that_are_too_many_are_refused_but_for_stop(with_roles: MakeRoles) -> None:

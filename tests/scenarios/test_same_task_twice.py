@@ -59,6 +59,17 @@ def test_a_nonce_names_a_task_for_good(paused: World) -> None:
     ]
 
 
+def test_a_nonce_counts_from_another_port_of_the_same_address_too(paused: World) -> None:
+    first = paused.client.move(1, nonce=5)
+    paused.run(0.1)
+    elsewhere = paused.add_client("elsewhere")
+    again = elsewhere.move(1, nonce=5)
+    stranger = paused.add_client("stranger", system_id=7)
+    own = stranger.move(1, nonce=5)
+    paused.run(0.1)
+    assert [s.task_id for s in (first, again, own)] == [1, 1, 2]
+
+
 @for_each("after, task_id", [(2.4, 1), (9.9, 1), (10.1, 2)])
 def test_confirmation_above_0_is_a_repeat_for_10_s(
     paused: World, after: float, task_id: int
@@ -88,6 +99,13 @@ def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:
         paused.run(0.1)
         ids.append(sent.task_id)
     assert ids == [1, 2, 3]
+
+
+def test_two_clients_may_ask_for_the_same(paused: World) -> None:
+    twin = paused.add_client("twin")
+    sent = [paused.client.move(1), twin.move(1)]
+    paused.run(0.1)
+    assert [s.task_id for s in sent] == [1, 2]
 
 
 def test_what_was_refused_can_be_tried_again_at_once(make_world: MakeWorld) -> None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from shutil import copy
 
+import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, SettingsChanged, WallClock
@@ -14,6 +15,7 @@ from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
+from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
 ALICE = Key("alice", bytes(range(32)), "operator")
@@ -99,6 +101,14 @@ def test_without_a_key_ring_signatures_are_taken_off(world: World) -> None:
     assert [task.submitter.key for task in world.tasks()] == [""]
 
 
+def test_the_key_of_rovers_is_no_client_s(world: World) -> None:
+    put(world, ALICE, ROVERS)
+    sent = signing(world, ROVERS).pause()
+    world.run(0.3)
+    assert sent.ack is None
+    assert counts(world)[1] >= 1
+
+
 @for_each("place", [8, 20, -13, -10, -1])
 def test_a_packet_that_was_changed_is_nobody_s(world: World, place: int) -> None:
     put(world, ALICE)
@@ -148,6 +158,29 @@ def test_a_replayed_command_is_not_done_again(world: World) -> None:
 @anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
+
+
+@pytest.fixture
+def kept(make_world: MakeWorld, path: Path) -> World:
+    """Return a world whose server keeps everything on a disk."""
+    return make_world(store=PromptSqliteStore(path, wall_offset=UTC))
+
+
+@pytest.mark.parametrize("well", [True, False])
+def test_nor_by_a_server_that_was_started_since(kept: World, path: Path, well: bool) -> None:
+    world = put(kept, ALICE)
+    client = signing(world, ALICE)
+    raw, task = recorded(world, client)
+    restart(world, path, well=well)
+    attacker = world.add_client("attacker")
+    attacker.heartbeats = False
+    attacker.send_raw(raw)
+    world.run(0.3)
+    assert [each.id for each in world.tasks()] == [task]
+    assert counts(world)[2] == 1
+    again = client.move(0.5)  # whose time goes on
+    world.run(0.3)
+    assert again.task_id == task + 1
 
 
 def restart(world: World, path: Path, *, well: bool, keys: tuple[Key, ...] = (ALICE,)) -> None:
@@ -202,6 +235,13 @@ def test_a_revoked_key_is_nobody_s_at_once(world: World) -> None:
     assert [each.ack is not None for each in sent] == [False, False, True]
     assert [task.submitter.key for task in world.tasks()] == ["bob"]
     assert len(client.received) - heard <= 2, "what was on its way"
+
+
+def test_a_revoked_key_is_not_taken_for_no_signature(world: World) -> None:
+    put(world, REVOKED, takes_unsigned=True)
+    sent = signing(world, ALICE).move(1.0)
+    world.run(0.3)
+    assert sent.ack is None
 
 
 def setup_message(secret: bytes) -> object:

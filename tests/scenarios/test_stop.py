@@ -117,6 +117,17 @@ def test_system_0_stops_every_rover(make_world: MakeWorld) -> None:
     assert [t.state for t in world.tasks()] == [S.KILLED, S.KILLED]
 
 
+def test_one_rover_is_stopped_and_the_other_drives_on(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    world.client.move(5, speed=1.0, target=(1, 191))
+    world.client.move(5, speed=1.0, target=(2, 191))
+    world.run(3)
+    world.client.stop(target=(1, 191))
+    world.until(lambda: world.stands(1), within=BRAKING)
+    world.until_idle(tasks=2)
+    assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
+
+
 def test_stop_with_an_empty_queue_and_twice(world: World) -> None:
     first, second = world.client.stop(), world.client.stop()
     world.until(lambda: stands_in_hold(world), within=2)
@@ -279,6 +290,18 @@ def test_no_command_that_moves_passes_while_stopped(
     world.run(1)
     assert [a.result for a in world.client.acks[1:]] in ([TEMPORARILY_REJECTED], [DENIED])
     assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
+
+
+def test_hold_by_a_client_does_not_end_a_stop_that_is_under_way(world: World) -> None:
+    drive(world)
+    world.fault(Faults(refuse_mode=True))
+    world.client.stop()
+    world.run(0.5)
+    world.client.mode(4)
+    world.run(0.5)
+    world.fault(Faults())
+    world.until(lambda: stands_in_hold(world), within=BRAKING)
+    assert world.paused() is R.STOPPED
 
 
 @for_each("silence", [4.0, 4.1, 4.2])  # HOLD is sent every 0.25 s

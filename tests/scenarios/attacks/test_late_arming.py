@@ -85,6 +85,31 @@ def test_an_arming_that_its_disarming_has_overtaken_begins_no_task(waiting: Worl
     assert waiting.paused() is R.OPERATOR
 
 
+def test_our_own_arming_is_called_back_as_well(world: World) -> None:
+    caught = catch_arming(world)
+    world.client.move(5, speed=0.5)
+    world.until(lambda: bool(caught), within=5)
+    world.watched.loses = lambda *_: False
+    disarmed_at_last(world)
+    world.bring_late(caught[0])
+    world.run(2)
+    assert stays(world, 3)
+    assert not world.rover.autopilot.armed
+
+
+def test_nor_does_one_arm_it_that_comes_after_a_stop(world: World) -> None:
+    caught = catch_arming(world)
+    world.client.move(5, speed=0.5)
+    world.until(lambda: bool(caught), within=5)
+    world.watched.loses = lambda *_: False
+    world.client.stop()
+    world.run(0.5)
+    world.bring_late(caught[0])
+    world.run(2)
+    assert stays(world, 3)
+    assert not world.rover.autopilot.armed
+
+
 def test_a_second_copy_of_a_return_does_not_undo_a_hold(world: World) -> None:
     """The net brings it to the rover twice, once before the HOLD and once after it."""
     away_from_home(world)

@@ -10,6 +10,7 @@ from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
+    ARM,
     GUIDED,
     HOLD,
     MANUAL,
@@ -102,6 +103,12 @@ def test_old_sticks_modes_and_set_points_do_not_move_an_armed_rover(
     assert moved(world, 3) < 0.001
     assert world.rover.autopilot.mode is mode
     assert not passed & MOVING
+
+
+def test_an_old_forced_arming_does_not_arm(world: World) -> None:
+    in_the_standstill(world, command_long(ARM, 1, 21196, target=(1, 1)))
+    world.run(1)
+    assert not world.rover.autopilot.armed
 
 
 def test_a_submission_that_its_client_has_given_up_on_is_not_driven(world: World) -> None:

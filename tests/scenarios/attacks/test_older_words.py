@@ -12,6 +12,7 @@ from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
+    ARM,
     AUTO,
     GUIDED,
     HOLD,
@@ -103,6 +104,18 @@ def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str)
     world.run(1.5)
     copies(station, word, 6, world, each=1.0)
     assert driven_since(world, 2) < 0.001
+
+
+def test_copies_of_an_arming_do_not_arm_what_was_disarmed_since(world: World) -> None:
+    station, person = world.client, world.add_client("person")
+    word = command_long(ARM, 1, target=(1, 1))
+    station.send(word)
+    world.run(1)
+    person.arm(False)
+    world.run(1)
+    copies(station, word, 5, world, each=1.0)
+    world.run(1)
+    assert not world.rover.autopilot.armed
 
 
 @for_each("apart", [0.0, 0.02, 5.0])
