@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from mav_tasks import TaskStatus
 from mav_tasks.agents import submission
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.submission import Wish
-from mav_tasks.client.values import TaskStatus
 from mav_tasks.errors import Refused, UsageError
 from mav_tasks.settings import Settings
 from rover_sim.testing.options import RoverOptions

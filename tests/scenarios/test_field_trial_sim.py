@@ -11,7 +11,6 @@ from rover_sim.field_trial.rows import Row, Verdict, table
 from rover_sim.field_trial.rows_run import run_rows
 from rover_sim.field_trial.session import Session
 from rover_sim.frames import Frame
-from tests.kit.cases import for_each
 from tests.kit.trial_ground import MAKES, Make, TrialGround
 
 #: by default, and what each kind of rover can do
@@ -47,7 +46,7 @@ def trial(make: str, row: str) -> list[Row]:
 
 
 @pytest.mark.timeout(300)
-@for_each("make, row", CASES)
+@pytest.mark.parametrize(("make", "row"), CASES)
 def test_a_rover_as_it_is_holds_the_table(make: str, row: str) -> None:
     rows = trial(make, row)
     assert rows
