@@ -69,8 +69,9 @@ def for_each(names: str | Sequence[str], values: Iterable[Any]) -> Callable[[Tes
 def cases(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:
     """Yield arguments in which each value of each axis occurs."""
     most = max(len(values) for _, values in axes)
-    shifted = (
-        [values[(n + n // len(values)) % len(values)] for _, values in axes] for n in range(most)
+    shifted = (  # by another number for each axis, so that values do not meet in one order only
+        [values[(n + n // len(values) + k) % len(values)] for k, (_, values) in enumerate(axes)]
+        for n in range(most)
     )
     for row in product(*(values for _, values in axes)) if LONG else shifted:
         case: dict[str, Any] = {}
