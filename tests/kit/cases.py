@@ -59,7 +59,9 @@ def for_each(names: str | Sequence[str], values: Iterable[Any]) -> Callable[[Tes
             Parameter(name, Parameter.POSITIONAL_OR_KEYWORD)
             for name in dict.fromkeys(needs(plain, plain.__module__, given))
         ]
-        vars(run).update(plain=plain, axes=axes)
+        marks = [mark for mark in vars(test).get("pytestmark", []) if mark.name != "timeout"]
+        limit = pytest.mark.timeout(120 + 30 * sum(1 for _ in cases(axes))).mark
+        vars(run).update(plain=plain, axes=axes, pytestmark=[*marks, limit])
         vars(run)["__signature__"] = signature(plain).replace(parameters=needed)
         return run
 
