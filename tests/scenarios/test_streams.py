@@ -10,6 +10,7 @@ from mav_tasks.engine.inputs import (
     Input,
     LinkChanged,
     LinkSide,
+    Outgoing,
     PeerChanged,
 )
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
@@ -20,10 +21,13 @@ from rover_sim.faults import Faults
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
-from tests.kit.world import World, at, near_pose
+from tests.kit.world import COMMAND_ID, MODE_COMMAND, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 SEED = 31
+
+
+SET_MODE = 176  # the command
 ATTITUDE, POSITION, HEARTBEAT = 30, 32, 0
 
 
@@ -102,6 +106,28 @@ def test_who_drove_and_is_gone_leaves_no_velocity_behind_and_must_ask_again(
     world.client.mode(GUIDED)
     world.run(2)
     assert world.truth.forward_speed > 0.4
+
+
+@pytest.mark.patches_core
+def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(streams: World) -> None:
+    world, sent = streams, list[Outgoing]()
+    take_packets = world.server.engine.take_packets
+
+    def taken() -> list[Outgoing]:
+        packets = take_packets()
+        sent.extend(packets)
+        return packets
+
+    world.server.engine.take_packets = taken  # type: ignore[method-assign]
+    world.client.move(3)
+    world.until_state(1, S.EXECUTING)
+    world.run(1)
+    assert not any(outgoing.is_first for outgoing in sent)
+    world.client.stop()
+    world.until(world.stands, within=3)
+    firsts = [outgoing for outgoing in sent if outgoing.is_first]
+    assert firsts[0].data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
+    assert {outgoing.data[7] for outgoing in firsts} == {MODE_COMMAND}
 
 
 @for_each("seconds", [0.5, 5.0])
