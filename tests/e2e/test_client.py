@@ -289,8 +289,8 @@ async def test_handles_outlive_the_server(
     tmp_path: Path, number: int, state: TaskState, end: TaskState
 ) -> None:
     client_port, rover_port = free_udp_ports(2)
-    exact = ("--noise", "off")
-    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic", *exact)
+    ready = ("--boot", "none")
+    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic", *ready)
     with process(*rover, folder=tmp_path, name="rover"):
         with serve(tmp_path, client_port, rover_port, "first") as server:
             server.wait_for("rover 1: found")

@@ -207,8 +207,8 @@ def running(folder: Path, point: str) -> Any:
     """A rover, and a server that will die at the point; gives the stand."""
     client_port, rover_port, push_port = free_udp_ports(3)
     truth = folder / "truth.csv"
-    exact = ("--noise", "off")
-    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic", *exact)
+    ready = ("--boot", "none")
+    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic", *ready)
     with process(*rover, "--truth", str(truth), folder=folder, name="rover") as rover_process:
         module = ("tests.kit.crashing", point) if ":" in point else ("mav_tasks.cli",)
         with serving(folder, client_port, rover_port, *module, name="first") as server:

@@ -28,7 +28,7 @@ class Fleet:
         self.processes: dict[str, Process] = {}
         self.ports: dict[str, int] = {}
         self.truth = folder / "truth.csv"
-        rover = ["--port", str(self.rover_port), "--body", "kinematic", "--noise", "off"]
+        rover = ["--port", str(self.rover_port), "--body", "kinematic", "--boot", "none"]
         opened.enter_context(
             process("-m", "rover_sim", *rover, "--truth", str(self.truth), folder=folder, name="r")
         )
@@ -36,7 +36,7 @@ class Fleet:
     def add_rover(self, system_id: int) -> int:
         """Start another rover; return its port."""
         (port,) = free_udp_ports(1)
-        rover = ["--port", str(port), "--body", "kinematic", "--noise", "off"]
+        rover = ["--port", str(port), "--body", "kinematic", "--boot", "none"]
         rover += ["--system-id", str(system_id)]
         it = process("-m", "rover_sim", *rover, folder=self._folder, name=f"r{system_id}")
         self._opened.enter_context(it)

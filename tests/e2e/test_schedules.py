@@ -31,7 +31,7 @@ class Rover:
     @contextmanager
     def rover(self) -> Iterator[None]:
         port = str(self.rover_port)
-        sim = ("-m", "rover_sim", "--port", port, "--body", "kinematic", "--noise", "off")
+        sim = ("-m", "rover_sim", "--port", port, "--body", "kinematic", "--boot", "none")
         with process(*sim, folder=self.folder, name="rover"):
             yield
 

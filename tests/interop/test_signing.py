@@ -237,7 +237,7 @@ def test_the_same_bytes_again_do_nothing_not_even_after_sigkill(
     serve += ["--client", f"udpin:127.0.0.1:{port}?unsigned=refuse"]
     serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}", "--keys", str(ring)]
     rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic"]
-    rover += ["--noise", "off"]  # exact arithmetic
+    rover += ["--boot", "none"]
     with process(*rover, folder=tmp_path, name="rover"):
         with process(*serve, folder=tmp_path, name="first") as first:
             first.wait_for("rover 1: found")

@@ -137,7 +137,7 @@ def test_a_stop_while_the_rover_changes_hands_is_in_force_afterwards(
     third = next(it for it in reach.world.gateways.values() if it not in known)
     reach.world.cut(reach.first.name)
     reach.world.cut(third.name)
-    reach.world.until(lambda: reach.first.let_go, within=20)
+    assert reach.world.run_until(lambda: bool(reach.first.let_go), within=20)  # not a moment later
     assert not reach.is_at(reach.other)
     sent = reach.client(third if far else reach.first).stop()
     reach.world.until(lambda: reach.is_at(reach.other), within=IN_TRANSIT)

@@ -27,7 +27,7 @@ def test_three_tasks_are_driven_and_the_rover_is_handed_back(world: World) -> No
     world.client.rotate(90, priority=5)
     world.client.move(0.5, priority=8)
     world.until_idle(tasks=3)
-    assert near_pose(world.pose(), (1.5, 0.0, 90.0), metres=0.04)
+    assert near_pose(world.pose(), (1.5, 0.0, 90.0))
     world.until(lambda: not world.rover.autopilot.armed, within=3)
     assert world.rover.autopilot.mode is Mode.HOLD
 

@@ -165,6 +165,7 @@ class TestOneThatDrivesHomeWithoutUs:
         assert any("wrong mode, set HOLD first" in text for text in world.client.texts())
         ask_mode(world.client, HOLD)
         world.until(world.stands, within=5)
+        world.run(1.2)  # until its next heartbeat
         released = world.client.command(RELEASE, 1, AGAIN)
         world.run(0.2)
         assert released.answer == (ACCEPTED, 1)

@@ -177,7 +177,7 @@ def test_a_joystick_takes_the_rover_over(make_world: MakeWorld, persona: Persona
     world.run(2)
     party.operator.let_go()
     assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-    own = [text for text in party.popups if text.startswith("Failsafe: no offboard signal")]
+    own = [text for text in party.popups if text == "Failsafe activated"]
     assert len(own) == (persona is not PROMPT), "a PX4 rover itself says so, and stands"
     assert party.popups == own
     assert party.qgc.screen.violations == []

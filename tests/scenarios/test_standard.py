@@ -12,7 +12,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, AUTO, DENIED, RTL, set_mode
-from tests.kit.world import World, at, is_at, near_pose, put_home
+from tests.kit.world import OFF, World, at, is_at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, LOITER_TIME, RETURN, TAKEOFF, DELAY = 16, 19, 20, 22, 93
@@ -36,7 +36,7 @@ def test_go_to_drives_to_the_place(world: World, target: tuple[int, int], frame:
 def test_go_to_in_the_local_frame_and_then_a_heading(world: World) -> None:
     world.client.command_int(WAYPOINT, 1.0, 0, 0, -90, x=-12_000, y=10_000, frame=LOCAL)
     world.until_idle(tasks=1)
-    assert near_pose(world.pose(), (-1.2, 1.0, -90.0), metres=0.03)
+    assert near_pose(world.pose(), (-1.2, 1.0, -90.0))
 
 
 def test_go_to_in_three_forms_is_one_task(world: World) -> None:
@@ -71,7 +71,7 @@ def test_go_to_now_runs_at_once_and_the_other_goes_on_when_continued(
     assert is_at(world, 0.5, -1.0)
     world.client.proceed()
     world.until_idle(tasks=4)
-    assert near_pose(world.pose(), (3.3, 0.0, 0.0), metres=0.04)
+    assert near_pose(world.pose(), (3.3, 0.0, 0.0))
 
 
 @for_each("how", ["command", "mode", "old mode message"])
@@ -109,7 +109,7 @@ def test_a_heading_is_turned_to(
 ) -> None:
     world.client.command(YAW, *params, target=(1, 1))
     world.until_idle(tasks=1)
-    assert near_pose(world.pose(), (0.0, 0.0, yaw), metres=0.03)
+    assert near_pose(world.pose(), (0.0, 0.0, yaw))
 
 
 def test_delays_and_loiters_stand_and_takeoff_is_nothing(world: World) -> None:
@@ -122,7 +122,7 @@ def test_delays_and_loiters_stand_and_takeoff_is_nothing(world: World) -> None:
     assert takeoff.answer == (ACCEPTED, 0)
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
     assert world.task(1).progress.execution_time == pytest.approx(2.0, abs=0.3)
-    assert world.pose()[0] == pytest.approx(0.5, abs=0.03)
+    assert world.pose()[0] == pytest.approx(0.5, abs=OFF)
 
 
 def test_drive_and_heading_last_their_time(world: World) -> None:

@@ -118,7 +118,7 @@ def test_a_return_is_shown_and_driven(world: World) -> None:
     world.run(0.05)
     assert shown(world) == RETURN
     world.until_state(3, S.COMPLETED, within=30)
-    assert near_pose(world.pose(), (0.0, 0.0, 180.0), metres=0.05, angle=5)
+    assert near_pose(world.pose(), (0.0, 0.0, 180.0), angle=5)
 
 
 @for_each("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])

@@ -67,7 +67,7 @@ def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) ->
     world = driving
     at = world.now
     WAYS[way](world)
-    world.until_state(1, S.PAUSED, within=0.5)
+    world.until_state(1, S.PAUSED, within=1.2)  # arming shows with the next heartbeat
     world.run(0.1)
     paused_at = world.now
     world.run(5)
@@ -159,9 +159,9 @@ def test_a_foreign_disarm_withdraws_the_permission_to_arm_until_continue(world: 
     world.operator_mode(Mode.HOLD)
     world.run(0.5)
     world.operator_arm(True)
-    world.run(0.5)
+    world.run(1.2)
     world.operator_arm(False)  # this time nothing of ours runs
-    world.run(0.5)
+    world.run(1.2)
     at = world.now
     second = world.client.move(1)
     world.run(3)

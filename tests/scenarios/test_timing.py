@@ -152,7 +152,7 @@ def test_a_restart_forgets_no_figures(make_world: MakeWorld, tmp_path: Path) -> 
 
 
 def test_a_script_asks_for_them() -> None:
-    world = RoverWorld(RoverOptions(noise="off"), seed=1, settings=Settings())
+    world = RoverWorld(RoverOptions(), seed=1, settings=Settings())
     try:
         world.server.start()
         world.until(lambda: world.server.is_ready)

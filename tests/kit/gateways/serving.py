@@ -199,7 +199,7 @@ def serving(server: PostgresServer, folder: Path, names: str) -> Iterator[Servin
     """Run gateways and a rover for a ``with`` block."""
     with ExitStack() as ends:
         (rover_port, *clients) = free_udp_ports(1 + len(names))
-        rover = ["--port", str(rover_port), "--body", "kinematic", "--noise", "off"]
+        rover = ["--port", str(rover_port), "--body", "kinematic", "--boot", "none"]
         rover += ["--truth", str(folder / "truth.csv")]
         ends.enter_context(process("-m", "rover_sim", *rover, folder=folder, name="rover"))
         it = Serving(server, folder, server.new_database(), ends, rover_port)

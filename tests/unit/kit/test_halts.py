@@ -1,6 +1,5 @@
 """The rule of halts can fail, and is not broken by a rover that somebody let go."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -66,7 +65,7 @@ class Watched:
 
     @staticmethod
     def _state(north: float, speed: float) -> BodyState:
-        return replace(STANDING, north=north, forward_speed=speed)
+        return STANDING._replace(north=north, forward_speed=speed)
 
 
 @pytest.fixture

@@ -29,7 +29,6 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.restored import Restored
 from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 
@@ -43,7 +42,7 @@ def recorded(folder: Path, *, seconds: float = 2.5, **options: Any) -> Path:
     net = MemoryNet()
     world = VirtualWorld(net)
     body = KinematicBody(start=Pose(), slip=0.0, seed=None)
-    rover = make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
+    rover = make_vehicle(body, system_id=1, now=0.0)
     server = InMemoryServer(net, vehicles=("rover",), observers=[decisions])
     server.pump.handle(WallClock(UTC), now=0.0)
     world.join(RoverParty(rover, net.link("rover")), server)

@@ -1,28 +1,27 @@
 """The manoeuvres of the recordings of real autopilots, on a simulated rover in virtual time."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import cos, degrees, hypot, sin
 
 from mav_tasks.mavlink.messages import Message
 from rover_sim.body import BodyState, wrap_angle
 from rover_sim.frames import Frame
 from rover_sim.personas import ARDUPILOT, PX4
-from rover_sim.realism import EXACT, Drive, Realism
+from rover_sim.realism import Realism
 from tests.unit.rover_sim.rig import Px4Rig, Rig, body_velocity, heartbeat, velocity
 
 LOOK = 0.02  # s between two looks at the truth
 STANDS = 0.03  # m/s, as in the recordings' figures
-REAL_DRIVE = replace(EXACT, drive=Drive.REAL)  # an exact estimate: the drive train alone
 
 
-def ardupilot(frame: Frame, realism: Realism = REAL_DRIVE) -> Rig:
+def ardupilot(frame: Frame, realism: Realism | None = None) -> Rig:
     """Return an ArduPilot rover, armed in GUIDED."""
-    rig = Rig(persona=replace(ARDUPILOT, announces_changes=True).on(frame), realism=realism)
+    rig = Rig(persona=ARDUPILOT.on(frame), realism=realism)
     rig.ready_to_drive()
     return rig
 
 
-def px4(frame: Frame, realism: Realism = REAL_DRIVE) -> Px4Rig:
+def px4(frame: Frame, realism: Realism | None = None) -> Px4Rig:
     """Return a PX4 rover that points north, armed in OFFBOARD on zeros."""
     rig = Px4Rig(persona=PX4.on(frame), realism=realism)
     rig.ready_to_drive()

@@ -15,11 +15,10 @@ from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import BodyState, Pose
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import ARDUPILOT, PX4, Persona
-from rover_sim.realism import EXACT, Realism
+from rover_sim.realism import NO_BOOT, Realism
 from rover_sim.vehicle import make_vehicle
 
-#: shows each change at once, so that a test need not wait for the next second
-PROMPT = replace(ARDUPILOT, announces_changes=True)
+PROMPT = ARDUPILOT
 CLIENT = Address(250, 191)
 ROVER = Address(1, 1)
 ORIGIN = Pose()
@@ -37,6 +36,12 @@ READY = 1.0  # s after which a rover has started and can be armed
 M = TypeVar("M", bound=Message)
 
 
+def calm(persona: Persona) -> Realism:
+    """Return the realism of a rover that knows its place, is ready at once and answers at once."""
+    timing = replace(persona.realism.timing, first_answer=0.0, last_answer=0.0, in_pairs=False)
+    return replace(persona.realism, estimator=None, timing=timing, boot=NO_BOOT)
+
+
 class Rig:
     """One rover with system id 1, and what its client hears."""
 
@@ -47,13 +52,18 @@ class Rig:
         slip: float = 0.3,
         wait: float = READY,
         persona: Persona = PROMPT,
-        realism: Realism = EXACT,
+        realism: Realism | None = None,
         seed: int = 0,
     ) -> None:
         self.now = 1000.0
         body = kinematic_body(persona.frame, start=start, slip=slip, seed=None)
         self.vehicle = make_vehicle(
-            body, system_id=1, persona=persona, now=self.now, realism=realism, seed=seed
+            body,
+            system_id=1,
+            persona=persona,
+            now=self.now,
+            realism=realism or calm(persona),
+            seed=seed,
         )
         self.autopilot = self.vehicle.autopilot
         self.heard: list[Message] = []
@@ -177,7 +187,7 @@ class Px4Rig(Rig):
         start: Pose = ORIGIN,
         wait: float = READY,
         persona: Persona = PX4,
-        realism: Realism = EXACT,
+        realism: Realism | None = None,
         slip: float = 0.3,
     ) -> None:
         super().__init__(start=start, wait=wait, persona=persona, realism=realism, slip=slip)

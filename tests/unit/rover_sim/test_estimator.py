@@ -151,7 +151,7 @@ def test_over_a_drive_the_position_is_off_by_as_much_as_real_ones(
     error: EstimatorError, median: float, p95: float
 ) -> None:
     off: list[float] = []
-    for seed in range(16):
+    for seed in range(48):
         first, *seen = standing(error, seed, 240 * CONTROL_RATE)[::CONTROL_RATE]
         off += [math.hypot(each.north - first.north, each.east - first.east) for each in seen]
     assert percentile(off, 50) == near(median)
@@ -200,7 +200,7 @@ def test_the_turn_rate_is_as_noisy_as_real_ones(
 def test_a_wrong_heading_does_not_turn_the_measured_velocity() -> None:
     error = replace(EXACTLY, yaw=Wander(0.0, 1.0, least=math.radians(5), most=math.radians(5)))
     estimator = Estimator(error, seed=2)
-    moving = replace(STANDING, forward_speed=2.0)
+    moving = STANDING._replace(forward_speed=2.0)
     seen = estimator.see(moving, asked=2.0)
     course = seen.yaw + math.atan2(seen.lateral_speed, seen.forward_speed)
     assert abs(math.degrees(seen.yaw - moving.yaw)) > 2.0

@@ -24,8 +24,8 @@ from rover_sim.faults import Faults
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.manual_control import BodyByHand
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import make_vehicle
+from tests.unit.rover_sim.rig import PROMPT, calm
 
 LEFT = frozenset({Actuator.LEFT})
 
@@ -99,7 +99,7 @@ def rovers(count: int) -> list[HandledRover]:
     for number in range(1, count + 1):
         bare = kinematic_body(Frame.SKID, start=Pose(), slip=0.0, seed=None)
         body = BodyByHand(bare)
-        vehicle = make_vehicle(body, system_id=number, now=0.0, realism=EXACT)
+        vehicle = make_vehicle(body, system_id=number, now=0.0, realism=calm(PROMPT))
         handled.append(HandledRover(vehicle, body))
     return handled
 

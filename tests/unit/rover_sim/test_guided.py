@@ -36,7 +36,7 @@ def test_without_setpoints_it_drives_on_for_three_seconds_then_brakes() -> None:
     assert rig.last(m.Statustext).severity == 4
     braking_from = rig.truth
     braking_time = rig.until(lambda: rig.truth.forward_speed == 0.0, limit=4.0)
-    assert 1.8 < braking_time < 2.8
+    assert 1.8 < braking_time < 3.2
     assert distance_from(rig, braking_from.north, braking_from.east) == pytest.approx(2.3, abs=0.3)
 
 
@@ -48,7 +48,7 @@ def test_after_the_timeout_it_stays_armed_in_guided() -> None:
     seen = rig.last(m.Heartbeat)
     assert (seen.custom_mode, seen.base_mode & 128) == (GUIDED, 128)
     rig.run(2.0, velocity(1.0))
-    assert rig.truth.forward_speed == pytest.approx(1.0, abs=0.01)
+    assert rig.truth.forward_speed == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("rate", [50.0, 10.0, 1.0])
@@ -58,7 +58,7 @@ def test_setpoint_rates_from_50_to_1_hz_drive_smoothly(rate: float) -> None:
     rig.run(3.0, velocity(1.0), rate=rate)
     for _ in range(50):
         rig.run(0.1, velocity(1.0), rate=rate)
-        assert rig.truth.forward_speed == pytest.approx(1.0, abs=0.01)
+        assert rig.truth.forward_speed == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_setpoint_sent_while_disarmed_is_kept_and_driven_when_armed() -> None:

@@ -29,7 +29,8 @@ def read(rig: Px4Rig, name: bytes) -> m.ParamValue:
 def test_the_list_is_complete_numbered_in_order_and_has_what_clients_miss() -> None:
     rig = Px4Rig()
     rig.send(m.ParamRequestList(1, 1))
-    values = rig.take(m.ParamValue)
+    digest, *values = rig.take(m.ParamValue)
+    assert digest.param_id == "_HASH_CHECK"
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
     assert {value.param_type for value in values} == {INT32, REAL32}

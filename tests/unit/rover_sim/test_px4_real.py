@@ -11,7 +11,7 @@ from rover_sim.frames import Frame
 from rover_sim.modes import Mode
 from rover_sim.personas import PX4
 from rover_sim.px4_failsafe import Action, action_on_loss
-from tests.unit.rover_sim.manoeuvres import REAL_DRIVE, ahead, px4, record
+from tests.unit.rover_sim.manoeuvres import ahead, px4, record
 from tests.unit.rover_sim.rig import (
     BODY_NED,
     PX4_OFFBOARD,
@@ -25,7 +25,7 @@ from tests.unit.rover_sim.rig import (
 
 def facing(yaw: float, frame: Frame = Frame.DIFFERENTIAL, *, slip: float = 0.3) -> Px4Rig:
     """Return a rover that has stood there since it was armed, in OFFBOARD."""
-    rig = Px4Rig(start=Pose(yaw=yaw), persona=PX4.on(frame), realism=REAL_DRIVE, slip=slip)
+    rig = Px4Rig(start=Pose(yaw=yaw), persona=PX4.on(frame), slip=slip)
     assert rig.arm() == MavResult.ACCEPTED
     rig.run(1.0, velocity(1e-3 * cos(yaw), 1e-3 * sin(yaw)))
     assert rig.set_mode(PX4_OFFBOARD) == MavResult.ACCEPTED

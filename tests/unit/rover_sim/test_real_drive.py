@@ -18,7 +18,6 @@ from rover_sim.frames import Frame
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
 from rover_sim.personas import ARDUPILOT, Mode
-from rover_sim.realism import Wire
 from rover_sim.steering import Demand
 from tests.unit.rover_sim.manoeuvres import ahead, ardupilot, px4, record
 from tests.unit.rover_sim.rig import HOLD, PX4_HOLD, Rig, body_velocity
@@ -205,4 +204,4 @@ def moving(speed: float) -> BodyState:
 
 
 def parameters() -> Parameters:
-    return Parameters(ARDUPILOT.parameters, ARDUPILOT.parameter_protocol, Outbox(), wire=Wire.REAL)
+    return Parameters(ARDUPILOT.parameters, ARDUPILOT.parameter_protocol, Outbox())

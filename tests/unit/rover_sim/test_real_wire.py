@@ -6,7 +6,6 @@ from mav_tasks.mavlink.enums import MavCmd, MavLandedState, MavResult
 from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PX4
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import Peers, Vehicle, make_vehicle
 from tests.unit.rover_sim.real_rig import RealRig
 from tests.unit.rover_sim.rig import CLIENT, heartbeat
@@ -49,12 +48,6 @@ def test_ardupilot_accepts_to_tell_of_its_gimbal_and_has_none() -> None:
     assert rig.ask(MavCmd.REQUEST_MESSAGE, 280).result == MavResult.ACCEPTED
     assert [e.get_msgId() for e in rig.heard if e.get_msgId() == 280] == []
     assert rig.ask(MavCmd.REQUEST_MESSAGE, 12_000).result == MavResult.FAILED
-
-
-def test_an_exact_rover_sends_no_parameter_unasked() -> None:
-    rig = RealRig(ARDUPILOT, realism=EXACT)
-    rig.run(61.0)
-    assert rig.take(m.ParamValue) == []
 
 
 def met(peers: Peers) -> Vehicle:

@@ -10,7 +10,6 @@ from rover_sim.personas import ARDUPILOT, PX4
 from rover_sim.realism import (
     ARDUPILOT_ESTIMATOR,
     ARDUPILOT_REALISM,
-    EXACT,
     NO_BOOT,
     PX4_REALISM,
     Gps,
@@ -28,14 +27,10 @@ def test_a_rover_is_as_unkind_as_its_make_unless_told_otherwise() -> None:
     assert options("--persona px4").realism == PX4_REALISM
 
 
-def test_without_noise_it_is_exact_and_ready_at_once() -> None:
-    assert options("--noise off").realism == EXACT
-
-
 def test_a_boot_can_be_asked_for_by_itself() -> None:
     assert options("--boot real").realism.boot == ARDUPILOT.boot
     assert options("--boot none").realism.boot == NO_BOOT
-    assert options("--noise off --boot real --persona px4").realism.boot == PX4.boot
+    assert options("--boot real --persona px4").realism.boot == PX4.boot
 
 
 def test_a_metre_receiver_is_noisier() -> None:
@@ -49,7 +44,6 @@ def test_an_origin_can_be_kept_back() -> None:
 def test_px4_answers_its_first_peer_unless_told_otherwise() -> None:
     assert options("--persona px4").peers is Peers.FIRST
     assert options("--persona px4 --peers all").peers is Peers.ALL
-    assert options("--persona px4 --noise off").peers is Peers.ALL
     assert options("--persona generic").peers is Peers.ALL
     assert options("").peers is Peers.ALL
 
@@ -70,7 +64,7 @@ def test_it_starts_where_it_is_told_also_in_the_south(form: str) -> None:
         ("--home 91,8,488,0", "latitude is within 90 degrees, longitude within 180"),
         ("--sticks 99", "must be one or two pulses of 800 to 2200"),
         ("--sticks 1500,1500,1500", "must be one or two pulses of 800 to 2200"),
-        ("--noise loud", "invalid choice: 'loud'"),
+        ("--boot slow", "invalid choice: 'slow'"),
     ],
 )
 def test_what_cannot_be_is_refused(

@@ -8,7 +8,6 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from rover_sim.frames import Frame
 from rover_sim.personas import ARDUPILOT, PX4
-from rover_sim.realism import EXACT
 from tests.unit.rover_sim.real_rig import RealRig
 from tests.unit.rover_sim.rig import BODY_NED, MANUAL, VELOCITY_AND_RATE
 
@@ -116,15 +115,6 @@ def test_px4_has_no_receiver_unless_somebody_holds_a_transmitter() -> None:
     rig.autopilot.operator_pulses(1500, 1600)
     rig.run(1.5)
     assert rig.last(m.RcChannels).chan1_raw == 1600
-
-
-def test_an_exact_rover_does_not_heed_the_stick_and_shows_no_channels() -> None:
-    rig = RealRig(ARDUPILOT, realism=EXACT)
-    rig.get_ready()
-    rig.send(throttle(1750))
-    rig.run(2.0, velocity(0.0))
-    assert rig.truth.forward_speed == 0.0
-    assert rig.ask(MavCmd.REQUEST_MESSAGE, 65).result == MavResult.FAILED
 
 
 def test_a_rover_with_a_faster_frame_is_driven_faster() -> None:

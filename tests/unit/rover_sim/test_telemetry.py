@@ -28,6 +28,7 @@ STREAMED = {
     m.BatteryStatus,
     m.SystemTime,
     m.MissionCurrent,
+    m.RcChannels,
 }
 
 

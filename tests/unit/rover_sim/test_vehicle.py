@@ -11,15 +11,14 @@ from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
-from rover_sim.personas import Mode
-from rover_sim.realism import EXACT
+from rover_sim.personas import PX4, Mode
 from rover_sim.vehicle import Vehicle, make_vehicle
-from tests.unit.rover_sim.rig import heartbeat
+from tests.unit.rover_sim.rig import PX4_MANUAL, calm, heartbeat
 
 
 def fresh() -> Vehicle:
     body = KinematicBody(start=Pose(), slip=0.0, seed=None)
-    return make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
+    return make_vehicle(body, system_id=1, now=0.0, realism=calm(PX4), persona=PX4)
 
 
 def run(vehicle: Vehicle, until: float) -> set[object]:
@@ -105,7 +104,7 @@ def test_a_change_of_mode_is_seen_with_the_next_beat_and_no_sooner() -> None:
     for step in range(1, 161):
         now = step * 0.025
         if step == 90:
-            vehicle.autopilot.operator_mode(Mode.HOLD, now=now)
+            vehicle.autopilot.operator_mode(Mode.MANUAL, now=now)
         vehicle.handle_deadline(now=now)
         for _, data in vehicle.take_packets():
             message = decoder.decode(split_datagram(data)[0])
@@ -114,4 +113,4 @@ def test_a_change_of_mode_is_seen_with_the_next_beat_and_no_sooner() -> None:
     assert [late - early for (early, _), (late, _) in pairwise(seen)] == pytest.approx(
         [1.0] * (len(seen) - 1), abs=0.03
     )
-    assert [mode for at, mode in seen if at > 90 * 0.025] == [4, 4]
+    assert [mode for at, mode in seen if at > 90 * 0.025] == [PX4_MANUAL] * 2

@@ -14,7 +14,6 @@ from rover_sim.check_vehicle.contract import GROUPS, check_vehicle
 from rover_sim.check_vehicle.report import Line, Report
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Persona
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 
 START = 1000.0  # s
@@ -44,9 +43,7 @@ class VirtualWire:
     ) -> None:
         start = Pose(yaw=1.0)
         body = KinematicBody(start=start, slip=0.3, seed=None)
-        self.vehicle: Vehicle = make_vehicle(
-            body, system_id=1, persona=persona, now=START, realism=EXACT
-        )
+        self.vehicle: Vehicle = make_vehicle(body, system_id=1, persona=persona, now=START)
         self.setpoints: list[m.SetPositionTargetLocalNed] = []
         self.unsafe: list[m.SetPositionTargetLocalNed] = []
         self._shown_armed = False

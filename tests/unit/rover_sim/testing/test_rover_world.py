@@ -185,7 +185,7 @@ def test_each_submission_is_one_task_though_a_third_is_lost(served: RoverWorld) 
             assert handle.done().state is TaskState.COMPLETED
     assert [task.id for task in served.server.tasks] == [handle.id for handle in handles]
     driven = sum(goal.distance for goal in goals)
-    assert served.rovers[0].north == pytest.approx(driven, abs=0.1)
+    assert served.rovers[0].north == pytest.approx(driven, abs=0.2)
 
 
 def test_a_link_that_comes_back_lets_the_task_go_on(served: RoverWorld) -> None:
@@ -302,7 +302,7 @@ def test_it_has_a_time_of_day(served: RoverWorld) -> None:
 def test_what_is_waited_for_may_ask_a_client(served: RoverWorld) -> None:
     with served.sync_client() as tasks:
         task = tasks.submit(Move(1.0))
-        served.until(lambda: tasks.queue().running is None)
+        served.until(lambda: served.rovers[0].north > 0.9 and tasks.queue().running is None)
         seen = [status.state for status in task.updates()]
     assert seen == [TaskState.COMPLETED]
 
