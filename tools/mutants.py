@@ -2,6 +2,7 @@
 
     tools/mutants.py --count 200 --seed 1 --out figures.json         by all tests that only compute
     tools/mutants.py --count 200 --seed 1 --only tests/scenarios     by these tests alone
+    tools/mutants.py --mutants figures.json --only tests/unit        the survivors of a run, again
     tools/mutants.py --show 17 --seed 1                              print one mutant
 
 The mutants are a random sample, the same for the same seed and source. First each test runs once,
@@ -161,6 +162,16 @@ def sample(count: int, seed: int) -> list[Mutant]:
     ]
     print(f"{len(everything)} mutants in all", flush=True)
     return random.Random(seed).sample(everything, min(count, len(everything)))
+
+
+def survivors(figures: Path) -> list[Mutant]:
+    """Return the mutants that no test killed in an earlier run on the same source."""
+    fields = Mutant.__dataclass_fields__
+    return [
+        Mutant(**{name: result[name] for name in fields})
+        for result in json.loads(figures.read_text(encoding="utf-8"))
+        if not result["killed by"] and not result.get("unmeasured")
+    ]
 
 
 def mutated(mutant: Mutant) -> ast.Module:
@@ -390,10 +401,14 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", nargs="*", default=["tests"], metavar="PATH")
+    parser.add_argument("--mutants", type=Path, metavar="FILE")
     parser.add_argument("--show", type=int, metavar="N")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    mutants = sample(options.count, options.seed)
+    if options.mutants:
+        mutants = survivors(options.mutants)
+    else:
+        mutants = sample(options.count, options.seed)
     if options.show is not None:
         mutant = mutants[options.show]
         print(mutant)
