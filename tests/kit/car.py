@@ -1,6 +1,5 @@
 """A body with car-like steering."""
 
-from dataclasses import replace
 from math import cos, exp, sin
 
 from rover_sim.body import BodyState, Pose, wrap_angle
