@@ -38,19 +38,27 @@ class Wilful(KinematicBody):
         super().advance(duration)
 
 
-def driven(make_world: MakeWorld, speed: float, settings: Settings | None = None) -> World:
-    world = make_world(body=Wilful, settings=settings)
+def driven(
+    make_world: MakeWorld, speed: float, settings: Settings | None = None
+) -> tuple[World, Wilful]:
+    bodies: list[Wilful] = []
+
+    def body(start: Pose) -> Wilful:
+        bodies.append(Wilful(start))
+        return bodies[0]
+
+    world = make_world(body=body, settings=settings)
     world.client.move(40.0 * copysign(1, speed), speed=abs(speed))
     world.until(lambda: world.truth.forward_speed / speed > 0.95, within=20)
-    return world
+    return world, bodies[0]
 
 
 @pytest.mark.parametrize(("speed", "added"), [(0.1, 1.9), (0.5, 2.0), (1.0, 2.5), (0.5, 0.9)])
 def test_one_that_is_much_too_fast_is_stopped_and_its_task_held(
     make_world: MakeWorld, speed: float, added: float
 ) -> None:
-    world = driven(make_world, speed)
-    world.rover.body.added = added
+    world, body = driven(make_world, speed)
+    body.added = added
     most = 2 * speed + TOO_FAST
     if speed + added < most:
         world.run(4)
@@ -71,8 +79,8 @@ def test_one_that_circles_on_in_hold_is_disarmed_and_one_that_rolls_out_is_not(
     make_world: MakeWorld, brakes: float, disarm_after: float, is_disarmed: bool
 ) -> None:
     settings = Settings(watch=Watch(disarm_moving=disarm_after))
-    world = driven(make_world, 1.0, settings)
-    world.rover.body.brakes = brakes
+    world, body = driven(make_world, 1.0, settings)
+    body.brakes = brakes
     world.client.stop()
     world.until(lambda: world.rover.autopilot.mode is Mode.HOLD, within=0.9)
     at = world.now

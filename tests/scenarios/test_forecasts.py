@@ -44,7 +44,7 @@ def test_each_kind_begins_and_ends_when_it_was_foreseen(world: World) -> None:
     later = submit(world, MOVE, 0.5, 0, 0, 0, driven[2], 0, 9)
     foreseen = {task: (told(world, task), world.now) for task in (*driven[1:], later)}
     world.until_idle(tasks=len(driven) + 1, within=200)
-    came = {(e.task_id, e.new): e.at for e in world.events(TaskChanged)}
+    came = {(int(e.task_id), e.new): e.at for e in world.events(TaskChanged)}
     for task, (status, told_at) in foreseen.items():
         begins, ends = (came[task, state] - told_at for state in (S.STARTING, S.COMPLETED))
         assert status.time_to_start == pytest.approx(begins, rel=0.2, abs=2), task

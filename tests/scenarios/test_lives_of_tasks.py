@@ -155,7 +155,7 @@ def wishes(world: World, random: Random) -> list[Callable[[], object]]:
     live = [task for task in world.tasks() if task.state not in TERMINAL]
     mine = [task for task in live if task.vehicle == rover]
     any_one, number = (random.choice(several).id if several else 99 for several in (live, mine))
-    held = [task.id for task in mine if task.state is S.HELD] or [0]
+    held = [int(task.id) for task in mine if task.state is S.HELD] or [0]
     server = (rover, 191)
 
     def submit() -> None:

@@ -77,7 +77,8 @@ def way(place: LocalPlace, steering: Steering) -> Path:
 
 def test_what_lies_ahead_is_driven_to_straight_and_what_lies_behind_on_an_arc() -> None:
     ahead = way(LocalPlace(5.0, 0.0), CAR)
-    assert ([bend.curvature for bend in ahead], path_length(ahead)) == ([0.0], pytest.approx(5.0))
+    assert [bend.curvature for bend in ahead] == [0.0]
+    assert path_length(ahead) == pytest.approx(5.0)
     assert [bend.curvature > 0 for bend in way(LocalPlace(-10.0, 4.0), CAR)] == [True, False]
     beside_it = LocalPlace(0.0, 1.0)  # by reversing, or by a loop
     assert [run[0].length < 0 for run in runs_of(way(beside_it, CAR))] == [True, False]

@@ -66,7 +66,7 @@ def is_led(goal: SingleGoal, done: float, pose: Pose, end: Pose) -> bool:
 
 
 def test_there_is_no_way_back_where_it_goes_on_by_itself() -> None:
-    for goal, done, pose in (
+    cases: tuple[tuple[SingleGoal, float, Pose], ...] = (
         *((Move(10.0), 3.0, beside(along, 0.0)) for along in (0.0, 3.0, 3.5, 1.0, 9.99)),
         (Move(-10.0), 3.0, beside(-3.5, 0.0)),
         *((Move(10.0), 3.0, beside(3.0, across)) for across in (0.9, -0.9, ON_SPOT / 2)),
@@ -74,7 +74,8 @@ def test_there_is_no_way_back_where_it_goes_on_by_itself() -> None:
         *((Rotate(-2.0), 1.0, beside(0, 0.01, radians(t) - 1.0)) for t in (0, 29, -29)),
         (Drive(0.5, 0.1, 9.0), 3.0, beside(7.0, -8.0, 2.0)),  # these promise a time only
         (Wait(9.0), 3.0, beside(7.0, -8.0, 2.0)),
-    ):
+    )
+    for goal, done, pose in cases:
         assert back(goal, done, pose) is None, (goal, pose)
     assert back(Rotate(pi), 1.0, beside(0.0, 0.0, 1.0 + radians(31))) is not None
 
