@@ -37,7 +37,7 @@ LEFT_OUT = (
     *("unit/links", "unit/recording", "unit/store", "unit/test_runner.py", "unit/kit"),
     *("unit/test_runner_standstill.py", "unit/rover_sim", "unit/tools", "test_forbidden.py"),
 )
-BUDGET = 300.0  # s of processor time of its tests, after which a mutant counts as one that survived
+BUDGET = 300.0  # s of processor time, after which a mutant counts as one that survived
 PROBE = "_reached_mutant"
 
 SWAPS: dict[type, type] = {
@@ -405,10 +405,8 @@ def main() -> int:
     parser.add_argument("--show", type=int, metavar="N")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    if options.mutants:
-        mutants = survivors(options.mutants)
-    else:
-        mutants = sample(options.count, options.seed)
+    again = options.mutants
+    mutants = survivors(again) if again else sample(options.count, options.seed)
     if options.show is not None:
         mutant = mutants[options.show]
         print(mutant)
