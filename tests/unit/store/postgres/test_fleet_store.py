@@ -10,6 +10,7 @@ import pytest
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Renew, Take
 from mav_tasks.store import Evicted, IdsGranted, VehiclesLoaded, Which, kind_of
+from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.tasks.events import Event, QueuePaused, VehicleHalted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -106,7 +107,7 @@ def test_a_write_in_flight_is_over_before_an_eviction_ends(url: str) -> None:
                 try:
                     b.evict(a)
                     done.set()
-                except StoreError:  # it gives up waiting, and tries again
+                except PostgresError:  # it gives up waiting, and tries again
                     b.leases.connect()
 
         thread = threading.Thread(target=evict)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Renew, Take
 from mav_tasks.store import VehiclesLoaded, Which, kind_of
+from mav_tasks.store.postgres.failures import PostgresError
 from rover_sim.postgres import installed
 from tests.kit.postgres import PostgresServer
 from tests.kit.processes import wait_until
@@ -26,7 +26,7 @@ from tests.unit.store.postgres.gateways import (
 )
 from tests.unit.store.samples import OFFSET, loaded, opened, submitted
 
-STEP = 60.0  # s, by which the next holder of a vehicle signs ahead
+STEP = 3.0  # s, by which the next holder of a vehicle signs ahead
 ROOT = Path(__file__).resolve().parents[4]
 
 
@@ -59,7 +59,7 @@ def evict(by: Gateway, name: str) -> None:
     while True:
         try:
             by.evict_named(name)
-        except StoreError:  # it gives up waiting soon
+        except PostgresError:  # it gives up waiting soon
             by.leases.connect()
         else:
             return
