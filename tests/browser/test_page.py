@@ -71,15 +71,6 @@ def test_stop_acts_at_once_and_says_what_came_of_it(
     assert it.task(task["id"])["state"] == "killed"
 
 
-def test_caps_lock_does_not_keep_the_key_from_stopping(chromium: Any, it: Web) -> None:
-    with opened(chromium, it) as page:
-        page.evaluate(
-            "() => document.body.dispatchEvent(new KeyboardEvent('keydown',"
-            " {key: 's', shiftKey: true, bubbles: true}))"
-        )
-        says(page, "#stop-outcome", "STOP: acknowledged")
-
-
 @pytest.mark.parametrize("size", [DESKTOP, PHONE])
 def test_a_dialogue_covers_neither_stop_nor_its_outcome(
     chromium: Any, it: Web, size: tuple[int, int]
@@ -123,26 +114,6 @@ def test_stop_is_in_reach_above_a_dialogue(chromium: Any, it: Web, shots: Path) 
         page.keyboard.press("Escape")
         page.wait_for_selector(".box", state="detached")
         assert page.evaluate(FOCUSED) == "Add a task…"
-
-
-def test_a_keyboard_keeps_its_place_when_what_it_was_on_goes_away(chromium: Any, it: Web) -> None:
-    it.post("/vehicles/1/pause", {})
-    first = move(it, 0.1)["id"]
-    with opened(chromium, it) as page:
-        cancel = f"[data-task='{first}'] >> text=Cancel…"
-        for key, is_open in (("Enter", True), ("Escape", False), ("Enter", True)):
-            if key == "Enter":
-                page.focus(cancel)
-            page.keyboard.press(key)
-            page.wait_for_selector(".box", state="visible" if is_open else "detached")
-            assert (page.evaluate(FOCUSED) == "Cancel the task") is is_open
-        for _ in range(6):  # round and round: dialogue and STOP, and nothing behind them
-            assert page.evaluate("!!document.activeElement.closest('.box, .stops')")
-            page.keyboard.press("Tab")
-        page.focus(".box .main-word")
-        page.keyboard.press("Enter")
-        page.wait_for_selector(f"#panel-queue [data-task='{first}']", state="detached")
-        assert page.evaluate("document.activeElement.id") == "panel-queue"
 
 
 FOCUSED = "document.activeElement.textContent.trim()"
@@ -278,62 +249,6 @@ def test_a_waiting_task_is_changed(chromium: Any, it: Web, shots: Path) -> None:
 ORDER = "[...document.querySelectorAll('#panel-queue [data-task]')].map((e) => e.dataset.task)"
 
 
-def test_a_finger_drags_a_task_by_its_handle_and_else_scrolls(
-    chromium: Any, it: Web, shots: Path
-) -> None:
-    it.post("/vehicles/1/pause", {})
-    ids = [move(it, 0.1)["id"] for _ in range(12)]
-    last, first = ids[-1], ids[0]
-    with opened(chromium, it, size=PHONE, touch=True) as page:
-        page.click("[data-show=side]")
-        finger = page.context.new_cdp_session(page)
-
-        def touch(kind: str, x: float = 0.0, y: float = 0.0) -> None:
-            points = [] if kind == "touchEnd" else [{"x": x, "y": y}]
-            finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-
-        def middle(selector: str) -> tuple[float, float]:
-            box = page.locator(selector).bounding_box()
-            return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-        row = "#panel-queue [data-task='{}']"
-        third = ids[2]
-        x, y = middle(f"{row.format(third)} .grip")
-        above = middle(row.format(first))[1]
-        touch("touchStart", x, y)
-        for part in (0.25, 0.5, 0.75, 1.0):
-            touch("touchMove", x, y + (above - y) * part)
-        says(page, "#panel-queue .said", f"Task {third} will run before task {first}.")
-        assert page.is_visible(f"{row.format(first)}.over-above")
-        page.screenshot(path=str(shots / "finger.png"))
-        touch("touchEnd")
-        page.wait_for_function(f"() => {ORDER}[0] === '{third}'")
-        assert not page.query_selector(".over-above, .dragged")
-
-        # at the edge of the list it scrolls
-        page.locator(row.format(first)).scroll_into_view_if_needed()
-        x, y = middle(f"{row.format(first)} .grip")
-        edge = page.locator(".side").bounding_box()
-        touch("touchStart", x, y)
-        for part in (0.5, 1.0):
-            touch("touchMove", x, y + (edge["y"] + edge["height"] - 10 - y) * part)
-        says(page, "#panel-queue .said", f"will run after task {last}.")
-        touch("touchEnd")
-        page.wait_for_function(f"() => {ORDER}.at(-1) === '{first}'")
-
-        # a finger beside the handle scrolls, and moves no task
-        order = page.evaluate(ORDER)
-        page.evaluate("() => document.querySelector('.side').scrollTo(0, 0)")
-        x, y = middle(f"{row.format(ids[3])} .whys")
-        touch("touchStart", x, y)
-        for step in range(1, 9):
-            touch("touchMove", x, y - 20 * step)
-        touch("touchEnd")
-        page.wait_for_function("() => document.querySelector('.side').scrollTop > 0")
-        assert page.evaluate(ORDER) == order
-        judge(page, "touch")
-
-
 def test_tasks_are_cancelled_one_by_one_and_all(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     first, *_ = (move(it, 0.1)["id"] for _ in range(3))
@@ -434,25 +349,6 @@ def test_a_plan_is_dropped_looked_at_and_queued(
         path.write_text(plan)
         page.set_input_files("#plan-file", path)
         says(page, ".box", "chosen.txt: 3 items")
-
-
-def test_a_plan_on_a_phone_is_seen_on_the_map(
-    chromium: Any, it: Web, tmp_path: Path, shots: Path
-) -> None:
-    it.post("/vehicles/1/pause", {})
-    rover = it.get("/vehicles/1")
-    places = [(rover["latitude"] + north * 4e-5, rover["longitude"]) for north in range(4)]
-    rows = [ITEM.format(n, int(n == 0), 3 * (n > 0), *place) for n, place in enumerate(places)]
-    path = tmp_path / "yard.txt"
-    path.write_text("QGC WPL 110\n" + "".join(rows))
-    with opened(chromium, it, size=PHONE) as page:
-        page.click("[data-show=side]")
-        page.set_input_files("#plan-file", path)
-        says(page, ".box", "yard.txt: 3 items")
-        assert page.is_visible("#map")
-        page.screenshot(path=str(shots / "phone plan.png"))
-        page.keyboard.press("Escape")
-        page.wait_for_selector(".box", state="detached")
 
 
 def drop(page: Any, name: str, text: str) -> None:

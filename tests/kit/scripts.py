@@ -38,6 +38,10 @@ _PARAMS = [
 each_case = pytest.mark.parametrize(("persona", "face", "loss"), _PARAMS)
 #: of tests of half a minute
 some_cases = pytest.mark.parametrize(("persona", "face", "loss"), some(_PARAMS, 1, 2))
+#: where blocking calls show the same as awaited ones
+some_makes = pytest.mark.parametrize(
+    ("persona", "loss"), [("ardupilot", 0.0), ("px4", 0.0), ("generic", LOSS)]
+)
 a_net = pytest.mark.parametrize("loss", some([*NETS], -1), ids=NETS.get)
 
 
