@@ -103,27 +103,6 @@ def test_a_shell_can_complete_commands() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("queue", "-s", "pigeon:1"), ("pigeon:1", "udpout:host:port")),
-        (("submit", "move", "1", "--in", "soon"), ("--in soon", "1h30m")),
-        (("submit", "move", "1", "--in", "5s", "--at", "14:30"), ("--in and --at",)),
-        (("submit", "move", "1", "--at", "2020-01-01T10:00"), ("in the past",)),
-        (("submit", "wait", "-5"), ("DURATION -5",)),
-        (("modify", "3"), ("modify 3", "--priority")),
-        (("release", "perhaps"), ("release perhaps", "again, remainder or skip")),
-        (("release", "x", "again"), ("release x", "id of a task")),
-        (("clear", "--all"), ("--all", "--yes")),
-        (("mission", "upload", "no/such/file"), ("no/such/file", "No such file")),
-    ],
-)
-def test_wrong_usage_is_one_line_and_status_2(
-    arguments: tuple[str, ...], words: tuple[str, ...]
-) -> None:
-    assert_one_line(called(*arguments), 2, *words)
-
-
-@pytest.mark.parametrize(
     "arguments",
     [("nonsense",), ("submit", "move"), ("submit", "move", "far"), ("submit", "move", "1", "--no")],
 )
@@ -272,13 +251,6 @@ def test_who_submits_while_nothing_runs_is_told_so_and_what_to_do(server: str, h
     )
     assert called("submit", "move", "1", "--json", server=server).error == ""
     assert called("clear", server=server).status == 0
-
-
-def test_latitude_and_longitude_are_not_taken_for_metres(server: str) -> None:
-    done = called("submit", "goto", "47.3", "8.5", server=server)
-    assert_one_line(done, 2, "47.3 8.5", "--global", "--local")
-    assert_one_line(called("submit", "goto", "nan", "1", server=server), 2, "nan")
-    assert called("queue", "--json", server=server).objects[0]["waiting_count"] == 0
 
 
 def test_what_is_out_of_range_is_no_task(server: str, client: SyncClient) -> None:

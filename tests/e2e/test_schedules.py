@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks import Move, Refused, SyncClient
-from mav_tasks.client.values import TaskStatus
+from mav_tasks import Move, Refused, SyncClient, TaskStatus
 from tests.kit.commands import called
 from tests.kit.processes import Stand, free_udp_ports, process, stand, wait_until
 
