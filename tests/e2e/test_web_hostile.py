@@ -266,3 +266,55 @@ def test_who_has_no_token_learns_nothing_of_the_server(tmp_path: Path) -> None:
         assert (ready.status_code, ready.text) == (503, "no answer from the task server\n")
         for path in ("/metrics", "/api/v1/openapi.json", "/api/v1/session"):
             assert httpx.get(f"{url}{path}").status_code == 401
+
+
+def test_what_a_page_of_another_site_can_send_changes_nothing(page: Web) -> None:
+    """By DNS rebinding, by forms, by scripts: hosts, origins, types of bodies, doubled headers."""
+    host = page.url.removeprefix("http://")
+    ours = {"origin": f"http://{host}", "sec-fetch-site": "same-origin"}
+    refused = {
+        421: [{"host": name} for name in ("evil.example", "127.0.0.1.evil.example", "[::1]:1")],
+        403: [
+            *({"origin": each} for each in ("https://evil.example", "null", f"https://{host}")),
+            {"sec-fetch-site": "cross-site"},
+            {"sec-fetch-site": "same-site", "origin": f"http://{host}"},
+        ],
+        415: [
+            {"content-type": each}
+            for each in ("text/plain", "application/x-www-form-urlencoded", "multipart/form-data")
+        ],
+        200: [ours, {}, {"content-type": "application/json; charset=utf-8"}],
+    }
+    wrong: list[tuple[object, int]] = []
+    for status, cases in refused.items():
+        for headers in cases:
+            answer = page.client.post("/api/v1/stop", content="{}", headers=JSON | headers)
+            if answer.status_code != status:
+                wrong.append((headers, answer.status_code))
+    for name, one, two in (
+        ("host", host, "evil.example"),
+        ("sec-fetch-site", "cross-site", "same-origin"),
+        ("content-type", "text/plain", "application/json"),
+    ):
+        answer = page.client.get("/", headers=[(name, one), (name, two)])
+        if answer.status_code != 400:
+            wrong.append((name, answer.status_code))
+    assert wrong == []
+    for answer in (page.client.get("/"), page.client.get("/nothing")):
+        policy = answer.headers["content-security-policy"]
+        assert "default-src 'self'" in policy
+        assert "frame-ancestors 'none'" in policy
+        assert "unsafe" not in policy
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert "access-control-allow-origin" not in answer.headers
+
+
+def test_large_bodies_and_too_many_requests_are_refused_but_a_pause_never_is(page: Web) -> None:
+    for body in (b"x" * 70_000, iter([b"x" * 1024] * 70)):
+        assert page.client.post("/api/v1/stop", headers=JSON, content=body).status_code == 413
+    codes: set[int] = set()
+    while codes != {200, 429}:  # a program that asks without end
+        codes.add(page.client.get("/api/v1/vehicles").status_code)
+    for _ in range(3):
+        assert page.client.post("/api/v1/vehicles/1/pause", json={}).status_code == 204
+    page.post("/stop", {})
