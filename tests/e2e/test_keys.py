@@ -219,6 +219,14 @@ def test_a_revoked_key_sends_nothing_any_more_within_half_a_second(signed: Signe
             what="the log",
         )
         assert anna.submit(Move(0.1)).done(timeout=30).is_over, "STOP was not obeyed"
+        content = signed.ring.read_bytes()
+        signed.ring.write_text("[keys.anna")
+        signed.stand.server.wait_for("the keys in force stay")
+        signed.ring.unlink()
+        signed.stand.server.wait_for("was removed: the keys in force stay")
+        assert anna.vehicles()[0].id == 1
+        signed.ring.touch(0o600)
+        signed.ring.write_bytes(content)
 
 
 def test_a_key_is_in_force_as_soon_as_it_is_made(signed: Signed) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.kit.commands import called
 from tests.kit.processes import environment_with, free_tcp_ports, free_udp_ports, process
 
 
@@ -43,35 +44,27 @@ def test_a_port_in_use_is_named() -> None:
         )
 
 
-@pytest.mark.parametrize(
-    ("url", "word"),
-    [
-        ("carrier-pigeon:127.0.0.1:1", "udpin:host:port"),
-        ("udpin:127.0.0.1", "host:port"),
-        ("udpin:127.0.0.1:99999", "65535"),
-        ("udpin::14560", "host:port"),
-        ("tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
-        ("serial:/dev/null:57600", "not a serial device"),
-        ("udpin:no.such.host.invalid:14560", "no.such.host.invalid"),
-        ("", "udpin:host:port"),
-    ],
-)
-@pytest.mark.parametrize("option", ["--client", "--vehicle"])
-def test_a_link_that_says_nothing_is_named(option: str, url: str, word: str) -> None:
-    assert_one_clear_line(run("serve", "--no-push", option, url), word)
-
-
-@pytest.mark.parametrize(
-    "option",
-    [
-        ("--client", "udpin:0.0.0.0:14560"),
-        ("--vehicle", "udpout:192.0.2.1:14580"),
-        ("--push", "192.0.2.1:14550"),
-        ("--vehicle", "tcp:192.0.2.1:5760"),
-    ],
-)
-def test_a_link_beyond_this_machine_needs_a_key(option: tuple[str, str]) -> None:
-    assert_one_clear_line(run("serve", *option), "--insecure", "signing key")
+def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
+    """That of URLs is in tests/unit/links."""
+    ring = tmp_path / "keys.toml"
+    for command in (("add", "ben", "--role", "safety"), ("revoke", "ben"), ("add", "anna")):
+        role = ("--role", "safety") if command == ("add", "anna") else ()
+        assert called("keys", *command, *role, "--keys", str(ring)).status == 0
+    near = "udpin:127.0.0.1:1"
+    for option, url, *words in (
+        ("--client", "", "udpin:host:port"),
+        ("--vehicle", "tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
+        ("--client", "serial:/dev/null:57600", "not a serial device"),
+        ("--client", "udpin:0.0.0.0:14560", "--insecure", "signing key"),
+        ("--vehicle", "udpout:192.0.2.1:14580", "--insecure", "signing key"),
+        ("--push", "192.0.2.1:14550", "--insecure", "signing key"),
+        ("--vehicle", f"{near}?key=carl", "no key 'carl' (usable keys: anna)"),
+        ("--client", f"{near}?key=ben", "key ben was revoked on"),
+        ("--vehicle", f"{near}?key=anna", "key anna has role safety"),
+    ):
+        keys = ("--set", f"signing.keys={ring}") if "?key" in url else ()
+        push = () if option == "--push" else ("--no-push",)
+        assert_one_clear_line(run("serve", *push, option, url, *keys), *words)
 
 
 def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:
