@@ -1,5 +1,6 @@
 """The command line with two rovers: which of them is meant, and which need not be named."""
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -78,7 +79,7 @@ def test_stop_pause_and_resume_are_for_one_rover_or_for_all(server: str) -> None
 def test_if_no_rover_can_the_command_line_says_of_each_one_why(server: str) -> None:
     assert called("pause", "--vehicle", "1", server=server).status == 0
     assert called("stop", "--vehicle", "2", server=server).status == 0
-    done = called("submit", "move", "1", "--vehicle", "any", server=server)
+    done = called(*shlex.split("submit move 3 --vehicle any"), server=server)
     assert (done.status, done.error) == (
         1,
         "mav-tasks: no rover can: rover 1: queue paused (operator); rover 2: STOP in force\n",

@@ -67,13 +67,11 @@ def test_a_key_is_made_shown_once_listed_and_revoked(ring: Path) -> None:
     assert secret not in listed.output
     assert anna["limits"] == {}
 
-    given = keys(
-        *("add", "agent", "--role", "submitter", "--max-speed", "0.5", "--max-distance", "20"),
-        *("--max-priority", "5", "--quota", "3", "--tasks", "move,goto"),
-        ring=ring,
-    )
+    of_the_guide = "keys add agent --role submitter --max-distance 50 --max-speed 0.5 --quota 5"
+    more = ("--max-priority", "5", "--tasks", "move,goto")
+    given = keys(*of_the_guide.split()[1:], *more, ring=ring)
     assert given.status == 0, given.error
-    limits = {"max_speed": 0.5, "max_distance": 20.0, "max_priority": 5, "quota": 3}
+    limits = {"max_speed": 0.5, "max_distance": 50.0, "max_priority": 5, "quota": 5}
     (agent,) = called("keys", "list", "--json", "--keys", str(ring)).objects[2:]
     assert agent["limits"] == {"tasks": ["move", "goto"], **limits}
 

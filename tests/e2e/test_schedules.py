@@ -1,5 +1,6 @@
 """A series in real processes: killed between two runs and at the end of one; its commands."""
 
+import shlex
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -8,10 +9,14 @@ from pathlib import Path
 import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskStatus
-from tests.kit.commands import called
+from tests.kit.commands import Done, called, mav_tasks
 from tests.kit.processes import Stand, free_udp_ports, process, stand, wait_until
 
 PERIOD = 10  # s, the shortest
+WAY = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t0\t0\t0\t1
+1\t0\t2\t54000\t0.1\t0.5\t0\t0\t0\t0\t0\t1
+"""
 
 
 class Rover:
@@ -122,3 +127,24 @@ def test_a_series_is_submitted_looked_at_and_ended(server: str) -> None:
     assert queue["waiting_count"] == 0
     again = called("cancel", number, "--series", server=server)
     assert (again.status, "does not repeat" in again.error) == (1, True)
+
+
+def test_the_commands_of_the_guide_do_what_it_says(server: str, tmp_path: Path) -> None:
+    (tmp_path / "round.waypoints").write_text(WAY, encoding="ascii")
+
+    def run(line: str, task: str = "") -> Done:
+        words = shlex.split(line.replace("12", task) if task else line)
+        done = mav_tasks(*words, server=server, folder=tmp_path)
+        assert (done.status, done.error) == (0, ""), line
+        return done
+
+    patrol, mission = (
+        run(line).output.strip().rpartition(" ")[2]
+        for line in (
+            "submit move 5 --label patrol --every 1h --deadline 10m",
+            'mission upload round.waypoints --every "0 6 * * 1-5 Europe/Zurich"',
+        )
+    )
+    assert run("modify 12 --every never", mission).lines == [f"rover 1: task {mission} changed"]
+    ended = run("cancel --series 12", patrol)
+    assert ended.lines == [f"rover 1: task {patrol} cancelled, and its series"]

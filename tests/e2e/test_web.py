@@ -1,6 +1,9 @@
 """The HTTP API of a real web process, beside a real server and rover."""
 
+import json
+import shlex
 import signal
+import subprocess
 from collections.abc import Callable, Iterator
 from itertools import groupby
 from pathlib import Path
@@ -342,6 +345,17 @@ def test_a_server_that_is_killed_is_missed_and_found_again(tmp_path: Path) -> No
                 within=20,
                 what="a pause",
             )
+
+
+#: as in the guide
+WITH_CURL = """curl http://127.0.0.1:8560/api/v1/vehicles/1/tasks -H 'Content-Type: application/json' -d '{"goals": [{"kind": "move", "distance": 2}]}'"""  # noqa: E501
+
+
+def test_the_command_of_the_guide(page: Web) -> None:
+    curl, url, *options = shlex.split(WITH_CURL)
+    command = [curl, "-sS", url.replace("http://127.0.0.1:8560", page.url), *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)
+    assert json.loads(done.stdout)["what"] == "move 2 m"
 
 
 @awaited
