@@ -360,29 +360,3 @@ def drop(page: Any, name: str, text: str) -> None:
     )
     page.dispatch_event(".drop", "dragover", {"dataTransfer": transfer})
     page.dispatch_event(".drop", "drop", {"dataTransfer": transfer})
-
-
-def test_a_click_on_the_map_sends_turns_and_fences(chromium: Any, it: Web, shots: Path) -> None:
-    it.post("/vehicles/1/pause", {})
-    with opened(chromium, it) as page:
-        for word, title, button, shown in (
-            ("Go here", "Send rover 1 here", "Add the task", "go to"),
-            ("Face here", "Turn rover 1 to", "Add the task", "face"),
-        ):
-            page.click("#map", position={"x": 420, "y": 200})
-            page.click(f".leaflet-popup >> text={word}")
-            says(page, ".box h2", title)
-            page.click(f".box >> text='{button}'")
-            says(page, "#panel-queue .task", shown)
-        page.click("#map", position={"x": 420, "y": 200})
-        page.wait_for_selector(".leaflet-popup >> text=Fence here")
-        judge(page, "a click on the map")
-        page.screenshot(path=str(shots / "map click.png"))
-        page.click(".leaflet-popup >> text=Fence here")
-        says(page, ".box", "This replaces its present fence.")
-        page.fill(".box [name=radius]", "30")
-        page.click(".box >> text='Set the fence'")
-        page.wait_for_selector(".box", state="detached")
-        (shape,) = it.get("/vehicles/1/fence")["shapes"]
-        assert shape["radius"] == 30
-    it.send("DELETE", "/vehicles/1/fence", None)

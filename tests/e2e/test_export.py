@@ -115,34 +115,6 @@ def test_setpoints_tasks_and_texts_are_those_of_the_run(run: Run) -> None:
     assert "rover 1: task 1 starting" in {each["message"] for each in run.values("/tasks/log")}
 
 
-def one_clear_line(*arguments: str | Path) -> str:
-    """Run a command that fails; return its line."""
-    done = called("export", *map(str, arguments))
-    assert (done.status, done.output) == (2, "")
-    (line,) = done.error.splitlines()
-    return line.removeprefix("mav-tasks: ")
-
-
-@pytest.mark.slow
-def test_what_is_wrong_is_one_clear_line(run: Run, tmp_path: Path) -> None:
-    out, text = tmp_path / "out", tmp_path / "text"
-    text.write_text("no recording, but a text that is a little longer\n", encoding="ascii")
-    assert one_clear_line("--mcap", out, text) == f"{text}: not a telemetry log"
-    assert one_clear_line("--mcap", out, run.mcap) == f"{run.mcap}: not a telemetry log"
-    assert one_clear_line("--mcap", out, tmp_path) == f"{tmp_path}: not a file"
-    nowhere = tmp_path / "none"
-    missing = f"{nowhere}: No such file or directory"
-    assert one_clear_line("--mcap", out, nowhere) == missing
-    assert one_clear_line("--tlog", out, nowhere) == missing
-    assert one_clear_line("--tlog", out, text) == f"{text}: not an MCAP file"
-    assert one_clear_line("--tlog", out, text, text) == "--tlog takes one MCAP file, not 2"
-    assert one_clear_line("--mcap", nowhere / "out", run.log).startswith(f"{nowhere / 'out'}: No")
-    both = "choose one of --mcap OUT and --tlog OUT"
-    assert one_clear_line(run.log) == both
-    assert one_clear_line("--mcap", out, "--tlog", out, run.log) == both
-    assert list(tmp_path.iterdir()) == [text]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("way", ["--mcap", "--tlog"])
 def test_a_full_disk_leaves_nothing_behind(run: Run, tmp_path: Path, way: str) -> None:

@@ -35,7 +35,6 @@ _PARAMS = [
     pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}")
     for make, face, loss in CASES
 ]
-each_case = pytest.mark.parametrize(("persona", "face", "loss"), _PARAMS)
 #: of tests of half a minute
 some_cases = pytest.mark.parametrize(("persona", "face", "loss"), some(_PARAMS, 1, 2))
 #: where blocking calls show the same as awaited ones
