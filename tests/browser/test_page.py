@@ -171,28 +171,6 @@ def test_tasks_of_every_kind_are_added_with_the_form(chromium: Any, it: Web) -> 
     assert it.get("/vehicles/1/queue")["waiting_count"] == len(GOALS)
 
 
-def test_the_form_says_what_is_wrong(chromium: Any, it: Web) -> None:
-    with opened(chromium, it, may_fail=True) as page:
-        page.click("text=Add a task…")
-        page.wait_for_selector(".box [name=speed][placeholder='0.5 m/s by default']")
-        page.select_option(".box [name=kind]", "face")
-        page.wait_for_selector(".box [name=rate][placeholder='40 deg/s by default']")
-        page.select_option(".box [name=kind]", "move")
-        page.click(".box >> text='Add the task'")
-        says(page, ".box .failure", "Distance (m): Please fill out this field.")
-        page.fill(".box [name=distance]", "1000000")
-        page.click(".box >> text='Add the task'")
-        says(page, ".box .failure", "param1 distance")
-        page.fill(".box [name=distance]", "0.2")
-        page.fill(".box [name=delay]", "600")
-        page.click(".box >> text='Add the task'")
-        page.wait_for_selector(".box", state="detached")
-        says(page, "#panel-queue .task", "move 0.2 m")
-        page.click("text=Add a task…")
-        page.click(".box >> text='Back'")
-        page.wait_for_selector(".box", state="detached")
-
-
 def test_order_by_arrows_and_by_dragging_leaves_priorities_alone(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     first, second, third = (move(it, 0.1 * n, priority=n)["id"] for n in (5, 4, 3))

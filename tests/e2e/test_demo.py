@@ -63,17 +63,6 @@ def test_in_the_fleet_s_demo_a_gateway_is_killed_and_its_rovers_go_on() -> None:
 
 
 @pytest.mark.timeout(60)
-def test_a_part_that_cannot_run_is_named_at_once(tmp_path: Path) -> None:
-    (tmp_path / "pybullet.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    for options in (("--body", "bullet"), ("--fast", "--body", "bullet")):
-        done = demo(*options, environment=environment)
-        assert done.returncode == 2, done.stdout + done.stderr
-        assert "pip install pybullet" in done.stdout.strip().splitlines()[-1]
-        assert "Traceback" not in done.stderr
-
-
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize("after", [0.3, 4.0])
 def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
     running = subprocess.Popen(

@@ -176,14 +176,6 @@ def test_another_key_is_not_answered(connect: Callable[..., Signing]) -> None:
     assert client.unsigned == 0
 
 
-def test_nor_is_who_does_not_sign(running: Stand) -> None:
-    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{running.client_port}", source_system=255)
-    link.mav.heartbeat_send(6, 8, 0, 0, 4)
-    link.mav.command_long_send(1, 191, TASK_MOVE, 0, 1.0, 0, 0, 0, 0, 0, 0)
-    assert link.recv_match(blocking=True, timeout=SILENCE) is None
-    link.close()
-
-
 def stamp(seconds_ago: float) -> int:
     return int((time.time() - seconds_ago - 1_420_070_400) * 100_000)
 
