@@ -185,22 +185,17 @@ def test_a_text_file_gives_its_items_and_home() -> None:
     assert parse_plan(WPL) == WPL_READ
 
 
-@pytest.mark.parametrize(("text", "read"), [(PLAN, READ), (WPL, WPL_READ)])
-@pytest.mark.parametrize(
-    "written",
-    [
-        lambda text: text,
-        lambda text: "\ufeff" + text,
-        lambda text: text.replace("\n", "\r\n"),
-        lambda text: "\n \n" + text,
-    ],
-)
-def test_marks_and_line_ends_of_other_systems_change_nothing(
-    tmp_path: Path, text: str, read: PlanFile, written: Callable[[str], str]
-) -> None:
-    file = tmp_path / "of any name"
-    file.write_bytes(written(text).encode())
-    assert read_plan(file) == parse_plan(written(text)) == read
+def test_marks_and_line_ends_of_other_systems_change_nothing(tmp_path: Path) -> None:
+    for text, read in [(PLAN, READ), (WPL, WPL_READ)]:
+        for written in [
+            lambda text: text,
+            lambda text: "\ufeff" + text,
+            lambda text: text.replace("\n", "\r\n"),
+            lambda text: "\n \n" + text,
+        ]:
+            file = tmp_path / "of any name"
+            file.write_bytes(written(text).encode())
+            assert read_plan(file) == parse_plan(written(text)) == read
 
 
 def test_comments_and_any_blanks_are_allowed_in_a_text_file() -> None:
@@ -225,19 +220,17 @@ def test_another_program_reads_the_same_from_a_text_file(tmp_path: Path) -> None
     assert ours.home == (round(home.x * 1e7), round(home.y * 1e7), home.z)
 
 
-@pytest.mark.parametrize(
-    "first", ["1 3 16 0 0 0 0 47 8 0 1", "1 0 17 0 0 0 0 47 8 0 1"], ids=["frame", "command"]
-)
-def test_line_0_is_home_whatever_stands_in_it_and_without_one_no_line_is(first: str) -> None:
-    jump = "0 2 177 1 3 0 0 0 0 0 1"
-    plan = parse_plan(wpl(line(0, first), line(1), line(2, jump)))
-    assert plan.home == (470000000, 80000000, 0.0)
-    assert [item.command for item in plan.items] == [16, 177]
-    assert plan.items[1].params[0] == 0.0
-    plan = parse_plan(wpl(line(1, first), line(2), line(3, jump)))
-    assert plan.home is None
-    assert [item.command for item in plan.items][1:] == [16, 177]
-    assert plan.items[2].params[0] == 0.0
+def test_line_0_is_home_whatever_stands_in_it_and_without_one_no_line_is() -> None:
+    for first in ["1 3 16 0 0 0 0 47 8 0 1", "1 0 17 0 0 0 0 47 8 0 1"]:
+        jump = "0 2 177 1 3 0 0 0 0 0 1"
+        plan = parse_plan(wpl(line(0, first), line(1), line(2, jump)))
+        assert plan.home == (470000000, 80000000, 0.0)
+        assert [item.command for item in plan.items] == [16, 177]
+        assert plan.items[1].params[0] == 0.0
+        plan = parse_plan(wpl(line(1, first), line(2), line(3, jump)))
+        assert plan.home is None
+        assert [item.command for item in plan.items][1:] == [16, 177]
+        assert plan.items[2].params[0] == 0.0
 
 
 def test_the_target_of_a_jump_is_an_index_into_the_items() -> None:
@@ -288,9 +281,8 @@ def test_the_rally_points_as_they_are_sent() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("frame", "place", "xy"),
-    [
+def test_x_and_y_are_ints_in_the_unit_of_the_frame() -> None:
+    for frame, place, xy in [
         (0, (90, -180), (900000000, -1800000000)),
         (6, (47.39850995, -8.00000015), (473985100, -80000002)),  # ties, to even
         (11, (0.00000005, 0.00000015), (0, 2)),
@@ -298,13 +290,9 @@ def test_the_rally_points_as_they_are_sent() -> None:
         (9, (1.00005, -0.33333), (10000, -3333)),
         (2, (1000, -3), (1000, -3)),
         (3, (None, None), (0, 0)),
-    ],
-)
-def test_x_and_y_are_ints_in_the_unit_of_the_frame(
-    frame: int, place: tuple[object, object], xy: tuple[int, int]
-) -> None:
-    item = parse_plan(with_items(waypoint(command=22, frame=frame, params=at(*place)))).items[0]
-    assert (item.frame, item.x, item.y) == (frame, *xy)
+    ]:
+        item = parse_plan(with_items(waypoint(command=22, frame=frame, params=at(*place)))).items[0]
+        assert (item.frame, item.x, item.y) == (frame, *xy)
 
 
 @given(st.decimals(-90, 90, places=12), st.floats(-180, 180))
@@ -448,20 +436,22 @@ LINE_PROBLEMS: list[tuple[str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("text", "words"), ROOT_PROBLEMS)
-def test_an_error_names_the_part_of_the_file(text: str, words: str) -> None:
-    assert problem(text).startswith(words)
+def test_an_error_names_the_part_of_the_file() -> None:
+    for text, words in ROOT_PROBLEMS:
+        assert problem(text).startswith(words)
 
 
-@pytest.mark.parametrize(("item", "words"), ITEM_PROBLEMS)
-def test_an_error_names_the_item(item: object, words: str) -> None:
-    assert problem(with_items(waypoint(), item)).startswith(f"item 2: {words}")
+def test_an_error_names_the_item() -> None:
+    for item, words in ITEM_PROBLEMS:
+        assert problem(with_items(waypoint(), item)).startswith(f"item 2: {words}")
 
 
-@pytest.mark.parametrize(("words_of_line", "words"), LINE_PROBLEMS)
-def test_an_error_names_the_line(words_of_line: str, words: str) -> None:
-    text = wpl(line(0, "1 0 16 0 0 0 0 47 8 0 1"), "# a comment counts as a line\n", words_of_line)
-    assert problem(text).startswith(f"line 4: {words}")
+def test_an_error_names_the_line() -> None:
+    for words_of_line, words in LINE_PROBLEMS:
+        text = wpl(
+            line(0, "1 0 16 0 0 0 0 47 8 0 1"), "# a comment counts as a line\n", words_of_line
+        )
+        assert problem(text).startswith(f"line 4: {words}")
 
 
 def test_items_are_counted_as_on_the_map_of_the_planner() -> None:

@@ -131,30 +131,3 @@ def test_what_a_client_has_set_is_shown_from_the_store(run: Run, tmp_path: Path)
     before = path.read_bytes()
     assert read_parameters(str(path)) == {"TSK_SPEED": 2.5}
     assert path.read_bytes() == before
-
-
-@pytest.mark.parametrize("name", ["tasks.sqlite3", "~/tasks.sqlite3"])
-def test_a_store_is_looked_at_by_whatever_name_the_server_takes(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.chdir(tmp_path)
-    with closing(SqliteStore(name, wall_offset=lambda: 0.0)) as store:
-        store.append([ParameterSet("TSK_SPEED", 1.5, "255/190@x:1", 1.0)])
-    shown = run("config", "show", "driving.speed", environment={"MAV_TASKS_STORE": name})
-    assert shown == (0, "driving.speed = 1.5  # m/s, TSK_SPEED, set by a client\n", "")
-
-
-@pytest.mark.parametrize("text", ["no database", ""])
-def test_a_store_that_cannot_be_looked_at_keeps_nothing_from_being_shown(
-    run: Run, tmp_path: Path, text: str
-) -> None:
-    path = tmp_path / "tasks.sqlite3"
-    path.write_text(text, encoding="utf-8")
-    code, output, error = run(
-        "config", "show", "driving", environment={"MAV_TASKS_STORE": str(path)}
-    )
-    assert code == 0
-    assert "driving.speed = 0.5" in output
-    assert bool(text) is (f"parameters set by clients are not shown: store {path}" in error)
-    assert path.read_text(encoding="utf-8") == text
