@@ -183,7 +183,7 @@ def test_a_bad_request_is_answered_with_its_status(running: Stand, port: int) ->
     ):
         with socket.create_connection(("127.0.0.1", port), timeout=LIMIT) as connection:
             connection.sendall(request)
-            answer = b"".join(iter(lambda: connection.recv(65_536), b""))  # noqa: B023
+            answer = b"".join(iter(lambda: connection.recv(65_536), b""))
         assert answer.startswith(f"HTTP/1.1 {status} ".encode()), request
 
 
