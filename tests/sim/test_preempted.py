@@ -41,27 +41,29 @@ def end_of(seed: int, submit: Callable[[World], object], *others: Callable[[Worl
         return world.pose()
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_move_interrupted_by_a_turn_and_another_move(seed: int) -> None:
-    def move(world: World) -> object:
-        return world.client.move(3.0, priority=2)
+def test_a_move_interrupted_by_a_turn_and_another_move() -> None:
+    for seed in [1, 2, 3]:
 
-    interrupted = end_of(
-        seed,
-        move,
-        lambda world: world.client.rotate(120, priority=8),
-        lambda world: world.client.move(0.6, priority=7),
-    )
-    assert near_pose(interrupted, end_of(seed, move), metres=0.03, angle=1.5)
+        def move(world: World) -> object:
+            return world.client.move(3.0, priority=2)
+
+        interrupted = end_of(
+            seed,
+            move,
+            lambda world: world.client.rotate(120, priority=8),
+            lambda world: world.client.move(0.6, priority=7),
+        )
+        assert near_pose(interrupted, end_of(seed, move), metres=0.03, angle=1.5)
 
 
-@pytest.mark.parametrize("seed", [4, 5])
-def test_a_turn_interrupted_by_a_move(seed: int) -> None:
-    def turn(world: World) -> object:
-        return world.client.rotate(150, priority=2)
+def test_a_turn_interrupted_by_a_move() -> None:
+    for seed in [4, 5]:
 
-    interrupted = end_of(seed, turn, lambda world: world.client.move(-0.5, priority=8))
-    undisturbed = end_of(seed, turn)
-    # On ground like this a turn alone leaves its spot by some centimetres; interrupted, by no more.
-    assert hypot(*interrupted[:2]) <= hypot(*undisturbed[:2]) + 0.03
-    assert abs(interrupted[2] - undisturbed[2]) < 1.5
+        def turn(world: World) -> object:
+            return world.client.rotate(150, priority=2)
+
+        interrupted = end_of(seed, turn, lambda world: world.client.move(-0.5, priority=8))
+        undisturbed = end_of(seed, turn)
+        # On ground like this a turn alone leaves its spot by some centimetres; interrupted, by no more.
+        assert hypot(*interrupted[:2]) <= hypot(*undisturbed[:2]) + 0.03
+        assert abs(interrupted[2] - undisturbed[2]) < 1.5

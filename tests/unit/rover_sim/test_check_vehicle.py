@@ -16,7 +16,6 @@ from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import split_datagram
 from rover_sim.check_vehicle.context import Options
-from rover_sim.check_vehicle.contract import NothingHeard
 from rover_sim.check_vehicle.report import Outcome
 from rover_sim.faults import Faults
 from rover_sim.modes import Mode
@@ -30,53 +29,42 @@ REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, ARM_DISARM = 512, 511, 400
 MOTION = (m.SetPositionTargetLocalNed, m.SetPositionTargetGlobalInt)
 
 
-@pytest.mark.parametrize("name", PERSONAS)
-def test_a_simulated_rover_of_each_make_passes(name: str) -> None:
-    wire = VirtualWire(PERSONAS[name])
-    report = run(wire, ALL)
-    assert [str(line) for line in report.failed] == []
-    assert [line.name for line in report.lines if line.outcome is Outcome.SKIPPED] == []
-    assert sum(line.outcome is Outcome.OK for line in report.lines) >= 80
-    assert not wire.vehicle.autopilot.armed
-    assert wire.vehicle.autopilot.mode is Mode.HOLD
-    assert abs(wire.vehicle.truth.forward_speed) < 0.05
-    assert math.hypot(wire.vehicle.truth.north, wire.vehicle.truth.east) > 2.0  # it did drive
+def test_a_simulated_rover_of_each_make_passes() -> None:
+    for name in PERSONAS:
+        wire = VirtualWire(PERSONAS[name])
+        report = run(wire, ALL)
+        assert [str(line) for line in report.failed] == []
+        assert [line.name for line in report.lines if line.outcome is Outcome.SKIPPED] == []
+        assert sum(line.outcome is Outcome.OK for line in report.lines) >= 80
+        assert not wire.vehicle.autopilot.armed
+        assert wire.vehicle.autopilot.mode is Mode.HOLD
+        assert abs(wire.vehicle.truth.forward_speed) < 0.05
+        assert math.hypot(wire.vehicle.truth.north, wire.vehicle.truth.east) > 2.0  # it did drive
 
 
-@pytest.mark.parametrize("name", PERSONAS)
-def test_by_default_it_neither_arms_nor_moves_nor_changes_what_is_stored(name: str) -> None:
-    asked: list[Message] = []
+def test_by_default_it_neither_arms_nor_moves_nor_changes_what_is_stored() -> None:
+    for name in PERSONAS:
+        asked: list[Message] = []
 
-    def hears(message: Message) -> Message:
-        asked.append(message)
-        return message
+        def hears(message: Message) -> Message:
+            asked.append(message)
+            return message
 
-    wire = VirtualWire(PERSONAS[name], hears=hears)
-    before = wire.vehicle.autopilot.mode
-    values = dict(wire.vehicle.autopilot.parameters._values)
-    report = run(wire, NOTHING)
-    assert report.failed == []
-    commands = {each.command for each in asked if isinstance(each, m.CommandLong)}
-    assert commands == {REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, 510, 176, 31_999}
-    stored = (m.MissionCount, m.MissionItemInt, m.MissionClearAll)
-    assert not any(isinstance(each, stored) for each in asked)
-    assert all((each.vx, each.vy) == (0.0, 0.0) for each in wire.setpoints)
-    # the one that was set to what it is went through a float of 32 bits
-    assert wire.vehicle.autopilot.parameters._values == pytest.approx(values, rel=1e-6)
-    after = Mode.MANUAL if before is Mode.INITIALISING else before
-    assert wire.vehicle.autopilot.mode is after  # as it was
-    assert (wire.vehicle.truth.north, wire.vehicle.truth.east) == (0.0, 0.0)
-
-
-def test_what_was_stored_is_put_back() -> None:
-    wire = VirtualWire(PX4)
-    mission = wire.vehicle.autopilot.missions
-    item = m.MissionItemInt(0, 0, 0, 3, 16, 0, 1, 5.0, 0.0, 0.0, 0.0, -353632000, 1491652000, 7.0)
-    mission._lists[0].append(item)
-    before = mission.plan_id(0)
-    run(wire, Options(write=True), ("identity", "plans"))
-    assert mission.plan_id(0) == before != 0
-    assert [mission.stored(kind) for kind in (1, 2)] == [(), ()]
+        wire = VirtualWire(PERSONAS[name], hears=hears)
+        before = wire.vehicle.autopilot.mode
+        values = dict(wire.vehicle.autopilot.parameters._values)
+        report = run(wire, NOTHING)
+        assert report.failed == []
+        commands = {each.command for each in asked if isinstance(each, m.CommandLong)}
+        assert commands == {REQUEST_MESSAGE, SET_MESSAGE_INTERVAL, 510, 176, 31_999}
+        stored = (m.MissionCount, m.MissionItemInt, m.MissionClearAll)
+        assert not any(isinstance(each, stored) for each in asked)
+        assert all((each.vx, each.vy) == (0.0, 0.0) for each in wire.setpoints)
+        # the one that was set to what it is went through a float of 32 bits
+        assert wire.vehicle.autopilot.parameters._values == pytest.approx(values, rel=1e-6)
+        after = Mode.MANUAL if before is Mode.INITIALISING else before
+        assert wire.vehicle.autopilot.mode is after  # as it was
+        assert (wire.vehicle.truth.north, wire.vehicle.truth.east) == (0.0, 0.0)
 
 
 # -- broken rovers
@@ -388,16 +376,18 @@ FAULTS: dict[str, Fault] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FAULTS)
-def test_what_is_wrong_is_named_and_nothing_else(name: str) -> None:
-    fault = FAULTS[name]
-    wire = VirtualWire(fault.persona, says=fault.says, hears=fault.hears, packets=fault.packets())
-    wire.vehicle.autopilot.set_faults(fault.faults)
-    report = run(wire, fault.options, fault.groups)
-    assert {line.name for line in report.failed} == fault.lines
-    for line in report.failed:
-        assert "expected" in line.said
-        assert "seen" in line.said
+def test_what_is_wrong_is_named_and_nothing_else() -> None:
+    for name in FAULTS:
+        fault = FAULTS[name]
+        wire = VirtualWire(
+            fault.persona, says=fault.says, hears=fault.hears, packets=fault.packets()
+        )
+        wire.vehicle.autopilot.set_faults(fault.faults)
+        report = run(wire, fault.options, fault.groups)
+        assert {line.name for line in report.failed} == fault.lines
+        for line in report.failed:
+            assert "expected" in line.said
+            assert "seen" in line.said
 
 
 def test_a_rover_that_cannot_be_disarmed_is_left_in_hold_and_said_so() -> None:
@@ -406,25 +396,6 @@ def test_a_rover_that_cannot_be_disarmed_is_left_in_hold_and_said_so() -> None:
     assert {"left behind", "disarm while driving"} <= {line.name for line in report.failed}
     assert wire.vehicle.autopilot.mode is Mode.HOLD
     assert abs(wire.vehicle.truth.forward_speed) < 0.05
-
-
-def test_the_text_of_a_refusal_is_in_the_line() -> None:
-    wire = VirtualWire(ARDUPILOT)
-    wire.vehicle.autopilot.set_faults(Faults(refuse_arm=True))
-    (line,) = run(wire, Options(arm=True), ("arming",)).failed
-    assert "Arm: refused by a simulated fault" in line.said
-
-
-def test_another_make_than_was_asked_for_fails() -> None:
-    report = run(VirtualWire(PX4), Options(persona="ardupilot"), ("identity",))
-    assert [line.name for line in report.failed] == ["autopilot"]
-
-
-def test_nothing_heard_is_said_so() -> None:
-    wire = VirtualWire(ARDUPILOT)
-    wire.vehicle.autopilot.set_faults(Faults(silent=True))
-    with pytest.raises(NothingHeard, match="no heartbeat"):
-        run(wire, NOTHING)
 
 
 # -- whatever happens while it drives
@@ -449,50 +420,45 @@ def break_down(_wire: VirtualWire) -> None:
     raise RuntimeError("a fault of our own")
 
 
-@pytest.mark.parametrize("name", PERSONAS)
-@pytest.mark.parametrize(
-    ("accident", "error"), [(interrupt, KeyboardInterrupt), (break_down, RuntimeError)]
-)
-def test_it_ends_with_zeros_hold_and_disarmed(
-    name: str, accident: Callable[[VirtualWire], None], error: type[BaseException]
-) -> None:
-    wire = VirtualWire(PERSONAS[name], at=while_driving(accident))
-    with pytest.raises(error):
-        run(wire, ALL, ("driving",))
-    last = wire.setpoints[-1]
-    assert (last.vx, last.vy, last.yaw_rate) == (0.0, 0.0, 0.0)
-    assert wire.vehicle.autopilot.mode is Mode.HOLD
-    assert not wire.vehicle.autopilot.armed
+def test_it_ends_with_zeros_hold_and_disarmed() -> None:
+    for name in PERSONAS:
+        for accident, error in [(interrupt, KeyboardInterrupt), (break_down, RuntimeError)]:
+            wire = VirtualWire(PERSONAS[name], at=while_driving(accident))
+            with pytest.raises(error):
+                run(wire, ALL, ("driving",))
+            last = wire.setpoints[-1]
+            assert (last.vx, last.vy, last.yaw_rate) == (0.0, 0.0, 0.0)
+            assert wire.vehicle.autopilot.mode is Mode.HOLD
+            assert not wire.vehicle.autopilot.armed
 
 
-@pytest.mark.parametrize("name", PERSONAS)
-def test_a_rover_that_somebody_else_takes_gets_no_other_motion(name: str) -> None:
-    taken: list[int] = []
+def test_a_rover_that_somebody_else_takes_gets_no_other_motion() -> None:
+    for name in PERSONAS:
+        taken: list[int] = []
 
-    def take(wire: VirtualWire) -> None:
-        wire.vehicle.autopilot.operator_mode(Mode.MANUAL, now=wire.now())
-        taken.append(len(wire.setpoints))
+        def take(wire: VirtualWire) -> None:
+            wire.vehicle.autopilot.operator_mode(Mode.MANUAL, now=wire.now())
+            taken.append(len(wire.setpoints))
 
-    wire = VirtualWire(PERSONAS[name], at=while_driving(take))
-    report = run(wire, ALL, ("driving",))
-    (line,) = report.failed
-    assert "it left the control mode" in line.said
-    late = [each for each in wire.setpoints[taken[0] :] if (each.vx, each.vy) != (0.0, 0.0)]
-    assert len(late) <= 21  # those of the second until the next heartbeat
+        wire = VirtualWire(PERSONAS[name], at=while_driving(take))
+        report = run(wire, ALL, ("driving",))
+        (line,) = report.failed
+        assert "it left the control mode" in line.said
+        late = [each for each in wire.setpoints[taken[0] :] if (each.vx, each.vy) != (0.0, 0.0)]
+        assert len(late) <= 21  # those of the second until the next heartbeat
 
 
-@pytest.mark.parametrize(
-    ("kind", "named"), [(m.Heartbeat, "no heartbeat"), (m.LocalPositionNed, "no LOCAL_POSITION")]
-)
-def test_it_does_not_drive_blind(kind: type[Message], named: str) -> None:
-    def lose(wire: VirtualWire) -> None:
-        wire.vehicle.autopilot.set_faults(Faults(withheld=frozenset({kind.id})))
+def test_it_does_not_drive_blind() -> None:
+    for kind, named in [(m.Heartbeat, "no heartbeat"), (m.LocalPositionNed, "no LOCAL_POSITION")]:
 
-    wire = VirtualWire(ARDUPILOT, at=while_driving(lose))
-    report = run(wire, ALL, ("driving",))
-    assert any(named in line.said for line in report.failed)
-    assert wire.vehicle.autopilot.mode is Mode.HOLD
-    assert not wire.vehicle.autopilot.armed
+        def lose(wire: VirtualWire) -> None:
+            wire.vehicle.autopilot.set_faults(Faults(withheld=frozenset({kind.id})))
+
+        wire = VirtualWire(ARDUPILOT, at=while_driving(lose))
+        report = run(wire, ALL, ("driving",))
+        assert any(named in line.said for line in report.failed)
+        assert wire.vehicle.autopilot.mode is Mode.HOLD
+        assert not wire.vehicle.autopilot.armed
 
 
 def test_no_motion_is_asked_of_a_rover_that_is_armed_by_somebody_else() -> None:
@@ -527,33 +493,8 @@ GENUINE = {
 }
 
 
-@pytest.mark.parametrize("what", GENUINE)
-def test_what_genuine_ones_do_is_no_fault(what: str) -> None:
-    persona, says = GENUINE[what]
-    report = run(VirtualWire(persona, says=says), NOTHING)
-    assert [str(line) for line in report.failed] == []
-
-
-def test_a_message_that_is_accepted_and_not_sent_is_a_fault_only_where_it_is_needed() -> None:
-    def says(message: Message) -> list[Message]:
-        if isinstance(message, m.CommandAck) and message.command == REQUEST_MESSAGE:
-            message.result = 0
-        return [message]
-
-    report = run(VirtualWire(ARDUPILOT, says=says), NOTHING, ("identity", "commands"))
-    failed = {line.name for line in report.failed}
-    assert "GIMBAL_MANAGER_INFORMATION on request" not in failed
-    assert "an unknown message" in failed
-    none = run(VirtualWire(ARDUPILOT, says=no_refusals), NOTHING, ("identity", "commands"))
-    assert "GIMBAL_MANAGER_INFORMATION on request" in {line.name for line in none.failed}
-
-
-def test_a_px4_that_accepts_a_mode_that_there_is_not_may_not_leave_its_own() -> None:
-    def says(message: Message) -> list[Message]:
-        if isinstance(message, m.CommandAck) and message.command == 176:
-            message.result = 0
-        return [message]
-
-    assert run(VirtualWire(PX4, says=says), NOTHING, ("identity", "modes")).failed == []
-    failed = run(VirtualWire(ARDUPILOT, says=says), NOTHING, ("identity", "modes")).failed
-    assert [line.name for line in failed] == ["a mode that does not exist"]
+def test_what_genuine_ones_do_is_no_fault() -> None:
+    for what in GENUINE:
+        persona, says = GENUINE[what]
+        report = run(VirtualWire(persona, says=says), NOTHING)
+        assert [str(line) for line in report.failed] == []

@@ -10,7 +10,6 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
 from rover_sim.personas import ARDUPILOT, PX4, Persona
 from tests.unit.rover_sim.real_rig import RealRig
-from tests.unit.rover_sim.rig import HOLD
 
 
 def delays_of(persona: Persona) -> list[float]:
@@ -26,15 +25,11 @@ def delays_of(persona: Persona) -> list[float]:
     return delays
 
 
-@pytest.mark.parametrize(
-    ("persona", "median", "most"), [(ARDUPILOT, 0.011, 0.024), (PX4, 0.004, 0.062)]
-)
-def test_commands_are_answered_as_late_as_by_real_ones(
-    persona: Persona, median: float, most: float
-) -> None:
-    delays = delays_of(persona)
-    assert median / 1.5 < statistics.median(delays) < median * 1.5
-    assert most / 1.5 < max(delays) <= most + 1e-6
+def test_commands_are_answered_as_late_as_by_real_ones() -> None:
+    for persona, median, most in [(ARDUPILOT, 0.011, 0.024), (PX4, 0.004, 0.062)]:
+        delays = delays_of(persona)
+        assert median / 1.5 < statistics.median(delays) < median * 1.5
+        assert most / 1.5 < max(delays) <= most + 1e-6
 
 
 def test_ardupilot_s_positions_come_in_pairs() -> None:
@@ -52,22 +47,6 @@ def test_ardupilot_s_positions_come_in_pairs() -> None:
     assert 0.05 < sum(gap < 0.001 for gap in gaps) / len(gaps) < 0.2  # two at once
 
 
-def test_no_position_overtakes_another() -> None:
-    rig = RealRig(ARDUPILOT, wait=3.0)
-    rig.ask(MavCmd.SET_MESSAGE_INTERVAL, m.LocalPositionNed.id, 25_000)
-    rig.run(30.0)
-    stamps = [e.time_boot_ms for _, e in rig.arrivals if isinstance(e, m.LocalPositionNed)]
-    assert stamps == sorted(stamps)
-
-
-def test_ardupilot_shows_a_new_mode_at_once() -> None:
-    rig = RealRig(ARDUPILOT, wait=3.3)
-    rig.arrivals.clear()
-    asked = rig.now
-    rig.set_mode_by(HOLD)
-    assert rig.times(m.Heartbeat)[0] - asked < 0.03
-
-
 def test_ardupilot_shows_arming_with_its_next_heartbeat() -> None:
     """Recorded, disarming was to be seen 0.5 and 0.75 s later."""
     rig = RealRig(ARDUPILOT, wait=3.3)
@@ -76,13 +55,4 @@ def test_ardupilot_shows_arming_with_its_next_heartbeat() -> None:
     rig.send(m.CommandLong(1, 1, MavCmd.COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0))
     rig.run(1.0)
     assert rig.autopilot.armed
-    assert 0.3 < rig.times(m.Heartbeat)[0] - asked < 1.0
-
-
-def test_px4_shows_a_new_mode_with_its_next_heartbeat() -> None:
-    rig = RealRig(PX4, wait=3.3)
-    rig.arrivals.clear()
-    asked = rig.now
-    rig.send(m.CommandLong(1, 1, MavCmd.DO_SET_MODE, 0, 1, 1, 0, 0, 0, 0, 0))
-    rig.run(1.0)
     assert 0.3 < rig.times(m.Heartbeat)[0] - asked < 1.0

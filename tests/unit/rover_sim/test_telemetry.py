@@ -2,7 +2,6 @@
 
 import math
 from collections import Counter
-from itertools import pairwise
 
 import pytest
 
@@ -36,18 +35,6 @@ def test_everything_streams_at_1_hz_unasked() -> None:
     rig.heard.clear()
     rig.run(5.0)
     assert Counter(type(message) for message in rig.heard) == dict.fromkeys(STREAMED, 5)
-
-
-def test_message_intervals_are_kept_one_by_one() -> None:
-    rig = Rig()
-    for message_id in (m.Attitude.id, m.LocalPositionNed.id):
-        assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, message_id, 50_000) == MavResult.ACCEPTED
-    rig.run(0.5)
-    rig.heard.clear()
-    rig.run(3.0)
-    times = [message.time_boot_ms for message in rig.heard if isinstance(message, m.Attitude)]
-    assert {late - early for early, late in pairwise(times)} == {50}
-    assert len(rig.take(m.LocalPositionNed)) == 60
 
 
 def test_an_interval_can_be_switched_off_and_back_to_the_default() -> None:
@@ -104,25 +91,6 @@ def test_position_and_motion_agree_with_the_truth() -> None:
     assert (home.x, home.y) == (3.0, -2.0)
 
 
-def test_timesync_is_answered_with_boot_time_and_the_question_echoed() -> None:
-    rig = Rig(wait=2.0)
-    rig.send(m.Timesync(0, 123_456_789))
-    (answer,) = rig.take(m.Timesync)
-    assert answer.tc1 == pytest.approx(2_000_000_000, abs=1000)
-    assert answer.ts1 == 123_456_789
-    rig.send(m.Timesync(5, 6))  # somebody else's answer
-    assert rig.take(m.Timesync) == []
-
-
-def test_file_transfer_is_refused_at_once() -> None:
-    rig = Rig()
-    payload = [7, 0, 3, 4, 9] + [0] * 246  # seq 7, session 3, OpenFileRO
-    rig.send(m.FileTransferProtocol(0, 1, 1, payload))
-    (answer,) = rig.take(m.FileTransferProtocol)
-    assert (answer.payload[0], answer.payload[2]) == (8, 3)
-    assert (answer.payload[3], answer.payload[5], answer.payload[12]) == (129, 4, 10)
-
-
 def test_faults_of_the_estimate_show_in_position_only() -> None:
     rig = Rig()
     rig.ready_to_drive()
@@ -155,14 +123,6 @@ def test_telemetry_can_be_withheld_or_silenced_altogether() -> None:
     rig.autopilot.set_faults(Faults())
     rig.run(1.1)
     assert rig.last(m.Heartbeat).custom_mode == GUIDED  # it had heard, and obeyed
-
-
-def test_a_deaf_rover_talks_but_does_not_obey() -> None:
-    rig = Rig()
-    rig.autopilot.set_faults(Faults(deaf=True))
-    rig.send(m.CommandLong(1, 1, 176, 0, 1, GUIDED, 0, 0, 0, 0, 0))
-    rig.run(1.1)
-    assert rig.last(m.Heartbeat).custom_mode != GUIDED
 
 
 def test_a_fence_that_is_not_there_is_healthy() -> None:
