@@ -68,13 +68,6 @@ def bits(*values: float) -> list[bytes]:
     return [struct.pack("<f", NAN if math.isnan(value) else value) for value in values]
 
 
-def test_a_mission_reads_back_as_it_was() -> None:
-    for written in [format_plan, format_wpl]:
-        assert callable(written)
-        plan = PlanFile(ITEMS, HOME, (), ())
-        assert parse_plan(written(plan)) == plan
-
-
 @pytest.mark.parametrize("written", [format_plan, format_wpl])
 @given(items=st.lists(items, min_size=1, max_size=4))
 def test_any_mission_reads_back_bit_by_bit(written: object, items: list[PlanItem]) -> None:
@@ -121,16 +114,6 @@ def test_what_a_planner_needs_besides_is_there() -> None:
     assert {"firmwareType", "vehicleType", "cruiseSpeed", "hoverSpeed"} < set(root["mission"])
     assert [item["doJumpId"] for item in root["mission"]["items"]] == [1, 2, 3, 4, 5, 6]
     assert (root["geoFence"]["version"], root["rallyPoints"]["version"]) == (2, 2)
-
-
-def test_where_no_place_is_on_earth_home_is_nowhere() -> None:
-    for written in (format_plan, format_wpl):
-        assert parse_plan(written(PlanFile(ITEMS[1:3], None, (), ()))).home == GeoPoint(0, 0, 0.0)
-
-
-def test_a_first_place_that_looks_like_home_is_none() -> None:
-    plan = PlanFile((PlanItem(16, 0, (0.0, 0.0, 0.0, 0.0), *PLACE, 0.0, True),), None, (), ())
-    assert parse_plan(format_wpl(plan)).items == plan.items
 
 
 def test_a_fence_and_rally_points_read_back_as_they_were(tmp_path: Path) -> None:

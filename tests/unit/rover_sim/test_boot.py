@@ -3,36 +3,45 @@
 Each time must lie within a factor of 1.5 of the recorded one.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavResult
-from rover_sim.personas import ARDUPILOT, PX4
-from tests.unit.rover_sim.real_rig import START, RealRig, Refusal, really_booting
-from tests.unit.rover_sim.rig import GUIDED, INITIALISING, MANUAL
+from rover_sim.personas import ARDUPILOT, PX4, Persona
+from rover_sim.realism import Realism
+from tests.unit.rover_sim.rig import GUIDED, INITIALISING, MANUAL, START, Refusal, Rig, command_long
 
 PREARM = 0x10000000
 
 
-class Recorded(RealRig):
+class Recorded(Rig):
     """An ArduPilot that is asked to arm every 3 s, as in the recording, until it is armed."""
 
     def __init__(self) -> None:
-        super().__init__(ARDUPILOT, realism=really_booting(ARDUPILOT))
+        super().__init__(ARDUPILOT, realism=booting(ARDUPILOT), seed=1, wait=1.05)
         self.refusals: list[Refusal] = []
-        self.run(1.05)
-        assert self.set_mode_by(GUIDED) == MavResult.ACCEPTED
-        while (refusal := self.try_at_once()).result != MavResult.ACCEPTED:
+        assert self.set_mode(GUIDED) == MavResult.ACCEPTED
+        while True:
+            self.send(command_long(MavCmd.REQUEST_MESSAGE, 49))
+            self.armable = self.now - START
+            refusal = self.try_to_arm()
+            if refusal.result == MavResult.ACCEPTED:
+                break
             self.refusals.append(refusal)
             self.run(2.9)
         self.run(20.0)
 
-    def try_at_once(self) -> Refusal:
-        self.send(m.CommandLong(1, 1, MavCmd.REQUEST_MESSAGE, 0, 49, 0, 0, 0, 0, 0, 0))
-        self.armable = self.now - START
-        return self.try_to_arm()
+    def first(self, kind: type[m.Message]) -> float:
+        """When, s after switching on, the first of a kind was heard."""
+        return self.times(kind)[0] - START
+
+
+def booting(persona: Persona) -> Realism:
+    """As unkind as its make, with the real times of its boot."""
+    return replace(persona.realism, boot=persona.boot)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +98,7 @@ def test_a_mode_accepted_in_the_first_second_is_lost_again(ardupilot: Recorded) 
 
 
 def test_px4_refuses_for_four_seconds_in_two_texts_one_of_them_split() -> None:
-    rig = RealRig(PX4, realism=really_booting(PX4))
+    rig = Rig(PX4, realism=booting(PX4), wait=0.0)
     rig.run(3.0)
     assert rig.try_to_arm() == Refusal(
         MavResult.TEMPORARILY_REJECTED,

@@ -11,8 +11,7 @@ from rover_sim.faults import Faults
 from rover_sim.frames import Frame
 from rover_sim.modes import Mode
 from rover_sim.realism import Drive
-from tests.unit.rover_sim.manoeuvres import REAL_DRIVE, ahead, ardupilot, px4, record
-from tests.unit.rover_sim.rig import HOLD, Px4Rig
+from tests.unit.rover_sim.rig import HOLD, REAL_DRIVE, Rig, ahead, ardupilot, px4, record
 
 LEFT, RIGHT = frozenset({Actuator.LEFT}), frozenset({Actuator.RIGHT})
 GPS_LOST = Faults(gps_lost=True)
@@ -63,7 +62,7 @@ def test_ardupilot_then_holds_and_cannot_be_armed() -> None:
 
 
 def test_px4_then_lands_where_it_is_and_disarms() -> None:
-    rig: Px4Rig = px4(Frame.DIFFERENTIAL)
+    rig: Rig = px4(Frame.DIFFERENTIAL)
     rig.autopilot.set_faults(GPS_LOST)
     record(rig, 12.0, ahead(rig, 0.5))
     assert "Failsafe activated" in rig.texts()

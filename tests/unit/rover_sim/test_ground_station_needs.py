@@ -37,7 +37,7 @@ PX4_AT_CONNECT_AND_IN_SETUP = """
 
 
 def parameters_of(name: str) -> dict[str, m.ParamValue]:
-    rig = Rig(persona=PERSONAS[name])
+    rig = Rig(PERSONAS[name])
     rig.take(m.ParamValue)
     rig.send(m.ParamRequestList(1, 1))
     return {each.param_id.rstrip("\0"): each for each in rig.take(m.ParamValue)}

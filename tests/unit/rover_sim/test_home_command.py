@@ -19,7 +19,7 @@ each = pytest.mark.parametrize("persona", [PROMPT, PX4], ids=lambda p: p.name)
 def test_home_is_where_it_is_put() -> None:
     for persona in [PROMPT, PX4]:
         for form in ["COMMAND_INT", "COMMAND_LONG"]:
-            rig = Rig(persona=persona)
+            rig = Rig(persona)
             rig.heard.clear()
             if form == "COMMAND_INT":
                 rig.send(
@@ -40,5 +40,5 @@ def test_a_place_that_is_none_is_refused() -> None:
     for persona in [PROMPT, PX4]:
         for latitude, longitude in [(math.nan, 8.0), (91.0, 8.0)]:
             refusal = MavResult.DENIED if persona is PX4 else MavResult.FAILED
-            rig = Rig(persona=persona)
+            rig = Rig(persona)
             assert rig.command(MavCmd.DO_SET_HOME, 0, 0, 0, 0, latitude, longitude, 0) == refusal

@@ -9,7 +9,7 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
 from rover_sim.personas import ARDUPILOT, PX4, Persona
-from tests.unit.rover_sim.real_rig import RealRig
+from tests.unit.rover_sim.rig import RealRig
 
 
 def delays_of(persona: Persona) -> list[float]:

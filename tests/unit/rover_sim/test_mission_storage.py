@@ -69,14 +69,6 @@ def test_items_that_cannot_be_stored_end_the_upload() -> None:
     assert upload(rig, [unknown]) == MavMissionResult.UNSUPPORTED
 
 
-def test_a_wrong_sequence_number_is_told_and_the_upload_goes_on() -> None:
-    rig = Rig()
-    rig.send(m.MissionCount(1, 1, 2), waypoint(1, 0, 0))
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.INVALID_SEQUENCE
-    rig.send(waypoint(0, 0, 0), waypoint(1, 0, 0))
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.ACCEPTED
-
-
 def test_a_second_client_is_denied_and_the_first_undisturbed() -> None:
     rig = Rig()
     rig.send(m.MissionCount(1, 1, 1))

@@ -132,7 +132,7 @@ TABLE += [(G, message, answer) for name, message, answer in TABLE if name == P]
 
 def test_what_it_answers() -> None:
     for name, message, answer in TABLE:
-        rig = Rig(persona=PERSONAS[name])
+        rig = Rig(PERSONAS[name])
         rig.heard.clear()
         rig.send(message)
         heard = [each.to_dict() for each in rig.heard if not isinstance(each, m.Statustext)]
@@ -145,7 +145,7 @@ def test_what_it_answers() -> None:
 def test_each_persona_shows_itself() -> None:
     shown = {}
     for name, persona in PERSONAS.items():
-        rig = Rig(persona=persona)
+        rig = Rig(persona)
         beat = rig.last(m.Heartbeat)
         shown[name] = (beat.autopilot, beat.type, hex(beat.custom_mode), beat.base_mode & 129)
     assert shown == {
@@ -155,38 +155,10 @@ def test_each_persona_shows_itself() -> None:
     }
 
 
-def test_its_modes_can_be_enumerated() -> None:
-    for name in [P, G]:
-        rig = Rig(persona=PERSONAS[name])
-        rig.take(m.AvailableModes)
-        rig.send(long(512, 435, 0))
-        every = rig.take(m.AvailableModes)
-        rig.send(*[long(512, 435, index) for index in range(1, 7)])
-        one_by_one = rig.take(m.AvailableModes)
-        assert [each.to_dict() for each in one_by_one] == [each.to_dict() for each in every]
-        assert {each.number_modes for each in every} == {6}
-        assert [
-            (
-                each.mode_index,
-                hex(each.custom_mode),
-                each.standard_mode,
-                each.mode_name.rstrip("\0"),
-            )
-            for each in every
-        ] == [
-            (1, "0x10000", 0, "Manual"),
-            (2, "0x30000", 0, "Position"),
-            (3, "0x4040000", 6, ""),
-            (4, "0x3040000", 0, "Hold"),
-            (5, "0x5040000", 5, ""),
-            (6, "0x60000", 0, "Offboard"),
-        ]
-
-
 def test_unusable_numbers_in_commands_arm_nothing() -> None:
     for name in PERSONAS:
         for value in [NAN, math.inf, -math.inf, -1e30, 1e30]:
-            rig = Rig(persona=PERSONAS[name])
+            rig = Rig(PERSONAS[name])
             for command in (*MavCmd, 224):
                 if (name, command) != (A, MavCmd.DO_CHANGE_SPEED):  # which makes ArduPilot abort
                     rig.send(long(command, *[value] * 7))

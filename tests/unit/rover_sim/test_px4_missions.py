@@ -6,7 +6,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.unit.rover_sim.rig import CLIENT, PX4_HOLD, PX4_MISSION, Px4Rig
+from tests.unit.rover_sim.rig import CLIENT, PX4_HOLD, PX4_MISSION, Px4Rig, Rig
 
 MISSION, FENCE, RALLY = 0, 1, 2
 
@@ -23,7 +23,7 @@ FENCE_ITEMS = [item(0, 50.0, 0.0, command=5003, kind=FENCE)]
 RALLY_ITEMS = [item(0, 1.0, 1.0, command=5100, kind=RALLY)]
 
 
-def upload(rig: Px4Rig, items: list[m.MissionItemInt], kind: int = MISSION) -> m.MissionAck:
+def upload(rig: Rig, items: list[m.MissionItemInt], kind: int = MISSION) -> m.MissionAck:
     rig.take(m.MissionRequestInt)
     rig.send(m.MissionCount(1, 1, len(items), kind))
     for each in items:
@@ -87,18 +87,3 @@ def test_mission_start_arms_and_drives_it_to_its_end() -> None:
     assert rig.last(m.MissionCurrent).mission_state == 5
     assert rig.mode() == PX4_HOLD
     assert [reached.seq for reached in rig.take(m.MissionItemReached)] == [0, 1]
-
-
-def test_it_goes_on_where_it_was_left() -> None:
-    rig = Px4Rig()
-    upload(rig, CORNER)
-    rig.command(MavCmd.MISSION_START)
-    rig.until(lambda: any(isinstance(x, m.MissionItemReached) for x in rig.heard), limit=10.0)
-    rig.set_mode(PX4_HOLD)
-    rig.run(1.1)
-    paused = rig.last(m.MissionCurrent)
-    assert (paused.seq, paused.mission_state, paused.mission_mode) == (1, 4, 2)
-    rig.take(m.MissionItemReached)
-    rig.set_mode(PX4_MISSION)
-    rig.run(10.0)
-    assert [reached.seq for reached in rig.take(m.MissionItemReached)] == [1]

@@ -3,7 +3,7 @@
 from struct import pack, unpack
 
 from mav_tasks.mavlink import messages as m
-from tests.unit.rover_sim.rig import Px4Rig
+from tests.unit.rover_sim.rig import Px4Rig, Rig
 
 UINT32, INT32, REAL32 = 5, 6, 9
 
@@ -16,7 +16,7 @@ def from_bits(value: int) -> float:
     return float(unpack("<f", pack("<i", value))[0])
 
 
-def read(rig: Px4Rig, name: bytes) -> m.ParamValue:
+def read(rig: Rig, name: bytes) -> m.ParamValue:
     rig.send(m.ParamRequestRead(1, 1, name, -1))
     (value,) = rig.take(m.ParamValue)
     return value

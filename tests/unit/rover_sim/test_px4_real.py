@@ -11,18 +11,21 @@ from rover_sim.frames import Frame
 from rover_sim.modes import Mode
 from rover_sim.personas import PX4
 from rover_sim.px4_failsafe import Action, action_on_loss
-from tests.unit.rover_sim.manoeuvres import REAL_DRIVE, ahead, px4, record
 from tests.unit.rover_sim.rig import (
     PX4_OFFBOARD,
     PX4_RTL,
-    Px4Rig,
+    REAL_DRIVE,
+    Rig,
+    ahead,
+    px4,
+    record,
     velocity,
 )
 
 
-def facing(yaw: float, frame: Frame = Frame.DIFFERENTIAL, *, slip: float = 0.3) -> Px4Rig:
+def facing(yaw: float, frame: Frame = Frame.DIFFERENTIAL, *, slip: float = 0.3) -> Rig:
     """Return a rover that has stood there since it was armed, in OFFBOARD."""
-    rig = Px4Rig(start=Pose(yaw=yaw), persona=PX4.on(frame), realism=REAL_DRIVE, slip=slip)
+    rig = Rig(PX4.on(frame), start=Pose(yaw=yaw), realism=REAL_DRIVE, slip=slip)
     assert rig.arm() == MavResult.ACCEPTED
     rig.run(1.0, velocity(1e-3 * cos(yaw), 1e-3 * sin(yaw)))
     assert rig.set_mode(PX4_OFFBOARD) == MavResult.ACCEPTED
@@ -51,7 +54,7 @@ def test_an_ackermann_rover_bends_while_it_brakes_on_zeros() -> None:
     assert run.states[-1].forward_speed == 0.0
 
 
-def lost(frame: Frame = Frame.DIFFERENTIAL, seconds: float = 15.0) -> Px4Rig:
+def lost(frame: Frame = Frame.DIFFERENTIAL, seconds: float = 15.0) -> Rig:
     """Return a rover that has been driven away from where it was armed; its setpoints end."""
     rig = px4(frame)
     record(rig, seconds, ahead(rig, 1.0))
@@ -79,7 +82,7 @@ def test_by_default_lost_setpoints_are_a_drive_home_where_it_disarms_itself() ->
     assert (rig.mode(), rig.autopilot.armed) == (PX4_OFFBOARD, False)
 
 
-def close_to_home(rig: Px4Rig) -> bool:
+def close_to_home(rig: Rig) -> bool:
     return abs(rig.truth.north) < 0.6 and abs(rig.truth.east) < 0.3
 
 

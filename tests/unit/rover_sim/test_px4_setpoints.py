@@ -19,6 +19,7 @@ from tests.unit.rover_sim.rig import (
     VELOCITY,
     VELOCITY_AND_RATE,
     Px4Rig,
+    Rig,
     body_velocity,
     local_target,
     velocity,
@@ -29,7 +30,7 @@ NAN = math.nan
 ACCELERATION = 0x0C3F
 
 
-def driven(stream: Message, *, seconds: float = 4.0, yaw: float = 0.0) -> Px4Rig:
+def driven(stream: Message, *, seconds: float = 4.0, yaw: float = 0.0) -> Rig:
     rig = Px4Rig(start=Pose(yaw=yaw))
     rig.ready_to_drive()
     rig.take(m.Statustext)
@@ -51,7 +52,7 @@ def test_it_turns_round_rather_than_reverse() -> None:
 
 
 def test_a_rover_that_honours_yaw_rate_turns_and_reverses() -> None:
-    rig = Px4Rig(persona=replace(PX4, honours_yaw_rate=True))
+    rig = Rig(replace(PX4, honours_yaw_rate=True))
     rig.ready_to_drive()
     rig.run(3.0, body_velocity(-0.5, yaw_rate=0.3))
     assert rig.truth.forward_speed == pytest.approx(-0.5, abs=0.02)

@@ -11,8 +11,16 @@ import pytest
 
 from mav_tasks.mavlink.enums import MavCmd
 from rover_sim.frames import Frame
-from tests.unit.rover_sim.manoeuvres import ahead, ardupilot, px4, record
-from tests.unit.rover_sim.rig import HOLD, PX4_HOLD, Rig, body_velocity
+from tests.unit.rover_sim.rig import (
+    HOLD,
+    PX4_HOLD,
+    Rig,
+    ahead,
+    ardupilot,
+    body_velocity,
+    px4,
+    record,
+)
 
 FACTOR = 1.5
 RIGS: Mapping[str, Callable[[], Rig]] = {

@@ -7,15 +7,15 @@ from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PX4
 from rover_sim.vehicle import Peers, Vehicle, make_vehicle
-from tests.unit.rover_sim.real_rig import RealRig
-from tests.unit.rover_sim.rig import CLIENT, heartbeat
+from tests.unit.rover_sim.rig import CLIENT, RealRig, heartbeat
 
 UNNUMBERED = 65535
 
 
 def test_ardupilot_never_says_whether_it_is_on_the_ground() -> None:
     rig = RealRig(ARDUPILOT)
-    rig.get_ready()
+    rig.run(3.0)
+    rig.ready_to_drive()
     rig.run(3.0)
     states = {e.landed_state for _, e in rig.arrivals if isinstance(e, m.ExtendedSysState)}
     assert states == {MavLandedState.UNDEFINED}
@@ -33,14 +33,6 @@ def test_ardupilot_sends_a_parameter_unasked_that_has_no_number() -> None:
     listed = rig.take(m.ParamValue)
     assert [v.param_index for v in listed] == list(range(listed[0].param_count))
     assert listed[-1].param_id == "STAT_RUNTIME"
-
-
-def test_px4_sends_its_digest_before_its_parameters() -> None:
-    rig = RealRig(PX4, wait=1.0)
-    rig.send(m.ParamRequestList(1, 1))
-    first, *others = rig.take(m.ParamValue)
-    assert (first.param_id, first.param_index) == ("_HASH_CHECK", UNNUMBERED)
-    assert [v.param_index for v in others] == list(range(first.param_count))
 
 
 def met(peers: Peers) -> Vehicle:

@@ -5,8 +5,7 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavResult
 from rover_sim.personas import ARDUPILOT
-from tests.unit.rover_sim.real_rig import RealRig
-from tests.unit.rover_sim.rig import BODY_NED, MANUAL, VELOCITY_AND_RATE
+from tests.unit.rover_sim.rig import BODY_NED, MANUAL, VELOCITY_AND_RATE, RealRig
 
 
 def velocity(speed: float) -> m.SetPositionTargetLocalNed:
@@ -23,7 +22,8 @@ def throttle(pulse: int) -> m.RcChannelsOverride:
 def test_the_throttle_stick_drives_in_guided_whatever_is_asked() -> None:
     for asked in [0.0, 0.5]:
         rig = RealRig(ARDUPILOT)
-        rig.get_ready()
+        rig.run(3.0)
+        rig.ready_to_drive()
         rig.run(2.0, velocity(asked))
         assert rig.truth.forward_speed == pytest.approx(asked, abs=0.1)
         for _ in range(30):
@@ -37,7 +37,8 @@ def test_the_throttle_stick_drives_in_guided_whatever_is_asked() -> None:
 
 def test_an_override_that_is_not_repeated_ends_after_three_seconds() -> None:
     rig = RealRig(ARDUPILOT)
-    rig.get_ready()
+    rig.run(3.0)
+    rig.ready_to_drive()
     rig.send(throttle(1750))
     rig.run(2.5, velocity(0.0))
     assert rig.truth.forward_speed > 1.0
@@ -47,8 +48,9 @@ def test_an_override_that_is_not_repeated_ends_after_three_seconds() -> None:
 
 def test_in_manual_the_channels_drive() -> None:
     rig = RealRig(ARDUPILOT)
-    rig.get_ready()
-    rig.set_mode_by(MANUAL)
+    rig.run(3.0)
+    rig.ready_to_drive()
+    rig.set_mode(MANUAL)
     rig.send(throttle(1600))
     rig.run(2.0)
     assert rig.truth.forward_speed == pytest.approx(0.6, abs=0.1)

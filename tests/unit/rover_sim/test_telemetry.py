@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavCmd, MavResult
+from mav_tasks.mavlink.enums import MavCmd
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
@@ -50,27 +50,6 @@ def test_an_interval_can_be_switched_off_and_back_to_the_default() -> None:
     assert rig.last(m.MessageInterval).interval_us == 1_000_000
     rig.run(3.0)
     assert len(rig.take(m.VfrHud)) == 3
-
-
-def test_intervals_that_cannot_be_are_denied() -> None:
-    rig = Rig()
-    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, 12_000, 100_000) == MavResult.DENIED
-    assert rig.texts()[-1] == "No ap_message for mavlink id (12000)"
-    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.Attitude.id, 1_000) == MavResult.DENIED
-
-
-def test_request_data_stream_sets_its_group() -> None:
-    rig = Rig()
-    rig.send(m.RequestDataStream(1, 1, 10, 10, 1))
-    rig.run(0.5)
-    rig.heard.clear()
-    rig.run(2.0)
-    counts = Counter(type(message) for message in rig.heard)
-    assert (counts[m.Attitude], counts[m.VfrHud]) == (20, 2)
-    rig.send(m.RequestDataStream(1, 1, 10, 0, 0))
-    rig.heard.clear()
-    rig.run(2.0)
-    assert rig.take(m.Attitude) == []
 
 
 def test_position_and_motion_agree_with_the_truth() -> None:

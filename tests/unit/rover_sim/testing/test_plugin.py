@@ -1,6 +1,5 @@
 """The pytest plugin as a stranger has it: test files of their own, run by a pytest of their own."""
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -126,60 +125,6 @@ def test_what_there_is_not_is_said_in_one_line(pytester: pytest.Pytester) -> Non
         result.assert_outcomes(errors=1)
         assert f"@pytest.mark.simulated_rover: {said}" in result.outlines
         assert "Traceback" not in result.stdout.str()
-
-
-SHOWS_SEED = """
-    import pytest
-
-    def test_by_name(rover_world):
-        print("seed of the first", rover_world.seed)
-
-    def test_by_another_name(rover_world):
-        print("seed of the second", rover_world.seed)
-
-    @pytest.mark.simulated_rover(seed=7)
-    def test_by_marker(rover_world):
-        print("seed of the third", rover_world.seed)
-"""
-
-
-def seeds(result: pytest.RunResult) -> list[int]:
-    """Return the seeds that SHOWS_SEED shows."""
-    found = re.findall(r"^seed of the \w+ (\d+)$", result.stdout.str(), flags=re.MULTILINE)
-    return [int(seed) for seed in found]
-
-
-def test_each_test_has_a_seed_by_its_name(pytester: pytest.Pytester) -> None:
-    first, second, third = seeds(run(pytester, SHOWS_SEED, "-rP"))
-    assert (first != second, third) == (True, 7)
-    assert seeds(run(pytester, SHOWS_SEED, "-rP")) == [first, second, 7]
-    folder = pytester.mkdir("elsewhere")
-    (pytester.path / "test_patrol.py").rename(folder / "test_patrol.py")
-    assert seeds(pytester.runpytest_inprocess(*PLUGIN, "-rP")) == [first, second, 7]
-
-
-def test_the_command_line_gives_another_seed(pytester: pytest.Pytester) -> None:
-    assert seeds(run(pytester, SHOWS_SEED, "-rP", "--rover-seed", "12")) == [12, 12, 7]
-    result = run(pytester, SHOWS_SEED, "--rover-seed", "twelve")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-
-
-def test_a_missing_pybullet_is_said(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    result = run(
-        pytester,
-        """
-        import pytest
-
-        @pytest.mark.simulated_rover(body="bullet")
-        def test_it(rover):
-            pass
-        """,
-    )
-    result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines(["@pytest.mark.simulated_rover: *pybullet*"])
 
 
 def test_a_test_without_a_rover_pays_nothing(pytester: pytest.Pytester) -> None:

@@ -1,19 +1,15 @@
 """Clients in a test's world: they drive the rover in no time, and what goes wrong is seen."""
 
 import asyncio
-import gc
 from datetime import UTC, datetime, timedelta
 from math import radians
 
 import pytest
 
 from mav_tasks import (
-    Client,
     Move,
     Rotate,
     SyncClient,
-    TaskFailed,
-    TaskReason,
     TaskState,
 )
 from rover_sim.errors import NotInVirtualTime, Stalled
@@ -60,30 +56,6 @@ def test_time_stands_while_nobody_waits(served: RoverWorld) -> None:
         served.sleep(4.0)
         assert served.now == pytest.approx(before + 4.0)
         assert served.rovers[0].speed > 0.3
-
-
-def test_asyncio_code_runs_in_its_time(served: RoverWorld) -> None:
-    async def patrol(client: Client) -> list[TaskState]:
-        async with client as tasks:
-            task = await tasks.submit(Move(1.0))
-            seen = [status.state async for status in task.updates()]
-            await asyncio.sleep(5.0)
-            return seen
-
-    seen = served.run(patrol(served.client()))
-    assert (seen[-1], TaskState.EXECUTING in seen) == (TaskState.COMPLETED, True)
-    assert served.rovers[0].north == pytest.approx(1.0, abs=0.05)
-
-
-def test_a_blocked_rover_is_stuck_and_the_script_is_told(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(2.0))
-        served.until(lambda: served.rovers[0].speed > 0.1)
-        served.rovers[0].block_wheels()
-        with pytest.raises(TaskFailed, match="stuck") as told:
-            task.done()
-    assert told.value.reason is TaskReason.STUCK
-    assert served.rovers[0].north < 1.0
 
 
 def test_a_rover_disarmed_by_hand_stops_its_task(served: RoverWorld) -> None:
@@ -164,16 +136,6 @@ def test_what_never_comes_is_told_with_who_waits_for_it(make_world: MakeWorld) -
         assert "waits_for_godot: await asyncio.Event().wait()" in str(told.value)
         world.sleep(15.0)  # what stalled is gone, and the next one has its own time
         assert task.refresh().id == task.id
-
-
-def test_a_link_of_the_real_world_is_refused_and_closed(served: RoverWorld) -> None:
-    async def go() -> None:
-        async with Client("udpout:127.0.0.1:14560"):
-            pass
-
-    with pytest.raises(NotInVirtualTime, match="a link of the world's net"):
-        served.run(go())
-    gc.collect()  # an open socket would be told of here, as an error
 
 
 def test_it_has_a_time_of_day(served: RoverWorld) -> None:
