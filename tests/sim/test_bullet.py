@@ -97,16 +97,6 @@ def test_quarter_turn_on_the_spot() -> None:
                 assert offset(start, end) == pytest.approx((0.0, 0.0), abs=0.01)
 
 
-def test_it_drives_as_well_on_varied_ground() -> None:
-    for seed in range(3):
-        with rover(variation=0.3, seed=seed) as body:
-            start = body.state
-            end = drive_straight(body, 2.0)
-            assert offset(start, end) == pytest.approx((2.0, 0.0), abs=0.02)
-            turned = turn_on_the_spot(body, math.radians(90))
-            assert math.degrees(turned.yaw - end.yaw) == pytest.approx(90.0, abs=1.0)
-
-
 def manoeuvre(seed: int, *, steps_at_once: int) -> BodyState:
     with rover(variation=0.3, seed=seed) as body:
         for step in range(120):

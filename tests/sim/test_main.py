@@ -214,22 +214,6 @@ def test_a_nan_setpoint_takes_it_down_as_it_does_the_real_one() -> None:
         assert "NaN" in process.stderr.read()
 
 
-def test_without_pybullet_the_rover_is_the_kinematic_one_and_says_so(tmp_path: Path) -> None:
-    with simulator(PYTHONPATH=without_pybullet(tmp_path)) as (process, _):
-        assert process.stderr is not None
-        said = process.stderr.readline()
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(LIMIT) == 0
-        assert process.stderr.read() == ""
-    assert said.startswith("rover_sim: pybullet is not installed, so the rover is the kinematic")
-
-
-def without_pybullet(folder: Path) -> str:
-    """Return a path for imports on which pybullet cannot be had."""
-    (folder / "pybullet.py").write_text('raise ImportError("not installed")\n')
-    return os.pathsep.join((str(folder), str(ROOT), str(ROOT / "sim")))
-
-
 def test_bad_options_are_refused_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     for options, named in [
         (("--count", "0"), "--count"),
@@ -245,13 +229,6 @@ def test_bad_options_are_refused_by_name(capsys: pytest.CaptureFixture[str]) -> 
             read_options(options)
         assert ended.value.code == 2
         assert named in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_the_frame_is_the_makes_or_the_one_that_is_asked_for() -> None:
-    for frame in ["skid", "differential", "ackermann"]:
-        assert read_options(["--frame", frame]).persona.frame.value == frame
-        assert read_options([]).persona.frame.value == "skid"
-        assert read_options(["--persona", "px4"]).persona.frame.value == "differential"
 
 
 def test_faults_are_planned_on_the_command_line() -> None:

@@ -4,7 +4,6 @@ import json
 import math
 import struct
 from collections.abc import Callable
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -235,12 +234,6 @@ def test_a_plan_may_have_no_home_no_fence_no_rally_points_and_no_items() -> None
     assert parse_plan("QGC WPL 110") == PlanFile((), None, (), ())
 
 
-def test_an_older_version_is_no_matter_where_nothing_is_in_it() -> None:
-    empty = {"version": 1, "points": []}
-    text = edited(lambda root: root.update(rallyPoints=empty, geoFence={"version": 1}))
-    assert parse_plan(text) == replace(READ, fence=(), rally=())
-
-
 def test_the_fence_as_it_is_sent() -> None:
     rows = [(i.command, i.frame, i.params[0], i.x, i.y, i.z) for i in fence_items(READ)]
     assert rows == [
@@ -255,14 +248,6 @@ def test_the_fence_as_it_is_sent() -> None:
     ]
     inside = PlanFile((), None, (FenceCircle(True, (1, 2), 3.0),), ())
     assert fence_items(inside) == (PlanItem(5003, 0, (3.0, 0.0, 0.0, 0.0), 1, 2, 0.0, False),)
-
-
-def test_the_rally_points_as_they_are_sent() -> None:
-    none = (0.0, 0.0, 0.0, 0.0)
-    assert rally_items(READ) == (
-        PlanItem(5100, 3, none, 473976040, 85509154, 50.0, False),
-        PlanItem(5100, 3, none, -1000000, -1799000000, 0.0, False),
-    )
 
 
 def test_x_and_y_are_ints_in_the_unit_of_the_frame() -> None:

@@ -22,7 +22,6 @@ from mav_tasks.plan_files import (
     fence_of,
     format_plan,
     format_wpl,
-    mission_of,
     parse_plan,
     read_plan,
     write_plan,
@@ -77,16 +76,6 @@ def test_any_mission_reads_back_bit_by_bit(written: object, items: list[PlanItem
     assert read.home == HOME
 
 
-def test_numbers_are_written_as_people_write_them() -> None:
-    as_sent = struct.unpack("<f", struct.pack("<f", 0.3))[0]
-    item = replace(ITEMS[0], params=(as_sent, 0.0, 0.0, NAN))
-    (written,) = json.loads(format_plan(PlanFile((item,), None, (), ())))["mission"]["items"]
-    assert written["params"] == [0.3, 0.0, 0.0, None, 47.3985099, 8.5451002, 50.0]
-    assert "\t0.3\t0.0\t0.0\tnan\t47.3985099\t8.5451002\t50.0\t1\n" in format_wpl(
-        PlanFile((item,), None, (), ())
-    )
-
-
 def test_a_text_file_means_the_same_to_another_implementation(tmp_path: Path) -> None:
     file = tmp_path / "way.waypoints"
     write_plan(PlanFile(ITEMS, HOME, (), ()), file)
@@ -135,17 +124,6 @@ def test_a_fence_as_it_was_sent_is_the_fence() -> None:
         fence_of([replace(item, params=(item.params[0], 1.0, 0.0, 0.0)) for item in sent])
     with pytest.raises(PlanFileError, match="item 16"):
         fence_of(ITEMS[:1])
-
-
-def test_the_home_of_an_ardupilot_is_no_item() -> None:
-    home = PlanItem(16, 0, (0.0, 0.0, 0.0, 0.0), *HOME[:2], HOME.altitude, True)
-    jump = replace(ITEMS[3], params=(1.0, 3.0, 0.0, 0.0))
-    fetched = (home, *ITEMS[:3], jump, *ITEMS[4:])
-    assert mission_of(fetched, has_home_item=True) == PlanFile(ITEMS, HOME, (), ())
-    assert mission_of(ITEMS, has_home_item=False) == PlanFile(ITEMS, None, (), ())
-    nowhere = replace(home, x=0, y=0)
-    assert mission_of((nowhere,), has_home_item=True) == PlanFile((), None, (), ())
-    assert mission_of((), has_home_item=True) == PlanFile((), None, (), ())
 
 
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:

@@ -40,14 +40,6 @@ def test_the_file_can_be_read() -> None:
         assert len({action["label"] for action in actions}) == len(actions) == len(ACTIONS)
 
 
-def test_a_task_has_the_usual_priority_and_stop_nothing_more() -> None:
-    actions = read(file_of(ACTIONS), "MavlinkActions")
-    moves = [action for action in actions if action["mavCmd"] == MOVE]
-    assert [(a["param1"], a["param7"]) for a in moves] == [(1.0, 5.0), (-1.0, 5.0)]
-    (stop,) = [action for action in actions if action["mavCmd"] == STOP]
-    assert [stop[f"param{n}"] for n in range(1, 8)] == [0.0] * 7
-
-
 def test_an_action_of_ones_own() -> None:
     action = parse_action("Patrol=54000,2.5,0.4")
     assert (action.label, action.command) == ("Patrol", MOVE)
@@ -83,22 +75,9 @@ def test_it_is_printed_in_either_format() -> None:
     assert (only["label"], only["compId"]) == ("Horn", 192)
 
 
-def test_only_of_nothing_is_a_mistake() -> None:
-    with pytest.raises(UsageError, match="--only: give at least one --action"):
-        CliRunner().invoke(app, ["qgc-actions", "--only"], catch_exceptions=False)
-
-
 def test_both_are_installed_where_it_looks(tmp_path: Path) -> None:
     said = run("--install", "--documents", str(tmp_path))
     for file_type in FILE_TYPES:
         path = tmp_path / "QGroundControl" / file_type / "mav-tasks.json"
         assert f"wrote {path}" in said
         assert len(read(path.read_text(encoding="utf-8"), file_type)) == len(ACTIONS)
-
-
-def test_where_it_cannot_be_written_is_said(tmp_path: Path) -> None:
-    (tmp_path / "QGroundControl").write_text("a file")
-    with pytest.raises(UsageError, match=re.escape(str(tmp_path))):
-        CliRunner().invoke(
-            app, ["qgc-actions", "--install", "--documents", str(tmp_path)], catch_exceptions=False
-        )

@@ -5,14 +5,11 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from mav_tasks.cli.app import main
-from mav_tasks.store.sqlite import SqliteStore, read_parameters
-from mav_tasks.tasks.server_events import ParameterSet
 
 Result = tuple[int, str, str]
 Run = Callable[..., Result]
@@ -103,31 +100,3 @@ def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) ->
         "where": f"{path}:2",
         "live": True,
     }
-
-
-def test_what_a_client_has_set_is_shown_from_the_store(run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "tasks.sqlite3"
-    variable = {"MAV_TASKS_STORE": str(path)}
-    command = ("config", "show", "driving.speed", "driving.max_speed")
-    assert "default" in run(*command, environment=variable)[1]
-    assert not path.exists()
-    with closing(SqliteStore(path, wall_offset=lambda: 0.0)) as store:
-        store.append([ParameterSet("TSK_SPEED", 2.5, "255/190@x:1", 1.0)])
-    faster = {**variable, "MAV_TASKS_DRIVING_MAX_SPEED": "3"}
-    with closing(SqliteStore(path, wall_offset=lambda: 0.0)):  # in use
-        code, output, error = run(*command, environment=faster)
-    assert (code, error) == (0, "")
-    is_set = r"^driving\.speed = 2\.5 +# m/s, TSK_SPEED, set by a client$"
-    assert re.search(is_set, output, re.MULTILINE)
-    code, output, error = run(*command, environment=variable)
-    assert (code, error) == (
-        0,
-        (
-            "mav-tasks: parameter of an earlier run ignored: "
-            "TSK_SPEED 2.5 is more than TSK_SPEED_MAX 2\n"
-        ),
-    )
-    assert re.search(r"^driving\.speed = 0\.5 +# m/s, default$", output, re.MULTILINE)
-    before = path.read_bytes()
-    assert read_parameters(str(path)) == {"TSK_SPEED": 2.5}
-    assert path.read_bytes() == before

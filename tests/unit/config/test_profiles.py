@@ -63,12 +63,6 @@ def test_each_rover_has_a_file_and_the_last_one_counts(home: Path) -> None:
     assert set(profiles.read(str(home))) == {again, replace(FULL, uid="another")}
 
 
-def test_a_file_of_ones_own_can_be_named(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    assert profiles.write(FULL, str(path)) == path
-    assert profiles.read(str(path)) == (FULL,)
-
-
 def test_a_file_that_cannot_be_written_leaves_the_one_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -82,19 +76,6 @@ def test_a_file_that_cannot_be_written_leaves_the_one_before(
     with pytest.raises(ConfigError, match=r"mine\.toml: No space left on device"):
         profiles.write(LEAST, str(path))
     assert (profiles.read(str(path)), list(tmp_path.iterdir())) == ((FULL,), [path])
-
-
-def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"none/p\.toml: No such file"):
-        profiles.write(FULL, str(tmp_path / "none" / "p.toml"))
-    with pytest.raises(ConfigError, match=r"none: No such file"):
-        profiles.read(str(tmp_path / "none"))
-
-
-def test_where_nothing_is_known_there_is_nothing(home: Path) -> None:
-    assert profiles.read("") == ()
-    profiles.write(FULL, None)
-    assert profiles.read("none") == ()
 
 
 NEEDED = 'system_id = 1\nautopilot = "px4"\nfirmware = "1"\nprobed = "2026"\n'
@@ -132,9 +113,3 @@ def test_the_server_has_them_with_its_settings(tmp_path: Path, home: Path) -> No
     assert Sources("", named).load().settings.engine.profiles == (LEAST,)
     named = {"MAV_TASKS_VEHICLES_PROFILES": "none"}
     assert Sources(None, named).load().settings.engine.profiles == ()
-
-
-def test_a_faulty_profile_is_a_fault_of_the_configuration(tmp_path: Path) -> None:
-    (tmp_path / "bad.toml").write_text("system_id = 0", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"bad\.toml: autopilot is missing"):
-        Sources("", {"MAV_TASKS_VEHICLES_PROFILES": str(tmp_path)}).load()

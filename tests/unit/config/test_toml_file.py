@@ -26,25 +26,6 @@ def faults(text: str) -> list[str]:
     return list(raised.value.faults)
 
 
-def test_values_are_taken_with_their_lines() -> None:
-    text = "[driving]\nspeed = 0.8\nturn_rate_deg = 90\n\n"
-    text += '[links]\nclients = [\n "tcpin:127.0.0.1:1",\n]\n'
-    text += 'push = []\n[clients.priorities]\n"255/190" = 7\n'
-    got = read(text)
-    assert got.settings.engine.driving.speed == 0.8
-    assert got.settings.engine.driving.turn_rate == got.settings.engine.driving.max_turn_rate
-    assert got.settings.links.clients == ("tcpin:127.0.0.1:1",)
-    assert got.settings.links.push == ()
-    assert got.settings.engine.clients.priorities == {"255/190": 7}
-    assert {name: each.where for name, each in got.given.items()} == {
-        "driving.speed": "c.toml:2",
-        "driving.turn_rate_deg": "c.toml:3",
-        "links.clients": "c.toml:6",
-        "links.push": "c.toml:9",
-        "clients.priorities": "c.toml:10",
-    }
-
-
 def test_nothing_gives_the_defaults() -> None:
     assert read("").settings == read("[driving]\n[watch]").settings == ServerSettings()
 
@@ -130,12 +111,6 @@ def test_a_value_that_is_none_breaks_no_bound() -> None:
     assert len(faults("driving.max_speed = 0.2\ndriving.speed = 99")) == 1
 
 
-def test_other_machines_may_be_let_in() -> None:
-    assert read(
-        "links.insecure = true\nlinks.clients = ['udpin:0.0.0.0:1']"
-    ).settings.links.insecure
-
-
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     for make, says in [
         (lambda path: None, "No such file"),
@@ -153,12 +128,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         else:
             path.unlink(missing_ok=True)
         assert str(raised.value).startswith(str(path))
-
-
-def test_a_byte_order_mark_is_passed_over() -> None:
-    assert (
-        read(decoded(b"\xef\xbb\xbfdriving.speed = 1", name="x")).settings.engine.driving.speed == 1
-    )
 
 
 def outcome(text: str | bytes) -> tuple[ServerSettings | None, tuple[str, ...]]:
@@ -209,12 +178,6 @@ def test_any_text_gives_settings_or_a_clear_fault(text: str) -> None:
     else:
         for key in KEYS.values():
             assert key.shape.kept(key.plain_of(got)) == key.of(got)
-
-
-@given(st.binary(max_size=200))
-def test_any_bytes_give_settings_or_a_clear_fault(data: bytes) -> None:
-    _, told = outcome(data)
-    assert all(each.startswith("c.toml") for each in told)
 
 
 def test_the_lines_of_keys_are_found_in_odd_texts() -> None:

@@ -130,18 +130,6 @@ def test_a_rover_that_drives_after_a_halt_is_seen_and_no_other() -> None:
         assert told(Watched(), script) == [breach] * bool(breach), script
 
 
-def test_hold_and_continue_said_together_are_a_go() -> None:
-    """As somebody does who makes the rover ready: neither waits for an answer."""
-    watched = Watched()
-    hold = Word(Kind.HALT, "HOLD", 176, 1, 1.0, "station", 100.0, 1, is_copy=False)
-    go = Word(Kind.GO, "continue", 193, 1, 1.0, "station", 100.0, 2, is_copy=False)
-    for word in (hold, go):
-        watched.halts.read(word, running=None, now=100.02)
-    watched.halts.answered("station", 176, ACCEPTED, now=100.02)
-    watched.halts.answered("station", 193, ACCEPTED, now=100.02)
-    assert watched.drive(5) == []
-
-
 def test_what_is_submitted_after_a_hold_of_nothing_drives() -> None:
     """Also while a word of a third is not answered yet, and if the two pass on their way."""
     for sent in [0.0, -0.05]:
@@ -156,11 +144,3 @@ def test_what_is_submitted_after_a_hold_of_nothing_drives() -> None:
         watched.halts.read(move, running=None, now=read_at)
         watched.halts.answered("third", 300, DENIED, now=read_at)
         assert watched.drive(5) == []
-
-
-def test_two_people_whose_words_pass_each_other_are_counted_and_nobody_is_wrong() -> None:
-    watched = Watched()
-    watched.say("pause")
-    watched.say("continue", by="tablet", first=watched.now - 0.05)
-    assert watched.drive(5) == []
-    assert watched.halts.in_flight == 1

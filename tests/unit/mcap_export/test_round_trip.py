@@ -330,12 +330,6 @@ def test_a_copy_that_was_changed_is_named(tmp_path: Path) -> None:
             Restored(rewritten(path, change))
 
 
-def test_a_file_without_a_log_is_named(tmp_path: Path) -> None:
-    path, _ = exported(tmp_path, log=FIRST)
-    with pytest.raises(RecordError, match="has no telemetry log"):
-        Restored(rewritten(path, without("/mavlink/raw")))
-
-
 def others(convention: str | None) -> Iterator[bytes]:
     """Yield files of others: with a message, and without."""
     for count in range(2):

@@ -109,23 +109,6 @@ def test_parameters_are_read_as_their_make_writes_them() -> None:
     assert json.loads(text)["parameters"]["COM_OF_LOSS_T"] is None
 
 
-def test_a_mission_on_board_is_counted_without_home() -> None:
-    world = ProbeWorld()
-    sent: list[m.Message] = [m.MissionCount(1, 1, 3, 0)]
-    sent += [m.MissionItemInt(1, 1, n, 6, 16, 0, 1, 0, 0, 0, 0, 10, 10, 0, 0) for n in range(3)]
-    for message in sent:
-        world.rover.autopilot.handle(message, Address(255, 190), now=world.now)
-        world.run(0.2)
-    assert world.finish().findings.mission_items == 2
-    assert marks_of(world)["mission on board"][0] is Mark.WARNING
-
-
-def test_nobody_there_is_told() -> None:
-    world = ProbeWorld()
-    world.fault(Faults(silent=True))
-    assert str(world.finish().error) == "no heartbeat from a rover within 10 s"
-
-
 def test_who_else_drives_it_is_left_alone() -> None:
     """Also a server that the probe has dialled instead of the rover."""
     for said, words in (
@@ -140,14 +123,6 @@ def test_who_else_drives_it_is_left_alone() -> None:
             world.run(2.5)  # it is asked what it is
         assert str(world.finish().error).startswith(words)
         assert (world.setpoints(), world.rests()) == ([], False)
-
-
-def test_a_ground_station_that_looks_on_is_told_and_no_hindrance() -> None:
-    world = ProbeWorld()
-    world.run(2.0)
-    world.somebody_sends(STATION, Address(255, 190))
-    probe = world.finish()
-    assert (probe.error, probe.findings.others) == (None, ["ground station 255/190"])
 
 
 def test_the_rates_that_it_asked_for_are_given_back_if_it_ends_before_its_time() -> None:
@@ -220,14 +195,6 @@ def test_all_is_measured_inside_its_area_and_the_rover_is_left_at_rest(persona: 
         assert orders[-1] == (400, 0.0)
     gaps = [later - earlier for (earlier, _), (later, _) in pairwise(world.setpoints())]
     assert len([gap for gap in gaps if gap > 0.2]) == 1
-
-
-def test_a_px4_that_turns_at_a_yaw_rate_gets_a_profile_that_says_so() -> None:
-    found = ProbeWorld(drive=True, persona=replace(PX4, honours_yaw_rate=True)).finish().findings
-    assert why_none(found) == ""
-    profile = profile_of(found, probed="2026-11-21T12:00:00Z")
-    assert (profile.yaw_rate, profile.reverse, profile.autopilot) == ("honoured", "yes", "px4")
-    assert (profile.system_id, profile.uid) == (1, "1")
 
 
 def test_a_car_is_driven_in_a_larger_area_and_not_asked_to_turn_on_the_spot() -> None:

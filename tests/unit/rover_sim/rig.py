@@ -52,16 +52,8 @@ def command_long(command: int, *params: float) -> m.CommandLong:
     return m.CommandLong(1, 1, command, 0, *params, *(0.0,) * (7 - len(params)))
 
 
-@dataclass(frozen=True, slots=True)
-class Refusal:
-    """A refused command."""
-
-    result: int
-    texts: tuple[str, ...]
-
-
 class Rig:
-    """One rover with system id 1, and what its client hears, and when."""
+    """One rover with system id 1, and what its client hears."""
 
     def __init__(
         self,
@@ -76,14 +68,12 @@ class Rig:
         """``realism``: None for that of its make."""
         self.now = START
         self.speaks_px4 = persona.name != "ardupilot"
-        self._is_late = realism is None or realism.timing is not None  # answers take their time
         body = kinematic_body(persona.frame, start=start, slip=slip, seed=None)
         self.vehicle = make_vehicle(
             body, system_id=1, persona=persona, now=self.now, realism=realism, seed=seed
         )
         self.autopilot = self.vehicle.autopilot
         self.heard: list[Message] = []
-        self.arrivals: list[tuple[float, Message]] = []
         self._decoder = Decoder()
         self._encoder = Encoder(CLIENT)
         self.send(heartbeat())
@@ -141,34 +131,13 @@ class Rig:
             m.CommandInt(1, 1, frame, command, 0, 0, -1.0, param2, 0.0, nan, x, y, 0.0)
         )
 
-    def ask(self, number: int, *params: float) -> Refusal:
-        """Send a command to a rover that takes its time; give what came of it."""
-        self.heard.clear()
-        self.send(command_long(number, *params))
-        self.run(0.1)
-        (ack,) = [e for e in self.heard if isinstance(e, m.CommandAck) and e.command == number]
-        joined: list[str] = []  # the pieces of long texts
-        for each in [e for e in self.heard if isinstance(e, m.Statustext)]:
-            text = each.text.rstrip("\0")
-            joined[len(joined) - bool(each.chunk_seq) :] = [
-                joined[-1] + text if each.chunk_seq else text
-            ]
-        return Refusal(ack.result, tuple(joined))
-
     def set_mode(self, custom_mode: int) -> MavResult:
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
         params = (main, sub, nan) if self.speaks_px4 else (custom_mode,)
-        if self._is_late:
-            return MavResult(self.ask(MavCmd.DO_SET_MODE, 1, *params).result)
         return self.command(MavCmd.DO_SET_MODE, 1, *params)
 
     def arm(self) -> MavResult:
-        if self._is_late:
-            return MavResult(self.try_to_arm().result)
         return self.command(MavCmd.COMPONENT_ARM_DISARM, 1)
-
-    def try_to_arm(self) -> Refusal:
-        return self.ask(MavCmd.COMPONENT_ARM_DISARM, 1)
 
     def mode(self) -> int:
         """The mode as HEARTBEAT has it, without waiting for the next one."""
@@ -198,10 +167,6 @@ class Rig:
         """Every STATUSTEXT since the last ``take``."""
         return [t.text.rstrip("\0") for t in self.heard if isinstance(t, m.Statustext)]
 
-    def times(self, kind: type[Message]) -> list[float]:
-        """When those of a kind were heard."""
-        return [at for at, message in self.arrivals if isinstance(message, kind)]
-
     def _answer_to(self, message: m.CommandLong | m.CommandInt) -> MavResult:
         before = len(self.heard)
         self.send(message)
@@ -219,7 +184,6 @@ class Rig:
                 message = self._decoder.decode(packet)
                 assert message is not None
                 self.heard.append(message)
-                self.arrivals.append((self.now, message))
 
 
 #: one that speaks as PX4 does
@@ -259,7 +223,6 @@ def body_velocity(forward: float, yaw_rate: float = 0.0) -> m.SetPositionTargetL
 # the manoeuvres of the recordings
 
 LOOK = 0.02  # s between two looks at the truth
-STANDS = 0.03  # m/s, as in the recordings' figures
 
 
 def driver(persona: Persona, frame: Frame, realism: Realism = REAL_DRIVE) -> Rig:
@@ -288,11 +251,6 @@ class Run:
     times: list[float]
     states: list[BodyState]
 
-    def reached(self, speed: float) -> float:
-        """Return after how many seconds it was first as fast."""
-        pairs = zip(self.times, self.states, strict=True)
-        return next((t for t, s in pairs if s.forward_speed >= speed), float("inf"))
-
     @property
     def speeds(self) -> list[float]:
         return [state.forward_speed for state in self.states]
@@ -305,17 +263,6 @@ class Run:
         """Return the mean speed of the last part of the run."""
         last = self.speeds[-int(part * len(self.speeds)) :]
         return sum(last) / len(last)
-
-    @property
-    def stood_after(self) -> tuple[float, float]:
-        """Return s and m until it stood for 0.2 s."""
-        count = 0
-        for number, speed in enumerate(self.speeds):
-            count = count + 1 if abs(speed) < STANDS else 0
-            if count == 10:
-                way = Run(self.times[: number + 1], self.states[: number + 1]).way
-                return self.times[number] - 9 * LOOK, way
-        return float("inf"), self.way
 
     @property
     def way(self) -> float:

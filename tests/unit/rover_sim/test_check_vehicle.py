@@ -107,11 +107,6 @@ def streams_each_second_only(message: Message) -> Message:
     return message
 
 
-def does_not_disarm(message: Message) -> Message | None:
-    off = isinstance(message, m.CommandLong) and (message.command, message.param1) == (400, 0)
-    return None if off else message
-
-
 def no_body_frame(message: Message) -> Message | None:
     return None if isinstance(message, MOTION) and message.coordinate_frame == 8 else message
 
@@ -216,14 +211,6 @@ def test_what_is_wrong_is_named_and_nothing_else() -> None:
         for line in report.failed:
             assert "expected" in line.said
             assert "seen" in line.said
-
-
-def test_a_rover_that_cannot_be_disarmed_is_left_in_hold_and_said_so() -> None:
-    wire = VirtualWire(ARDUPILOT, hears=does_not_disarm)
-    report = run(wire, ALL, ("driving",))
-    assert {"left behind", "disarm while driving"} <= {line.name for line in report.failed}
-    assert wire.vehicle.autopilot.mode is Mode.HOLD
-    assert abs(wire.vehicle.truth.forward_speed) < 0.05
 
 
 # -- whatever happens while it drives

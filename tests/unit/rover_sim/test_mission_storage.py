@@ -80,17 +80,6 @@ def test_a_second_client_is_denied_and_the_first_undisturbed() -> None:
     assert rig.take(m.MissionAck)[0].type == MavMissionResult.ACCEPTED
 
 
-def test_a_silent_sender_is_asked_each_second_and_given_up_after_eight() -> None:
-    rig = Rig()
-    rig.send(m.MissionCount(1, 1, 2))
-    rig.take(m.MissionRequest)
-    rig.run(7.5)
-    assert [request.seq for request in rig.take(m.MissionRequest)] == [0] * 7
-    rig.run(1.0)
-    assert "Mission upload timeout" in rig.texts()
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.OPERATION_CANCELLED
-
-
 def guided_item(north: float, east: float) -> m.MissionItem:
     x, y = DEFAULT_ORIGIN.to_global(north, east)
     return m.MissionItem(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, x * 1e-7, y * 1e-7, 0.0)

@@ -22,21 +22,6 @@ def read(rig: Rig, name: bytes) -> m.ParamValue:
     return value
 
 
-def test_the_list_is_complete_numbered_in_order_and_has_what_clients_miss() -> None:
-    rig = Px4Rig()
-    rig.send(m.ParamRequestList(1, 1))
-    values = rig.take(m.ParamValue)
-    assert [value.param_index for value in values] == list(range(len(values)))
-    assert {value.param_count for value in values} == {len(values)}
-    assert {value.param_type for value in values} == {INT32, REAL32}
-    names = [value.param_id.rstrip("\0") for value in values]
-    assert names == sorted(names)
-    assert {
-        *("SYS_AUTOSTART", "COM_RC_IN_MODE", "CAL_GYRO0_ID", "CAL_ACC0_ID", "SYS_HAS_MAG"),
-        *("COM_OF_LOSS_T", "COM_OBL_RC_ACT", "MAV_SYS_ID"),
-    } <= set(names)
-
-
 def test_integers_are_read_bytewise_with_their_index() -> None:
     for name, number in [
         (b"SYS_AUTOSTART", 50000),

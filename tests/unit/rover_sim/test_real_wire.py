@@ -2,7 +2,6 @@
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.mavlink.enums import MavLandedState
 from rover_sim.body import Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PX4
@@ -10,15 +9,6 @@ from rover_sim.vehicle import Peers, Vehicle, make_vehicle
 from tests.unit.rover_sim.rig import CLIENT, RealRig, heartbeat
 
 UNNUMBERED = 65535
-
-
-def test_ardupilot_never_says_whether_it_is_on_the_ground() -> None:
-    rig = RealRig(ARDUPILOT)
-    rig.run(3.0)
-    rig.ready_to_drive()
-    rig.run(3.0)
-    states = {e.landed_state for _, e in rig.arrivals if isinstance(e, m.ExtendedSysState)}
-    assert states == {MavLandedState.UNDEFINED}
 
 
 def test_ardupilot_sends_a_parameter_unasked_that_has_no_number() -> None:

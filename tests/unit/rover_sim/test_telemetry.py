@@ -12,8 +12,6 @@ from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from tests.unit.rover_sim.rig import GUIDED, Rig, body_velocity
 
-GEOFENCE = 0x100000  # MAV_SYS_STATUS_SENSOR
-
 STREAMED = {
     m.Heartbeat,
     m.SysStatus,
@@ -102,10 +100,3 @@ def test_telemetry_can_be_withheld_or_silenced_altogether() -> None:
     rig.autopilot.set_faults(Faults())
     rig.run(1.1)
     assert rig.last(m.Heartbeat).custom_mode == GUIDED  # it had heard, and obeyed
-
-
-def test_a_fence_that_is_not_there_is_healthy() -> None:
-    """As ArduPilot says it; MAVProxy announces "fence breach" of any other rover."""
-    status = Rig().last(m.SysStatus)
-    assert not status.onboard_control_sensors_present & GEOFENCE
-    assert status.onboard_control_sensors_health & GEOFENCE

@@ -47,17 +47,6 @@ def test_a_script_drives_the_rover(served: RoverWorld) -> None:
     assert 8 < served.now < 30
 
 
-def test_time_stands_while_nobody_waits(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        tasks.submit(Move(2.0))
-        before = served.now
-        assert served.rovers[0].stands
-        assert served.now == before
-        served.sleep(4.0)
-        assert served.now == pytest.approx(before + 4.0)
-        assert served.rovers[0].speed > 0.3
-
-
 def test_a_rover_disarmed_by_hand_stops_its_task(served: RoverWorld) -> None:
     with served.sync_client() as tasks:
         task = tasks.submit(Move(2.0))

@@ -57,27 +57,6 @@ def test_asyncio_is_all_there(world: VirtualWorld, run: Run) -> None:
     run(all_of_it())
 
 
-def test_a_reader_is_called_when_something_has_arrived(world: VirtualWorld, run: Run) -> None:
-    here, there = world.net.link("here"), world.net.link("there")
-    assert here.fileno() != there.fileno()
-    got: list[tuple[float, list[Any]]] = []
-
-    async def listen() -> None:
-        loop = asyncio.get_running_loop()
-        loop.add_reader(here.fileno(), lambda: got.append((loop.time(), here.receive(64))))
-        there.send("here", b"one")
-        await asyncio.sleep(1.0)
-        there.send("here", b"two")
-        await asyncio.sleep(1.0)
-        assert loop.remove_reader(here.fileno())
-        there.send("here", b"three")
-        await asyncio.sleep(1.0)
-
-    run(listen())
-    assert got == [(0.25, [("there", b"one")]), (1.25, [("there", b"two")])]
-    assert here.receive(64) == [("there", b"three")]
-
-
 async def opens_a_socket() -> None:
     await asyncio.get_running_loop().create_datagram_endpoint(
         asyncio.DatagramProtocol, remote_addr=("127.0.0.1", 14560)
