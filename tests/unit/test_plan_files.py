@@ -3,7 +3,6 @@
 import json
 import math
 import struct
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -140,15 +139,21 @@ WPL_READ = PlanFile(
 )
 
 
-def edited(change: Callable[[Any], object]) -> str:
-    """PLAN with ``change`` done to its root object."""
-    root = json.loads(PLAN)
-    change(root)
+def changed(path: str, *value: object) -> str:
+    """PLAN with another value at a path of keys and indices; without one it is taken away."""
+    root = holder = json.loads(PLAN)
+    *way, last = [int(key) if key.isdigit() else key for key in path.split()]
+    for key in way:
+        holder = holder[key]
+    if value:
+        holder[last] = value[0]
+    else:
+        del holder[last]
     return json.dumps(root)
 
 
 def with_items(*items: object) -> str:
-    return edited(lambda root: root["mission"].update(items=items))
+    return changed("mission items", items)
 
 
 def waypoint(**fields: object) -> dict[str, object]:
@@ -286,62 +291,62 @@ ROOT_PROBLEMS: list[tuple[str, str]] = [
     ('{"fileType": "Parameters"}', 'file: fileType "Parameters" is neither Plan nor Mission,'),
     ('{"fileType": "Mission", "version": "2.0"}', 'file: version "2.0" is not supported, expected'),
     ('{"fileType": ' + "[" * 400 + "]" * 400 + "}", "file: fileType is a list, expected text"),
-    (edited(lambda root: root.pop("version")), "file: version is missing"),
-    (edited(lambda root: root.update(version=2)), "file: version 2 is not supported, expected 1"),
-    (edited(lambda root: root.update(version=True)), "file: version is true, expected a number"),
-    (edited(lambda root: root.pop("mission")), "file: mission is missing"),
-    (edited(lambda root: root.update(mission=[])), "file: mission is a list, expected an object"),
+    (changed("version"), "file: version is missing"),
+    (changed("version", 2), "file: version 2 is not supported, expected 1"),
+    (changed("version", True), "file: version is true, expected a number"),
+    (changed("mission"), "file: mission is missing"),
+    (changed("mission", []), "file: mission is a list, expected an object"),
     (
-        edited(lambda root: root["mission"].update(version=1)),
+        changed("mission version", 1),
         "mission: version 1 is not supported, expected 2",
     ),
-    (edited(lambda root: root["mission"].pop("items")), "mission: items is missing"),
+    (changed("mission items"), "mission: items is missing"),
     (
-        edited(lambda root: root["mission"].update(plannedHomePosition=[1, 2])),
+        changed("mission plannedHomePosition", [1, 2]),
         "home: a point needs 3 numbers, not 2",
     ),
     (
-        edited(lambda root: root["mission"].update(plannedHomePosition=[1, 181, 0])),
+        changed("mission plannedHomePosition", [1, 181, 0]),
         "home: longitude 181 not in -180..180",
     ),
     (
-        edited(lambda root: root["geoFence"].update(version=3)),
+        changed("geoFence version", 3),
         "geoFence: version 3 is not supported, expected 1 or 2",
     ),
     (
-        edited(lambda root: root["geoFence"]["polygons"][1]["polygon"].pop()),
+        changed("geoFence polygons 1 polygon 2"),
         "fence polygon 2: 2 points, at least 3 are needed",
     ),
     (
-        edited(lambda root: root["geoFence"]["polygons"][0].update(inclusion=1)),
+        changed("geoFence polygons 0 inclusion", 1),
         "fence polygon 1: inclusion is 1, expected true or false",
     ),
     (
-        edited(lambda root: root["geoFence"]["polygons"][0].update(version=2)),
+        changed("geoFence polygons 0 version", 2),
         "fence polygon 1: version 2 is not supported, expected 1",
     ),
     (
-        edited(lambda root: root["geoFence"]["circles"][0]["circle"].update(radius=0)),
+        changed("geoFence circles 0 circle radius", 0),
         "fence circle 1: radius 0 m is not above 0",
     ),
     (
-        edited(lambda root: root["geoFence"]["circles"][0]["circle"].update(center=[91, 0])),
+        changed("geoFence circles 0 circle center", [91, 0]),
         "fence circle 1: latitude 91 not in -90..90",
     ),
     (
-        edited(lambda root: root.update(geoFence={"polygon": [[1, 2]], "version": 1})),
+        changed("geoFence", {"polygon": [[1, 2]], "version": 1}),
         "fence: 1 points, at least 3 are needed",
     ),
     (
-        edited(lambda root: root["geoFence"].update(circles={"1": 2})),
+        changed("geoFence circles", {"1": 2}),
         "geoFence: circles is an object, expected a list",
     ),
     (
-        edited(lambda root: root["rallyPoints"].update(version=3)),
+        changed("rallyPoints version", 3),
         "rallyPoints: version 3 is not supported, expected 1 or 2",
     ),
     (
-        edited(lambda root: root["rallyPoints"]["points"][1].__setitem__(0, None)),
+        changed("rallyPoints points 1 0", None),
         "rally point 2: latitude is null, expected a number",
     ),
 ]
@@ -431,7 +436,7 @@ def test_a_file_that_cannot_be_read_is_such_an_error(tmp_path: Path) -> None:
         read_plan(tmp_path)
 
 
-def test_size_and_number_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_size_and_number_are_limited(tmp_path: Path) -> None:
     big = tmp_path / "big"
     big.write_bytes(PLAN.encode() + b" " * (MAX_SIZE - len(PLAN)))
     assert read_plan(big) == READ
@@ -440,13 +445,12 @@ def test_size_and_number_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyP
         read_plan(big)
     assert problem(PLAN + " " * MAX_SIZE) == "more than 10000000 characters"
     rally = [[1, 2, 3]] * (MAX_ITEMS + 1)
-    many = edited(lambda root: root["rallyPoints"].update(points=rally))
+    many = changed("rallyPoints points", rally)
     assert problem(many) == "more than 65534 rally points"
     corners = [[1, 2]] * MAX_ITEMS
-    fenced = edited(lambda root: root["geoFence"]["polygons"][0].update(polygon=corners))
+    fenced = changed("geoFence polygons 0 polygon", corners)
     assert problem(fenced) == "more than 65534 fence items"
-    monkeypatch.setattr("mav_tasks.plan_files.reader.MAX_ITEMS", 6)
-    assert problem(PLAN) == "more than 6 mission items"
+    assert problem(wpl(*map(line, range(1, MAX_ITEMS + 2)))) == "more than 65534 mission items"
 
 
 def check_sendable(plan: PlanFile) -> None:

@@ -65,16 +65,6 @@ def test_what_is_wrong_with_a_configuration_is_told_line_by_line(run: Run, tmp_p
     assert_one_clear_line(run("config", "check", str(tmp_path)), str(tmp_path), "not a file")
 
 
-def test_the_sample_is_begun_checked_and_never_written_over(run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "c.toml"
-    assert run("config", "init", str(path)) == (0, f"wrote {path}\n", "")
-    code, printed, _ = run("config", "init")
-    assert (code, printed) == (0, path.read_text(encoding="utf-8"))
-    assert run("config", "check", str(path)) == (0, "ok\n", "")
-    assert_one_clear_line(run("config", "init", str(path)), str(path), "exists")
-    assert_one_clear_line(run("config", "init", str(tmp_path / "no" / "c")), "No such file")
-
-
 def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) -> None:
     path, again = tmp_path / "c.toml", tmp_path / "again.toml"
     path.write_text("[driving]\nspeed = 0.8\n", encoding="utf-8")

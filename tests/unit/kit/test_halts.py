@@ -128,19 +128,3 @@ def told(watched: Watched, script: str) -> list[str]:
 def test_a_rover_that_drives_after_a_halt_is_seen_and_no_other() -> None:
     for script, breach in SCRIPTS.items():
         assert told(Watched(), script) == [breach] * bool(breach), script
-
-
-def test_what_is_submitted_after_a_hold_of_nothing_drives() -> None:
-    """Also while a word of a third is not answered yet, and if the two pass on their way."""
-    for sent in [0.0, -0.05]:
-        watched = Watched()
-        hold = Word(Kind.HALT, "HOLD", 176, 1, 1.0, "station", watched.now, 1, is_copy=False)
-        watched.halts.read(hold, running=None, now=watched.now, has_tasks=False)
-        watched.halts.answered("station", 176, ACCEPTED, now=watched.now)
-        read_at, first_sent = watched.now + 0.02, watched.now + 0.01 + sent
-        start = Word(Kind.GO, "mission start", 300, 1, 0.0, "third", first_sent, 2, is_copy=False)
-        move = Word(Kind.WISH, "submission", 54000, 1, 1.0, "other", first_sent, 3, is_copy=False)
-        watched.halts.read(start, running=None, now=read_at)
-        watched.halts.read(move, running=None, now=read_at)
-        watched.halts.answered("third", 300, DENIED, now=read_at)
-        assert watched.drive(5) == []

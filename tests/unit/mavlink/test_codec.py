@@ -13,7 +13,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import DecodeCounts, Decoder, Encoder, Packer, target_of
 from mav_tasks.mavlink.packet import Packet, split_datagram
-from tests.unit.mavlink.samples import stock_message, stock_packet, values_of
+from tests.unit.mavlink.samples import message_of, raw_packet, stock_message, stock_packet
 
 SOURCE = Address(12, 34)
 
@@ -41,7 +41,7 @@ def test_messages_of_all_kinds_are_packed_as_pymavlink_packs_them() -> None:
     for number, kind in m.ALL.items():
         random = Random(number)
         for seq in (0, 5, 255):
-            message = kind(*values_of(kind, random))
+            message = message_of(kind, random, _dialect)
             ours = Packer().pack(message, SOURCE, seq=seq)
             assert ours == their_packet(message, seq=seq), message
 
@@ -50,12 +50,9 @@ def packets_of(kind: Any) -> Iterator[bytes]:
     """Packets of fields, and of payloads of any bytes that are too short or too long."""
     random = Random(kind.id)
     for v1 in (False, False, False, *(True,) * (kind.id < 256)):
-        yield their_packet(kind(*values_of(kind, random)), v1=v1)
+        yield their_packet(message_of(kind, random, _dialect), v1=v1)
     for length in (0, 1, kind.unpacker.size // 2, kind.unpacker.size, 255):
-        payload = random.randbytes(length)
-        head = bytes([length, 0, 0, 9, 1, 2]) + kind.id.to_bytes(3, "little")
-        crc = _dialect.x25crc(head + payload + bytes([kind.crc_extra])).crc
-        yield b"\xfd" + head + payload + crc.to_bytes(2, "little")
+        yield raw_packet(kind, random.randbytes(length))
 
 
 def test_packets_of_all_kinds_are_decoded_as_pymavlink_decodes_them() -> None:

@@ -3,7 +3,7 @@
 import io
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
 from random import Random
@@ -19,7 +19,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, Writer
 
 from mav_tasks.engine.inputs import Input, LinkChanged, LinkSide, Packets, PeerChanged, WallClock
-from mav_tasks.errors import RecordError, UsageError
+from mav_tasks.errors import RecordError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
@@ -207,12 +207,6 @@ def test_the_same_recordings_make_the_same_file(tmp_path: Path) -> None:
     assert contents[0] == contents[1]
 
 
-def test_two_recordings_of_one_name_are_refused(tmp_path: Path) -> None:
-    paths = [tmp_path / "log.tlog", tmp_path / "x" / "log.tlog"]
-    with pytest.raises(UsageError, match=r"two recordings are named log\.tlog"):
-        made_of(tmp_path, *paths)
-
-
 def record_of(folder: Path) -> Path:
     """Return a record of packets on two links, one of them a stream."""
     recording = Recording(decisions=str(folder / "records"))
@@ -328,33 +322,6 @@ def test_a_copy_that_was_changed_is_named(tmp_path: Path) -> None:
     ):
         with pytest.raises(RecordError, match=r"changed.mcap: 'log.tlog' is incomplete, or not"):
             Restored(rewritten(path, change))
-
-
-def others(convention: str | None) -> Iterator[bytes]:
-    """Yield files of others: with a message, and without."""
-    for count in range(2):
-        file = io.BytesIO()
-        writer: Any = Writer(file, compression=CompressionType.NONE)
-        writer.start("ros2")
-        if convention is not None:
-            writer.add_metadata("mav-tasks", {"convention": convention})
-        channel = writer.register_channel("/mavlink/raw", "tlog", 0)
-        for _ in range(count):
-            writer.add_message(channel, 1, FIRST, 1)
-        writer.finish()
-        yield file.getvalue()
-
-
-def test_files_of_another_convention_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "other.mcap"
-    for data in others(None):
-        path.write_bytes(data)
-        with pytest.raises(RecordError, match="an MCAP file, but not made by mav-tasks export"):
-            Restored(path)
-    for data in others("2"):
-        path.write_bytes(data)
-        with pytest.raises(RecordError, match="its convention is '2'; this version reads '1'"):
-            Restored(path)
 
 
 def test_another_file_is_named(tmp_path: Path) -> None:

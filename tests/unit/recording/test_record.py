@@ -269,22 +269,16 @@ BAD_LINES: dict[str, Callable[[list[Any]], list[Any]]] = {
     "is unreadable": lambda lines: [*lines[:-1], ["packets", 9.0, "x", [["y"]]]],
     "datagrams": lambda lines: [*lines[:2], ["packets", 1.0, "x", [["y", "MQ=="]], [0.5, 0.5]]],
     "'melody' is unknown": lambda lines: [*lines[:-1], ["melody", 9.0]],
-    "line 2 is unreadable": lambda lines: [lines[0], ["link", "now"]],
-    "line 3 is unreadable: cannot": lambda lines: [*lines[:2], 5],
     "Settings.colour is unknown": lambda lines: [{**lines[0], "settings": {"colour": "red"}}],
-    "unreadable header: KeyError": lambda lines: [{"mav-tasks record": 3, "version": "x"}],
     "its format is 2; this version reads 3": lambda lines: [{"mav-tasks record": 2}],
     "recorded by version 0.0.1, whose events have another format": lambda lines: [
         {**lines[0], "rows": {}, "version": "0.0.1"}
     ],
-    "line 2 is not a task": lambda lines: [with_tasks(lines[0]), ["deadline", 1.0]],
     "unreadable tasks": lambda lines: [with_tasks(lines[0]), ["task", [1]]],
     "ends before the run began": lambda lines: [with_tasks(lines[0])],
-    "not a record of decisions": lambda lines: [[1, 2, 3]],
     "unreadable header: no words": lambda lines: [{**lines[0], "version": "\x1b[31m1"}],
     "unreadable header: no time": lambda lines: [{**lines[0], "now": "noon"}],
     " is not a valid end mark": lambda lines: [*lines[:-1], ["end", "\x1b[31m", 1, ""]],
-    "not a valid end mark": lambda lines: [*lines[:-1], ["end", 3]],
 }
 
 

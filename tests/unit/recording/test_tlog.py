@@ -145,15 +145,6 @@ def test_a_stream_may_be_cut_anywhere(tmp_path: Path) -> None:
         assert [seq for *_, seq in told(tmp_path / str(cut))] == [*range(1, 11)]
 
 
-def test_noise_is_not_logged(tmp_path: Path) -> None:
-    tlog = started(tmp_path)
-    good = packet(heartbeat(), ROVER, 7)
-    bad = good[:-1] + bytes([good[-1] ^ 1])
-    tlog.on_input(Packets("rovers", [("x", b"\xfd\x01"), ("x", bad), ("x", b"?" + good)]), now=1.0)
-    tlog.close()
-    assert told(tmp_path) == [(1.0, "HEARTBEAT", ROVER, 7)]
-
-
 def test_the_log_goes_on_in_the_next_file(tmp_path: Path) -> None:
     tlog = started(tmp_path, tlog_size=2_000, tlog_files=3)
     for number in range(400):

@@ -13,8 +13,6 @@ from tests.unit.rover_sim.rig import PROMPT, Rig
 X, Y = DEFAULT_ORIGIN.to_global(40.0, 20.0)
 LATITUDE, LONGITUDE = X / 1e7, Y / 1e7
 
-each = pytest.mark.parametrize("persona", [PROMPT, PX4], ids=lambda p: p.name)
-
 
 def test_home_is_where_it_is_put() -> None:
     for persona in [PROMPT, PX4]:
@@ -34,11 +32,3 @@ def test_home_is_where_it_is_put() -> None:
             home = rig.last(m.HomePosition)
             assert (home.latitude, home.longitude) == pytest.approx((X, Y), abs=100)
             assert (home.x, home.y) == pytest.approx((40.0, 20.0), abs=1.5)  # float32 degrees
-
-
-def test_a_place_that_is_none_is_refused() -> None:
-    for persona in [PROMPT, PX4]:
-        for latitude, longitude in [(math.nan, 8.0), (91.0, 8.0)]:
-            refusal = MavResult.DENIED if persona is PX4 else MavResult.FAILED
-            rig = Rig(persona)
-            assert rig.command(MavCmd.DO_SET_HOME, 0, 0, 0, 0, latitude, longitude, 0) == refusal

@@ -1,15 +1,12 @@
 """What the rover tells about itself, and how often."""
 
-import math
 from collections import Counter
 
 import pytest
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd
-from rover_sim.body import Pose
 from rover_sim.faults import Faults
-from rover_sim.geo import DEFAULT_ORIGIN
 from tests.unit.rover_sim.rig import GUIDED, Rig, body_velocity
 
 STREAMED = {
@@ -48,24 +45,6 @@ def test_an_interval_can_be_switched_off_and_back_to_the_default() -> None:
     assert rig.last(m.MessageInterval).interval_us == 1_000_000
     rig.run(3.0)
     assert len(rig.take(m.VfrHud)) == 3
-
-
-def test_position_and_motion_agree_with_the_truth() -> None:
-    rig = Rig(start=Pose(north=3.0, east=-2.0, yaw=math.radians(120)))
-    rig.ready_to_drive()
-    rig.run(4.0, body_velocity(1.0))
-    for message_id in (m.LocalPositionNed.id, m.GlobalPositionInt.id, m.Attitude.id, m.VfrHud.id):
-        rig.command(MavCmd.REQUEST_MESSAGE, message_id)
-    truth, local = rig.truth, rig.last(m.LocalPositionNed)
-    assert math.dist((local.x, local.y), (truth.north, truth.east)) < 0.03  # one step old
-    assert math.atan2(local.vy, local.vx) == pytest.approx(math.radians(120), abs=1e-3)
-    assert rig.last(m.Attitude).yaw == pytest.approx(math.radians(120), abs=1e-3)
-    world = rig.last(m.GlobalPositionInt)
-    there = DEFAULT_ORIGIN.to_local(world.lat, world.lon)
-    assert there == pytest.approx((local.x, local.y), abs=0.02)
-    assert (world.hdg, rig.last(m.VfrHud).heading) == (12000, 120)
-    home = rig.last(m.HomePosition)
-    assert (home.x, home.y) == (3.0, -2.0)
 
 
 def test_faults_of_the_estimate_show_in_position_only() -> None:
