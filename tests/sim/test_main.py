@@ -131,41 +131,41 @@ BODIES = [
 ]
 
 
-def test_a_pymavlink_client_arms_drives_and_stops_a_rover(tmp_path: Path) -> None:
-    for body in BODIES:
-        truth = tmp_path / "truth.csv"
-        with simulator("--body", body, "--truth", str(truth)) as (process, port), client(port) as c:
-            beat = c.wait("HEARTBEAT")
-            assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
-            assert (beat.type, beat.autopilot) == (10, 3)
-            c.wait("HEARTBEAT", lambda h: h.custom_mode == 0)
-            for message_id in (30, 32):
-                assert c.ask(511, message_id, 50_000) == 0
-            assert c.ask(176, 1, 15) == 0
-            while c.ask(400, 1) != 0:  # refused until its estimate has settled
-                c.wait("ATTITUDE")
-            start = c.wait("LOCAL_POSITION_NED")
-            limit = time.monotonic() + LIMIT
-            while (now := c.wait("LOCAL_POSITION_NED")).x - start.x < 1.0:
-                assert time.monotonic() < limit
-                c.forward(1.0)
-            for _ in range(3):
-                c.forward(0.0)
-            c.wait("LOCAL_POSITION_NED", lambda p: abs(p.vx) < 0.01)
-            assert abs(now.y - start.y) < 0.05
-            assert c.ask(176, 1, 4) == 0
-            assert c.ask(400, 0) == 0
-            process.send_signal(signal.SIGTERM)
-            assert process.wait(timeout=LIMIT) == 0
-            assert process.stderr is not None
-            assert process.stderr.read() == ""
-        with truth.open(encoding="ascii") as file:
-            rows = list(csv.DictReader(file))
-        assert set(rows[0]) == {
-            "time", "system_id", "north", "east", "yaw", "forward_speed", "yaw_rate"
-        }  # fmt: skip
-        assert float(rows[-1]["north"]) > 1.0
-        assert len(rows) == pytest.approx(10 * float(rows[-1]["time"]), rel=0.2, abs=3)
+@pytest.mark.parametrize("body", BODIES)
+def test_a_pymavlink_client_arms_drives_and_stops_a_rover(body: str, tmp_path: Path) -> None:
+    truth = tmp_path / "truth.csv"
+    with simulator("--body", body, "--truth", str(truth)) as (process, port), client(port) as c:
+        beat = c.wait("HEARTBEAT")
+        assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
+        assert (beat.type, beat.autopilot) == (10, 3)
+        c.wait("HEARTBEAT", lambda h: h.custom_mode == 0)
+        for message_id in (30, 32):
+            assert c.ask(511, message_id, 50_000) == 0
+        assert c.ask(176, 1, 15) == 0
+        while c.ask(400, 1) != 0:  # refused until its estimate has settled
+            c.wait("ATTITUDE")
+        start = c.wait("LOCAL_POSITION_NED")
+        limit = time.monotonic() + LIMIT
+        while (now := c.wait("LOCAL_POSITION_NED")).x - start.x < 1.0:
+            assert time.monotonic() < limit
+            c.forward(1.0)
+        for _ in range(3):
+            c.forward(0.0)
+        c.wait("LOCAL_POSITION_NED", lambda p: abs(p.vx) < 0.01)
+        assert abs(now.y - start.y) < 0.05
+        assert c.ask(176, 1, 4) == 0
+        assert c.ask(400, 0) == 0
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=LIMIT) == 0
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    with truth.open(encoding="ascii") as file:
+        rows = list(csv.DictReader(file))
+    assert set(rows[0]) == {
+        "time", "system_id", "north", "east", "yaw", "forward_speed", "yaw_rate"
+    }  # fmt: skip
+    assert float(rows[-1]["north"]) > 1.0
+    assert len(rows) == pytest.approx(10 * float(rows[-1]["time"]), rel=0.2, abs=3)
 
 
 def test_several_rovers_share_the_socket_and_are_told_apart() -> None:

@@ -188,10 +188,7 @@ def test_the_lines_of_keys_are_found_in_odd_texts() -> None:
         ('driving = {"speed" = 1, acceleration = 1}', 1),
         ('store.path = """\n[driving]\nspeed = 3\n"""\n[driving]\n"speed" = 1', 6),
         ("log.level = 'info'\r\n[driving]\r\nspeed = 1\r\n", 3),
-        (
-            'links.clients = ["tcpin:127.0.0.1:1",\n  "tcpin:127.0.0.1:2", # ]\n]\ndriving.speed = 1',
-            4,
-        ),
+        ('links.push = ["127.0.0.1:1",\n  "127.0.0.1:2", # ]\n]\ndriving.speed = 1', 4),
     ):
         assert read(text).given["driving.speed"].where == f"c.toml:{line}", text
 
