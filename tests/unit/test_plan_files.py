@@ -190,15 +190,10 @@ def test_a_text_file_gives_its_items_and_home() -> None:
 
 def test_marks_and_line_ends_of_other_systems_change_nothing(tmp_path: Path) -> None:
     for text, read in [(PLAN, READ), (WPL, WPL_READ)]:
-        for written in [
-            lambda text: text,
-            lambda text: "\ufeff" + text,
-            lambda text: text.replace("\n", "\r\n"),
-            lambda text: "\n \n" + text,
-        ]:
+        for written in (text, "\ufeff" + text, text.replace("\n", "\r\n"), "\n \n" + text):
             file = tmp_path / "of any name"
-            file.write_bytes(written(text).encode())
-            assert read_plan(file) == parse_plan(written(text)) == read
+            file.write_bytes(written.encode())
+            assert read_plan(file) == parse_plan(written) == read
 
 
 def test_another_program_reads_the_same_from_a_text_file(tmp_path: Path) -> None:

@@ -112,22 +112,20 @@ def test_a_value_that_is_none_breaks_no_bound() -> None:
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    for make, says in [
-        (lambda path: None, "No such file"),
-        (lambda path: path.mkdir(), "not a file"),
-        (os.mkfifo, "not a file"),
-        (lambda path: path.write_bytes(b"a = 1\n\xff"), ":2: not UTF-8"),
-        (lambda path: path.write_bytes(b"#" * (LARGEST + 1)), "larger than 256 kB"),
-    ]:
-        path = tmp_path / f"{says[-3:]}.toml"
-        make(path)
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "bytes").write_bytes(b"a = 1\n\xff")
+    (tmp_path / "large").write_bytes(b"#" * (LARGEST + 1))
+    for name, says in (
+        ("none", "No such file"),
+        ("folder", "not a file"),
+        ("pipe", "not a file"),
+        ("bytes", ":2: not UTF-8"),
+        ("large", "larger than 256 kB"),
+    ):
         with pytest.raises(ConfigError, match=says) as raised:
-            read_text(path)
-        if path.is_dir():
-            path.rmdir()
-        else:
-            path.unlink(missing_ok=True)
-        assert str(raised.value).startswith(str(path))
+            read_text(tmp_path / name)
+        assert str(raised.value).startswith(str(tmp_path / name))
 
 
 def outcome(text: str | bytes) -> tuple[ServerSettings | None, tuple[str, ...]]:

@@ -15,7 +15,8 @@ def raw_packet(kind: MessageClass, payload: bytes) -> bytes:
     """A packet of any payload with a good checksum, not cut at its zeros."""
     head = bytes([len(payload), 0, 0, 9, 1, 2]) + kind.id.to_bytes(3, "little")
     crc: int = common.x25crc(head + payload + bytes([kind.crc_extra])).crc
-    return b"\xfd" + head + payload + crc.to_bytes(2, "little")
+    packet: bytes = b"\xfd" + head + payload + crc.to_bytes(2, "little")
+    return packet
 
 
 def message_of(kind: MessageClass, random: Random, dialect: Any = common) -> Any:

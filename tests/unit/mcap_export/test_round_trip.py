@@ -18,7 +18,6 @@ from mcap import stream_reader
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, Writer
 
-from mav_tasks.engine.inputs import Input, LinkChanged, LinkSide, Packets, PeerChanged, WallClock
 from mav_tasks.errors import RecordError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -26,8 +25,6 @@ from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.layout import Layout
 from mav_tasks.mcap_export.exporting import Counts, export
 from mav_tasks.mcap_export.restoring import restore
-from mav_tasks.recording import observers
-from mav_tasks.settings import Recording, Settings
 from tests.unit.mcap_export.json_schema import check, check_schema
 from tests.unit.recording.odd_packets import SIGNED, UNKNOWN, V1, WRONG_CRC
 
@@ -175,19 +172,6 @@ def test_what_the_dialect_does_not_know_is_counted_and_raw_only(tmp_path: Path) 
     }
 
 
-def test_a_message_has_time_sequence_and_schema(tmp_path: Path) -> None:
-    path, _ = exported(tmp_path, log=FIRST + SECOND)
-    with path.open("rb") as file:
-        found = list(make_reader(file).iter_messages(topics=["/mavlink/1/1/ATTITUDE"]))
-    times = [(each.log_time, each.sequence) for _, _, each in found]
-    assert times == [((START + 1000) * 1000, 0), ((START + 2000) * 1000, 1)]
-    schema, channel, _ = found[0]
-    assert schema is not None
-    assert (schema.name, channel.message_encoding) == ("mavlink.ATTITUDE", "json")
-    fields = json.loads(schema.data)["properties"]
-    assert fields["time_boot_ms"] == {"type": "integer", "description": "uint32_t, ms"}
-
-
 def test_logs_of_one_run_are_merged_by_time_and_come_back_each(tmp_path: Path) -> None:
     early = b"".join(attitudes(100))
     late = b"".join(attitudes(100, start=START + 50_500))
@@ -205,56 +189,6 @@ def test_the_same_recordings_make_the_same_file(tmp_path: Path) -> None:
         folder.mkdir()
         contents.append(exported(folder, log=ODD["several rovers"])[0].read_bytes())
     assert contents[0] == contents[1]
-
-
-def record_of(folder: Path) -> Path:
-    """Return a record of packets on two links, one of them a stream."""
-    recording = Recording(decisions=str(folder / "records"))
-    (record,) = observers(recording, Settings(), None, now=0.0)
-    packet = FIRST[8:]
-    heartbeat = Encoder(GCS).encode(m.Heartbeat(6, 8, 0, 0, 4, 3))
-    items: list[Input] = [
-        WallClock(START / 1e6),
-        LinkChanged("rovers", LinkSide.VEHICLES, up=True, is_stream=True),
-        PeerChanged("rovers", 1, up=True),
-        LinkChanged("clients", LinkSide.CLIENTS, up=True),
-        Packets("rovers", [(1, packet[:9])]),
-        Packets("rovers", [(1, packet[9:])]),
-        Packets("clients", [("gcs", heartbeat)]),
-    ]
-    for now, item in enumerate(items):
-        record.on_input(item, now=float(now))
-    record.close()
-    (path,) = (folder / "records").iterdir()
-    return path
-
-
-def test_a_record_alone_has_what_was_received_with_its_links(tmp_path: Path) -> None:
-    record = record_of(tmp_path)
-    path, counts = made_of(tmp_path, record)
-    assert counts.packets == 2
-    with path.open("rb") as file:
-        found = {
-            channel.topic: (channel.metadata, message.log_time)
-            for _, channel, message in make_reader(file).iter_messages()
-        }
-    assert found["/mavlink/1/1/ATTITUDE"] == (
-        {"link": "rovers", "side": "vehicles"},
-        (START + 5_000_000) * 1000,
-    )
-    assert found["/mavlink/255/190/HEARTBEAT"] == (
-        {"link": "clients", "side": "clients"},
-        (START + 6_000_000) * 1000,
-    )
-    (name,) = Restored(path).contents
-    assert name == record.name.replace(".decisions.gz", ".tlog")
-
-
-def test_beside_a_log_a_record_adds_no_packets(tmp_path: Path) -> None:
-    (tmp_path / "log.tlog").write_bytes(FIRST)
-    path, counts = made_of(tmp_path, record_of(tmp_path), tmp_path / "log.tlog")
-    assert counts.packets == 1
-    assert Restored(path).contents == {"log.tlog": FIRST}
 
 
 def rewritten(path: Path, change: Callable[[list[Any]], list[Any]], **options: Any) -> Path:

@@ -21,6 +21,7 @@ from mav_tasks.mcap_export.exporting import export
 from mav_tasks.recording import observers
 from mav_tasks.settings import Recording, Settings
 from mav_tasks.tasks.events import (
+    Event,
     QueuePaused,
     TaskAssigned,
     TaskChanged,
@@ -177,7 +178,7 @@ def test_each_change_of_a_task_has_all_that_is_known_of_it(tmp_path: Path) -> No
     record.on_input(WallClock(START / 1e6), now=0.0)
     fails = changed(TaskState.STARTING, TaskState.FAILED, TaskReason.STUCK, 5)
     paused = QueuePaused(1, TaskReason.TAKEOVER, "server", 1.0)
-    events = [
+    events: list[Event] = [
         TaskSubmitted(TASK, 0.0),
         TaskModified(TaskId(3), 1, 2, HOME, "255/190", 1.0, TERMS),
         TaskAssigned(TaskId(3), 2, 3, 1, "rover 1: silent; free", 1.0),

@@ -165,8 +165,8 @@ def test_settings_tasks_and_all_inputs_come_back_bit_for_bit(tmp_path: Path) -> 
 def test_outputs_that_are_equal_to_others_are_told_apart(tmp_path: Path) -> None:
     values = [0.0, -0.0, 0, 1, 1.0, True, nan, inf, -inf, None]
     one = i.Outgoing("link", "peer", b"data")
-    others = [{"link": "knil"}, {"peer": "reep"}, {"peer": ("peer",)}, {"data": b"Data"}]
-    packets = [one._replace(**other) for other in (*others, {"is_first": True})]
+    packets = [one._replace(link="knil"), one._replace(data=b"Data"), one._replace(is_first=True)]
+    packets += [one._replace(peer=peer) for peer in ("reep", ("peer",))]
     record = begun(tmp_path, Settings())
     for value in values:
         record.on_output([], [ParameterSet("X", value, "server", 1.0)], now=1.0)

@@ -62,7 +62,7 @@ def to_client(data: bytes, peer: str = "gcs") -> Outgoing:
     return Outgoing("clients", peer, data)
 
 
-def started(folder: Path, **options: int) -> EngineObserver:
+def started(folder: Path, **options: Any) -> EngineObserver:
     recording = Recording(tlog=str(folder), **options)
     (tlog,) = observers(recording, Settings(), None, now=0.0)
     for item in LINKS:

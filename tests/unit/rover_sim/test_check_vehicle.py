@@ -203,8 +203,8 @@ FAULTS: dict[str, Fault] = {
 
 def test_what_is_wrong_is_named_and_nothing_else() -> None:
     for name, fault in FAULTS.items():
-        hooks = {"says": fault.says, "hears": fault.hears, "packets": fault.packets()}
-        wire = VirtualWire(fault.persona, **hooks)
+        packets = fault.packets()
+        wire = VirtualWire(fault.persona, says=fault.says, hears=fault.hears, packets=packets)
         wire.vehicle.autopilot.set_faults(fault.faults)
         report = run(wire, fault.options, fault.groups)
         assert {line.name for line in report.failed} == fault.lines, name

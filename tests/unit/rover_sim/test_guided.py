@@ -5,14 +5,10 @@ import math
 import pytest
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavCmd, MavResult
 from tests.unit.rover_sim.rig import (
     GUIDED,
     HOLD,
-    MANUAL,
-    POSITION,
     Rig,
-    local_target,
     velocity,
 )
 
@@ -61,15 +57,3 @@ def test_entering_guided_forgets_the_target_but_asking_again_does_not() -> None:
     rig.set_mode(GUIDED)
     rig.run(3.0)
     assert rig.truth.forward_speed == 0.0
-
-
-def test_change_speed_holds_for_a_position_target_only() -> None:
-    rig = Rig()
-    rig.set_mode(MANUAL)
-    assert rig.command(MavCmd.DO_CHANGE_SPEED, 1, 2.0) == MavResult.FAILED
-    rig.ready_to_drive()
-    rig.send(local_target(POSITION, position=(20.0, 0.0)))
-    assert rig.command(MavCmd.DO_CHANGE_SPEED, 1, -1.0) == MavResult.FAILED
-    assert rig.command(MavCmd.DO_CHANGE_SPEED, 1, 0.8) == MavResult.ACCEPTED
-    rig.run(4.0)
-    assert rig.truth.forward_speed == pytest.approx(0.8, abs=0.02)

@@ -4,7 +4,7 @@ import math
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
+from mav_tasks.mavlink.enums import MavCmd, MavResult
 from rover_sim.geo import DEFAULT_ORIGIN
 from tests.unit.rover_sim.rig import CLIENT, PX4_HOLD, PX4_MISSION, Px4Rig, Rig
 
@@ -60,20 +60,6 @@ def test_a_plan_has_an_id_in_ack_count_and_current_until_it_is_cleared() -> None
     current = rig.last(m.MissionCurrent)
     assert (current.mission_id, current.rally_points_id) == (0, 0)
     assert (current.total, current.mission_state) == (65535, 1)
-
-
-def test_a_silent_sender_is_asked_some_four_times_a_second_and_given_up_after_five() -> None:
-    rig = Px4Rig()
-    rig.send(m.MissionCount(1, 1, 2))
-    rig.take(m.MissionRequestInt)
-    rig.run(4.9)
-    asked = [request.seq for request in rig.take(m.MissionRequestInt)]
-    assert asked == [0] * len(asked)
-    assert 16 <= len(asked) <= 20  # whole control periods between them
-    rig.run(1.0)
-    assert "Operation timeout" in rig.texts()
-    assert rig.take(m.MissionAck) == []
-    assert upload(rig, CORNER).type == MavMissionResult.ACCEPTED
 
 
 def test_mission_start_arms_and_drives_it_to_its_end() -> None:

@@ -5,7 +5,6 @@ from collections import Counter
 import pytest
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavCmd
 from rover_sim.faults import Faults
 from tests.unit.rover_sim.rig import GUIDED, Rig, body_velocity
 
@@ -30,21 +29,6 @@ def test_everything_streams_at_1_hz_unasked() -> None:
     rig.heard.clear()
     rig.run(5.0)
     assert Counter(type(message) for message in rig.heard) == dict.fromkeys(STREAMED, 5)
-
-
-def test_an_interval_can_be_switched_off_and_back_to_the_default() -> None:
-    rig = Rig()
-    rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.VfrHud.id, -1)
-    rig.heard.clear()
-    rig.run(3.0)
-    assert rig.take(m.VfrHud) == []
-    rig.command(MavCmd.GET_MESSAGE_INTERVAL, m.VfrHud.id)
-    assert rig.last(m.MessageInterval).interval_us == -1
-    rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.VfrHud.id, 0)
-    rig.command(MavCmd.GET_MESSAGE_INTERVAL, m.VfrHud.id)
-    assert rig.last(m.MessageInterval).interval_us == 1_000_000
-    rig.run(3.0)
-    assert len(rig.take(m.VfrHud)) == 3
 
 
 def test_faults_of_the_estimate_show_in_position_only() -> None:

@@ -43,7 +43,7 @@ def test_every_setting_has_exactly_one_key() -> None:
 PRIORITIES = ByClient(Number(0, 10, is_whole=True), example=7)
 
 
-NO_VALUES = (nan, inf, -inf, -1, 10**400, None, object(), [1], {"a": []}, b"")
+NO_VALUES: tuple[object, ...] = (nan, inf, -inf, -1, 10**400, None, object(), [1], {"a": []}, b"")
 NO_TEXTS = ("nan", "inf", "1e999", "ten", "=", "9" * 5000, "²")
 
 

@@ -47,29 +47,6 @@ def test_a_script_drives_the_rover(served: RoverWorld) -> None:
     assert 8 < served.now < 30
 
 
-def test_a_rover_disarmed_by_hand_stops_its_task(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(2.0))
-        served.until(lambda: served.rovers[0].speed > 0.3)
-        served.rovers[0].disarm()
-        served.sleep(2.0)  # it says so once a second
-        assert served.rovers[0].stands
-        assert task.refresh().state is TaskState.PAUSED
-        tasks.resume()
-        task.done()
-    assert served.rovers[0].north == pytest.approx(2.0, abs=0.05)
-
-
-def test_several_rovers_have_one_server(make_world: MakeWorld) -> None:
-    world = start(make_world(count=3))
-    with world.sync_client() as tasks:
-        assert [vehicle.id for vehicle in tasks.vehicles()] == [1, 2, 3]
-        under_way = [tasks.submit(Move(float(n)), vehicle=n) for n in (1, 2, 3)]
-        for task in under_way:
-            task.done()
-    assert [rover.north for rover in world.rovers] == pytest.approx([1, 2, 3], abs=0.05)
-
-
 def pose_after(world: RoverWorld) -> tuple[float, float, float, float]:
     """Drive over a bad link; gives where and when that ended, exactly."""
     start(world)

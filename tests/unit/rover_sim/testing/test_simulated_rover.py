@@ -4,7 +4,6 @@ from math import pi
 
 import pytest
 
-from rover_sim.faults import Faults
 from rover_sim.testing.rover_world import RoverWorld
 from rover_sim.testing.simulated_rover import SimulatedRover
 from tests.unit.rover_sim.testing.conftest import MakeWorld
@@ -40,12 +39,3 @@ def test_carried_elsewhere_it_drives_on_from_there(make_world: MakeWorld, body: 
     rover.place(north=0.0)
     assert pose(rover)[0] == pytest.approx(0.0)
     assert rover.east - before[1] == pytest.approx(2.0, abs=0.1)
-
-
-def test_what_is_broken_is_broken_until_it_is_mended(world: RoverWorld) -> None:
-    world.server.start()
-    world.until(lambda: world.server.is_ready)
-    world.rovers[0].set_faults(Faults(silent=True))
-    world.until(lambda: not world.server.is_ready, within=10)
-    world.rovers[0].set_faults(Faults())
-    world.until(lambda: world.server.is_ready, within=10)
