@@ -79,14 +79,6 @@ def test_it_finds_who_it_is_and_changes_and_moves_nothing(persona: Persona) -> N
     assert marks_of(world)["driving"] == (Mark.PLAIN, "not tried: needs --drive")
 
 
-def test_a_rate_that_is_refused_is_told() -> None:
-    world = ProbeWorld(persona=SLOW)
-    rate = next(each for each in world.finish().findings.rates if each.name == "ATTITUDE")
-    assert (rate.answer, round(rate.granted or 0.0)) == ("DENIED", 1)
-    mark, words = marks_of(world)["ATTITUDE"]
-    assert (mark, "DENIED" in words) == (Mark.WARNING, True)
-
-
 def test_parameters_are_read_as_their_make_writes_them() -> None:
     ardupilot = ProbeWorld()
     ardupilot.rover.autopilot.parameters["FS_GCS_ENABLE"] = 1

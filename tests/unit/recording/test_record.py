@@ -328,13 +328,6 @@ def test_what_is_small_on_the_disk_and_large_to_read_is_refused_soon(tmp_path: P
         assert most < 100e6
 
 
-def test_another_version_is_named_and_tried(whole: Path) -> None:
-    older = changed(whole, lambda lines: [{**lines[0], "version": "0.0.7"}, *lines[1:-1]])
-    code, words = said(older)
-    assert code == 0
-    assert words.splitlines()[0].startswith("recorded by version 0.0.7; this is ")
-
-
 def test_a_record_ends_before_it_is_too_long(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
