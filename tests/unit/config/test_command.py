@@ -3,7 +3,6 @@
 import json
 import re
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -27,9 +26,8 @@ def run(
             variables = {"MAV_TASKS_STORE": ":memory:", "MAV_TASKS_CONFIG": ""}
             for name, value in {**variables, **(environment or {})}.items():
                 context.setenv(name, value)
-            context.setattr(sys, "argv", ["mav-tasks", *arguments])
             with pytest.raises(SystemExit) as ended:
-                main()
+                main(arguments)  # given, or it would end this process as its own
         said = capsys.readouterr()
         return int(ended.value.code or 0), said.out, said.err
 
