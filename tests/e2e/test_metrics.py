@@ -146,6 +146,30 @@ def test_who_may_read_it_and_how(running: Stand, port: int) -> None:
     assert figure(found, "mav_tasks_metrics_requests_total", code="403") == 1
 
 
+HOST = b"Host: localhost\r\n"
+
+
+def test_a_bad_request_is_answered_with_its_status(running: Stand, port: int) -> None:
+    get = b"GET /metrics HTTP/1.1\r\n"
+    for request, status in (
+        (b"POST /metrics HTTP/1.1\r\n" + HOST + b"Content-Length: 3\r\n\r\nabc", 405),
+        (b"GET /metrics\r\n\r\n", 400),
+        (b"GET /metrics HTTP/2.0\r\n" + HOST + b"\r\n", 400),
+        (b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n", 400),  # somebody tries TLS
+        (get + b"\r\n", 400),
+        (get + HOST + HOST + b"\r\n", 400),
+        (get + b"X: " + b"x" * 20_000 + b"\r\n\r\n", 431),
+        *((get + b"Host: " + host + b"\r\n\r\n", 403) for host in (b"10.0.0.1", b"[::2]", b"")),
+        (get + b"Host: 127.0.0.1.evil.example\r\n\r\n", 403),
+        (get + b"hOST:[::1]:8561 \r\n\r\n", 200),
+        (b"GET /metrics?x=1 HTTP/1.0\r\n\r\n", 200),
+    ):
+        with socket.create_connection(("127.0.0.1", port), timeout=LIMIT) as connection:
+            connection.sendall(request)
+            answer = b"".join(iter(lambda: connection.recv(65_536), b""))
+        assert answer.startswith(f"HTTP/1.1 {status} ".encode()), request
+
+
 def test_it_is_ready_while_the_store_can_be_written(running: Stand, port: int, path: Path) -> None:
     link = running.connect()
     assert asked(port, "/readyz") == (200, "ok\n")
