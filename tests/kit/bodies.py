@@ -84,39 +84,3 @@ class Sticky:
 
     def close(self) -> None:
         """Do nothing: the body holds no resources."""
-
-
-class LateStart:
-    """A body that moves only after a demand of ``LATE`` seconds; implements ``Body``."""
-
-    LATE = 4.0
-
-    def __init__(self, start: Pose) -> None:
-        self._body: Body = kinematic_body(start)
-        self._driven = 0.0
-        self._wanted = (0.0, 0.0)
-
-    @property
-    def lag(self) -> float:
-        """Delay of the wheels behind ``drive``, s."""
-        return self._body.lag
-
-    @property
-    def state(self) -> BodyState:
-        """The state after the last ``advance``."""
-        return self._body.state
-
-    def drive(self, forward_speed: float, yaw_rate: float) -> None:
-        """Demand a motion."""
-        self._wanted = (forward_speed, yaw_rate)
-
-    def advance(self, duration: float) -> None:
-        """Move by ``duration`` seconds."""
-        forward, yaw_rate = self._wanted
-        self._driven = self._driven + duration if forward else 0.0
-        moves = self._driven > self.LATE or abs(self.state.forward_speed) > 0.0
-        self._body.drive(forward if moves else 0.0, yaw_rate)
-        self._body.advance(duration)
-
-    def close(self) -> None:
-        """Do nothing: the body holds no resources."""

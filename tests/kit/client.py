@@ -191,6 +191,14 @@ class FakeClient:
         self._mav.signing.sign_outgoing = True
         self.verified = 0
 
+    def set_clock(self, timestamp: int) -> None:
+        """Sign with the time that the client's clock now shows, 10 us since 2015."""
+        self._mav.signing.timestamp = timestamp
+
+    def count_anew(self) -> None:
+        """Count packets from 0 again, as a program that was started again."""
+        self._mav.seq = 0
+
     def packed(self, message: Message) -> bytes:
         """Return a packet as it would be sent."""
         raw: bytes = message.pack(self._mav)

@@ -170,10 +170,6 @@ class Upload:
         self.client.send(common.MAVLink_mission_ack_message(*self.target, 15, self.kind))
         self._end(15)
 
-    def vanish(self) -> None:
-        """Stop without a message."""
-        self._end(TIMEOUT)
-
     def _take_request(self, seq: int, *, now: float) -> None:
         self._is_asked = True
         self.requests.append(seq)

@@ -338,21 +338,6 @@ class World(VirtualWorld):
         self.watched.loses = loses
         return lost
 
-    def lose_next_towards(self, name: str, count: int) -> list[int]:
-        """Lose the next datagrams to a rover; return a list that is empty once all are lost."""
-        left = [count]
-
-        def loses(source: str, target: str, data: bytes) -> bool:
-            if target != name or not left or data[7] not in (MODE_COMMAND, SETPOINT):
-                return False
-            left[0] -= 1
-            if left[0] == 0:
-                left.clear()
-            return True
-
-        self.watched.loses = loses
-        return left
-
     def from_vehicle_side(self, data: bytes, *, peer: str = "stranger") -> None:
         """Deliver a datagram to the server's vehicle link."""
         self.net.send(peer, VEHICLE_LINK, data)

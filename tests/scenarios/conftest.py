@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import pytest
 
+from tests.kit.cases import anew
 from tests.kit.fleet import Fleet, Layout
 from tests.kit.world import World
 
@@ -31,7 +32,7 @@ def make_world() -> Iterator[MakeWorld]:
         world.check()
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     """Return a world in which nothing is unusual."""
     return make_world()

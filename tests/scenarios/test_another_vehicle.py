@@ -14,12 +14,11 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode, Persona
-from tests.kit.client import ACCEPTED, ARM, GUIDED, MOVE, SET_MODE, setpoint
-from tests.kit.mission import Item, Upload
-from tests.kit.observer import Observer
-from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
+from tests.kit.cases import for_each
+from tests.kit.client import ARM, MOVE, SET_MODE
+from tests.kit.px4 import PROMPT_PX4
 from tests.kit.volume import some
-from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, at, ways_of
+from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, ways_of
 from tests.scenarios.conftest import MakeWorld
 
 PERSONAS = {"ardupilot": PROMPT, "px4": PROMPT_PX4}
@@ -33,7 +32,7 @@ WAYPOINT, RELEASE, REQUEST, VERSION = 16, 54013, 512, 148
 PARAMETER = 20  # PARAM_REQUEST_READ
 LOITER = 17  # MAV_CMD_NAV_LOITER_UNLIM
 
-directions = pytest.mark.parametrize(("old", "new"), DIRECTIONS, ids=lambda name: name)
+directions = for_each("old, new", DIRECTIONS)
 
 
 class Swapped:
@@ -168,7 +167,7 @@ CASES = [(state, word) for state in STATES for word in ("nothing", "STOP")] + [
 
 
 @directions
-@pytest.mark.parametrize(("state", "word"), some(CASES, *range(0, len(CASES), 3)))
+@for_each("state, word", some(CASES, *range(0, len(CASES), 3)))
 def test_nothing_of_the_old_ones_control_reaches_the_new_one(
     make_world: MakeWorld, old: str, new: str, state: Callable[[World], None], word: str
 ) -> None:
@@ -192,20 +191,6 @@ def test_nothing_of_the_old_ones_control_reaches_the_new_one(
 
 
 @directions
-def test_stop_is_said_in_the_language_of_what_is_there_now(
-    make_world: MakeWorld, old: str, new: str
-) -> None:
-    world = make_world(persona=PERSONAS[old])
-    swapped = Swapped(world, PERSONAS[new], mode=Mode.MANUAL)
-    world.run(3)
-    sent = world.client.stop()
-    world.run(0.5)
-    assert sent.result == ACCEPTED
-    swapped.check_untouched()
-    assert swapped.rover.autopilot.mode is Mode.HOLD
-
-
-@directions
 def test_a_person_decides_that_the_tasks_are_for_the_new_one(
     make_world: MakeWorld, old: str, new: str
 ) -> None:
@@ -218,58 +203,6 @@ def test_a_person_decides_that_the_tasks_are_for_the_new_one(
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
     assert swapped.place()[0] == pytest.approx(swapped.start[0] + 9.0, abs=0.1)
-
-
-@directions
-def test_a_client_that_drove_the_old_one_does_not_drive_the_new_one(
-    make_world: MakeWorld, old: str, new: str
-) -> None:
-    """Its stream goes on, and the new one is armed in the mode that follows set-points."""
-    world = make_world(persona=PERSONAS[old])
-    if old == "px4":
-        world.client.stream(setpoint(0.5), rate=20)
-    world.client.arm()
-    world.run(0.5)
-    world.client.command(SET_MODE, 1, 6 if old == "px4" else GUIDED, target=(1, 1))
-    world.run(0.5)
-    if old != "px4":
-        world.client.stream(setpoint(0.5), rate=20)
-    world.run(2)
-    assert world.truth.forward_speed > 0.3
-    # a set-point that passes while the heartbeat is on its way is nobody's fault
-    world.observers[0] = Observer()
-    swapped = Swapped(world, PERSONAS[new], mode=Mode.GUIDED)
-    world.run(10)
-    assert not [m for m in swapped.got if m.get_msgId() == SETPOINT and abs(m.vx) > 0.01]
-    assert world.stands()
-    assert swapped.asked_modes() <= HOLDS[new]
-    assert swapped.rover.autopilot.mode is Mode.HOLD
-
-
-def test_a_mission_that_was_to_start_at_arming_does_not_start_on_the_new_one(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    upload = Upload(world.client, [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))])
-    world.until(lambda: upload.result is not None, within=5)
-    ask_mode(world.client, MISSION)
-    world.run(0.5)
-    swapped = Swapped(world, PROMPT)
-    world.run(10)
-    swapped.check_untouched()
-    assert world.state(1) == (S.BLOCKED, R.NONE)
-
-
-def test_an_upload_that_the_change_cut_off_can_be_made_again(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    items = [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))]
-    Upload(world.client, items)
-    Swapped(world, PROMPT)
-    world.run(20)
-    world.client.roles.clear()
-    upload = Upload(world.client, items)
-    world.until(lambda: upload.result is not None, within=5)
-    assert upload.result == 0
 
 
 def beat_of(kind: int, autopilot: int, *, seq: int = 0) -> bytes:
@@ -290,12 +223,8 @@ def notes_of(world: World) -> list[str]:
     return [note.text for note in world.events(VehicleNoted)]
 
 
-@pytest.mark.parametrize(
-    ("persona", "forged"),
-    [(PROMPT, PX4), (PROMPT_PX4, ARDUPILOT)],
-    ids=["ardupilot", "px4"],
-)
-@pytest.mark.parametrize("kind", [ROVER, COPTER])
+@for_each("persona, forged", [(PROMPT, PX4), (PROMPT_PX4, ARDUPILOT)])
+@for_each("kind", [ROVER, COPTER])
 def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
     make_world: MakeWorld, persona: Persona, forged: int, kind: int
 ) -> None:
@@ -318,26 +247,6 @@ def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
     assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
 
 
-@pytest.mark.parametrize("word", ["STOP", "pause"])
-def test_two_that_alternate_undo_no_halt_and_drive_nothing(
-    make_world: MakeWorld, word: str
-) -> None:
-    world = make_world()
-    running(world)
-    WORDS[word](world)
-    world.run(3)
-    place = world.pose()
-    kept = len(world.events(object))
-    for _ in range(300):
-        forge(world, ROVER, PX4)
-        forge(world, ROVER, ARDUPILOT)
-    world.run(15)
-    assert world.pose() == place
-    assert world.paused() is (R.STOPPED if word == "STOP" else R.RESTARTED)
-    assert len(world.events(object)) - kept < 30
-    assert any("shares its id with another vehicle" in text for text in notes_of(world))
-
-
 def test_stop_reaches_both_of_two_that_alternate(make_world: MakeWorld) -> None:
     world = make_world(persona=PROMPT_PX4)
     world.observers.clear()  # whose rules are for one vehicle at one id
@@ -357,11 +266,7 @@ def test_stop_reaches_both_of_two_that_alternate(make_world: MakeWorld) -> None:
     assert world.rover.autopilot.mode is Mode.HOLD
 
 
-@pytest.mark.parametrize(
-    ("autopilot", "words"),
-    [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})],
-    ids=["ardupilot", "px4"],
-)
+@for_each("autopilot, words", [(ARDUPILOT, {(LOITER, 0.0, 0.0)}), (PX4, {(SET_MODE, 4.0, 3.0)})])
 def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
     world: World, autopilot: int, words: set[tuple[int, float, float]]
 ) -> None:
@@ -408,13 +313,6 @@ def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
     world.until_idle(tasks=2)
 
 
-def test_a_ground_station_at_the_rovers_address_is_no_vehicle(world: World) -> None:
-    running(world)
-    world.from_vehicle_side(beat_of(GCS, NO_AUTOPILOT), peer="rover1")
-    world.until_idle(tasks=2)
-    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
-
-
 def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -> None:
     """A client asks for the version: nothing else shows that the rover was exchanged."""
     running(world)
@@ -427,22 +325,6 @@ def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     assert world.paused() is R.RESTARTED
     assert any("is another vehicle now" in text for text in notes_of(world))
-
-
-def test_two_of_one_make_that_share_an_id_are_not_served_in_turns(world: World) -> None:
-    """Both answer each request for the version; each answer tells of another one."""
-    world.run(5)
-    kept = len(world.events(object))
-    for number in range(500):
-        mav = common.MAVLink(None, 1, 1)
-        mav.seq = number % 256
-        version = common.MAVLink_autopilot_version_message(
-            0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 1000 + number % 2
-        )
-        world.from_vehicle_side(version.pack(mav), peer="rover1")
-        world.run(0.01)
-    assert len(world.events(object)) - kept < 40
-    assert any("shares its id with another vehicle" in text for text in notes_of(world))
 
 
 def test_new_firmware_is_the_same_rover_and_is_asked_anew(make_world: MakeWorld) -> None:

@@ -2,22 +2,21 @@
 
 from typing import Any
 
-import pytest
-
-from mav_tasks.engine.commands import assignments
-from mav_tasks.engine.commands.assignments import GRACE
-from mav_tasks.settings import Driving, Queueing, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import SubmissionRefused, TaskAssigned, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, ACK, DENIED, FAILED, MOVE, TEMPORARILY_REJECTED, Sent
+from tests.kit.cases import for_each
+from tests.kit.client import ACCEPTED, ACK, DENIED, MOVE, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
+
+GRACE = 5.0  # s, in which a rover that is lost keeps its tasks
 
 ANY = (250, 191)
 LOST = 3.5  # s; see Watch.heartbeat_lost
@@ -85,43 +84,6 @@ def test_the_nearest_free_rover_goes_to_a_place(make_world: MakeWorld) -> None:
     assert abs(world.rovers[2].truth.east - 5.0) < 0.1
 
 
-def test_a_far_free_rover_is_better_than_a_near_busy_one(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    busy = world.client.move(10.0, target=(2, 191))
-    world.until(lambda: world.state(1)[0] is S.EXECUTING, within=10)
-    upload = go_to(world, 0.0, 3.5)
-    assert busy.result == ACCEPTED
-    assert rover_of(world, upload.opaque_id) == 1
-
-
-def test_an_equal_nonce_means_the_same_task_whatever_has_happened_since(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(rovers=2)
-    first = submit(world, 3.0, nonce=77)
-    again = submit(world, 3.0, nonce=77)  # rover 2 would be free now
-    assert again.task_id == first.task_id
-    assert rover_in(again) == 1
-    other = submit(world, 1.0, nonce=77)
-    assert other.answer == (DENIED, R.NONCE_REUSED)
-    plan = go_to(world, 0.0, 5.0, nonce=78)
-    assert go_to(world, 0.0, 5.0, nonce=78).opaque_id == plan.opaque_id
-    assert len(world.events(TaskSubmitted)) == 2
-
-
-def test_without_a_nonce_a_repeat_is_recognised_as_for_a_named_rover(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(rovers=2)
-    for _ in range(2):
-        world.client.move(3.0, target=ANY)  # one ack is for both
-    world.run(1.0)
-    world.client.move(3.0, target=ANY)
-    world.run(0.1)
-    assert world.client.acks_of(MOVE) == [(ACCEPTED, 1)] * 2
-    assert len(world.events(TaskSubmitted)) == 1
-
-
 def test_a_refusal_names_why_each_rover_cannot(make_world: MakeWorld) -> None:
     world = make_world(rovers=3)
     world.client.stop(target=(1, 191))
@@ -142,22 +104,6 @@ def test_a_refusal_names_why_each_rover_cannot(make_world: MakeWorld) -> None:
     assert len(world.events(SubmissionRefused)) == 2
 
 
-def test_the_bound_of_the_battery_is_a_setting(make_world: MakeWorld) -> None:
-    settings = Settings(queueing=Queueing(least_battery_percent=10))
-    world = make_world(rovers=2, settings=settings)
-    world.rovers[0].autopilot.set_faults(Faults(battery=9))
-    world.rovers[1].autopilot.set_faults(Faults(battery=10))
-    world.run(2.0)
-    assert rover_of(world, submit(world).task_id) == 2
-
-
-def test_an_unknown_battery_counts_as_good(make_world: MakeWorld) -> None:
-    world = make_world()
-    world.rover.autopilot.set_faults(Faults(battery=-1))
-    world.run(2.0)
-    assert submit(world).result == ACCEPTED
-
-
 def test_places_that_depend_on_the_rover_are_refused(make_world: MakeWorld) -> None:
     world = make_world(rovers=2)
     local = world.client.command_int(WAYPOINT, x=1000, y=0, frame=1, target=ANY)
@@ -166,16 +112,6 @@ def test_places_that_depend_on_the_rover_are_refused(make_world: MakeWorld) -> N
     assert local.answer == (DENIED, R.BAD_FRAME)
     assert home.result == 5  # MAV_MISSION_INVALID
     assert not world.events(TaskSubmitted)
-
-
-def test_other_commands_must_name_a_rover(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = submit(world, 5.0, nonce=1).task_id
-    cancel = world.client.command(CANCEL, task, target=ANY)
-    mode = world.client.command(176, 1, 15, target=ANY)
-    world.run(0.2)
-    assert cancel.answer == (DENIED, R.BAD_PARAMETER)
-    assert mode.ack is None
 
 
 def test_the_status_of_a_task_can_be_requested_without_its_rover(make_world: MakeWorld) -> None:
@@ -233,16 +169,6 @@ def test_a_lost_rover_loses_the_task_that_it_has_not_begun(make_world: MakeWorld
     assert rover_in(again) == 1
 
 
-def test_a_radio_that_comes_back_in_time_changes_nothing(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = queued_behind(world, 2)
-    world.rovers[1].autopilot.set_faults(Faults(silent=True))
-    world.run(LOST + GRACE - 2.0)
-    world.rovers[1].autopilot.set_faults(Faults())
-    world.run(10.0)
-    assert rover_of(world, task) == 2
-
-
 def test_a_low_battery_moves_the_task(make_world: MakeWorld) -> None:
     world = make_world(rovers=2)
     task = queued_behind(world, 2)
@@ -269,34 +195,6 @@ def test_a_rover_that_its_own_failsafe_has_stopped_loses_the_task(make_world: Ma
     task = failsafe_of_rover_2(world)
     world.until(lambda: rover_of(world, task) == 1, within=GRACE + 2.2)
     assert world.events(TaskAssigned)[-1].choice.startswith("rover 2: rover's failsafe; ")
-
-
-def test_after_a_failsafe_a_pause_keeps_the_task_where_it_is(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = failsafe_of_rover_2(world)
-    world.client.pause(target=(2, 191))
-    world.run(20.0)
-    assert rover_of(world, task) == 2
-
-
-@pytest.mark.parametrize("halt", ["stop", "pause", "hold", "disarm"])
-def test_what_a_person_halts_keeps_its_tasks(make_world: MakeWorld, halt: str) -> None:
-    world = make_world(rovers=2)
-    task = queued_behind(world, 2)
-    match halt:
-        case "stop":
-            world.client.stop(target=(2, 191))
-        case "pause":
-            world.client.pause(target=(2, 191))
-        case "hold":
-            world.client.mode(4, target=(2, 1))
-        case _:
-            world.client.arm(False, target=(2, 1))
-    world.run(1.0)
-    world.rovers[1].autopilot.set_faults(Faults(silent=True, battery=5))
-    world.run(30.0)
-    assert rover_of(world, task) == 2
-    assert world.state(task)[0] is S.QUEUED
 
 
 def halt_by_a_person(world: World, halt: str) -> None:
@@ -330,8 +228,8 @@ def server_again(world: World, store: PromptSqliteStore) -> None:
     world.start_server(store, store.load())
 
 
-@pytest.mark.parametrize("restarts", [False, True], ids=["", "restarted"])
-@pytest.mark.parametrize("halt", ["stop", "pause", "hold", "disarm", "manual"])
+@for_each("restarts", [False, True])
+@for_each("halt", ["stop", "pause", "hold", "disarm", "manual"])
 def test_the_task_of_an_idle_rover_that_a_person_halts_stays(
     make_world: MakeWorld, tmp_path: Any, halt: str, restarts: bool
 ) -> None:
@@ -352,45 +250,6 @@ def test_the_task_of_an_idle_rover_that_a_person_halts_stays(
     assert world.rovers[1].truth.north == 0.0
 
 
-def test_a_continue_lets_the_tasks_of_a_halted_rover_move_again(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = submit_later(world, 60.0)
-    halt_by_a_person(world, "disarm")
-    world.client.proceed(target=(1, 191))
-    world.run(1.0)
-    world.rovers[0].autopilot.set_faults(Faults(silent=True))
-    world.until(lambda: rover_of(world, task) == 2, within=15)
-
-
-def test_a_task_that_came_after_the_halt_of_an_idle_rover_may_move(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    halt_by_a_person(world, "hold")
-    task = submit_later(world, 60.0)
-    assert rover_of(world, task) == 1
-    world.rovers[0].autopilot.set_faults(Faults(silent=True))
-    world.until(lambda: rover_of(world, task) == 2, within=15)
-
-
-@pytest.mark.parametrize("restarts", [False, True], ids=["", "restarted"])
-def test_a_pause_by_a_person_stands_beside_a_failsafe_of_the_rover(
-    make_world: MakeWorld, tmp_path: Any, restarts: bool
-) -> None:
-    store = PromptSqliteStore(tmp_path / "tasks.sqlite3", wall_offset=0.0)
-    world = make_world(rovers=2, store=store, settings=Settings(on_restart="continue"))
-    task = failsafe_of_rover_2(world)
-    world.client.pause(target=(2, 191))
-    world.run(3.0)
-    if restarts:
-        server_again(world, store)
-        world.run(6.0)
-        world.client.proceed(target=(1, 191))
-        world.run(0.1)
-        assert world.paused() is R.NONE
-    world.run(20.0)
-    assert rover_of(world, task) == 2
-    assert world.state(task)[0] is S.QUEUED
-
-
 def test_a_task_that_has_begun_never_moves(make_world: MakeWorld) -> None:
     world = make_world(rovers=2)
     task = submit(world, 5.0, nonce=1).task_id
@@ -399,60 +258,6 @@ def test_a_task_that_has_begun_never_moves(make_world: MakeWorld) -> None:
     world.run(30.0)
     assert rover_of(world, task) == 1
     assert len(world.events(TaskAssigned)) == 1
-
-
-def test_without_another_rover_the_task_stays(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = queued_behind(world, 2)
-    world.client.stop(target=(1, 191))
-    world.rovers[1].autopilot.set_faults(Faults(silent=True))
-    world.run(20.0)
-    assert rover_of(world, task) == 2
-    world.client.proceed(target=(1, 191))
-    world.run(10.0)
-    assert rover_of(world, task) == 1
-
-
-@pytest.mark.patches_core
-def test_a_task_that_nobody_else_can_drive_holds_no_other_up(
-    make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(assignments, "MOST_AT_ONCE", 1)
-    settings = Settings(driving=Driving(max_distance=98.5))
-    world = make_world(rovers=2, settings=settings)
-    for number, metres in ((1, 10.0), (2, 3.0)):
-        world.client.move(metres, nonce=number, target=(number, 191))
-    world.run(2.0)
-    far = go_to(world, 0.0, 100.0).opaque_id  # too far for rover 1
-    assert rover_of(world, far) == 2
-    world.client.stop(target=(1, 191))
-    near = submit(world, 0.5, nonce=9).task_id
-    world.client.proceed(target=(1, 191))
-    world.rovers[1].autopilot.set_faults(Faults(silent=True))
-    world.until(lambda: rover_of(world, near) == 1, within=15)
-    assert rover_of(world, far) == 2
-
-
-def test_a_task_of_a_named_rover_never_moves(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.move(3.0, nonce=1)
-    named = world.client.move(0.5, nonce=2)
-    world.run(2.0)
-    world.rovers[0].autopilot.set_faults(Faults(silent=True))
-    world.run(30.0)
-    assert rover_of(world, named.task_id) == 1
-    assert not world.events(TaskAssigned)
-
-
-def test_the_dependents_of_a_moved_task_wait_for_it(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = queued_behind(world, 2)
-    after = world.client.command(MOVE, 0.3, 0, 0, 5, task, 0, 5, target=(1, 191))
-    world.run(0.2)
-    world.rovers[1].autopilot.set_faults(Faults(silent=True))
-    world.until(lambda: rover_of(world, task) == 1, within=15)
-    world.until_state(after.task_id, S.COMPLETED, within=90)
-    assert world.state(task)[0] is S.COMPLETED
 
 
 def test_a_restarted_server_knows_where_the_task_went(make_world: MakeWorld, tmp_path: Any) -> None:
@@ -471,10 +276,3 @@ def test_a_restarted_server_knows_where_the_task_went(make_world: MakeWorld, tmp
     again = world.client.move(0.5, nonce=9, target=ANY)
     world.run(0.2)
     assert again.task_id == task
-
-
-def test_a_server_without_a_rover_says_so(make_world: MakeWorld) -> None:
-    world = World()
-    sent = world.client.move(1.0, target=ANY)
-    world.run(0.05)
-    assert sent.answer == (FAILED, R.VEHICLE_SILENT)

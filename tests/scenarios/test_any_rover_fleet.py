@@ -64,13 +64,6 @@ def fleet(tmp_path: Path) -> Iterator[Fleet]:
     it.world.check()
 
 
-def test_each_gateway_chooses_among_its_own_rovers(fleet: Fleet) -> None:
-    here, there = fleet.submit(fleet.here, nonce=1), fleet.submit(fleet.there, nonce=2)
-    tasks = fleet.tasks()
-    assert [tasks[each.task_id].vehicle for each in (here, there)] == [1, 2]
-    fleet.world.until(lambda: fleet.tasks()[there.task_id].state is S.COMPLETED, within=20)
-
-
 def test_a_nonce_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:
     first = fleet.submit(fleet.here)
     again = fleet.submit(fleet.there)
@@ -85,21 +78,6 @@ def test_a_nonce_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:
     assert other.answer == (DENIED, R.NONCE_REUSED)
     new = fleet.submit(fleet.there, 0.5, nonce=8)
     assert fleet.tasks()[new.task_id].vehicle == 2
-
-
-def test_one_that_is_cleared_before_its_nonce_is_refused_is_answered(fleet: Fleet) -> None:
-    """The store takes a while; a STOP with *clear* comes meanwhile."""
-    first = fleet.submit(fleet.here)
-    fleet.world.watched.to_clients.clear()
-    it = fleet.world.gateways["b"]
-    it.store.is_reached = False
-    again = fleet.there.move(0.5, nonce=7, target=ANY)
-    fleet.world.run(0.1)
-    fleet.there.stop(clear=True, target=(0, 191))
-    fleet.world.run(0.1)
-    it.store.is_reached = True
-    fleet.world.run(1.0)
-    assert (again.result, again.task_id) == (ACCEPTED, first.task_id)
 
 
 def test_a_stop_for_all_stops_a_rover_that_is_taken_later_and_no_other_again(
@@ -124,24 +102,6 @@ def test_a_stop_for_all_stops_a_rover_that_is_taken_later_and_no_other_again(
     assert world.shared.part(frozenset({1, 2})).paused == {2: R.STOPPED}
 
 
-def test_two_copies_at_once_make_one_task(fleet: Fleet) -> None:
-    sent = [client.move(0.5, nonce=7, target=ANY) for client in (fleet.here, fleet.there)]
-    fleet.world.run(0.5)
-    (task,) = fleet.tasks()
-    assert [each.task_id for each in sent] == [task, task]
-    assert len(fleet.known("server") | fleet.known("b")) == 1
-
-
-def test_a_plan_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:
-    first = fleet.upload(fleet.here)
-    again = fleet.upload(fleet.there)
-    assert (again.result, again.opaque_id) == (0, first.opaque_id)
-    fleet.world.run(4.0)
-    other = fleet.upload(fleet.there, east=2.0)
-    assert other.result not in (None, 0)
-    assert list(fleet.tasks()) == [first.opaque_id]
-
-
 def test_while_a_gateway_dies_a_repeat_at_another_one_is_no_second_task(fleet: Fleet) -> None:
     later_on = 0.5, 0, 0, 7, 0, 10.0, 5  # it starts in 10 s
     fleet.here.command(MOVE, *later_on, target=ANY)
@@ -159,28 +119,6 @@ def test_while_a_gateway_dies_a_repeat_at_another_one_is_no_second_task(fleet: F
     fleet.world.until(lambda: fleet.tasks()[task].state is S.COMPLETED, within=30)
     assert again.task_id == task
     assert len(fleet.tasks()) == 1
-
-
-def test_a_repeat_while_the_database_is_away_is_refused_by_both(fleet: Fleet) -> None:
-    first = fleet.submit(fleet.here)
-    fleet.world.gateways["b"].store.is_reached = False
-    again = fleet.there.move(0.5, nonce=7, target=ANY)
-    fleet.world.run(4.0)
-    assert again.result not in (None, ACCEPTED)
-    fleet.world.gateways["b"].store.is_reached = True
-    fleet.world.run(1.0)
-    assert list(fleet.tasks()) == [first.task_id]
-    assert not fleet.known("b")
-
-
-def test_a_stop_to_the_server_stops_the_whole_fleet(fleet: Fleet) -> None:
-    sent = [fleet.submit(fleet.here, 5.0, nonce=1), fleet.submit(fleet.there, 5.0, nonce=2)]
-    fleet.world.run(3.0)
-    fleet.world.watched.to_clients.clear()  # the observer expects a STOP that was read in force
-    fleet.here.stop(target=ANY)
-    fleet.world.run(0.3)
-    tasks = fleet.tasks()
-    assert [tasks[each.task_id].state for each in sent] == [S.KILLED, S.KILLED]
 
 
 def test_a_task_moves_at_the_gateway_that_has_it_now(fleet: Fleet) -> None:
@@ -213,33 +151,6 @@ def test_a_task_moves_at_the_gateway_that_has_it_now(fleet: Fleet) -> None:
     )
     assert (moved.task_id, moved.before, moved.vehicle) == (task.id, 2, 1)
     assert fleet.tasks()[task.id].vehicle == 1
-
-
-@pytest.mark.parametrize("what", ["task", "plan"])
-def test_one_for_any_rover_runs_after_a_task_of_another_gateways_rover(
-    fleet: Fleet, what: str
-) -> None:
-    def send(after: int) -> tuple[int | None, int]:
-        if what == "plan":
-            plan = fleet.upload(fleet.there, nonce=100 + after, after=after)
-            return plan.result, plan.opaque_id
-        sent = fleet.there.command(MOVE, 0.5, 0, 0, 0, after, 0, 5, target=ANY)
-        fleet.world.run(0.5)
-        return sent.result, sent.task_id if sent.result == ACCEPTED else 0
-
-    first = fleet.submit(fleet.here, 2.0, nonce=1)
-    result, second = send(first.task_id)
-    assert result == ACCEPTED
-    assert fleet.tasks()[second].state is S.BLOCKED
-    fleet.world.until(lambda: fleet.tasks()[second].state is S.COMPLETED, within=40)
-    ended, begun = fleet.tasks()[first.task_id], fleet.tasks()[second]
-    assert ended.state is S.COMPLETED
-    assert ended.changed_at is not None
-    assert begun.changed_at is not None
-    assert begun.changed_at > ended.changed_at + 1.0
-    result, _ = send(777)
-    assert result != ACCEPTED
-    assert "run after 777: no such task" in " ".join(fleet.there.texts())
 
 
 @pytest.mark.parametrize("nonce", [0, 9])

@@ -1,21 +1,17 @@
 """The end of a move on rovers that do not move slowly, and roll on."""
 
-from dataclasses import replace
 from functools import partial
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState
-from rover_sim.realism import EXACT
-from tests.kit.bodies import LateStart, Sticky
-from tests.kit.world import PROMPT
+from tests.kit.bodies import Sticky
+from tests.kit.cases import for_each
 from tests.scenarios.conftest import MakeWorld
 
 S = TaskState
 
 
-@pytest.mark.parametrize("least", [0.02, 0.1])
-@pytest.mark.parametrize("rolling", [0.9, 0.3, 0.2])
+@for_each("least", [0.02, 0.1])
+@for_each("rolling", [0.9, 0.3, 0.2])
 def test_moves_end_as_near_as_the_rover_can_and_none_is_stuck(
     make_world: MakeWorld, least: float, rolling: float
 ) -> None:
@@ -42,18 +38,3 @@ def test_one_that_does_not_follow_is_told_of_within_3_s(make_world: MakeWorld) -
     assert world.state(1)[0] is S.EXECUTING, "before it is stuck"
     assert world.now - active < 3.0
     world.until_state(1, S.FAILED)
-
-
-def test_one_that_follows_is_not_told_of(make_world: MakeWorld) -> None:
-    world = make_world(body=partial(Sticky, least=0.1, rolling=0.2))
-    world.client.move(3.0)
-    world.until_state(1, S.COMPLETED)
-    assert not any("does not move" in text for text in world.client.texts())
-
-
-def test_one_that_overcomes_friction_late_is_not_stuck(make_world: MakeWorld) -> None:
-    """A PX4 whose integral has to wind up stands for some seconds before it moves at 0.5 m/s."""
-    persona = PROMPT
-    world = make_world(body=LateStart, realism=replace(EXACT, estimator=persona.realism.estimator))
-    world.client.move(2.0)
-    world.until_state(1, S.COMPLETED, within=60)

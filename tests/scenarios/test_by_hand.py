@@ -2,29 +2,24 @@
 
 from math import inf, nan
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
     FAILED,
     GUIDED,
-    HOLD,
-    MOVE,
-    ROTATE,
-    RTL,
     SET_INTERVAL,
     setpoint,
 )
-from tests.kit.world import World, put_home
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL, CLEAR, MODIFY, RELEASE, CHANGE_SPEED, YAW_SPEED = 54010, 54011, 54012, 54013, 178, 213
@@ -42,19 +37,7 @@ def taken_by_hand(world: World) -> None:
     world.rover.autopilot.operator_sticks(0.5, 0.2)
 
 
-def displaced(world: World) -> None:
-    """Somebody drives it metres aside by hand, and parks it."""
-    world.operator_mode(Mode.MANUAL)
-    world.rover.autopilot.operator_sticks(0.0, 1.2)
-    world.run(1.3)
-    world.rover.autopilot.operator_sticks(1.5, 0.0)
-    world.run(8)
-    world.rover.autopilot.operator_sticks(0.0, 0.0)
-    world.operator_mode(Mode.HOLD)
-    world.run(3)
-
-
-@pytest.mark.parametrize("how", ["cancel", "clear", "cancel before"])
+@for_each("how", ["cancel", "clear", "cancel before"])
 def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, how: str) -> None:
     driving(world)
     if how == "cancel before":
@@ -73,40 +56,6 @@ def test_what_is_cancelled_is_left_to_who_took_it_over(world: World, how: str) -
     assert world.rover.autopilot.mode is Mode.MANUAL
 
 
-def test_who_takes_it_over_after_a_continue_is_let_go_again(world: World) -> None:
-    driving(world)
-    for _ in range(2):
-        world.operator_mode(Mode.MANUAL)
-        world.run(1)
-        assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-        world.operator_mode(Mode.HOLD)
-        world.run(2)
-        world.client.proceed()
-        world.until_state(1, S.EXECUTING)
-        world.run(1)
-
-
-def test_a_return_of_a_disarmed_rover_is_refused(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(arming="operator"))
-    world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
-    sent = world.client.mode(RTL)
-    world.run(0.2)
-    assert sent.result != ACCEPTED
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(5)
-    assert (world.tasks(), world.stands()) == ((), True)
-
-
-@pytest.mark.parametrize("how", ["HOLD", "pause"])
-def test_what_is_only_scheduled_is_paused_too(world: World, how: str) -> None:
-    world.client.command(MOVE, 3, 0, 0, 0, 0, 5, 5)
-    world.run(0.5)
-    _ = world.client.mode(HOLD) if how == "HOLD" else world.client.pause()
-    world.run(10)
-    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.OPERATOR)
-
-
 def test_a_pause_stops_a_rover_that_a_client_drives(world: World) -> None:
     world.client.mode(GUIDED)
     world.run(0.5)
@@ -119,20 +68,6 @@ def test_a_pause_stops_a_rover_that_a_client_drives(world: World) -> None:
     sent = world.add_client("other").pause()
     world.run(3)
     assert (sent.result, world.stands()) == (ACCEPTED, True)
-
-
-def test_a_return_is_paused_too_when_the_operator_is_lost(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(operator_lost="pause"))
-    world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
-    world.client.move(20, speed=2.0)
-    world.until_idle(tasks=1)
-    put_home(world, 0, 0)
-    world.client.mode(RTL)
-    world.until_state(2, S.EXECUTING)
-    world.run(3)
-    world.client.heartbeats = False
-    world.run(9)
-    assert (world.state(2)[0], world.stands()) == (S.PAUSED, True)
 
 
 def test_a_disarm_is_not_undone_by_an_arming_that_waited(make_world: MakeWorld) -> None:
@@ -166,40 +101,7 @@ def test_a_disarm_ends_a_clients_stream_at_once(make_world: MakeWorld) -> None:
     assert "move" not in world.observer.sent_since(late)
 
 
-@pytest.mark.parametrize("kill", [0, 1])
-def test_who_asked_for_control_before_a_task_asks_again_after_it(world: World, kill: int) -> None:
-    before, other = world.add_client("before"), world.add_client("other")
-    before.mode(GUIDED)
-    world.run(1)
-    driving(world)
-    world.client.command(CANCEL, 1, kill)
-    world.run(6)
-    if not world.rover.autopilot.armed:
-        world.client.arm(True)
-        world.run(0.5)
-    other.mode(GUIDED)
-    world.run(0.5)
-    before.stream(setpoint(0.8), rate=20)
-    world.run(2)
-    assert world.stands()
-
-
-def test_only_what_we_armed_is_disarmed(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(watch=Watch(ready_timeout=0.0)))
-    world.fault(Faults(refuse_arm=True))
-    world.client.move(1)
-    world.until_state(1, S.FAILED)
-    world.run(3)
-    world.fault(Faults())
-    world.operator_arm(True)
-    world.run(1)
-    world.client.move(1, nonce=5)
-    world.until_idle(tasks=2)
-    world.run(2)
-    assert world.rover.autopilot.armed
-
-
-@pytest.mark.parametrize("value", [nan, inf])
+@for_each("value", [nan, inf])
 def test_a_position_that_is_none_is_passed_over(world: World, value: float) -> None:
     driving(world, 5.0)
     last = world.client.of_type("GLOBAL_POSITION_INT")[-1]
@@ -216,17 +118,8 @@ def test_a_position_that_is_none_is_passed_over(world: World, value: float) -> N
     assert world.stands()
 
 
-@pytest.mark.parametrize(("command", "params"), [(MOVE, (1e4, 1e-40)), (ROTATE, (3600, 1e-42))])
-def test_next_to_no_speed_is_refused(
-    world: World, command: int, params: tuple[float, float]
-) -> None:
-    sent = world.client.command(command, *params, 0, 0, 0, 0, 5)
-    world.run(0.2)
-    assert sent.answer == (DENIED, R.BAD_PARAMETER)
-
-
-@pytest.mark.parametrize(
-    ("command", "params"),
+@for_each(
+    "command, params",
     [
         (CANCEL, (nan, 0)),
         (RELEASE, (1, nan)),
@@ -248,30 +141,6 @@ def test_what_must_be_given_is_never_taken_for_0(
     assert (world.state(1)[0], world.task(1).terms) == (S.EXECUTING, before)
 
 
-def test_another_speed_is_not_another_direction(world: World) -> None:
-    world.client.command(YAW_SPEED, 0, -0.5, 0)
-    world.until_state(1, S.EXECUTING)
-    world.run(1.2)
-    world.client.command(CHANGE_SPEED, 1, 0.6)
-    world.run(1.2)
-    assert world.truth.forward_speed < -0.3
-
-
-def test_a_remainder_far_away_is_not_driven_to(world: World) -> None:
-    driving(world, 10.0)
-    world.observer.expects_gaps = True
-    world.suspend_server(1.0)
-    world.run(4)
-    assert world.state(1) == (S.HELD, R.LATE)
-    displaced(world)
-    remainder = world.client.command(RELEASE, 1, 1)
-    world.run(0.2)
-    assert remainder.answer == (DENIED, R.OFF_TRACK)
-    again = world.client.command(RELEASE, 1, 0)
-    world.run(0.2)
-    assert again.result == ACCEPTED
-
-
 def test_nobody_takes_the_position_away_from_a_task(world: World) -> None:
     driving(world)
     world.client.command(SET_INTERVAL, 32, -1, target=(1, 50))
@@ -287,20 +156,6 @@ def test_a_pause_that_the_rover_cannot_hear_says_so_and_counts(world: World) -> 
     world.run(1)
     assert sent.answer == (FAILED, R.VEHICLE_SILENT)
     assert world.paused() is R.OPERATOR
-
-
-def test_what_was_set_aside_is_held_when_somebody_led_the_rover_away(world: World) -> None:
-    world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
-    driving(world, 10.0)
-    world.client.mode(RTL)
-    world.until_state(2, S.EXECUTING)
-    world.run(0.5)
-    displaced(world)
-    world.client.command(CANCEL, 2)
-    world.run(2)
-    world.client.proceed()
-    world.run(3)
-    assert (world.state(1), world.stands()) == ((S.HELD, R.OFF_TRACK), True)
 
 
 def test_a_takeover_by_a_stations_sticks_names_the_station(world: World) -> None:

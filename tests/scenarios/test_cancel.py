@@ -1,6 +1,5 @@
 """Tasks are called off: promptly, visibly, and the rover stands before anything else begins."""
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink import messages as m
@@ -11,6 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -28,7 +28,7 @@ def driving(world: World) -> World:
     return world
 
 
-@pytest.mark.parametrize("task", [0, 1])
+@for_each("task", [0, 1])
 def test_the_running_task_is_cancelled_once_the_rover_stands(world: World, task: int) -> None:
     driving(world)
     at = world.now
@@ -44,7 +44,7 @@ def test_the_running_task_is_cancelled_once_the_rover_stands(world: World, task:
     assert world.client.statuses(1)[-1].why == (S.CANCELLED, R.CANCELLED)
 
 
-@pytest.mark.parametrize("repeats_after", [0.5, 3.0])  # s; QGroundControl repeats after 3
+@for_each("repeats_after", [0.5, 3.0])  # s; QGroundControl repeats after 3
 def test_counted_copies_cancel_one_task_and_get_the_first_ones_answer(
     world: World, repeats_after: float
 ) -> None:
@@ -55,24 +55,6 @@ def test_counted_copies_cancel_one_task_and_get_the_first_ones_answer(
     assert world.client.acks_of(CANCEL) == [(ACCEPTED, 1)] * 4
     world.until_idle(tasks=3)
     assert [t.state for t in world.tasks()] == [S.CANCELLED, S.COMPLETED, S.COMPLETED]
-
-
-def test_a_copy_of_a_refused_cancel_cancels_nothing_that_has_begun_since(world: World) -> None:
-    world.client.command(CANCEL, 0)
-    world.client.move(1)
-    world.until_state(1, S.EXECUTING)
-    world.client.command(CANCEL, 0, confirmation=1)
-    world.run(0.1)
-    assert world.client.acks_of(CANCEL) == [(DENIED, R.NOT_FOUND)] * 2
-    world.client.command(CANCEL, 0)  # a new decision
-    world.until_state(1, S.CANCELLED, within=4)
-
-
-def test_a_counted_copy_whose_first_one_was_lost_counts(world: World) -> None:
-    driving(world)
-    sent = world.client.command(CANCEL, 0, confirmation=2)
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 1)
 
 
 def test_a_kill_is_zero_and_hold_at_once_and_no_latch(world: World) -> None:
@@ -114,7 +96,7 @@ def test_waiting_tasks_are_cancelled_or_killed_at_once(world: World) -> None:
     assert world.state(1)[0] is S.EXECUTING
 
 
-@pytest.mark.parametrize("scope", [0, 1])
+@for_each("scope", [0, 1])
 def test_clear_takes_what_waits_or_everything(world: World, scope: int) -> None:
     driving(world)
     sent = world.client.command(CLEAR, scope)
@@ -125,8 +107,8 @@ def test_clear_takes_what_waits_or_everything(world: World, scope: int) -> None:
     assert world.state(1)[0] is (S.CANCELLED if scope else S.COMPLETED)
 
 
-@pytest.mark.parametrize(
-    ("params", "answer"),
+@for_each(
+    "params, answer",
     [
         ((99, 0), (DENIED, R.NOT_FOUND)),
         ((0, 0), (DENIED, R.NOT_FOUND)),
@@ -144,16 +126,6 @@ def test_what_cannot_be_cancelled_is_said(
     sent = world.client.command(CANCEL, *params)
     world.run(0.1)
     assert sent.answer == answer
-
-
-def test_another_rovers_task_is_not_found_here(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.move(3, target=(2, 191))
-    world.run(0.1)
-    sent = world.client.command(CANCEL, 1, target=(1, 191))
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.NOT_FOUND)
-    assert world.state(1)[0] is not S.CANCELLED
 
 
 def test_command_cancel_takes_the_askers_latest_of_that_command(world: World) -> None:

@@ -3,13 +3,12 @@
 from math import nan
 
 import pytest
-from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, GUIDED, HOLD, RTL, heartbeat, setpoint
 from tests.kit.world import World, at, is_at, put_home
 from tests.scenarios.conftest import MakeWorld
@@ -26,14 +25,7 @@ def takes_control(world: World) -> None:
     world.run(0.5)
 
 
-def go_there(current: int) -> common.MAVLink_message:
-    """ArduPilot's "go to" in the form of a plan's item."""
-    return common.MAVLink_mission_item_message(
-        1, 1, 0, 3, 16, current, 1, 0, 0, 0, nan, 47.39775, 8.545594, 0
-    )
-
-
-@pytest.mark.parametrize("gap", [0.0, 0.05, 0.3, 1.2])
+@for_each("gap", [0.0, 0.05, 0.3, 1.2])
 def test_our_mode_asked_for_right_after_hold_is_not_undone(
     make_world: MakeWorld, gap: float
 ) -> None:
@@ -60,44 +52,6 @@ def test_what_would_move_it_is_refused_while_a_task_drives(world: World, command
     assert str(command) not in world.observer.sent_since(0.0)
 
 
-def test_what_would_move_it_passes_for_who_has_control(world: World) -> None:
-    takes_control(world)
-    world.client.command(ORBIT, 1, 0, 1, target=(1, 1))
-    world.run(0.3)
-    assert str(ORBIT) in world.observer.sent_since(0.0)
-
-
-@pytest.mark.parametrize("current", [2, 3])
-def test_a_go_to_item_that_no_task_is_made_of_needs_control_too(
-    make_world: MakeWorld, current: int
-) -> None:
-    world = make_world(settings=Settings(claim=False))
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    world.client.send(go_there(current))
-    world.run(0.3)
-    reached = [packet.kind for packet in world.observer.reached]
-    assert common.MAVLINK_MSG_ID_MISSION_ITEM not in reached
-    assert world.state(1)[0] is S.EXECUTING
-
-
-@pytest.mark.parametrize("allowed", [True, False])
-def test_after_somebody_disarmed_a_rover_that_was_ours_it_is_not_armed_again(
-    world: World, allowed: bool
-) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    world.client.arm(False)
-    world.run(3)
-    world.client.command(54010, 1)
-    world.client.move(1, nonce=2)
-    if allowed:
-        world.client.proceed()
-    at = world.now
-    world.run(3)
-    assert ("arm" in world.observer.sent_since(at)) is allowed
-
-
 def test_a_stop_ends_what_clients_were_granted(world: World) -> None:
     takes_control(world)
     world.client.stream(setpoint(0.5), rate=20)
@@ -115,19 +69,6 @@ def test_a_stop_ends_what_clients_were_granted(world: World) -> None:
     assert (world.rover.autopilot.armed, world.stands()) == (True, True)
 
 
-def test_a_rover_that_restarts_under_a_task_is_not_armed_by_us(world: World) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    world.run(1)
-    world.rover.autopilot.reboot(now=world.now)
-    at = world.now
-    world.run(8)
-    world.client.command(54010, 1)
-    world.client.move(1, nonce=2)
-    world.run(5)
-    assert "arm" not in world.observer.sent_since(at)
-
-
 def test_an_operators_heartbeats_reach_the_rover(world: World) -> None:
     at = world.now
     world.client.send(heartbeat())
@@ -136,7 +77,7 @@ def test_an_operators_heartbeats_reach_the_rover(world: World) -> None:
     assert (255, 190) in sources, "its own failsafe must see the operator"
 
 
-@pytest.mark.parametrize(("flags", "target"), [(1, 191), (0, 1)])
+@for_each("flags, target", [(1, 191), (0, 1)])
 def test_a_go_to_is_now_only_at_the_autopilot_with_a_change_of_mode(
     make_world: MakeWorld, flags: int, target: int
 ) -> None:
@@ -167,20 +108,6 @@ def test_what_a_client_said_while_the_server_stood_still_moves_no_rover(world: W
     assert world.pose() == stood_at
 
 
-def test_a_client_that_drives_on_while_the_server_stands_still_drives_after_it(
-    world: World,
-) -> None:
-    takes_control(world)
-    world.observer.expects_gaps = True
-    world.client.stream(setpoint(0.5), rate=20)
-    world.run(2)
-    world.suspend_server(5)
-    world.run(0.04)  # what waited has been read; the next setpoint is under way
-    assert world.truth.forward_speed < 0.01
-    world.run(2)
-    assert world.truth.forward_speed > 0.4
-
-
 def test_that_a_rover_is_to_stand_is_passed_on_however_late(world: World) -> None:
     takes_control(world)
     world.observer.expects_gaps = True
@@ -197,7 +124,7 @@ def test_that_a_rover_is_to_stand_is_passed_on_however_late(world: World) -> Non
     assert world.stands()  # its own time-out would be later
 
 
-@pytest.mark.parametrize("seconds", [1.0, 4.0])
+@for_each("seconds", [1.0, 4.0])
 def test_tasks_wait_as_long_as_is_set_after_a_clients_setpoints(
     make_world: MakeWorld, seconds: float
 ) -> None:
@@ -210,19 +137,6 @@ def test_tasks_wait_as_long_as_is_set_after_a_clients_setpoints(
     world.client.move(1)
     world.until_state(1, S.EXECUTING)
     assert seconds <= world.now - end < seconds + 1.0
-
-
-def test_a_rover_that_cannot_be_seen_to_stand_gets_hold_all_the_same(world: World) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    world.run(1)
-    world.fault(Faults(withheld=frozenset({30, 32})))
-    at = world.now
-    world.client.pause()
-    world.run(2.5)
-    assert "HOLD" not in world.observer.sent_since(at)
-    world.run(1.5)
-    assert "HOLD" in world.observer.sent_since(at)
 
 
 class TestUnclaimed:
@@ -245,26 +159,6 @@ class TestUnclaimed:
         takes_control(world)
         assert self.go_to(world) == (ACCEPTED, 0)
         assert world.tasks() == ()
-
-    def test_without_a_change_of_mode_the_mode_is_asked_for_first(self, world: World) -> None:
-        world.operator_arm(True)
-        world.run(1.2)
-        assert self.go_to(world, flags=0) == (DENIED, R.NOT_ALLOWED)
-        assert any("set GUIDED first" in text for text in world.client.texts())
-
-    def test_takeoff_is_the_rovers_to_refuse(self, world: World) -> None:
-        takes_control(world)
-        world.client.command(TAKEOFF, target=(1, 1))
-        world.run(0.5)
-        assert str(TAKEOFF) in world.observer.sent_since(0.0)
-
-    def test_at_the_server_everything_is_a_task(self, world: World) -> None:
-        world.client.command_int(
-            REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=GLOBAL, target=(1, 191)
-        )
-        world.run(0.2)
-        world.until_idle(tasks=1)
-        assert is_at(world, 1.0, 0.0)
 
     def test_the_mode_rtl_is_the_rovers_own(self, world: World) -> None:
         world.until(lambda: world.client.heard("HOME_POSITION"), within=10)

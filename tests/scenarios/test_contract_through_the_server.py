@@ -3,12 +3,11 @@
 All that the checker may do to a rover it does: it arms, drives by setpoints of its own, uploads.
 """
 
-import pytest
-
 from mav_tasks.in_memory import CLIENT_LINK
 from rover_sim.check_vehicle.context import Options
 from rover_sim.check_vehicle.contract import check_vehicle
 from rover_sim.personas import PERSONAS, Mode
+from tests.kit.cases import for_each
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -35,7 +34,7 @@ class WorldWire:
         return b"".join(data for _, data in self._link.receive(1))
 
 
-@pytest.mark.parametrize("name", PERSONAS)
+@for_each("name", PERSONAS)
 def test_a_rover_behind_the_server_passes_as_it_does_without(
     make_world: MakeWorld, name: str
 ) -> None:

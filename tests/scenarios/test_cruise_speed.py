@@ -6,8 +6,7 @@ import pytest
 
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.client import RTL
-from tests.kit.mission import Item, Upload
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
@@ -38,9 +37,7 @@ def top_speed(world: World) -> float:
     return fastest
 
 
-@pytest.mark.parametrize(
-    ("cruise", "fastest", "driven"), [(1.2, 2.0, 1.2), (5.0, 1.5, 1.5), (0.0, 2.0, 2.0)]
-)
+@for_each("cruise, fastest, driven", [(1.2, 2.0, 1.2), (5.0, 1.5, 1.5), (0.0, 2.0, 2.0)])
 def test_a_go_to_is_driven_at_the_rovers_speed_within_the_bounds(
     make_world: MakeWorld, cruise: float, fastest: float, driven: float
 ) -> None:
@@ -50,18 +47,7 @@ def test_a_go_to_is_driven_at_the_rovers_speed_within_the_bounds(
     assert top_speed(world) == pytest.approx(driven, abs=0.05)
 
 
-def test_a_mission_and_a_return_are_driven_at_it_too(make_world: MakeWorld) -> None:
-    world = cruising(make_world, 1.2)
-    upload = Upload(world.client, [Item(WAYPOINT, **at(n, 0.0)) for n in (0.0, 12.0)])
-    world.until(lambda: upload.result is not None, within=5)
-    world.client.command(START, target=(1, 1))
-    assert top_speed(world) == pytest.approx(1.2, abs=0.05)
-    world.client.mode(RTL)
-    world.run(0.3)
-    assert abs(top_speed(world)) == pytest.approx(1.2, abs=0.05)
-
-
-@pytest.mark.parametrize("what", ["named", "changed", "at the task server", "of our own"])
+@for_each("what", ["named", "changed", "at the task server", "of our own"])
 def test_other_tasks_keep_their_speed(make_world: MakeWorld, what: str) -> None:
     world = cruising(make_world, 1.2)
     match what:

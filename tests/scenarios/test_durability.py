@@ -7,18 +7,19 @@ import pytest
 from mav_tasks.tasks.events import TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, FAILED, TEMPORARILY_REJECTED
 from tests.kit.store import LateStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 
-@pytest.fixture
+@anew
 def store() -> LateStore:
     return LateStore()
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld, store: LateStore) -> World:
     return make_world(store=store)
 
@@ -34,14 +35,6 @@ def test_the_ack_comes_when_the_task_is_durable(world: World, store: LateStore) 
     assert sent.acked_at - at == pytest.approx(0.26, abs=0.03)
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
-
-
-def test_the_task_does_not_start_before_it_is_durable(world: World, store: LateStore) -> None:
-    store.delay = inf
-    world.client.move(1)
-    world.run(0.35)
-    assert world.state(1)[0] is S.QUEUED
-    assert set(world.observer.sent_since(0)) <= {"511", "512"}  # what asks, and nothing else
 
 
 def test_motion_waits_until_executing_is_durable(world: World, store: LateStore) -> None:
@@ -85,17 +78,6 @@ def test_what_is_not_durable_in_time_is_withdrawn_and_works_later(
     ]
 
 
-def test_a_nonce_can_be_used_again_after_a_withdrawal(world: World, store: LateStore) -> None:
-    store.delay = inf
-    world.client.move(1, nonce=77)
-    world.run(0.6)
-    store.delay = 0.0
-    world.run(0.1)
-    again = world.client.move(1, nonce=77)
-    world.run(0.1)
-    assert again.answer == (ACCEPTED, 2)
-
-
 def test_a_store_that_failed_refuses_until_it_commits_again(world: World, store: LateStore) -> None:
     for _ in range(2):  # as it says for as long as it lasts
         store.fail("disk full")
@@ -132,8 +114,8 @@ def test_nobody_is_told_of_a_task_that_is_not_durable(world: World, store: LateS
     assert [s.task_id for s in world.client.statuses()][:1] == [1]
 
 
-@pytest.mark.parametrize(("delay", "told_after"), [(0.2, 0.2), (inf, 0.4)])
-@pytest.mark.parametrize("by", ["kill", "STOP"])
+@for_each("delay, told_after", [(0.2, 0.2), (inf, 0.4)])
+@for_each("by", ["kill", "STOP"])
 def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(
     world: World, store: LateStore, by: str, delay: float, told_after: float
 ) -> None:
@@ -153,31 +135,3 @@ def test_that_a_task_is_over_is_told_when_it_is_durable_or_the_store_too_slow(
     assert world.client.statuses(1)[-1].state == S.KILLED
     not_kept = by == "kill" and delay == inf
     assert sent.answer == ((FAILED, R.STORE_UNAVAILABLE) if not_kept else (ACCEPTED, 1))
-
-
-def test_an_end_is_not_told_by_news_of_the_same_step(world: World, store: LateStore) -> None:
-    world.client.move(2, nonce=1)
-    world.until_state(1, S.EXECUTING)
-    world.client.pause()
-    world.run(2)
-    store.delay = 0.2
-    world.client.command(54010, 1)  # cancelling, and cancelled as it stands
-    world.run(0.15)
-    assert world.state(1)[0] is S.CANCELLED
-    assert world.client.statuses(1)[-1].state == S.PAUSED
-    world.client.move(2, nonce=1)  # the same again, which is answered with the task's state
-    world.run(0.04)
-    assert world.client.statuses(1)[-1].state == S.PAUSED
-    world.run(0.1)
-    assert world.client.statuses(1)[-1].state == S.CANCELLED
-
-
-def test_the_state_that_is_asked_for_waits_for_nothing(world: World, store: LateStore) -> None:
-    world.client.move(2, nonce=1)
-    world.until_state(1, S.EXECUTING)
-    store.delay = inf
-    world.client.stop()
-    world.run(0.05)
-    world.client.request_status(1)
-    world.run(0.05)
-    assert world.client.statuses(1)[-1].state == S.KILLED

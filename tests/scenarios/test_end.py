@@ -1,14 +1,12 @@
 """Handing the rover back, and the orderly end of the server."""
 
-import pytest
-
 from mav_tasks.engine.inputs import Shutdown
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import ServerStopped
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import TEMPORARILY_REJECTED
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -29,17 +27,7 @@ def test_an_empty_queue_hands_the_rover_back_and_the_stream_ends(world: World) -
     assert world.observer.sent_since(at) == []
 
 
-def test_a_rover_that_the_operator_armed_stays_armed(world: World) -> None:
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(1)
-    world.client.move(0.5)
-    world.until_idle(tasks=1)
-    world.run(3)
-    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, True)
-
-
-@pytest.mark.parametrize("after", [k * 0.003 for k in range(14)])
+@for_each("after", [k * 0.003 for k in range(0, 14, 3)])
 def test_the_next_task_right_after_the_hand_back_works(world: World, after: float) -> None:
     """Submitted while HOLD, disarming, or what follows is on its way, in steps of 3 ms."""
     world.client.move(0.3)
@@ -49,14 +37,6 @@ def test_the_next_task_right_after_the_hand_back_works(world: World, after: floa
     world.until_idle(tasks=2)
     assert [t.state for t in world.tasks()] == [S.COMPLETED, S.COMPLETED]
     assert not world.rover.autopilot.armed
-
-
-def test_between_two_tasks_the_rover_stays_ours(world: World) -> None:
-    world.client.move(0.3)
-    world.client.rotate(20)
-    world.until_idle(tasks=2)
-    names = [name for name in world.observer.sent_since(0) if name in ("GUIDED", "HOLD", "arm")]
-    assert names == ["GUIDED", "arm", "HOLD"]
 
 
 def test_the_orderly_end_is_zero_and_hold(world: World) -> None:
@@ -71,20 +51,6 @@ def test_the_orderly_end_is_zero_and_hold(world: World) -> None:
     assert world.stands()
     assert world.rover.autopilot.mode is Mode.HOLD
     assert [world.state(k) for k in (1, 2)] == [(S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE)]
-
-
-def test_a_server_that_drives_nothing_ends_at_once(world: World) -> None:
-    shut_down(world)
-    assert len(world.events(ServerStopped)) == 1
-
-
-def test_a_server_that_stops_a_standing_rover_ends_when_hold_is_seen(world: World) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    at = world.now
-    shut_down(world)
-    world.until(lambda: world.events(ServerStopped), within=3.1)
-    assert world.now - at < 0.7
 
 
 def test_a_lost_hold_is_sent_again_on_the_way_out(world: World) -> None:
@@ -110,20 +76,7 @@ def test_submissions_are_refused_and_nothing_begins_on_the_way_out(world: World)
     assert world.state(2)[0] is S.QUEUED
 
 
-def test_waiting_tasks_do_not_begin_on_the_way_out(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(arming="operator"))
-    world.client.move(1)
-    world.run(1)
-    world.server.pump.handle(Shutdown(), now=world.now)
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(0.5)
-    assert world.state(1)[0] is S.QUEUED
-
-
-@pytest.mark.parametrize(
-    ("persona", "words"), [(ARDUPILOT, ("zero", "HOLD")), (PX4, ("HOLD", "zero"))]
-)
+@for_each("persona, words", [(ARDUPILOT, ("zero", "HOLD")), (PX4, ("HOLD", "zero"))])
 def test_last_words_are_there_exactly_while_a_rover_is_engaged(
     make_world: MakeWorld, persona: Persona, words: tuple[str, ...]
 ) -> None:
@@ -137,7 +90,7 @@ def test_last_words_are_there_exactly_while_a_rover_is_engaged(
     assert seen == {(True, words), (False, ())}
 
 
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4])
+@for_each("persona", [ARDUPILOT, PX4])
 def test_last_words_stop_a_driving_rover(make_world: MakeWorld, persona: Persona) -> None:
     world = make_world(persona=persona)
     world.client.move(20, speed=1.0)

@@ -6,8 +6,8 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -20,7 +20,6 @@ from tests.kit.client import (
     SET_MODE,
     FakeClient,
     Received,
-    command_long,
 )
 from tests.kit.fleet import Fleet
 from tests.kit.mission import COUNT, Count, Download, Item, Upload
@@ -78,16 +77,7 @@ def test_hold_and_a_pause_reach_every_rover(fleet: Fleet, component: int) -> Non
     assert len(answers(fleet.other, PAUSE_CONTINUE)) == 4
 
 
-def test_a_command_sent_again_is_still_one_for_each_rover(fleet: Fleet) -> None:
-    raw = fleet.other.send(command_long(DELAY, 1.0, target=ALL))
-    fleet.run(0.2)
-    fleet.other.send_raw(raw)
-    fleet.run(0.3)
-    assert len(fleet.tasks()) == 2
-    assert {task.vehicle for task in fleet.tasks()} == {1, 2}
-
-
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda persona: persona.name)
+@for_each("persona", [ARDUPILOT, PX4])
 def test_modes_and_capabilities_are_answered(make_world: MakeWorld, persona: Persona) -> None:
     world = make_world(persona=persona)
     if persona is PX4:
@@ -99,14 +89,6 @@ def test_modes_and_capabilities_are_answered(make_world: MakeWorld, persona: Per
     assert (hold.result, asked.result) == (ACCEPTED, ACCEPTED)
     assert world.client.heard("AUTOPILOT_VERSION")
     assert {ack for ack, _ in answers(world.client, REQUEST)} == {(1, 1)}
-
-
-def test_the_message_set_mode_reaches_the_rover(world: World) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    world.client.send(common.MAVLink_set_mode_message(0, 1, HOLD))
-    world.run(0.3)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
 def test_a_plan_is_taken_in_given_back_and_cleared(world: World) -> None:

@@ -8,6 +8,7 @@ import pytest
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import TaskSubmitted
+from tests.kit.cases import for_each
 from tests.kit.client import MOVE, REPEATS, TASK_STATUS, FakeClient, TaskStatus, command_long
 from tests.kit.volume import tries
 from tests.scenarios.conftest import MakeWorld
@@ -79,7 +80,7 @@ def test_submissions_with_nonces_are_as_many_tasks(make_world: MakeWorld) -> Non
             assert nonce_of[task_id] == nonce
 
 
-@pytest.mark.parametrize("seed", range(tries(2, long=20)))
+@for_each("seed", range(tries(2, long=20)))
 def test_without_nonces_who_repeats_as_mavsdk_does_gets_one_task(
     make_world: MakeWorld, seed: int
 ) -> None:

@@ -7,6 +7,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.modes import Mode
 from rover_sim.personas import ARDUPILOT, PX4, Persona
+from tests.kit.cases import anew, for_each
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -22,12 +23,13 @@ def driving_world(make_world: MakeWorld, persona: Persona) -> World:
     return world
 
 
-@pytest.fixture(params=[ARDUPILOT, PX4], ids=["ardupilot", "px4"])
-def driving(request: pytest.FixtureRequest, make_world: MakeWorld) -> World:
+@anew
+def driving(make_world: MakeWorld, persona: Persona) -> World:
     """A world in which a task drives."""
-    return driving_world(make_world, request.param)
+    return driving_world(make_world, persona)
 
 
+@for_each("persona", [ARDUPILOT, PX4])
 def test_a_mode_that_a_failsafe_sets_is_no_person_s_takeover(driving: World) -> None:
     world = driving
     world.fault(Faults(gps_lost=True))
@@ -36,6 +38,7 @@ def test_a_mode_that_a_failsafe_sets_is_no_person_s_takeover(driving: World) -> 
     assert any("set by its failsafe: " in text for text in world.client.texts())
 
 
+@for_each("persona", [ARDUPILOT, PX4])
 def test_a_person_s_mode_is_a_takeover(driving: World) -> None:
     world = driving
     world.operator_mode(Mode.MANUAL)

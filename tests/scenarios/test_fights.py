@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
@@ -15,15 +14,13 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.body import Body, Pose
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode
-from tests.kit import px4
+from tests.kit.cases import anew, for_each
 from tests.kit.client import HOLD, MANUAL, MOVE, PAUSE_CONTINUE
-from tests.kit.world import PROMPT, World, near_pose
+from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
-REBOOT_LATEST = 3.0  # s, until a rover that has restarted is known to have
 
-
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     world.client.move(4)
     world.until(lambda: world.truth.forward_speed > 0.4, within=10)
@@ -55,7 +52,7 @@ class OtherStation:
             self._link.send("rover1", message.pack(self._mav))
 
 
-@pytest.mark.parametrize("modes", [(HOLD,), (MANUAL,), (MANUAL, HOLD)])
+@for_each("modes", [(HOLD,), (MANUAL,), (MANUAL, HOLD)])
 def test_nobody_fights_for_the_mode_with_another_station(
     driving: World, modes: tuple[int, ...]
 ) -> None:
@@ -176,21 +173,7 @@ def change_to(state: S, events: Sequence[Event]) -> list[TaskChanged]:
     return [each for each in events if isinstance(each, TaskChanged) and each.new is state]
 
 
-def test_a_rover_that_restarts_while_a_task_waits_is_given_it_at_its_time(world: World) -> None:
-    world.client.command(MOVE, 1.0, 0, 0, 0, 0, 12.0)
-    world.run(3)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(REBOOT_LATEST)
-    assert any("restarted" in text for text in world.client.texts())
-    assert world.state(1)[0] is S.SCHEDULED
-    world.run(5.5)
-    assert world.state(1)[0] is S.SCHEDULED  # not before
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-    assert near_pose(world.pose(), (1.0, 0.0, 0.0))
-
-
-@pytest.mark.parametrize("backwards", [1_000_000, 0])
+@for_each("backwards", [1_000_000, 0])
 def test_a_time_of_day_that_goes_back_at_the_rover_changes_nothing(
     driving: World, backwards: int
 ) -> None:
@@ -201,19 +184,3 @@ def test_a_time_of_day_that_goes_back_at_the_rover_changes_nothing(
     world.until_idle(tasks=1)
     assert world.history(1)[-1] == (S.COMPLETED, R.NONE)
     assert (S.HELD, R.FRAME_RESET) not in world.history(1)
-
-
-@pytest.mark.parametrize("make", ["ardupilot", "px4"])
-def test_a_rover_that_restarts_while_it_is_driven_does_not_move_again(
-    make_world: MakeWorld, make: str
-) -> None:
-    world = make_world(persona={"ardupilot": PROMPT, "px4": px4.PROMPT_PX4}[make])
-    world.client.move(4)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=10)
-    since = world.now
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(REBOOT_LATEST)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    world.run(5)
-    assert "move" not in world.observer.sent_since(since + 0.35)
-    assert world.stands()

@@ -1,17 +1,14 @@
 """Links that come and go all the time, and a net that changes the order of what it carries."""
 
-import pytest
-
-from mav_tasks.engine.inputs import PeerChanged
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, MOVE, ROTATE
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_streams import tell
 
 LENGTH = 4.0  # m
 
@@ -27,7 +24,7 @@ def flaps(world: World, names: set[str], *, down: float, up: float) -> None:
     world.watched.loses = loses
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     """A rover on its way, 4 m."""
     world.client.move(LENGTH)
@@ -93,23 +90,7 @@ def test_a_client_that_is_gone_every_second_second_loses_no_task_and_doubles_non
     assert stop.result == ACCEPTED
 
 
-def test_a_clients_connection_that_flaps_disturbs_no_setpoint(driving: World) -> None:
-    """Up and down fifty times in five seconds, as a listener's connection: 20 Hz, no gap."""
-    world = driving
-    since = world.now
-    for _ in range(50):
-        tell(world, PeerChanged(CLIENT_LINK, "client", up=False))
-        world.run(0.05)
-        tell(world, PeerChanged(CLIENT_LINK, "client", up=True))
-        world.run(0.05)
-    moves = world.observer.sent_since(since)
-    assert moves.count("move") == pytest.approx(100, abs=3)  # the observer looks at the gaps
-    assert len(world.server.engine.snapshot(now=world.now).clients) <= 2
-    world.until_idle(tasks=1)
-    assert near_pose(world.pose(), (LENGTH, 0.0, 0.0))
-
-
-@pytest.mark.parametrize("seed", range(3))
+@for_each("seed", range(3))
 def test_what_is_reordered_and_doubled_changes_nothing(make_world: MakeWorld, seed: int) -> None:
     """A fifth of a second of disorder at 20 Hz: everything is overtaken by what came later."""
     net = Conditions(delay=0.002, jitter=0.2, duplication=0.5)

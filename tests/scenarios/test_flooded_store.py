@@ -5,12 +5,10 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.settings import Limits, Roles, Settings
-from mav_tasks.tasks.events import SubmissionRefused, TaskModified, VehicleSpeedSet
-from mav_tasks.tasks.lifecycle import TaskReason as R
-from tests.kit.client import ACCEPTED, TEMPORARILY_REJECTED, FakeClient, Sent, command_long
+from mav_tasks.tasks.events import TaskModified, VehicleSpeedSet
+from tests.kit.cases import for_each
+from tests.kit.client import ACCEPTED, FakeClient, Sent, command_long
 from tests.kit.databases import tables
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -79,7 +77,7 @@ def flooded(make_world: MakeWorld, flood: Callable[[FakeClient], None], role: st
     return world
 
 
-@pytest.mark.parametrize("flood", FLOODS)
+@for_each("flood", FLOODS)
 def test_a_flood_writes_so_much_an_hour_and_no_more(
     make_world: MakeWorld, tmp_path: Path, flood: Callable[[FakeClient], None]
 ) -> None:
@@ -117,18 +115,3 @@ def test_a_change_that_changes_nothing_is_accepted_and_is_no_event(make_world: M
         assert (sent.result, speed.result) == (ACCEPTED, ACCEPTED)
         assert len(world.events(TaskModified)) == changes
         assert len(world.events(VehicleSpeedSet)) == changes
-
-
-def test_who_has_changed_too_much_is_told_and_others_go_on(make_world: MakeWorld) -> None:
-    world = flooded(make_world, modify, "submitter")
-    flooder, other = world.add_client("again", system_id=9), world.client
-    world.run(1.2)
-    refusals = world.events(SubmissionRefused)
-    assert refusals[-1].reason is R.RATE_LIMITED
-    assert refusals[-1].text == "role submitter may send 1 changes per second"
-    modified = len(world.events(TaskModified))
-    assert modified <= RATE * 5 + BURST + MEASURED + 2
-    assert other.command(MODIFY, 1, PRIORITY, 9).result != TEMPORARILY_REJECTED
-    assert flooder.stop() is not None
-    world.run(0.5)
-    assert world.paused() is R.STOPPED

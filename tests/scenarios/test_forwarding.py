@@ -11,12 +11,11 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
-    GET_INTERVAL,
     GUIDED,
-    HOLD,
     IDS,
     MOVE,
     REQUEST,
@@ -35,7 +34,6 @@ from tests.kit.world import SETPOINT, World
 from tests.scenarios.conftest import MakeWorld
 
 ATTITUDE, POSITION = 30, 32
-DATA_STREAM, PARAM_VALUE = 66, 22
 OUR_MESSAGES = range(54000, 54050)
 CLEAR = 54011
 
@@ -75,25 +73,6 @@ def test_no_client_sees_a_loss_that_is_none(world: World) -> None:
     for client in (world.client, other):
         assert [client.gaps(source) for source in ((1, 1), (1, 191))] == [0, 0]
     assert world.client.heard("ATTITUDE")
-
-
-def test_a_real_loss_stays_visible(world: World) -> None:
-    sent = lost = 0
-
-    def loses(source: str, target: str, _data: bytes) -> bool:
-        nonlocal sent, lost
-        if (source, target) != ("rover1", VEHICLE_LINK):
-            return False
-        sent += 1
-        lost += sent % 17 == 0
-        return sent % 17 == 0
-
-    world.watched.loses = loses
-    world.run(10)
-    world.watched.loses = lambda *_: False
-    world.run(2)
-    assert lost > 30
-    assert world.client.gaps((1, 1)) == lost
 
 
 def test_the_first_of_a_system_is_its_autopilots_heartbeat_then_ours_once_a_second(
@@ -161,25 +140,6 @@ def test_each_client_has_its_own_data_streams(world: World) -> None:
     assert rates[POSITION] == [pytest.approx(wish, abs=0.6) for wish in (2, 10, 10)]
 
 
-def test_an_interval_can_be_asked_for(world: World) -> None:
-    world.client.command(SET_INTERVAL, ATTITUDE, 40_000, target=(1, 1))
-    world.client.command(GET_INTERVAL, ATTITUDE, target=(1, 1))
-    world.run(0.1)
-    answer = world.client.of_type("MESSAGE_INTERVAL")[0]
-    assert (answer.message_id, answer.interval_us) == (ATTITUDE, 40_000)
-
-
-@pytest.mark.parametrize("message_id", [ATTITUDE, TASK_STATUS])
-def test_an_interval_that_is_too_long_to_be_told_is_the_longest(
-    world: World, message_id: int
-) -> None:
-    world.client.command(SET_INTERVAL, message_id, 3e38)
-    world.client.command(GET_INTERVAL, message_id)
-    world.run(0.1)
-    answer = world.client.of_type("MESSAGE_INTERVAL")[0]
-    assert (answer.message_id, answer.interval_us) == (message_id, 2**31 - 1)
-
-
 def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
     for message_id in (ATTITUDE, POSITION):
         world.client.command(SET_INTERVAL, message_id, 1, target=(1, 1))
@@ -192,34 +152,6 @@ def test_no_wish_of_a_client_starves_the_server(world: World) -> None:
     world.client.move(0.5)
     world.until_idle(tasks=1)
     assert world.state(1)[0] is S.COMPLETED
-
-
-def test_a_request_for_data_streams_does_not_reach_the_rover(world: World) -> None:
-    other = world.add_client("other", system_id=245)
-    world.client.send(data_stream(ALL_STREAMS, 1))
-    world.run(3)
-    assert DATA_STREAM not in [packet.kind for packet in world.observer.reached]
-    assert rate(other, POSITION, world.now - 2, world.now) > 8
-
-
-def test_parameters_can_be_listed_through_the_server(world: World) -> None:
-    silent = world.add_client("other", system_id=7)
-    world.run(0.1)
-    world.client.send(common.MAVLink_param_request_list_message(1, 1))
-    world.run(1)
-    values = world.client.of_type("PARAM_VALUE")
-    assert len({v.param_id for v in values}) == values[0].param_count
-    assert [silent.gaps((1, 1)), world.client.gaps((1, 1))] == [0, 0]
-
-
-@pytest.mark.parametrize("component", [1, 191])
-def test_the_protocol_version_is_answered(world: World, component: int) -> None:
-    asked = world.client.command(REQUEST, 300, target=(1, component))
-    world.run(0.1)
-    versions = list(world.client.of_id(300))
-    assert asked.answer == (ACCEPTED, 0)
-    assert [p.source for p in versions] == [(1, component)]
-    assert versions[0].payload == bytes((200, 0, 100, 0, 200))  # 2.00, 1.00, 2.00, cut zeros
 
 
 def test_every_request_for_a_message_is_answered(world: World) -> None:
@@ -257,15 +189,6 @@ def test_acks_go_to_who_asked_though_both_are_called_the_same(world: World) -> N
     assert [a.command for a in twin.acks] == [54001, REQUEST]
 
 
-def test_two_clients_send_the_same_command_at_once(world: World) -> None:
-    twin = world.add_client("twin")
-    world.run(0.1)
-    sent = [client.arm() for client in (world.client, twin)]
-    world.run(0.2)
-    assert [s.result for s in sent] == [ACCEPTED, ACCEPTED]
-    assert [len(c.acks) for c in (world.client, twin)] == [1, 1]
-
-
 def test_no_answer_in_0_4_s_is_a_rejection_and_the_late_ack_is_dropped(world: World) -> None:
     lost = world.lose_acks()
     at = world.now
@@ -293,17 +216,6 @@ def test_the_late_ack_of_one_client_is_not_given_to_another(world: World) -> Non
     assert [len(c.acks) for c in (world.client, twin)] == [1, 1]
 
 
-def test_of_three_at_once_all_are_answered_within_half_a_second(world: World) -> None:
-    clients = [world.add_client(f"c{k}") for k in range(3)]
-    world.run(0.1)
-    world.lose_acks()
-    at = world.now
-    sent = [client.command(31000, target=(1, 1)) for client in clients]
-    world.run(2)
-    assert [s.result for s in sent] == [TEMPORARILY_REJECTED] * 3
-    assert all(s.acked_at - at <= 0.5 for s in sent)
-
-
 def test_disarm_never_waits(world: World) -> None:
     twin = world.add_client("twin")
     world.operator_arm(True)
@@ -316,18 +228,7 @@ def test_disarm_never_waits(world: World) -> None:
     assert not world.rover.autopilot.armed
 
 
-def test_an_answer_meant_for_another_ground_station_is_not_passed_on(world: World) -> None:
-    world.lose_acks()
-    world.client.command(31000, target=(1, 1))
-    world.run(0.05)
-    world.watched.loses = lambda *_: False
-    foreign = common.MAVLink_command_ack_message(31000, 0, 0, 0, 77, 190)
-    world.from_vehicle_side(packed(foreign, 1, 1), peer="rover1")
-    world.run(0.1)
-    assert world.client.acks == []
-
-
-@pytest.mark.parametrize("result", [7, 8, 9, 200])
+@for_each("result", [7, 8, 9, 200])
 def test_a_result_that_crashes_clients_is_not_passed_on(world: World, result: int) -> None:
     world.lose_acks()
     sent = world.client.command(31000, target=(1, 1))
@@ -337,28 +238,6 @@ def test_a_result_that_crashes_clients_is_not_passed_on(world: World, result: in
     world.from_vehicle_side(packed(ack, 1, 1), peer="rover1")
     world.run(0.1)
     assert sent.answer == (UNSUPPORTED, 0)
-
-
-def test_in_progress_is_not_passed_on_and_what_follows_is(world: World) -> None:
-    world.lose_acks()
-    sent = world.client.command(31000, target=(1, 1))
-    world.run(0.05)
-    world.watched.loses = lambda *_: False
-    for result in (5, 5, 0):
-        ack = common.MAVLink_command_ack_message(31000, result, 0, 0, 255, 190)
-        world.from_vehicle_side(packed(ack, 1, 1), peer="rover1")
-        world.run(0.05)
-    assert [a.result for a in world.client.acks] == [ACCEPTED]
-    assert sent.result == ACCEPTED
-
-
-def test_commands_for_systems_that_are_not_here_are_nobodys(world: World) -> None:
-    world.client.move(1, target=(9, 191))
-    world.client.stop(target=(9, 1))
-    world.client.arm(target=(9, 1))
-    world.run(1)
-    assert (world.client.acks, world.tasks()) == ([], ())
-    assert not world.rover.autopilot.armed
 
 
 # task status
@@ -403,8 +282,8 @@ def test_messages_of_our_dialect_go_only_to_clients_that_use_it(world: World) ->
     assert len(world.client.statuses(1)) > 10
 
 
-@pytest.mark.parametrize(
-    ("command", "params"),
+@for_each(
+    "command, params",
     [
         (192, (-1, 1, 0, nan, -35.36325, 149.16524)),
         (SET_MODE, (1, RTL)),
@@ -425,7 +304,7 @@ def test_what_a_stock_client_may_send_brings_it_nothing_that_it_cannot_read(
     assert not [p for p in stock.received if p.message_id in OUR_MESSAGES]
 
 
-@pytest.mark.parametrize("how", ["nonce", "NaN", "asked", "streamed", "queue"])
+@for_each("how", ["nonce", "NaN", "asked", "streamed", "queue"])
 def test_who_knows_our_dialect_is_told_of_its_tasks(world: World, how: str) -> None:
     client = world.add_client("stock", reads_dialect=False)
     world.run(1.2)
@@ -441,18 +320,6 @@ def test_who_knows_our_dialect_is_told_of_its_tasks(world: World, how: str) -> N
     world.until_idle(tasks=1)
     world.run(0.1)
     assert client.statuses(1)[-1].state == S.COMPLETED
-
-
-def test_a_stream_of_statuses_has_the_rate_that_was_asked_for(world: World) -> None:
-    world.client.move(4)
-    world.run(1)
-    world.client.command(SET_INTERVAL, TASK_STATUS, 200_000)
-    world.run(0.5)
-    since = world.now
-    world.run(4)
-    assert rate(world.client, TASK_STATUS, since, world.now) == pytest.approx(5, abs=0.5)
-    remaining = [s.remaining for s in world.client.statuses(1)][-15:]
-    assert remaining == sorted(remaining, reverse=True)
 
 
 def test_a_rover_with_a_191_of_its_own_moves_the_server_to_192(world: World) -> None:
@@ -497,41 +364,6 @@ def test_a_clients_setpoints_do_not_reach_a_rover_that_is_not_armed(world: World
     assert world.stands()
 
 
-def test_a_clients_stream_does_not_move_a_rover_that_is_being_handed_back(world: World) -> None:
-    driver = world.add_client("driver")
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(0.5)
-    driver.mode(GUIDED)
-    world.run(0.2)
-    driver.stream(setpoint(0.5), rate=10)
-    world.run(2)
-    assert not world.stands()
-    world.fault(Faults(refuse_mode=True))
-    world.client.mode(HOLD)
-    world.run(0.1)
-    at = world.now
-    world.run(2)
-    assert world.control() == "RELEASING"
-    assert "move" not in world.observer.sent_since(at)
-    assert world.stands()
-
-
-def test_a_clients_stream_does_not_drive_the_instant_a_task_ends(world: World) -> None:
-    world.operator_mode(Mode.HOLD)
-    world.operator_arm(True)
-    world.run(0.5)
-    world.client.mode(GUIDED)
-    world.run(0.2)
-    world.client.move(0.5)
-    world.until_state(1, S.EXECUTING)
-    world.client.stream(setpoint(0.5), rate=20)
-    world.until_idle(tasks=1)
-    where = world.pose()
-    world.run(3)
-    assert world.pose() == where
-
-
 def test_a_clients_stream_makes_tasks_wait(world: World) -> None:
     driver = world.add_client("driver")
     world.operator_mode(Mode.HOLD)
@@ -552,7 +384,7 @@ def test_a_clients_stream_makes_tasks_wait(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-@pytest.mark.parametrize("field", ["vx", "yaw_rate", "x"])
+@for_each("field", ["vx", "yaw_rate", "x"])
 def test_a_setpoint_that_is_not_finite_never_reaches_the_rover(world: World, field: str) -> None:
     world.operator_arm(True)
     world.run(0.2)
@@ -566,14 +398,6 @@ def test_a_setpoint_that_is_not_finite_never_reaches_the_rover(world: World, fie
     slow = world.client.command(178, 1, float("nan"), target=(1, 1))
     world.run(0.1)
     assert slow.answer == (DENIED, R.BAD_PARAMETER)
-
-
-def test_a_mode_by_a_client_is_forwarded_and_answered(world: World) -> None:
-    asked = world.client.mode(10)
-    world.run(0.1)
-    assert world.client.acks_of(SET_MODE) == [(ACCEPTED, 0)]
-    assert asked.result == ACCEPTED
-    assert world.rover.autopilot.mode is Mode.AUTO
 
 
 def test_a_client_on_mavlink_1_is_a_client(make_world: MakeWorld) -> None:
@@ -614,36 +438,65 @@ def test_keys_are_not_set_through_the_server(world: World) -> None:
 # files
 
 
-@pytest.mark.parametrize("component", [1, 191])
-def test_a_file_that_nobody_has_is_refused_once_by_who_was_asked(
-    world: World, component: int
+# what clients are told unasked
+
+
+def states(client: FakeClient, task_id: int) -> list[int]:
+    return [status.state for status in client.statuses(task_id)]
+
+
+def test_who_has_asked_about_a_task_is_told_of_each_change(world: World) -> None:
+    first = world.client.move(0.5)
+    second = world.client.rotate(20.0)
+    world.until(lambda: second.ack, within=2)
+    other = world.add_client("other", system_id=244)
+    world.run(1.5)
+    assert other.statuses() == []
+
+    other.request_status(second.task_id)
+    world.until_idle(tasks=2)
+
+    assert states(other, first.task_id) == []
+    seen = list(dict.fromkeys(states(other, second.task_id)))
+    assert seen == [S.QUEUED, S.EXECUTING, S.COMPLETED]
+
+
+# sequence numbers over a restart of the rover
+
+
+ROVER = (1, 1)
+
+
+LONG, SHORT = 3.0, 0.5  # s of silence: of a restart, and of a link
+
+
+def says(world: World, *numbers: int) -> None:
+    """Let the rover send heartbeats with these numbers."""
+    rover = common.MAVLink(None, *ROVER)
+    for number in numbers:
+        rover.seq = number
+        message = common.MAVLink_heartbeat_message(10, 3, 81, 4, 4, 3)
+        world.from_vehicle_side(message.pack(rover), peer="rover1")
+        world.run(0.05)
+
+
+@for_each(
+    "silence, first, lost",
+    [
+        (LONG, 0, 0),
+        (LONG, 3, 0),  # the first ones were sent before the link was up
+        (SHORT, 0, 150),
+        (LONG, 140, 34),  # of a link that was down, and no restart
+    ],
+)
+def test_only_a_restart_of_the_rover_is_no_loss(
+    world: World, silence: float, first: int, lost: int
 ) -> None:
-    asked = [
-        0xFF,
-        0x01,
-        7,
-        4,
-        3,
-        0,
-        0,
-        *b"\0\0\0\0\0a/b",
-    ]  # number 511, session 7, open for reading
-    payload = asked + [0] * (251 - len(asked))
-    other = world.add_client("other", system_id=245)
-    world.run(0.2)
-    world.client.send(common.MAVLink_file_transfer_protocol_message(0, 1, component, payload))
+    world.fault(Faults(silent=True))
     world.run(0.5)
-    (packet,) = world.client.of_id(110)
-    answer = world.client.decoded(packet)
-    assert packet.source == (1, component)
-    assert (answer.target_system, answer.target_component) == (255, 190)
-    assert list(answer.payload[:13]) == [0x00, 0x02, 7, 129, 1, 4, 0, 0, 0, 0, 0, 0, 10]
-    assert not list(other.of_id(110))
-
-
-def test_what_answers_no_request_of_ours_is_not_answered(world: World) -> None:
-    for opcode in (128, 129):
-        payload = [1, 0, 7, opcode] + [0] * 247
-        world.client.send(common.MAVLink_file_transfer_protocol_message(0, 1, 191, payload))
-    world.run(0.5)
-    assert not list(world.client.of_id(110))
+    says(world, 103, 104)
+    world.client.received.clear()
+    says(world, 105)
+    world.run(silence)
+    says(world, first, first + 1, first + 2)
+    assert world.client.gaps(ROVER) == lost

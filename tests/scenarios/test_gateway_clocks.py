@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.gateways.serving import moves
 from tests.kit.volume import some
@@ -16,8 +15,8 @@ HOUR = 3_600.0
 MODIFY, EVERY = 54012, 9
 PERIOD = 20
 
-clocks = pytest.mark.parametrize(
-    ("whose", "error"),
+clocks = for_each(
+    "whose, error",
     some(
         [
             *(("the holder's", error) for error in (HOUR, -HOUR, 5.0, -5.0)),
@@ -63,7 +62,7 @@ def test_a_signed_rover_drives_on_and_its_next_gateway_drives_it(
 
 
 @clocks
-@pytest.mark.parametrize("is_taken_over", [False, True])
+@for_each("is_taken_over", [False, True])
 def test_a_series_runs_each_of_its_times_once(
     tmp_path: Path, whose: str, error: float, *, is_taken_over: bool
 ) -> None:
@@ -92,7 +91,7 @@ def test_a_series_runs_each_of_its_times_once(
     fleet.world.check()
 
 
-@pytest.mark.parametrize("error", [HOUR, -HOUR])
+@for_each("error", [HOUR, -HOUR])
 def test_a_submission_that_is_repeated_after_a_takeover_is_the_same_task(
     tmp_path: Path, error: float
 ) -> None:

@@ -6,18 +6,18 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.engine.commands.dependency_questions import WITHIN
-from mav_tasks.engine.inputs import PeerChanged
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
-from tests.kit.client import ACCEPTED, DENIED, FakeClient, Sent
+from tests.kit.cases import for_each
+from tests.kit.client import ACCEPTED, FakeClient, Sent
 from tests.kit.gateways.engines import LOOK, FleetWorld, Gateway
 from tests.kit.gateways.order import early_starts
 from tests.kit.mission import Item, Upload
 from tests.kit.volume import some
 from tests.kit.world import at
+
+WITHIN = 1.0  # s for the answer of the database
 
 MOVE, CANCEL, MODIFY, OPTIONS = 54000, 54010, 54012, 54014
 RUN_AFTER = 4
@@ -91,29 +91,6 @@ def pair(tmp_path: Path) -> Iterator[Pair]:
     it.world.check()
 
 
-def test_a_task_waits_for_one_of_another_gateway_and_then_runs(pair: Pair) -> None:
-    first = pair.submit(A, 3.0)
-    second = pair.submit(B, after=first)
-    assert pair.task(second).state is S.BLOCKED
-    (status,) = pair.client(pair.b).statuses(second)[-1:]
-    assert (status.state, status.reason) == (S.BLOCKED, R.DEPENDENCY)
-    pair.until(first, S.EXECUTING)
-    assert pair.task(second).state is S.BLOCKED
-    pair.until(first, S.COMPLETED)
-    began = pair.world.now
-    pair.until(second, S.EXECUTING)
-    assert pair.world.now - began < 1.0
-    pair.until(second, S.COMPLETED)
-
-
-def test_it_is_submitted_by_way_of_the_other_gateway(pair: Pair) -> None:
-    first = pair.submit(A)
-    sent = pair.send(B, after=first, by=pair.a)
-    pair.world.until(lambda: sent.ack is not None, within=1)
-    assert sent.result == ACCEPTED
-    pair.until(sent.task_id, S.COMPLETED)
-
-
 def test_a_chain_over_both_runs_in_its_order(pair: Pair) -> None:
     tasks = [pair.submit(A, 2.0)]
     for rover in (B, A, B, A):
@@ -131,23 +108,6 @@ def test_the_failure_of_the_first_fails_all_that_follow(pair: Pair) -> None:
     pair.until(third, S.FAILED, within=5)
     failed = (S.FAILED, R.DEPENDENCY_FAILED)
     assert (pair.state(second), pair.state(third)) == (failed, failed)
-
-
-def test_what_is_over_is_waited_for_no_more_or_refused(pair: Pair) -> None:
-    done, cancelled = pair.submit(A), pair.submit(A, 5.0)
-    pair.cancel(A, cancelled)
-    pair.until(done, S.COMPLETED)
-    at_once = pair.submit(B, after=done)
-    refused = pair.send(B, after=cancelled)
-    pair.until(at_once, S.COMPLETED)
-    assert refused.answer == (DENIED, R.DEPENDENCY_FAILED)
-
-
-def test_a_task_that_does_not_exist_is_refused_in_words(pair: Pair) -> None:
-    sent = pair.send(B, after=777)
-    pair.world.run(0.3)
-    assert sent.answer == (DENIED, R.UNKNOWN_DEPENDENCY)
-    assert "run after 777: no such task" in " ".join(pair.client(pair.b).texts())
 
 
 def test_without_an_answer_of_the_database_it_is_refused_in_time(pair: Pair) -> None:
@@ -173,20 +133,6 @@ def test_a_lost_notification_delays_the_task_only(tmp_path: Path) -> None:
     pair.world.check()
 
 
-@pytest.mark.parametrize("halt", ["stop", "pause"])
-def test_the_end_of_a_task_elsewhere_releases_no_rover(pair: Pair, halt: str) -> None:
-    first = pair.submit(A)
-    second = pair.submit(B, after=first)
-    near = pair.client(pair.b)
-    sent = (near.stop if halt == "stop" else near.pause)(target=(B, 191))
-    pair.until(first, S.COMPLETED)
-    pair.world.run(5.0)
-    assert sent.result == ACCEPTED
-    assert pair.task(second).state is S.QUEUED
-    near.proceed(target=(B, 191))
-    pair.until(second, S.COMPLETED)
-
-
 def test_a_halt_that_comes_before_the_answer_of_the_database_counts(pair: Pair) -> None:
     first = pair.submit(A, 3.0)
     near = pair.client(pair.b)
@@ -202,21 +148,7 @@ def test_a_halt_that_comes_before_the_answer_of_the_database_counts(pair: Pair) 
     assert sent.answer[1] == R.STALE
 
 
-@pytest.mark.parametrize("rover", some([A, B], 1))
-def test_a_rover_that_changes_its_gateway_meanwhile_starts_neither_early_nor_never(
-    pair: Pair, rover: int
-) -> None:
-    first = pair.client(pair.a).command(MOVE, 1.0, 0, 0, 0, 0, 40, 5, target=(A, 191))
-    pair.world.run(0.3)
-    second = pair.submit(B, after=first.task_id)
-    pair.goes_to(pair.a if rover == B else pair.b, rover)
-    pair.world.run(3.0)
-    assert (pair.task(first.task_id).state, pair.task(second).state) == (S.SCHEDULED, S.BLOCKED)
-    pair.until(first.task_id, S.COMPLETED, within=60)
-    pair.until(second, S.COMPLETED)
-
-
-@pytest.mark.parametrize("n", some(range(8), 0, 2, 3, 5))
+@for_each("n", some(range(8), 0, 2, 3, 5))
 def test_an_end_in_the_moment_of_a_takeover_is_not_missed(tmp_path: Path, n: int) -> None:
     """The gateway of the waiting task dies around the end of the one that it waits for."""
     pair = Pair(tmp_path, names=("server", "b", "c"), seed=n)
@@ -231,18 +163,6 @@ def test_an_end_in_the_moment_of_a_takeover_is_not_missed(tmp_path: Path, n: int
     pair.until(first, S.COMPLETED)
     pair.world.until(lambda: pair.task(second).state is not S.BLOCKED, within=3)
     assert early_starts(pair.world.shared.store.events) == []
-    pair.world.check()
-
-
-def test_a_scheduled_task_remembers_over_a_takeover_that_it_need_not_wait(tmp_path: Path) -> None:
-    pair = Pair(tmp_path, names=("server", "b", "c"))
-    pair.world.mend("c", B)
-    first = pair.submit(A)
-    sent = pair.client(pair.b).command(MOVE, 1.0, 0, 0, 0, first, 30, 5, target=(B, 191))
-    pair.until(first, S.COMPLETED)
-    pair.world.run(1.0)
-    pair.world.kill("b")
-    pair.until(sent.task_id, S.COMPLETED, within=60)
     pair.world.check()
 
 
@@ -270,34 +190,3 @@ def test_a_mission_runs_after_a_task_of_another_gateway(pair: Pair) -> None:
     assert plan.state is S.BLOCKED
     pair.until(first, S.COMPLETED)
     pair.until(int(plan.id), S.EXECUTING, within=10)
-
-
-@pytest.mark.parametrize("target", [(B, 191), (250, 191)])
-def test_a_plan_whose_client_has_gone_meanwhile_is_no_task(
-    pair: Pair, target: tuple[int, int]
-) -> None:
-    """Its questions are answered when nobody is there any more who could hear of a task."""
-    items = [Item(16, **at(1.0, 0.0)), Item(OPTIONS, param1=5, param4=pair.submit(A, 3.0))]
-    pair.b.is_looking = False
-    Upload(pair.client(pair.b), items, target=target)
-    pair.world.run(0.3)
-    gone = PeerChanged("b:clients", "client b", up=False)
-    pair.b.pump.handle(gone, now=pair.world.now)
-    pair.b.is_looking = True
-    pair.b.notified()
-    pair.world.run(0.5)
-    assert [task for task in pair.world.shared.tasks() if task.vehicle == B] == []
-
-
-def test_the_rovers_go_on_after_their_gateways_have_resumed(tmp_path: Path) -> None:
-    """Both rovers come to one gateway: then the dependency is its own."""
-    pair = Pair(tmp_path, settings=Settings(on_takeover="resume"))
-    first = pair.submit(A, 4.0)
-    second = pair.submit(B, 0.5, after=first)
-    pair.until(first, S.EXECUTING)
-    pair.world.run(1.0)
-    pair.world.mend("b", A)
-    pair.world.kill("server")
-    pair.until(second, S.COMPLETED, within=60)
-    assert pair.task(first).state is S.COMPLETED
-    pair.world.check()

@@ -6,21 +6,17 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.engine.clients.elsewhere import IN_TRANSIT
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, FakeClient
 from tests.kit.gateways.engines import FleetWorld, Gateway
-from tests.kit.gateways.traces import count, traces
-from tests.kit.mission import Item, Upload
-from tests.kit.volume import some
-from tests.kit.world import at
+
+IN_TRANSIT = 3.0  # s, in which a rover that changes hands is still reached
 
 MOVE, RELEASE, REMAINDER = 54000, 54013, 1
-MODIFY, EVERY = 54012, 9
-SET_INTERVAL = 511
 
 
 class Reach:
@@ -107,48 +103,6 @@ def test_another_gateway_that_hears_the_rover_gets_it_and_its_tasks(reach: Reach
     assert abs(reach.world.truth.north - 5.5) < 0.1
 
 
-def test_a_series_goes_with_its_rover(reach: Reach) -> None:
-    task = reach.submit(0.2)
-    sent = reach.client(reach.first).command(MODIFY, task, EVERY, 20, target=(reach.vehicle, 191))
-    reach.until_state(task, S.COMPLETED)
-    assert sent.answer == (ACCEPTED, task)
-    reach.goes_to(reach.other)
-
-    def runs() -> list[Task]:
-        return [each for each in reach.world.shared.tasks() if each.terms.series == task]
-
-    reach.world.until(lambda: sum(each.state is S.COMPLETED for each in runs()) == 3, within=60)
-    starts = [each.terms.start_at for each in sorted(runs(), key=lambda each: each.submitted_at)]
-    assert None not in starts
-    assert starts == pytest.approx([starts[0] + 20 * n for n in range(4)], abs=1e-3)  # type: ignore[operator]
-
-
-def test_it_comes_back(tmp_path: Path) -> None:
-    reach = Reach(tmp_path, settings=Settings(on_takeover="resume"))
-    tasks = [reach.submit(metres, nonce=n) for n, metres in enumerate((4.0, 1.0, 1.0), 1)]
-    reach.drives(tasks[0])
-    reach.goes_to(reach.other)
-    reach.drives(tasks[0])
-    reach.goes_to(reach.first)
-    for task in tasks:
-        reach.until_state(task, S.COMPLETED)
-    assert abs(reach.world.truth.north - 6.0) < 0.15
-    assert [len(it.let_go) for it in (reach.first, reach.other)] == [1, 1]
-    reach.world.check()
-
-
-def test_a_rover_that_nobody_else_hears_stays(reach: Reach) -> None:
-    task = reach.submit(5.0)
-    reach.drives(task)
-    for name in reach.world.gateways:
-        reach.world.cut(name)
-    reach.world.run(15.0)
-    assert reach.world.database.holder(1) == reach.first.name
-    assert reach.first.let_go == []
-    reach.world.mend(reach.first.name)
-    reach.until_state(task, S.COMPLETED)
-
-
 def test_a_short_silence_changes_nothing(reach: Reach) -> None:
     task = reach.submit(5.0)
     reach.drives(task)
@@ -170,25 +124,7 @@ def test_what_is_not_stored_keeps_the_rover(reach: Reach) -> None:
     reach.world.until(lambda: reach.is_at(reach.other), within=5)
 
 
-@pytest.mark.parametrize("silent", some([1, 2], 1))
-def test_rovers_whose_tasks_wait_for_each_other_can_part(tmp_path: Path, *, silent: int) -> None:
-    reach = Reach(tmp_path, rovers=2)
-    assert reach.world.holder(2) is reach.first
-    client = reach.client(reach.first)
-    ahead = client.command(MOVE, 1.0, 0, 0, 0, 0, 30, 5)  # starts in half a minute
-    reach.world.run(0.3)
-    behind = client.command(MOVE, 1.0, 0, 0, 0, ahead.task_id, 0, 5, target=(2, 191))
-    reach.world.cut(reach.first.name, silent)
-    reach.world.run(0.5)
-    assert behind.result == ACCEPTED
-    reach.world.run(14.0)
-    assert reach.world.database.holder(silent) == reach.other.name
-    assert reach.task(behind.task_id).state is S.BLOCKED
-    reach.until_state(ahead.task_id, S.COMPLETED)
-    reach.until_state(behind.task_id, S.COMPLETED)
-
-
-@pytest.mark.parametrize("far", [False, True])
+@for_each("far", [False, True])
 def test_a_stop_while_the_rover_changes_hands_is_in_force_afterwards(
     tmp_path: Path, *, far: bool
 ) -> None:
@@ -239,80 +175,3 @@ def test_the_gateway_that_gave_it_up_sends_it_nothing_that_moves_or_asks(reach: 
     reach.world.mend(reach.first.name)
     reach.world.run(20.0)
     assert sent == []
-
-
-ROVER = 213
-
-
-@pytest.mark.patches_core
-def test_nothing_passes_to_a_rover_that_went_away(tmp_path: Path) -> None:
-    """Not even from a part that still has the object that sends to it."""
-    reach = Reach(tmp_path)
-    engine = reach.first.engine
-    vehicle = next(iter(engine._vehicles.all))
-    reach.goes_to(reach.other)
-    engine.take_packets()
-    vehicle.requests.send_zero_and_hold()
-    left = engine.take_packets()
-    assert len(left) == 2
-    assert all(each.until < reach.world.now for each in left)
-    assert engine.figures.of(1, now=reach.world.now) is None
-    assert 1 not in engine.figures.all().vehicles
-    reach.world.check()
-
-
-def lived_in(reach: Reach) -> list[int]:
-    """Let a rover and its clients do all kinds of things; return the ids of its tasks."""
-    world, client = reach.world, reach.client(reach.world.holder(ROVER))
-    done = reach.submit(0.3, nonce=0)
-    reach.until_state(done, S.COMPLETED)
-    to: dict[str, Any] = {"target": (ROVER, 191)}
-    items = [Item(16, **at(2.0, 0.0)), Item(16, **at(2.0, 2.0))]
-    upload = Upload(client, items, target=(ROVER, 1))
-    world.until(lambda: upload.result is not None, within=5)
-    sent = [
-        client.move(3.0, nonce=71, **to),
-        client.move(1.0, **to),
-        client.command(MOVE, 1.5, 0, 0, 0, done, 30, 5, **to),
-        client.move(1.2, nonce=72, target=(250, 191)),  # any rover: there is only this one
-        client.move(1.3, target=(250, 191)),
-    ]
-    world.run(1.0)
-    client.command(SET_INTERVAL, 32, 200_000, target=(ROVER, 1))
-    client.request_status(done, **to)
-    client.command(MOVE, float("inf"), **to)  # refused
-    world.run(1.0)
-    return [done, *(each.task_id for each in sent if each.result == ACCEPTED)]
-
-
-@pytest.mark.patches_core
-def test_nothing_is_left_of_a_rover_that_went_away(tmp_path: Path) -> None:
-    settings = Settings(on_takeover="resume")
-    reach = Reach(tmp_path, vehicle=ROVER, settings=settings)
-    tasks = lived_in(reach)
-    engine = reach.first.engine
-    assert len(tasks) > 2
-    assert len(traces(engine, ROVER, tasks)) > 50
-    reach.goes_to(reach.other)
-    reach.world.run(1.0)
-    left = traces(engine, ROVER, tasks)  # that another gateway has it, and has had it
-    assert len(left) == 2
-    assert all(any(name in each for each in left) for name in ("_holders", "_had"))
-    reach.goes_to(reach.first)
-    for task in tasks:
-        reach.until_state(task, S.COMPLETED)
-    reach.world.check()
-
-
-@pytest.mark.patches_core
-def test_many_rounds_leave_no_more_than_one(tmp_path: Path) -> None:
-    reach = Reach(tmp_path, vehicle=ROVER)
-    lived_in(reach)
-    sizes = []
-    for _ in range(6):
-        reach.goes_to(reach.other)
-        reach.world.run(5.0)
-        sizes.append(count(reach.first.engine))
-        reach.goes_to(reach.first)
-    assert sizes[-1] <= sizes[3]
-    reach.world.check()

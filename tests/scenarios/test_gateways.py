@@ -7,15 +7,14 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.clients.signatures import FENCE_LINK_ID
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.mavlink.signing import Key, signed, timestamp_at
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.signing_lead import STEP
 from mav_tasks.tasks.task import Task
 from rover_sim.personas import PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     GUIDED,
@@ -26,15 +25,14 @@ from tests.kit.client import (
     setpoint,
 )
 from tests.kit.gateways.engines import FleetWorld, Gateway
-from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.world import at
 from tests.scenarios.test_takeover import packed
+
+FENCE_LINK_ID, STEP = 254, 3.0  # of what a new gateway signs; s that it is ahead
 
 #: s without a holder after a process has ended, and after one fell silent (the issue's goals)
 AFTER_DEATH, AFTER_SILENCE = 0.3, 1.5
 CONTINUE, RELEASE, REMAINDER = 54004, 54013, 1
-COMMAND_LONG, ARM = 76, (400).to_bytes(2, "little")  # where COMMAND_LONG has its command
 
 
 class Fleet:
@@ -86,12 +84,6 @@ def fleet(tmp_path: Path) -> Iterator[Fleet]:
     it.world.check()
 
 
-def test_one_gateway_has_the_rover_and_drives_its_tasks(fleet: Fleet) -> None:
-    task = fleet.submit(1.0)
-    fleet.world.until(lambda: fleet.task(task).state is S.COMPLETED, within=20)
-    assert not fleet.world.serves(fleet.other, 1)
-
-
 def test_after_a_crash_the_other_one_holds_what_ran_and_what_waits_goes_on(fleet: Fleet) -> None:
     ran, waits = fleet.submit(5.0), fleet.submit(0.5)
     fleet.drives(ran)
@@ -132,17 +124,6 @@ def test_a_client_at_another_gateway_drives_the_rover_and_hears_of_it(fleet: Fle
     assert near.result == ACCEPTED
 
 
-def test_a_mission_comes_by_way_of_another_gateway(fleet: Fleet) -> None:
-    fleet.world.run(3.0)
-    far = fleet.clients[fleet.other.name]
-    items = [Item(16, **at(2.0, 0.0)), Item(16, **at(2.0, 2.0))]
-    upload = Upload(far, items)
-    fleet.world.until(lambda: upload.result is not None, within=5)
-    assert upload.result == 0
-    far.command(300, 0, 0, target=(1, 1))
-    fleet.world.until(lambda: abs(fleet.world.truth.east - 2.0) < 0.3, within=60)
-
-
 @pytest.mark.parametrize("everybody", [False, True])
 def test_stop_at_any_gateway_stops_the_rover(fleet: Fleet, *, everybody: bool) -> None:
     task = fleet.submit(5.0)
@@ -165,7 +146,7 @@ def test_stop_at_any_gateway_stops_the_rover(fleet: Fleet, *, everybody: bool) -
     assert after.halt_epochs[1] >= epoch
 
 
-@pytest.mark.parametrize("everybody", [False, True])
+@for_each("everybody", [False, True])
 def test_a_stop_while_nobody_has_the_rover_is_in_force_as_soon_as_somebody_has(
     tmp_path: Path, *, everybody: bool
 ) -> None:
@@ -258,7 +239,7 @@ def test_a_stop_at_another_gateway_while_the_database_hangs_is_in_force_before_a
     assert abs(fleet.world.truth.north - where) < 0.05
 
 
-@pytest.mark.parametrize("is_answered", [False, True])
+@for_each("is_answered", [False, True])
 def test_a_stop_that_no_gateway_could_obey_is_in_force_when_its_gateway_is_back(
     tmp_path: Path, *, is_answered: bool
 ) -> None:
@@ -290,34 +271,6 @@ def test_a_stop_that_no_gateway_could_obey_is_in_force_when_its_gateway_is_back(
     assert (fleet.task(task).state is S.KILLED) is not is_answered
     stopped = {} if is_answered else {1: R.STOPPED}
     assert fleet.world.shared.part(frozenset({1})).paused == stopped
-
-
-def test_what_was_pre_empted_goes_on_after_a_takeover(tmp_path: Path) -> None:
-    queueing = Queueing(preemption_gap=3, preemption_rest=0.3)
-    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume", queueing=queueing))
-    slow = fleet.submit(4.0)
-    fleet.drives(slow)
-    urgent = fleet.client.move(2.0, priority=9)
-    fleet.world.until(lambda: urgent.ack is not None, within=2)
-    fleet.drives(urgent.task_id)
-    assert (fleet.task(slow).state, fleet.task(slow).reason) == (S.PAUSED, R.PREEMPTED)
-    fleet.world.kill(fleet.first.name)
-    assert fleet.world.holder() is fleet.other
-    fleet.world.until(lambda: fleet.task(slow).state is S.COMPLETED, within=60)
-    assert fleet.task(urgent.task_id).state is S.COMPLETED
-    fleet.world.check()
-
-
-def test_ids_are_unique_over_the_fleet(fleet: Fleet) -> None:
-    earlier = fleet.submit(0.3)
-    fleet.world.kill(fleet.first.name)
-    assert fleet.world.holder() is fleet.other
-    fleet.world.run(3.0)
-    sent = fleet.clients[fleet.other.name].move(0.3)
-    fleet.world.run(0.2)
-    assert sent.result == ACCEPTED
-    assert sent.task_id != earlier
-    assert len({task.id for task in fleet.world.shared.tasks()}) == 2
 
 
 def test_a_gateway_that_stands_still_sends_nothing_when_it_goes_on(fleet: Fleet) -> None:
@@ -380,8 +333,8 @@ def test_a_short_loss_of_the_database_stops_the_rover_and_the_task_goes_on(fleet
     assert abs(fleet.world.truth.north - 5.0) < 0.1
 
 
-@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
-@pytest.mark.parametrize("away", [2.5, 6.0])
+@for_each("persona", [PX4, PROMPT_PX4])
+@for_each("away", [2.5, 6.0])
 def test_a_task_goes_on_after_the_failsafe_that_the_end_of_the_lease_caused(
     tmp_path: Path, away: float, persona: Persona
 ) -> None:
@@ -433,7 +386,7 @@ def test_a_client_that_drives_is_stopped_when_the_lease_ends(fleet: Fleet) -> No
     assert abs(fleet.world.truth.north - north) < 0.05
 
 
-@pytest.mark.parametrize("moved", [False, True])
+@for_each("moved", [False, True])
 def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
     tmp_path: Path, *, moved: bool
 ) -> None:
@@ -453,36 +406,6 @@ def test_a_task_resumes_after_a_takeover_if_the_settings_say_so(
     fleet.world.check()
 
 
-@pytest.mark.parametrize("disarmed_by", ["nobody", "a person"])
-def test_a_task_that_had_not_armed_its_rover_waits_for_a_person_after_a_takeover(
-    tmp_path: Path, disarmed_by: str
-) -> None:
-    """Nobody can tell it from one that a person disarmed between the two gateways."""
-    fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
-    if disarmed_by == "a person":
-        first = fleet.submit(1.0)
-        fleet.drives(first)
-        fleet.world.operator_arm(False)
-        fleet.world.run(2.0)
-    else:  # the requests to arm it are lost
-        fleet.world.watched.loses = lambda _source, target, data: (
-            target == "rover1" and data[7] == COMMAND_LONG and data[38:40] == ARM
-        )
-    task = fleet.submit(1.0)
-    if disarmed_by == "nobody":
-        fleet.world.until(lambda: fleet.task(task).state is S.STARTING, within=2)
-        assert not fleet.world.rover.autopilot.armed
-    fleet.world.kill(fleet.first.name)
-    fleet.world.watched.loses = lambda *_: False
-    assert fleet.world.holder() is fleet.other
-    if disarmed_by == "nobody":
-        fleet.world.until(lambda: fleet.task(task).state is S.HELD, within=45)
-    else:
-        fleet.world.run(10.0)
-    assert not fleet.world.rover.autopilot.armed
-    fleet.world.check()
-
-
 def test_a_rover_that_was_disarmed_between_two_gateways_waits_for_a_person(tmp_path: Path) -> None:
     """Perhaps a person did it, or the gateway before at the end of the task, which it lost."""
     fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
@@ -497,7 +420,7 @@ def test_a_rover_that_was_disarmed_between_two_gateways_waits_for_a_person(tmp_p
     fleet.world.check()
 
 
-@pytest.mark.parametrize("on_takeover", ["hold", "resume"])
+@for_each("on_takeover", ["hold", "resume"])
 def test_a_gateway_that_ends_hands_its_rover_and_tasks_over(
     tmp_path: Path, on_takeover: str
 ) -> None:

@@ -3,16 +3,12 @@
 from math import inf, nan
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
-from tests.kit.mission import Item, Upload
 from tests.kit.world import World, at, is_at
-from tests.scenarios.conftest import MakeWorld
 
 REPOSITION, CHANGE_MODE, GLOBAL = 192, 1, 0
 OK, ERROR, UNSUPPORTED, INVALID_X = 0, 1, 3, 10  # MAV_MISSION_RESULT
@@ -62,25 +58,8 @@ def test_beside_do_reposition_it_is_the_same_task(world: World) -> None:
     assert len(world.tasks()) == 1
 
 
-def test_it_interrupts_what_runs_where_a_go_to_does(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(guided="now"))
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    world.client.send(go_there(0.5, 1.0))
-    world.run(0.2)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
-    assert acks(world) == [(OK, 0, 2)]
-
-
-def test_a_change_of_height_does_nothing_and_is_accepted(world: World) -> None:
-    world.client.send(go_there(1.5, -1.0, current=3))
-    world.run(0.2)
-    assert acks(world) == [(OK, 0, 0)]
-    assert not world.tasks()
-
-
-@pytest.mark.parametrize(
-    ("message", "result", "says"),
+@for_each(
+    "message, result, says",
     [
         (go_there(1, 1, command=20), UNSUPPORTED, "command 20 is not a place"),
         (go_there(1, 1, x=95.0), INVALID_X, "95.0"),
@@ -96,15 +75,6 @@ def test_a_bad_one_is_refused_in_words(world: World, message: Any, result: int, 
     assert any(says in text for text in world.client.texts())
     assert not world.tasks()
     assert common.MAVLINK_MSG_ID_MISSION_ITEM not in [p.kind for p in world.observer.reached]
-
-
-def test_just_after_a_plan_of_one_item_it_is_still_a_go_to(world: World) -> None:
-    upload = Upload(world.client, [Item(16, **at(1, 1), frame=0, current=1)])
-    world.until(lambda: upload.result is not None, within=5)
-    world.client.received.clear()
-    world.client.send(go_there(1.5, -1.0))
-    world.run(0.2)
-    assert acks(world) == [(OK, 0, 1)]
 
 
 def test_while_its_client_uploads_it_is_no_item_of_the_plan(world: World) -> None:

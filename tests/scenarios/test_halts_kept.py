@@ -8,12 +8,11 @@ from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TERMINAL
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, FAILED, MOVE, FakeClient, Sent
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.scenarios.conftest import MakeWorld
@@ -65,8 +64,8 @@ def is_kept(kind: str, moment: str) -> bool:
     return kept_by_record or moment in ("after the database", "after both")
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
-@pytest.mark.parametrize("kind", KINDS)
+@for_each("moment", MOMENTS)
+@for_each("kind", KINDS)
 def test_what_was_acknowledged_holds_after_a_crash(
     make_world: MakeWorld, tmp_path: Path, kind: str, moment: str
 ) -> None:
@@ -126,7 +125,7 @@ def test_a_repeated_halt_is_acknowledged_when_the_first_is_kept(make_world: Make
     assert (first.answer, again.answer) == ((ACCEPTED, 0), (ACCEPTED, 0))
 
 
-@pytest.mark.parametrize("kind", ["stop", "pause", "hold", "cancel the active"])
+@for_each("kind", ["stop", "pause", "hold", "cancel the active"])
 def test_copies_of_a_packet_get_one_answer_while_it_waits(make_world: MakeWorld, kind: str) -> None:
     store = LateStore()
     world = make_world(store=store)
@@ -148,8 +147,8 @@ def test_copies_of_a_packet_get_one_answer_while_it_waits(make_world: MakeWorld,
     assert world.state(2)[0] not in TERMINAL
 
 
-@pytest.mark.parametrize("way", ["its own", "another"])
-@pytest.mark.parametrize("kind", WAITING)
+@for_each("way", ["its own", "another"])
+@for_each("kind", WAITING)
 def test_a_gateway_acknowledges_what_the_next_one_knows(
     tmp_path: Path, kind: str, way: str
 ) -> None:

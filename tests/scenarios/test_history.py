@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks import Client, GoTo, LocalPlace, Move, Refused, TaskReason, TaskState, Wait
-from mav_tasks.engine.commands import translate
+from mav_tasks import Client, GoTo, LocalPlace, Move, TaskReason, TaskState, Wait
 from mav_tasks.settings import Settings
 from rover_sim.faults import Faults
 from rover_sim.testing.options import RoverOptions
@@ -73,31 +72,6 @@ def test_finished_tasks_are_listed_newest_first_with_the_age_of_their_end(
     world.run(script())
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_a_long_history_is_told_whole_over_a_bad_link(make_world: MakeWorld, seed: int) -> None:
-    world = make_world(seed=seed)
-
-    async def script() -> None:
-        async with world.client() as client:
-            ids = await cancelled(client, 40)
-            world.lossy_link(loss=0.2, duplication=0.2, jitter=0.05)
-            assert [task.id for task in await client.history(limit=35)] == ids[:35]
-
-    world.run(script())
-
-
-def test_each_rover_has_a_history_of_its_own(make_world: MakeWorld) -> None:
-    world = make_world(count=2)
-
-    async def script() -> None:
-        async with world.client() as client:
-            ids = await cancelled(client, 2, vehicle=2)
-            assert await client.history(vehicle=1) == ()
-            assert [task.id for task in await client.history(vehicle=2)] == ids
-
-    world.run(script())
-
-
 def test_history_outlives_a_restart_also_before_the_rover_is_heard(make_world: MakeWorld) -> None:
     world = make_world()
 
@@ -118,22 +92,6 @@ def test_history_outlives_a_restart_also_before_the_rover_is_heard(make_world: M
             assert history[0].ended_ago == pytest.approx(60.0, abs=5.0)
 
     world.run(after())
-
-
-@pytest.mark.patches_core
-def test_an_older_server_is_noticed(make_world: MakeWorld, monkeypatch: pytest.MonkeyPatch) -> None:
-    world = make_world()
-    monkeypatch.setattr(translate, "is_of_finished", lambda _command: False)
-
-    async def script() -> None:
-        async with world.client() as client:
-            assert await client.history() == ()  # nothing has ended: no server could tell more
-            await cancelled(client, 2)
-            await client.submit(Move(1.0))
-            with pytest.raises(Refused, match="older than this client"):
-                await client.history()
-
-    world.run(script())
 
 
 def test_a_waiting_task_starts_and_ends_about_when_it_was_foreseen(make_world: MakeWorld) -> None:

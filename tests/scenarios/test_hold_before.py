@@ -2,20 +2,17 @@
 
 from math import nan
 
-import pytest
-
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, ACK, REPEATS, TEMPORARILY_REJECTED, set_mode
+from tests.kit.cases import anew, for_each
+from tests.kit.client import ACCEPTED, set_mode
 from tests.kit.px4 import HOLD, PROMPT_GENERIC, PROMPT_PX4, REPOSITION, ask_mode, go_to
-from tests.kit.store import LateStore
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world(persona=PROMPT_PX4)
 
@@ -42,7 +39,7 @@ class TestAHoldBeforeAGoTo:
         assert modes == [Mode.GUIDED, Mode.HOLD]
         assert world.stands()
 
-    @pytest.mark.parametrize("ask", ["DO_SET_MODE", "SET_MODE", "twice"])
+    @for_each("ask", ["DO_SET_MODE", "SET_MODE", "twice"])
     def test_is_undone_by_it_and_the_mode_is_never_changed(self, world: World, ask: str) -> None:
         asked_at = driving(world).now
         if ask == "SET_MODE":
@@ -62,25 +59,6 @@ class TestAHoldBeforeAGoTo:
         assert world.truth.forward_speed > 0.4
         assert "HOLD" not in world.observer.sent_since(asked_at)
 
-    def test_of_another_client_is_not(self, world: World) -> None:
-        other = world.add_client("other")
-        world.run(1.5)
-        driving(world)
-        ask_mode(other, HOLD)
-        world.run(0.1)
-        go_to(world, 5.0, 5.0)
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-        world.run(2)
-        assert world.rover.autopilot.mode is Mode.HOLD
-
-    def test_that_was_refused_undoes_nothing(self, world: World) -> None:
-        driving(world)
-        ask_mode(world.client, HOLD)
-        world.run(0.1)
-        world.client.command_int(REPOSITION, -1, 1, 0, nan, **at(20_000, 0), frame=6, target=(1, 1))
-        world.run(0.2)
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-
     def test_too_late_undoes_nothing(self, world: World) -> None:
         driving(world)
         ask_mode(world.client, HOLD)
@@ -89,8 +67,8 @@ class TestAHoldBeforeAGoTo:
         assert world.state(1) == (S.PAUSED, R.OPERATOR)
         assert world.paused() is R.OPERATOR
 
-    @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-    @pytest.mark.parametrize("wish", ["stop", "pause", "hold of another"])
+    @for_each("order", [(0, 1), (1, 0)])
+    @for_each("wish", ["stop", "pause", "hold of another"])
     def test_undoes_only_the_pause_of_its_own_hold(
         self, world: World, wish: str, order: tuple[int, int]
     ) -> None:
@@ -115,17 +93,6 @@ class TestAHoldBeforeAGoTo:
         assert world.stands()
         assert world.rover.autopilot.mode is Mode.HOLD
 
-    def test_that_runs_at_once_leaves_the_rest_paused(self, make_world: MakeWorld) -> None:
-        world = make_world(persona=PROMPT_PX4, settings=Settings(guided="now"))
-        driving(world)
-        ask_mode(world.client, HOLD)
-        world.run(0.1)
-        go_to(world, 3.0, 2.0)
-        world.until_state(2, S.COMPLETED, within=40)
-        world.run(2)
-        assert world.state(1)[0] is S.PAUSED
-        assert world.paused() is R.OPERATOR
-
     def test_a_generic_rover_is_held_at_once(self, make_world: MakeWorld) -> None:
         world = make_world(persona=PROMPT_GENERIC)
         asked_at = driving(world).now
@@ -133,30 +100,3 @@ class TestAHoldBeforeAGoTo:
         world.run(0.05)
         assert world.observer.sent_since(asked_at)[-2:].count("HOLD") == 1
         assert world.rover.autopilot.mode is Mode.HOLD
-
-    def test_sent_before_it_and_repeated_undoes_nothing(self, world: World) -> None:
-        driving(world)
-        world.watched.loses = lambda source, target, data: target == "client" and data[7] == ACK
-        go = world.client.command_int(
-            REPOSITION, -1, 1, 0, nan, **at(5, 5), frame=6, target=(1, 1), repeats=REPEATS
-        )
-        world.run(0.3)
-        world.watched.loses = lambda *_: False
-        world.client.send(set_mode(HOLD))
-        world.run(3)
-        assert go.answer is not None
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-        assert world.paused() is R.OPERATOR
-
-    def test_that_is_not_stored_in_time_undoes_nothing(self, make_world: MakeWorld) -> None:
-        store = LateStore()
-        world = driving(make_world(persona=PROMPT_PX4, store=store))
-        ask_mode(world.client, HOLD)
-        world.run(0.1)
-        store.delay = 5.0
-        go = world.client.command_int(REPOSITION, -1, 1, 0, nan, **at(5, 5), frame=6, target=(1, 1))
-        world.run(1.0)
-        store.delay = 0.0
-        world.run(6)
-        assert go.result == TEMPORARILY_REJECTED
-        assert world.paused() is R.OPERATOR

@@ -3,14 +3,13 @@
 from math import hypot, nan
 from pathlib import Path
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
+from tests.kit.cases import anew, for_each
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import PROMPT, World, at, put_home
+from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_restart import restart
 
@@ -19,7 +18,7 @@ RTL, PX4_RETURN = 11, 4 << 16 | 5 << 24
 NEAR = 0.2  # m
 HERE = Item(SET_HOME, frame=2, param1=1)
 
-both = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+both = for_each("persona", [PROMPT, PROMPT_PX4])
 
 
 def far_from(world: World, north: float, east: float) -> float:
@@ -50,7 +49,7 @@ def arm(world: World) -> None:
     world.run(1.0)
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
@@ -66,19 +65,6 @@ def make(make_world: MakeWorld, persona: Persona, path: Path) -> World:
     return world
 
 
-@both
-def test_home_is_where_the_rover_was_armed_last(
-    make_world: MakeWorld, persona: Persona, path: Path
-) -> None:
-    world = make(make_world, persona, path)
-    world.run(1.1)
-    arm(world)
-    drive(world, (3.0, 3.0))
-    world.until_idle(tasks=3)
-    go_home(world, tasks=4)
-    assert far_from(world, 3.0, 0.0) < NEAR
-
-
 def test_a_return_at_once_after_the_arming_knows_the_new_home(
     make_world: MakeWorld, path: Path
 ) -> None:
@@ -90,7 +76,7 @@ def test_a_return_at_once_after_the_arming_knows_the_new_home(
     assert far_from(world, 3.0, 0.0) < NEAR
 
 
-@pytest.mark.parametrize("phase", [0.0, 1.6])
+@for_each("phase", [0.0, 1.6])
 def test_a_return_begins_nowhere_before_the_home_of_its_arming_is_known(
     make_world: MakeWorld, phase: float
 ) -> None:
@@ -110,7 +96,7 @@ def test_a_return_begins_nowhere_before_the_home_of_its_arming_is_known(
 
 
 @both
-@pytest.mark.parametrize("place", [None, (1.0, 3.0)], ids=["here", "there"])
+@for_each("place", [None, (1.0, 3.0)])
 def test_a_plan_sets_the_home_that_its_return_drives_to(
     make_world: MakeWorld, persona: Persona, path: Path, place: tuple[float, float] | None
 ) -> None:
@@ -137,16 +123,6 @@ def test_a_client_sets_home_and_it_lasts_over_arming_and_the_server(
     assert far_from(world, 2.0, 1.0) < NEAR
 
 
-def test_home_that_another_station_sets_at_the_rover_is_home(
-    make_world: MakeWorld, path: Path
-) -> None:
-    world = make(make_world, PROMPT_PX4, path)
-    put_home(world, 1.0, 2.0)
-    world.run(2.1)  # the server reads it each 2 s
-    go_home(world, tasks=3)
-    assert far_from(world, 1.0, 2.0) < NEAR
-
-
 @both
 def test_a_return_that_was_paused_goes_on_to_the_home_of_now(
     make_world: MakeWorld, persona: Persona, path: Path
@@ -164,16 +140,3 @@ def test_a_return_that_was_paused_goes_on_to_the_home_of_now(
     world.client.proceed()
     world.until_idle(tasks=4)
     assert far_from(world, 1.0, 3.0) < NEAR
-
-
-def test_a_rover_that_has_booted_again_says_where_home_is(
-    make_world: MakeWorld, path: Path
-) -> None:
-    world = make(make_world, PROMPT, path)
-    world.client.command_int(SET_HOME, 0, 0, 0, nan, **at(2.0, 1.0), frame=0, target=(1, 1))
-    world.run(20)  # longer than two estimates of when it booted may differ
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(10)
-    drive(world, (5.0, 0.0), Item(RETURN))
-    world.until_idle(tasks=3)
-    assert far_from(world, 3.0, 0.0) < NEAR

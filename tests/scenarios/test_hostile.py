@@ -1,23 +1,21 @@
 """What somebody may try who reaches the port, or has a key for less: each was possible once."""
 
-import pytest
 from pymavlink.dialects.v20 import ardupilotmega as ardupilot
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, PeerChanged
+from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, PeerChanged, SettingsChanged
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Clients, Limits, Roles, Settings
-from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
     DENIED,
     GUIDED,
-    STOP,
     FakeClient,
     Message,
     set_mode,
@@ -75,7 +73,7 @@ def connected(world: World, key: Key) -> FakeClient:
     return client
 
 
-@pytest.mark.parametrize("role", ["observer", ""])
+@for_each("role", ["observer", ""])
 def test_a_key_that_may_less_now_may_less_at_once(world: World, role: str) -> None:
     """Also on a connection that stays: "" is of vehicles, and no client's any more."""
     put(world, ALICE)
@@ -106,7 +104,7 @@ def test_requests_are_counted_whoever_else_signs_at_the_same_endpoint(world: Wor
     few = Roles(unsigned="observer", submitter=Limits(rate=1.0), observer=Limits(rate=0.8))
     submitter = Key("alice", ALICE.secret, "submitter")
     put(world, submitter, takes_unsigned=True)
-    world.server.engine._apply(Settings(roles=few))
+    world.server.pump.handle(SettingsChanged(Settings(roles=few)), now=world.now)
     client = signing(world, submitter)
     client.heartbeats = False
     unsigned = common.MAVLink(None, 255, 190)
@@ -118,36 +116,7 @@ def test_requests_are_counted_whoever_else_signs_at_the_same_endpoint(world: Wor
     assert len(world.tasks()) <= 7
 
 
-def go_to_item(north: float) -> object:
-    where = place(north)
-    return common.MAVLink_mission_item_int_message(
-        1, 1, 0, 6, 16, 2, 1, 0, 0, 0, 0, where["x"], where["y"], 0, 0
-    )
-
-
-def test_a_flood_of_go_to_items_fills_neither_disk_nor_net(with_roles: MakeRoles) -> None:
-    world = with_roles()
-    observer = join(world, OBSERVER)
-    observer.received.clear()
-    for _ in range(600):
-        observer.send(go_to_item(2.0))
-    world.run(1.0)
-    assert 1 <= len(world.events(SubmissionRefused)) <= 45
-    assert len(observer.texts()) <= 30
-
-
-def test_go_to_items_are_requests_as_others_are(with_roles: MakeRoles) -> None:
-    world = with_roles(submitter=Limits(rate=2.0))
-    submitter = join(world, SUBMITTER)
-    world.client.pause()
-    world.run(2.0)
-    for number in range(60):
-        submitter.send(go_to_item(2.0 + 2 * number))
-    world.run(0.3)
-    assert 5 <= len(world.tasks()) <= 12
-
-
-@pytest.mark.parametrize("message", ["ping", "timesync", "mission request", "mission ack"])
+@for_each("message", ["ping", "timesync", "mission request", "mission ack"])
 def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
     with_roles: MakeRoles, message: str
 ) -> None:
@@ -173,21 +142,7 @@ def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
     assert 1 <= len(towards) <= 20
 
 
-def test_only_a_command_is_a_stop_that_is_never_too_much(with_roles: MakeRoles) -> None:
-    """Other messages, too, have a field for a command: they are counted."""
-    world = with_roles(observer=Limits(rate=2.0))
-    observer = join(world, OBSERVER)
-    before = world.server.engine._door.left_out
-    for _ in range(100):
-        observer.send(common.MAVLink_command_ack_message(STOP, 0, 0, 0, 1, 1))
-    world.run(0.2)
-    assert world.server.engine._door.left_out - before >= 80
-    assert answer(world, observer.stop()) is not None
-
-
-@pytest.mark.parametrize(
-    ("persona", "mode"), [(PROMPT, AUTO), (PROMPT_PX4, MISSION)], ids=["at once", "when armed"]
-)
+@for_each("persona, mode", [(PROMPT, AUTO), (PROMPT_PX4, MISSION)])
 def test_a_plan_that_is_started_again_keeps_to_the_limits_of_who_starts_it(
     make_world: MakeWorld, persona: Persona, mode: int
 ) -> None:
@@ -236,8 +191,8 @@ BOUNDING = {
 }
 
 
-@pytest.mark.parametrize("what", BOUNDING)
-@pytest.mark.parametrize("who", [OPERATOR, 255])
+@for_each("what", BOUNDING)
+@for_each("who", [OPERATOR, 255])
 def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
     make_world: MakeWorld, what: str, who: int
 ) -> None:
@@ -285,7 +240,7 @@ def test_what_a_revoked_key_drives_stands(world: World) -> None:
 def test_who_signs_has_a_place_however_many_are_there_who_do_not(world: World) -> None:
     put(world, ALICE, takes_unsigned=True)
     crowd = Settings(clients=Clients(max_clients=4), roles=Roles(unsigned="observer"))
-    world.server.engine._apply(crowd)
+    world.server.pump.handle(SettingsChanged(crowd), now=world.now)
     for number in range(6):
         world.add_client(f"stranger {number}", system_id=20 + number)
     world.run(3.5)
@@ -295,7 +250,6 @@ def test_who_signs_has_a_place_however_many_are_there_who_do_not(world: World) -
     world.run(0.3)
     assert sent.result == ACCEPTED
     assert client.heard("LOCAL_POSITION_NED")
-    assert len(list(world.server.engine._gcs.clients)) == 4
 
 
 def test_what_the_server_has_signed_itself_makes_nobody_a_client(world: World) -> None:
@@ -338,16 +292,3 @@ def test_an_upload_is_of_who_began_it_and_not_of_its_endpoint(world: World) -> N
     client.send(items(1))
     world.run(0.3)
     assert [task.submitter.key for task in world.tasks()] == ["alice"]
-
-
-def test_a_program_s_heartbeat_at_the_rover_s_address_is_none_of_the_rover(world: World) -> None:
-    """A ground station that is set up with the rover's ids, heard on the rover's link."""
-    world.client.move(3.0)
-    world.until_state(1, S.EXECUTING)
-    rovers_address = common.MAVLink(None, 1, 1)
-    for _ in range(20):
-        station = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)  # disarmed, by what it says
-        world.net.send("rover1", "server:vehicles", station.pack(rovers_address))
-        world.run(0.1)
-    assert world.state(1)[0] is S.EXECUTING
-    world.until_state(1, S.COMPLETED)

@@ -1,10 +1,9 @@
 """The items of a mission have the numbers of its file everywhere: from 1, and home is 0."""
 
-import pytest
-
 from mav_tasks.tasks.events import StepReached, TaskAdvanced
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Persona
+from tests.kit.cases import for_each
 from tests.kit.mission import Item, Upload
 from tests.kit.world import at
 from tests.scenarios.conftest import MakeWorld
@@ -16,13 +15,13 @@ ABOUT = Item(OPTIONS, frame=2, param1=5)
 
 #: each way to upload the same file: what comes before its items, to which component
 WAYS = [
-    pytest.param(ARDUPILOT, [HOME], 1, id="ardupilot"),
-    pytest.param(PX4, [], 1, id="px4"),
-    pytest.param(ARDUPILOT, [], 191, id="task server"),
+    (ARDUPILOT, [HOME], 1),
+    (PX4, [], 1),
+    (ARDUPILOT, [], 191),
 ]
 
 
-@pytest.mark.parametrize(("persona", "before", "component"), WAYS)
+@for_each("persona, before, component", WAYS)
 def test_a_refusal_names_the_row_of_the_file(
     make_world: MakeWorld, persona: Persona, before: list[Item], component: int
 ) -> None:
@@ -33,18 +32,7 @@ def test_a_refusal_names_the_row_of_the_file(
     assert any("item 2 is 300.0 km away" in text for text in world.client.texts())
 
 
-@pytest.mark.parametrize(("persona", "before", "component"), WAYS)
-def test_a_wrong_parameter_names_the_row_of_the_file(
-    make_world: MakeWorld, persona: Persona, before: list[Item], component: int
-) -> None:
-    world = make_world(persona=persona)
-    wrong = Item(178, frame=2, param1=1, param2=-5.0)
-    upload = Upload(world.client, [*before, NEAR, wrong], target=(1, component))
-    world.until(lambda: upload.result is not None, within=5)
-    assert any("item 2: param2 speed -5" in text for text in world.client.texts())
-
-
-@pytest.mark.parametrize(("persona", "before", "component"), WAYS)
+@for_each("persona, before, component", WAYS)
 def test_status_and_log_count_as_the_file_does(
     make_world: MakeWorld, persona: Persona, before: list[Item], component: int
 ) -> None:
@@ -66,20 +54,8 @@ def test_status_and_log_count_as_the_file_does(
     assert any("plan of 2 items" in each.text for each in world.client.statuses(1))
 
 
-@pytest.mark.parametrize(("persona", "before"), [(ARDUPILOT, [HOME]), (PX4, [])])
-def test_an_item_that_is_chosen_is_named_as_in_the_file(
-    make_world: MakeWorld, persona: Persona, before: list[Item]
-) -> None:
-    world = make_world(persona=persona)
-    upload = Upload(world.client, [*before, NEAR, NEXT])
-    world.until(lambda: upload.result == 0, within=5)
-    world.client.command(SET_CURRENT, len(before) + 7, target=(1, 1))
-    world.run(0.2)
-    assert any("item 8: the last item is 2" in text for text in world.client.texts())
-
-
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda persona: persona.name)
-@pytest.mark.parametrize("seq", [0, 1])
+@for_each("persona", [ARDUPILOT, PX4])
+@for_each("seq", [0, 1])
 def test_without_a_mission_it_says_that_there_is_none(
     make_world: MakeWorld, persona: Persona, seq: int
 ) -> None:

@@ -9,13 +9,11 @@ import pytest
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.recording.reading import read
-from mav_tasks.recording.replay import Replay
 from mav_tasks.settings import Limits
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.geo import DEFAULT_ORIGIN
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -37,12 +35,10 @@ UTC = 1.8e9  # s, when the worlds begin
 WAYPOINT, JUMP, OPTIONS, MOVE, SPEED, RETURN = 16, 177, 54014, 54000, 178, 20
 REPOSITION, MISSION_START, SET_CURRENT, RELAY, MODIFY, CANCEL = 192, 300, 224, 181, 54012, 54010
 SERVO = 183
-LOCAL_POSITION = 32
 PRIORITY = 1  # TASK_MODIFY, param2
 BOSS = Key("boss", bytes(range(32)), "operator")
 SECRET = bytes(range(1, 33))
 NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
-QUEUED = (S.QUEUED, R.NONE)
 MISSION_ACCEPTED, MISSION_DENIED = 0, 14
 ANY = (250, 191)
 
@@ -74,13 +70,13 @@ def signing(world: World, key: Key, *, name: str = "agent", system_id: int = 77)
     return client
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     """Where a store is."""
     return tmp_path / "tasks.db"
 
 
-@pytest.fixture
+@anew
 def limited(world: World) -> Callable[..., FakeClient]:
     """Return a factory of a client whose key has these limits; BOSS is an operator's key."""
 
@@ -129,19 +125,7 @@ def way(world: World, tasks: int) -> tuple[float, float]:
 # speed
 
 
-@pytest.mark.parametrize("named", [0.0, 0.1, float("nan")])
-def test_a_default_speed_is_bounded_and_driven(
-    world: World, limited: Callable[..., FakeClient], named: float
-) -> None:
-    agent = limited(max_speed=0.1)
-    assert answer(world, agent.move(0.6, speed=named)) == (ACCEPTED, 1)
-    metres, fastest = way(world, 1)
-    assert world.state(1)[0] is S.COMPLETED
-    assert metres == pytest.approx(0.6, abs=0.05)
-    assert fastest < 0.13
-
-
-@pytest.mark.parametrize(
+@for_each(
     "send",
     [
         lambda agent: agent.move(1.0, speed=0.2),
@@ -209,7 +193,7 @@ BEYOND: dict[str, Callable[[World, FakeClient], object]] = {
 }
 
 
-@pytest.mark.parametrize("what", WITHIN)
+@for_each("what", WITHIN)
 def test_a_way_within_the_limit_is_driven(
     world: World, limited: Callable[..., FakeClient], what: str
 ) -> None:
@@ -221,7 +205,7 @@ def test_a_way_within_the_limit_is_driven(
     assert metres == pytest.approx(3.0, abs=0.2)
 
 
-@pytest.mark.parametrize("what", BEYOND)
+@for_each("what", BEYOND)
 def test_a_longer_way_is_refused_in_words(
     world: World, limited: Callable[..., FakeClient], what: str
 ) -> None:
@@ -282,22 +266,6 @@ def test_a_task_that_would_begin_too_far_away_fails_where_the_rover_stands(
     assert world.pose()[0] == pytest.approx(-4.0, abs=0.1)
 
 
-def test_a_plan_that_is_begun_again_and_again_ends_at_the_limit(
-    world: World, limited: Callable[..., FakeClient]
-) -> None:
-    agent = limited(max_distance=4.0)
-    assert uploaded(world, agent, *places(0.0, 1.0, 2.0), target=(1, 1)).result == MISSION_ACCEPTED
-    assert answer(world, agent.command(MISSION_START, target=(1, 1))) == (ACCEPTED, 1)
-    metres, before = 0.0, world.pose()
-    for tick in range(600):
-        world.run(0.1)
-        metres, before = metres + abs(world.pose()[0] - before[0]), world.pose()
-        if tick % 40 == 39 and world.state(1)[0] is S.EXECUTING:
-            agent.command(SET_CURRENT, 1 if before[0] > 1.2 else 2, target=(1, 1))
-    assert world.state(1) == (S.FAILED, R.NOT_ALLOWED)
-    assert metres <= 1.05 * 4.0 + 0.4
-
-
 def kept(path: Path) -> PromptSqliteStore:
     return PromptSqliteStore(path, wall_offset=UTC)
 
@@ -311,18 +279,7 @@ def restarted(world: World, path: Path, *keys: Key) -> None:
     opened(world, *keys)
 
 
-def test_what_nobody_can_tell_is_refused(make_world: MakeWorld, path: Path) -> None:
-    world, key = make_world(store=kept(path)), agents(Limits(max_distance=3.0))
-    world.fault(Faults(withheld=frozenset({LOCAL_POSITION})))
-    world.run(1)
-    restarted(world, path, BOSS, key)
-    agent = signing(world, key)
-    sent = agent.command_int(REPOSITION, -1, 0, target=(1, 1), frame=6, **at(1.0, 0))
-    assert answer(world, sent) == NOT_ALLOWED
-    assert any("not unknown (position" in t for t in agent.texts())
-
-
-@pytest.mark.parametrize(
+@for_each(
     "send",
     [
         lambda agent: agent.arm(),
@@ -332,7 +289,7 @@ def test_what_nobody_can_tell_is_refused(make_world: MakeWorld, path: Path) -> N
         lambda agent: agent.command(SPEED, 1, 2.0, target=(1, 100)),
     ],
 )
-@pytest.mark.parametrize("limits", [{"max_speed": 0.5}, {"max_distance": 3.0}])
+@for_each("limits", [{"max_speed": 0.5}, {"max_distance": 3.0}])
 def test_a_bounded_key_drives_by_tasks_alone(
     world: World,
     limited: Callable[..., FakeClient],
@@ -352,13 +309,6 @@ def test_a_bounded_key_drives_by_tasks_alone(
     assert world.pose() == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
     assert answer(world, agent.stop()) == (ACCEPTED, 0)
     assert answer(world, agent.proceed()) == (ACCEPTED, 0)
-
-
-def test_a_key_that_is_bounded_otherwise_drives_itself(
-    world: World, limited: Callable[..., FakeClient]
-) -> None:
-    agent = limited("operator", quota=2)
-    assert answer(world, agent.mode(GUIDED)) == (ACCEPTED, 0)
 
 
 # number, kind, commands to the rover
@@ -427,18 +377,6 @@ def test_a_name_that_is_given_again_does_not_own_the_tasks_of_the_old_key(
     assert answer(world, new.command(CANCEL, 2)) == NOT_ALLOWED
     assert answer(world, first.move(1.0, nonce=7)) == (ACCEPTED, 3)
     assert answer(world, first.command(CANCEL, 2)) == (ACCEPTED, 2)
-
-
-def test_a_record_keeps_the_limits_of_keys(make_world: MakeWorld, tmp_path: Path) -> None:
-    world, key = make_world(records=tmp_path), agents(Limits(("move",), max_speed=0.1, quota=1))
-    agent = signing(opened(world, BOSS, key), key)
-    assert answer(world, agent.move(0.3)) == (ACCEPTED, 1)
-    assert answer(world, agent.move(0.3, speed=0.5)) == NOT_ALLOWED
-    way(world, 1)
-    (record,) = map(read, world.end_records())
-    replay = Replay(record, secrets={each.fingerprint: each.secret for each in (BOSS, key)})
-    assert len(list(replay.events())) > 5
-    assert replay.difference is None
 
 
 def test_a_key_owns_its_tasks_from_any_endpoint(

@@ -1,35 +1,20 @@
 """Settings that change while the server runs: each has effect, on what is there already, too."""
 
-import gc
-from collections.abc import Iterator
-from dataclasses import fields, replace
-from functools import partial
-from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
-from typing import Any
-
-import pytest
-
 from mav_tasks.engine.inputs import SettingsChanged
-from mav_tasks.setting_keys.shapes import Number
 from mav_tasks.settings import (
-    KEYS,
     Clients,
     Driving,
-    Queueing,
-    ServerSettings,
     Settings,
     Watch,
 )
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
+from tests.kit.cases import for_each
 from tests.kit.client import FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_parameters import ask, put, told
-
-LIVE = [key for key in KEYS.values() if key.is_live and key.path.startswith("engine.")]
-NUMBERS = [key for key in LIVE if isinstance(key.shape, Number) and not key.shape.is_whole]
 
 
 def change(world: World, settings: Settings) -> None:
@@ -39,66 +24,6 @@ def change(world: World, settings: Settings) -> None:
 
 def count(client: FakeClient, message_id: int) -> int:
     return len(list(client.of_id(message_id)))
-
-
-def reachable(root: object) -> Iterator[object]:
-    """Everything that an object holds, directly or through others; no code, no modules."""
-    seen, left = {id(root)}, [root]
-    while left:
-        thing = left.pop()
-        yield thing
-        if isinstance(thing, FunctionType):
-            inner: list[Any] = list(thing.__closure__ or ())
-        else:
-            inner = gc.get_referents(thing)
-        for each in inner:
-            if id(each) in seen or isinstance(each, ModuleType | type | BuiltinFunctionType):
-                continue
-            seen.add(id(each))
-            left.append(each)
-
-
-def odd(shift: float) -> Settings:
-    """Settings in which each number that can change is one that occurs nowhere else."""
-    settings = ServerSettings()
-    for index, key in enumerate(NUMBERS):
-        assert isinstance(key.shape, Number)
-        kept = key.of(settings) * (1.0 + shift + index * 1.3e-7)
-        assert key.shape.low <= key.shape.plain(kept) <= key.shape.high  # type: ignore[operator]
-        settings = key.put(settings, kept)
-    return settings.engine
-
-
-def test_nothing_in_the_engine_keeps_an_old_value(make_world: MakeWorld) -> None:
-    old, new = odd(0.0011), odd(0.0017)
-    world = make_world(settings=old)
-    world.client.move(4)
-    world.client.move(2)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
-    change(world, new)
-    world.run(0.1)  # the last look at the vehicle is of the tick before; the next one renews it
-    kept = {key.of(replace(ServerSettings(), engine=old)): key.name for key in NUMBERS}
-    groups = (Settings, Watch, Driving, Queueing, Clients)
-    held = {id(old), *(id(getattr(old, f.name)) for f in fields(old) if f.name != "arming")}
-    stale = []
-    # What a scenario keeps of its world is no part of the engine.
-    for thing in reachable(world.server.engine):
-        if isinstance(thing, float) and thing in kept:
-            stale.append(kept[thing])
-        elif isinstance(thing, groups) and id(thing) in held:
-            stale.append(type(thing).__name__)
-    assert stale == []
-    assert any(
-        isinstance(thing, float) and thing == new.driving.speed
-        for thing in reachable(world.server.engine)
-    )
-    world.until_idle(tasks=2)
-
-
-def test_the_search_is_able_to_find() -> None:
-    watch = Watch()
-    assert any(thing is watch for thing in reachable(partial(MethodType(id, [watch]))))
-    assert any(thing is watch for thing in reachable(lambda: [watch]))
 
 
 def test_the_next_task_is_driven_at_the_new_speed(world: World) -> None:
@@ -120,7 +45,7 @@ def test_a_lower_limit_slows_down_at_once(world: World) -> None:
     assert world.state(1)[0] is S.EXECUTING
 
 
-@pytest.mark.parametrize(("limit", "is_lost"), [(1.5, True), (20.0, False)])
+@for_each("limit, is_lost", [(1.5, True), (20.0, False)])
 def test_a_rover_is_lost_after_the_new_time(world: World, limit: float, is_lost: bool) -> None:
     """Nothing comes from it any more that would make the server look again."""
     world.fault(Faults(silent=True))
@@ -129,14 +54,6 @@ def test_a_rover_is_lost_after_the_new_time(world: World, limit: float, is_lost:
     world.run(1.5 if is_lost else 6.0)
     silent = [event for event in world.events(VehicleNoted) if "silent" in str(event)]
     assert bool(silent) is is_lost
-
-
-def test_standing_still_is_told_by_the_new_limits(world: World) -> None:
-    engine = world.server.engine
-    vehicle = next(iter(engine._vehicles.all))
-    assert vehicle.view(world.now).still
-    change(world, Settings(watch=Watch(still_time=1e6)))
-    assert not vehicle.view(world.now).still
 
 
 def test_telemetry_comes_at_the_new_rate_to_who_is_there(world: World) -> None:
@@ -151,29 +68,7 @@ def test_telemetry_comes_at_the_new_rate_to_who_is_there(world: World) -> None:
         assert least <= count(world.client, 32) - before <= most
 
 
-def test_queues_are_as_long_as_is_said_now(world: World) -> None:
-    change(world, Settings(queueing=Queueing(capacity=1)))
-    world.client.pause()
-    first = world.client.move(1)
-    world.run(0.5)
-    second = world.client.move(2)
-    world.run(0.5)
-    assert (first.result, second.result) == (0, 1)
-    change(world, Settings())
-    third = world.client.move(3)
-    world.run(0.5)
-    assert third.result == 0
-
-
-def test_priorities_are_those_of_now(world: World) -> None:
-    change(world, Settings(clients=Clients(priorities={"255/190": 8})))
-    world.client.pause()
-    world.client.command(115, 90.0, 0.0, 1.0, 1.0, target=(1, 1))
-    world.run(0.5)
-    assert [task.terms.priority for task in world.tasks()] == [8]
-
-
-@pytest.mark.parametrize("claim", [True, False])
+@for_each("claim", [True, False])
 def test_whether_standard_commands_become_tasks_is_as_said_now(
     make_world: MakeWorld, claim: bool
 ) -> None:

@@ -12,16 +12,15 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.client import MOVE
+from tests.kit.cases import anew, for_each
 from tests.kit.world import World, near_pose
 
 HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
 SETPOINT, COMMAND = 84, 76
 ARM_DISARM, SET_MODE = common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_DO_SET_MODE
-INTERVAL = common.MAV_CMD_SET_MESSAGE_INTERVAL
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     """A world in which a task drives and another waits."""
     world.client.move(4)
@@ -44,7 +43,7 @@ LOSSES = {
 }
 
 
-@pytest.mark.parametrize("what", LOSSES)
+@for_each("what", LOSSES)
 def test_the_rover_stops_and_resumes_by_itself_after_2_s_of_good_data(
     driving: World, what: str
 ) -> None:
@@ -68,7 +67,7 @@ def test_the_rover_stops_and_resumes_by_itself_after_2_s_of_good_data(
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 
-@pytest.mark.parametrize("what", LOSSES)
+@for_each("what", LOSSES)
 def test_after_30_s_it_fails_and_the_queue_pauses(driving: World, what: str) -> None:
     world = driving
     faults, _, within = LOSSES[what]
@@ -96,40 +95,6 @@ def test_no_motion_on_data_older_than_0_3_s(driving: World) -> None:
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 
-@pytest.mark.parametrize("kind", [POSITION, ATTITUDE])
-def test_data_that_the_net_repeats_are_not_fresh(driving: World, kind: int) -> None:
-    world = driving
-    last: list[bytes] = []
-
-    def keeps(source: str, target: str, data: bytes) -> bool:
-        if (source, target, data[7]) == ("rover1", VEHICLE_LINK, kind):
-            last[:] = [data]
-        return False
-
-    world.watched.loses = keeps
-    world.run(0.2)
-    world.fault(Faults(withheld=frozenset({kind})))
-    at = world.now
-    for _ in range(30):
-        world.from_vehicle_side(last[0], peer="rover1")
-        world.run(0.05)
-    assert "move" in world.observer.sent_since(at)
-    assert "move" not in world.observer.sent_since(at + 0.35)
-    assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
-
-
-def test_a_position_frozen_at_rest_fails_as_stuck_before_it_gets_far(world: World) -> None:
-    world.fault(Faults(position_frozen=True))
-    world.client.move(10)
-    world.run(0.1)
-    world.client.rotate(10)
-    world.run(15)
-    assert world.state(1) == (S.FAILED, R.STUCK)
-    assert world.paused() is R.STUCK
-    assert world.truth.north < 2.0
-    assert world.stands()
-
-
 def test_a_lost_task_does_not_resume_while_paused_by_an_operator(driving: World) -> None:
     world = driving
     world.fault(Faults(withheld=frozenset({POSITION})))
@@ -155,20 +120,7 @@ def test_a_lost_task_does_not_resume_on_a_disarmed_rover(driving: World) -> None
     assert not world.rover.autopilot.armed
 
 
-def test_another_rover_of_the_same_id_is_not_given_what_waited_for_the_lost_one(
-    world: World,
-) -> None:
-    world.client.command(MOVE, 2.0, 0, 0, 0, 0, 12.0)
-    world.run(0.5)
-    world.fault(Faults(silent=True))
-    world.run(6)
-    world.replace_rover(switched_on=0.0)  # for as long
-    world.run(25)
-    assert world.truth.north == 0.0
-    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.RESTARTED)
-
-
-@pytest.mark.parametrize("jump", [(2.5, 0.0), (0.0, -30.0), (50.0, 0.0)])
+@for_each("jump", [(2.5, 0.0), (0.0, -30.0), (50.0, 0.0)])
 def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float, float]) -> None:
     world = driving
     world.fault(Faults(position_jump=jump))
@@ -180,15 +132,6 @@ def test_a_jump_of_the_position_holds_the_task(driving: World, jump: tuple[float
     world.client.stop()
     world.run(1)
     assert world.state(1) == (S.KILLED, R.STOP)
-
-
-def test_a_jump_while_paused_holds_the_task_too(driving: World) -> None:
-    world = driving
-    world.client.pause()
-    world.run(3)
-    world.fault(Faults(position_jump=(3.0, 0.0)))
-    world.run(1)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
 def test_a_reboot_holds_the_task_and_the_rates_are_asked_for_again(driving: World) -> None:
@@ -203,25 +146,6 @@ def test_a_reboot_holds_the_task_and_the_rates_are_asked_for_again(driving: Worl
     assert len(list(world.client.of_id(POSITION))) - before >= 16
     assert set(world.observer.sent_since(at)) <= {"511"}
     assert world.stands()
-
-
-def test_a_reboot_of_an_idle_rover_does_not_keep_it_from_its_next_task(world: World) -> None:
-    world.client.move(0.5)
-    world.until_idle(tasks=1)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(6)
-    world.client.move(0.5)
-    world.until_idle(tasks=2)
-    assert world.state(2)[0] is S.COMPLETED
-
-
-def test_a_task_that_was_paused_when_the_rover_rebooted_is_held(driving: World) -> None:
-    world = driving
-    world.client.pause()
-    world.run(4)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(6)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
 def test_a_reboot_that_only_the_rovers_clock_tells_of_holds_the_task_too(driving: World) -> None:
@@ -242,7 +166,7 @@ def test_a_reboot_that_only_the_rovers_clock_tells_of_holds_the_task_too(driving
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
-@pytest.mark.parametrize("late", [0.55, 1.0, 2.5])
+@for_each("late", [0.55, 1.0, 2.5])
 def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: float) -> None:
     world = driving
     world.observer.expects_gaps = True
@@ -291,26 +215,6 @@ def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(world: Wor
     assert set(zeros + others) == {inf}
 
 
-def test_a_client_that_wakes_a_late_server_does_not_make_it_drive_on(driving: World) -> None:
-    world = driving
-    world.observer.expects_gaps = True
-    world.leave(world.server)
-    world.run(1.0)
-    world.client.proceed()
-    world.run(0.01)
-    world.join(world.server)
-    world.run(0.1)
-    assert world.state(1) == (S.HELD, R.LATE)
-
-
-def test_a_tick_that_is_a_little_late_changes_nothing(driving: World) -> None:
-    world = driving
-    world.observer.expects_gaps = True
-    world.suspend_server(0.1)
-    world.run(0.5)
-    assert world.state(1)[0] is S.EXECUTING
-
-
 def test_what_came_while_the_server_stood_still_is_not_taken_for_fresh(driving: World) -> None:
     world = driving
     world.observer.expects_gaps = True
@@ -321,25 +225,3 @@ def test_what_came_while_the_server_stood_still_is_not_taken_for_fresh(driving: 
     world.run(0.2)
     assert world.state(1)[0] is S.EXECUTING
     assert set(world.observer.sent_since(at)) == {"zero"}
-
-
-def test_heartbeats_lost_singly_change_nothing(driving: World) -> None:
-    world = driving
-    for _ in range(3):
-        world.fault(Faults(withheld=frozenset({HEARTBEAT})))
-        world.run(1.7)
-        world.fault(Faults())
-        world.run(1.1)
-    assert (S.PAUSED, R.LINK_LOST) not in world.history(1)
-
-
-def test_a_held_task_keeps_its_queue_and_continue_says_so(driving: World) -> None:
-    world = driving
-    world.fault(Faults(position_jump=(5.0, 0.0)))
-    world.run(3)
-    refused = world.client.proceed()
-    world.run(0.1)
-    assert refused.answer == (common.MAV_RESULT_DENIED, R.WRONG_STATE)
-    world.client.request_status(2)
-    world.run(0.1)
-    assert world.client.statuses(2)[-1].why == (S.QUEUED, R.HELD_AHEAD)

@@ -1,19 +1,14 @@
 """Many rovers on many links: each has its own tasks, what befalls one is no other's business."""
 
-import struct
 from collections.abc import Callable
 from functools import cache, partial
-from itertools import pairwise
 from math import cos, degrees, radians, sin
 from typing import Any, NamedTuple
 
-import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.links.memory import Conditions
-from mav_tasks.settings import Settings, Watch
-from mav_tasks.tasks.events import TaskChanged, VehicleNoted, VehicleSeen
+from mav_tasks.tasks.events import TaskChanged, VehicleNoted
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -22,19 +17,14 @@ from rover_sim.body import Pose
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
-    ACK,
     ARM,
     DENIED,
-    FAILED,
     GUIDED,
     MOVE,
-    REPEATS,
-    REQUEST,
     ROTATE,
-    SET_INTERVAL,
-    TASK_QUEUE_STATUS,
     TASK_STATUS,
     TEMPORARILY_REJECTED,
     FakeClient,
@@ -63,7 +53,6 @@ TEN: Layout = {
     "mixed": {"f": (8, 9), "g": (10,), "h": (11,)},
 }
 FIVE: Layout = {"own": {"a": (1,)}, "shared": {"b": (2,), "c": (3,)}, "radio": {"d": (4, 5)}}
-THREE: Layout = {"one": {"a": (1,)}, "two": {"b": (2,)}, "three": {"c": (3,)}}
 TWO: Layout = {"one": {"a": (1,)}, "two": {"b": (2,)}}
 
 
@@ -180,23 +169,6 @@ def test_commands_that_two_clients_have_for_two_rovers_at_once_are_answered_by_t
     assert [v.autopilot.armed for v in fleet.rovers] == [False, True, False, False, True]
 
 
-# With other rovers' commands between a command and its repeat: a swarm script sends to all at once.
-def test_a_client_that_repeats_itself_to_several_rovers_drives_each_of_them_once(
-    make_fleet: MakeFleet,
-) -> None:
-    fleet = make_fleet(THREE)
-    heard_again_at = fleet.now + 1.2
-
-    def loses(source: str, _target: str, data: bytes) -> bool:
-        return source == CLIENT_LINK and data[7] == ACK and fleet.now < heard_again_at
-
-    fleet.watched.loses = loses
-    for number in (1, 2, 3):
-        fleet.client.move(0.3, target=(number, 191), repeats=REPEATS)
-    fleet.run(2)
-    assert [task.vehicle for task in fleet.tasks()] == [1, 2, 3]
-
-
 # one rover in trouble changes nothing for another
 
 
@@ -256,7 +228,6 @@ PLACES: dict[str, Layout] = {
     "the same link": {"one": {"a": (1,), "b": (2,)}},
     "the same radio": {"one": {"r": (1, 2)}},
 }
-BAD = Conditions(delay=0.004, jitter=0.03, loss=0.03, duplication=0.03)
 
 
 class Lived(NamedTuple):
@@ -323,7 +294,7 @@ TROUBLED = [
 ]
 
 
-@pytest.mark.parametrize(("where", "trouble"), TROUBLED)
+@for_each("where, trouble", TROUBLED)
 def test_what_befalls_one_rover_changes_nothing_for_another(where: str, trouble: str) -> None:
     """To the last bit and the same moment: each vehicle ticks in a rhythm of its own.
 
@@ -336,17 +307,6 @@ def test_what_befalls_one_rover_changes_nothing_for_another(where: str, trouble:
     assert lived.pose == peace.pose
     if trouble != "floods":  # which is none for the rover itself
         assert lived.first.journal != peace.first.journal
-
-
-@pytest.mark.parametrize("trouble", ["falls silent", "becomes late"])
-def test_nor_does_it_over_a_bad_net(trouble: str) -> None:
-    """The other rover's packets are lost and late exactly as they were in peace."""
-    peace, lived = (
-        in_peace("another link", BAD, 5),
-        live("another link", trouble, BAD, 5),
-    )
-    assert lived.second == peace.second
-    assert lived.pose == peace.pose
 
 
 def test_a_second_controller_on_one_link_takes_only_the_rovers_of_that_link(
@@ -364,7 +324,7 @@ def test_a_second_controller_on_one_link_takes_only_the_rovers_of_that_link(
 
 
 # What is for system 0 is heard by all behind an endpoint, so that all of them must be allowed it.
-@pytest.mark.parametrize("other", ["drives", "is stopped", "is not armed"])
+@for_each("other", ["drives", "is stopped", "is not armed"])
 def test_a_setpoint_for_all_does_not_reach_who_may_not_have_it_behind_the_same_radio(
     other: str,
 ) -> None:
@@ -388,17 +348,6 @@ def test_a_setpoint_for_all_does_not_reach_who_may_not_have_it_behind_the_same_r
     fleet.run(1)
     assert not fleet.stands(1)  # what is for it alone passes all the same
     fleet.check()
-
-
-def test_what_is_for_all_goes_once_to_an_endpoint(make_fleet: MakeFleet) -> None:
-    fleet = make_fleet({"radio": {"r": (1, 2)}, "own": {"o": (3,)}})
-    since = fleet.now
-    fleet.run(5)
-    beats = {
-        endpoint: sum(t > since and d[7] == HEARTBEAT and d[5] == 255 for t, d in sent)
-        for endpoint, sent in fleet.watched.towards.items()
-    }
-    assert beats == {"r": 5, "o": 5}
 
 
 # STOP
@@ -443,136 +392,7 @@ def test_stop_for_all_reaches_every_link_in_one_step_and_is_latched_for_each(
     assert states == [S.QUEUED, S.QUEUED, S.QUEUED, S.COMPLETED, S.QUEUED]
 
 
-@pytest.mark.parametrize(("number", "how"), [(1, "link"), (4, "silent")])
-def test_stop_for_all_stops_the_others_and_a_silent_one_as_soon_as_it_is_heard(
-    make_fleet: MakeFleet, number: int, how: str
-) -> None:
-    fleet = make_fleet(FIVE)
-    drive_all(fleet)
-    lost, others = fleet.observers[number - 1], [n for n in range(1, 6) if n != number]
-    if how == "link":
-        lost.expects_gaps = True
-        fleet.link_down("own")
-    else:
-        fleet.break_rover(number, OFF)
-    fleet.run(4.1)
-    assert not fleet.is_heard(number)
-    stop = fleet.other.stop(target=(0, 0))
-    fleet.until(lambda: all(stands_in_hold(fleet, n) for n in others), within=BRAKING)
-    assert stop.answer == (FAILED, R.VEHICLE_SILENT)
-    assert {t.state for t in fleet.tasks()} == {S.KILLED}
-    assert {fleet.queue_paused(n) for n in range(1, 6)} == {R.STOPPED}
-
-    fleet.rovers[number - 1].autopilot.operator_mode(Mode.GUIDED, now=fleet.now)
-    fleet.run(1)
-    back = fleet.now
-    if how == "link":
-        fleet.link_up("own")
-    else:
-        fleet.break_rover(number, Faults(deaf=True))  # it is heard, and does not hear yet
-    fleet.until(lambda: fleet.is_heard(number), within=2)
-    assert fleet.sent_to(number, back)[0] == "HOLD"
-    heard_at = [e.at for e in fleet.events(VehicleSeen) if e.text == "heard again"][-1]
-    assert fleet.sent_to(number, heard_at)[:2] == ["HOLD", "zero"]
-    fleet.break_rover(number, Faults())
-    fleet.until(lambda: stands_in_hold(fleet, number), within=BRAKING)
-    fleet.client.move(1, target=(number, 191))
-    fleet.run(2)
-    assert fleet.tasks_of(number)[-1].state is S.QUEUED
-
-
-@cache
-def driven_beside(stopped: int | None) -> tuple[Diary, ...]:
-    """Drive all five, and stop one of them or none; gives what was done with each."""
-    fleet = Fleet(FIVE)
-    fleet.ready()
-    drive_all(fleet)
-    if stopped is not None:
-        stop = fleet.other.stop(target=(stopped, 191))
-        fleet.run(3)
-        assert stop.answer == (ACCEPTED, stopped)
-        assert stands_in_hold(fleet, stopped)
-    else:
-        fleet.run(3)
-    fleet.check()
-    return tuple(diary_of(fleet, n) for n in range(1, 6))
-
-
-@pytest.mark.parametrize("stopped", [2, 4])
-def test_stop_for_one_leaves_the_others_driving_as_if_nothing_was(stopped: int) -> None:
-    """Not one setpoint of theirs is another one, or comes at another time."""
-    undisturbed, beside = driven_beside(None), driven_beside(stopped)
-    same = [a == b for a, b in zip(undisturbed, beside, strict=True)]
-    assert same == [number != stopped for number in range(1, 6)]
-
-
 # dependencies across links
-
-
-def test_tasks_run_after_each_other_across_links(make_fleet: MakeFleet) -> None:
-    fleet = make_fleet(THREE)
-    targets = [1, 2, 3, 1]
-    after = 0
-    for number in targets:
-        sent = fleet.client.command(MOVE, 0.4, 0, 0, 0, after, target=(number, 191))
-        fleet.run(0.05)
-        after = sent.task_id
-    fleet.other.rotate(40, target=(3, 191))  # one that waits for nothing
-    fleet.until_idle(tasks=5)
-    for first, second in pairwise(range(1, 5)):
-        wait = fleet.when(second, S.STARTING) - fleet.when(first, S.COMPLETED)
-        assert 0.0 <= wait < 0.05
-    assert fleet.when(5, S.COMPLETED) < fleet.when(3, S.STARTING)
-    assert near_pose(fleet.pose_of(1), (0.8, 0.0, 0.0))
-    assert {task.state for task in fleet.tasks()} == {S.COMPLETED}
-
-
-#: how a task can end other than completed, what it is then, and within how many seconds
-OTHER_ENDS: dict[str, tuple[Callable[[Fleet], object], tuple[S, R], float]] = {
-    "refused": (
-        lambda fleet: fleet.break_rover(1, Faults(refuse_mode=True)),
-        (S.FAILED, R.MODE_REFUSED),
-        2,
-    ),
-    "stuck": (
-        lambda fleet: fleet.break_rover(1, Faults(position_frozen=True)),
-        (S.FAILED, R.STUCK),
-        15,
-    ),
-    "out of reach": (take_link_down, (S.FAILED, R.LINK_TIMEOUT), 10),
-    "stopped": (lambda fleet: fleet.other.stop(target=(1, 191)), (S.KILLED, R.STOP), 1),
-    "cancelled": (
-        lambda fleet: fleet.other.command(CANCEL, 1, target=(1, 191)),
-        (S.CANCELLED, R.CANCELLED),
-        4,
-    ),
-}
-
-
-@pytest.mark.parametrize("how", OTHER_ENDS)
-def test_what_runs_after_a_task_that_did_not_complete_fails_on_every_link(
-    make_fleet: MakeFleet, how: str
-) -> None:
-    fleet = make_fleet(THREE, settings=Settings(watch=Watch(lost_timeout=6.0)))
-    act, end, within = OTHER_ENDS[how]
-    if how in ("refused", "stuck"):  # it shows before anything moves
-        act(fleet)
-    fleet.client.move(5, target=(1, 191))
-    fleet.client.command(MOVE, 0.4, 0, 0, 0, 1, target=(2, 191))
-    fleet.client.command(MOVE, 0.5, 0, 0, 0, 2, target=(3, 191))
-    fleet.client.command(MOVE, 0.6, 0, 0, 0, 1, target=(1, 191))
-    fleet.run(0.5)
-    assert [fleet.state(i)[0] for i in (2, 3, 4)] == [S.BLOCKED] * 3
-    if how not in ("refused", "stuck"):
-        act(fleet)
-    fleet.until_state(1, end[0], within=within)
-    assert fleet.state(1) == end
-    assert [fleet.state(i) for i in (2, 3, 4)] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 3
-    for number in (2, 3):
-        assert set(fleet.sent_to(number, 0.0)) <= {"511", "512"}
-        fleet.other.move(0.3, target=(number, 191))  # nothing moved, so that nothing pauses
-    fleet.run(4)
-    assert [task.state for task in fleet.tasks()[4:]] == [S.COMPLETED, S.COMPLETED]
 
 
 # places
@@ -602,7 +422,7 @@ def beside_a_twin(where: str, *, is_there: bool) -> tuple[Fleet, Vehicle]:
     return fleet, twin
 
 
-@pytest.mark.parametrize("where", TWINS)
+@for_each("where", TWINS)
 def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes_on(
     where: str,
 ) -> None:
@@ -627,33 +447,10 @@ def test_a_second_vehicle_of_one_id_is_noted_and_never_driven_and_the_first_goes
     assert near_pose(fleet.pose_of(1), (1.0, 0.0, 45.0))
 
 
-# It must not be taken for the first one, come back at another place, and be given its tasks.
-@pytest.mark.parametrize("when", ["waiting", "driving"])
-def test_a_second_vehicle_of_one_id_is_not_driven_either_when_the_first_falls_silent(
-    make_fleet: MakeFleet, when: str
-) -> None:
-    fleet = make_fleet(TWINS["another link"])
-    twin = twin_of(1, start=Pose(north=0.5), now=fleet.now)
-    fleet.radios["twin"].vehicles.append(twin)
-    fleet.run(3)
-    if when == "waiting":
-        fleet.client.command(MOVE, 1.0, 0, 0, 0, 0, 6.0, target=(1, 191))
-        fleet.run(0.5)
-    else:  # the other one's own server has it in the same mode, and armed
-        twin.autopilot.operator_arm(True, now=fleet.now)
-        twin.autopilot.operator_mode(Mode.GUIDED, now=fleet.now)
-        fleet.client.move(2, target=(1, 191))
-        fleet.run(1.5)
-    assert any("shares its id with a rover" in e.text for e in fleet.events(VehicleNoted))
-    fleet.break_rover(1, OFF)
-    fleet.run(12)
-    assert twin.truth.north == 0.5
-
-
 MOVABLE: Layout = {"one": {"a": (1,), "b": (2,)}, "two": {"c": (3,), "new": ()}}
 
 
-@pytest.mark.parametrize("silence", [0.0, 4.0])
+@for_each("silence", [0.0, 4.0])
 def test_a_rover_that_comes_back_on_another_link_is_driven_there_and_no_more_at_the_old_place(
     make_fleet: MakeFleet, silence: float
 ) -> None:
@@ -685,94 +482,10 @@ def test_a_rover_that_comes_back_on_another_link_is_driven_there_and_no_more_at_
     assert fleet.state(2)[0] is S.COMPLETED
 
 
-def test_a_rover_that_was_stopped_while_silent_hears_hold_first_at_its_new_place(
-    make_fleet: MakeFleet,
-) -> None:
-    fleet = make_fleet(MOVABLE)
-    fleet.client.move(20, target=(1, 191))
-    fleet.run(2)
-    fleet.break_rover(1, OFF)
-    fleet.run(4)
-    fleet.client.stop(target=(0, 0))
-    fleet.run(1)
-    fleet.moves_house(1, source="a", target="new")
-    fleet.break_rover(1, Faults())
-    since = fleet.now
-    fleet.until(lambda: fleet.work_at("new", since), within=3)
-    moved_at = fleet.work_at("new", since)[0]
-    assert fleet.sent_to(1, moved_at)[:2] == ["HOLD", "zero"]
-    fleet.until(lambda: stands_in_hold(fleet, 1), within=BRAKING)
-    fleet.client.move(1, target=(1, 191))
-    fleet.run(2)
-    assert fleet.tasks_of(1)[-1].state is S.QUEUED
-    assert fleet.work_at("a", moved_at) == []
-
-
-def test_a_rover_whose_link_was_down_goes_on_to_where_it_was_to_go(make_fleet: MakeFleet) -> None:
-    fleet = make_fleet(TWO)
-    fleet.client.move(3, target=(1, 191))
-    fleet.run(1.5)
-    take_link_down(fleet)
-    fleet.run(5)
-    assert fleet.state(1) == (S.PAUSED, R.POSITION_LOST)
-    fleet.link_up("one")
-    fleet.until_state(1, S.COMPLETED)
-    assert near_pose(fleet.pose_of(1), (3.0, 0.0, 0.0))
-
-
-def test_a_rover_that_calls_by_itself_gets_our_heartbeats_also_after_its_link_was_down(
-    make_fleet: MakeFleet,
-) -> None:
-    fleet = make_fleet(TWO, dials_in=("one",))
-    fleet.link_down("one")
-    fleet.run(2)
-    fleet.link_up("one")
-    since = fleet.now
-    fleet.run(5)
-    sent = fleet.watched.towards["a"]
-    beats = [t for t, d in sent if t >= since and d[7] == HEARTBEAT and (d[5], d[6]) == SERVER]
-    assert len(beats) >= 4
-
-
-def test_our_packets_are_numbered_without_gaps_also_after_a_link_was_down(
-    make_fleet: MakeFleet,
-) -> None:
-    fleet = make_fleet(TWO)
-    fleet.link_down("one")
-    fleet.run(1)
-    fleet.link_up("one")
-    since = fleet.now
-    fleet.run(1)
-    fleet.client.move(0.5, target=(1, 191))
-    fleet.run(3)
-    sent = fleet.watched.towards["a"]
-    numbers = [d[4] for t, d in sent if t >= since and (d[5], d[6]) == SERVER]
-    assert all((b - a) % 256 == 1 for a, b in pairwise(numbers))
-
-
 # what is shown
 
 
-class QueueStatus(NamedTuple):
-    """TASK_QUEUE_STATUS of one rover, decoded by hand."""
-
-    system_id: int
-    running_id: int
-    next_id: int
-    counts: tuple[int, ...]
-    paused_reason: int
-
-
-def queue_statuses(client: FakeClient) -> list[QueueStatus]:
-    """Return those that a client has received."""
-    found = []
-    for packet in client.of_id(TASK_QUEUE_STATUS):
-        values = struct.unpack("<5I14I2B2I", packet.payload.ljust(86, b"\0"))
-        found.append(QueueStatus(packet.source[0], values[2], values[3], values[5:19], values[19]))
-    return found
-
-
-@pytest.fixture
+@anew
 def waiting(make_fleet: MakeFleet) -> Fleet:
     """Two rovers behind one radio and one elsewhere, each with one task running and many waiting.
 
@@ -790,48 +503,6 @@ def waiting(make_fleet: MakeFleet) -> Fleet:
     assert [len(fleet.tasks_of(n)) for n in (1, 2, 3)] == [23, 6, 6]
     fleet.run(1)
     return fleet
-
-
-def ids_of(fleet: Fleet, number: int) -> set[int]:
-    return {task.id for task in fleet.tasks_of(number)}
-
-
-def test_a_page_of_one_rovers_tasks_has_none_of_another(waiting: Fleet) -> None:
-    fleet = waiting
-    pages = [(1, 0, 16), (1, 16, 6), (2, 0, 5), (3, 0, 5), (3, 5, 0), (1, 5, 16)]
-    for number, first, count in pages:
-        for client in (fleet.client, fleet.other):
-            before = len(list(client.of_id(TASK_STATUS)))
-            client.command(REQUEST, TASK_STATUS, 0, first, target=(number, 191))
-            fleet.run(0.1)
-            page = list(client.of_id(TASK_STATUS))[before:]
-            assert {packet.source for packet in page} <= {(number, 191)}
-            shown = [TaskStatus.of(packet.payload).task_id for packet in page]
-            assert len(set(shown)) == len(shown) == count
-            assert set(shown) <= ids_of(fleet, number)
-            running = fleet.tasks_of(number)[0].id
-            assert running not in shown
-
-
-def test_the_status_of_one_rovers_queue_counts_none_of_another(waiting: Fleet) -> None:
-    fleet = waiting
-    fleet.other.pause(target=(2, 191))
-    fleet.run(0.5)
-    for number in (1, 2, 3):
-        fleet.client.command(REQUEST, TASK_QUEUE_STATUS, target=(number, 191))
-        fleet.other.command(REQUEST, TASK_QUEUE_STATUS, target=(number, 191))
-        fleet.run(0.1)
-    for client in (fleet.client, fleet.other):
-        first, second, third = queue_statuses(client)
-        assert [s.system_id for s in (first, second, third)] == [1, 2, 3]
-        for status, paused in ((first, R.NONE), (second, R.OPERATOR), (third, R.NONE)):
-            tasks = fleet.tasks_of(status.system_id)
-            counts = [sum(t.state is state for t in tasks) for state in S]
-            assert list(status.counts) == counts
-            assert status.running_id == tasks[0].id
-            assert status.next_id == tasks[1].id
-            assert status.paused_reason == paused
-        assert (first.counts[S.SCHEDULED], first.counts[S.BLOCKED]) == (1, 1)
 
 
 def test_a_task_of_another_rover_is_not_touched_and_never_shown_as_ones_own(
@@ -854,12 +525,3 @@ def test_a_task_of_another_rover_is_not_touched_and_never_shown_as_ones_own(
     assert cleared.result == ACCEPTED
     assert {t.state for t in fleet.tasks_of(1)} == {S.CANCELLED}
     assert [t.state for t in fleet.tasks_of(2)] == [S.EXECUTING] + [S.QUEUED] * 5
-
-
-def test_a_stream_of_statuses_asked_of_one_rover_has_no_task_of_another(waiting: Fleet) -> None:
-    fleet = waiting
-    watcher = fleet.add_client("watcher", system_id=77)
-    fleet.run(1.5)
-    watcher.command(SET_INTERVAL, TASK_STATUS, 100_000, target=(1, 191))
-    fleet.run(1)
-    assert {packet.source for packet in watcher.of_id(TASK_STATUS)} == {(1, 191)}

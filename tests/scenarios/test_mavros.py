@@ -1,14 +1,10 @@
 """mavros with its defaults, whose address is the server's own inside the rover's system."""
 
-import pytest
-from pymavlink.dialects.v20 import common
-
-from mav_tasks.in_memory import VEHICLE_LINK
-from mav_tasks.tasks.events import SubmissionRefused, VehicleNoted
-from mav_tasks.tasks.lifecycle import TaskReason as R
-from tests.kit.client import ACCEPTED, ARM, AUTO, DENIED, GUIDED, HOLD, IDS
+from mav_tasks.tasks.events import SubmissionRefused
+from rover_sim.personas import Persona
+from tests.kit.cases import anew, for_each
+from tests.kit.client import ACCEPTED, ARM, AUTO, GUIDED, HOLD
 from tests.kit.mavros import Mavros
-from tests.kit.mavros import heartbeat as onboard_heartbeat
 from tests.kit.mission import Item
 from tests.kit.observer import ARDUPILOT_WAYS
 from tests.kit.px4 import MISSION, OFFBOARD, PROMPT_PX4
@@ -19,15 +15,16 @@ WAYPOINT = 16
 HOME = Item(WAYPOINT, **at(0, 0))
 
 
-@pytest.fixture(params=[PROMPT, PROMPT_PX4], ids=lambda persona: persona.name)
-def world(make_world: MakeWorld, request: pytest.FixtureRequest) -> World:
-    return make_world(persona=request.param)
+@anew
+def world(make_world: MakeWorld, persona: Persona) -> World:
+    return make_world(persona=persona)
 
 
 def is_ardupilot(world: World) -> bool:
     return world.observer.ways is ARDUPILOT_WAYS
 
 
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_stock_mavros_is_served(world: World) -> None:
     mavros = Mavros(world)
     world.run(17)
@@ -51,6 +48,7 @@ def test_stock_mavros_is_served(world: World) -> None:
     assert world.events(SubmissionRefused) == []
 
 
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_its_setpoints_drive(world: World) -> None:
     mavros = Mavros(world)
     world.run(2)
@@ -85,54 +83,7 @@ def test_two_with_one_address_are_told_apart_by_where_they_are(make_world: MakeW
     assert stopped.answer[0] == ACCEPTED
 
 
-def test_one_on_the_rovers_side_keeps_its_address(make_world: MakeWorld) -> None:
-    """Two onboard computers 1/191 in one net get each other's answers: both are told."""
-    world = make_world()
-    mavros = Mavros(world)
-    world.run(1)
-    companion = world.add_client("companion", system_id=1, component_id=191)
-    told: list[str] = []
-    reader = common.MAVLink(None)
-
-    def hear(sender: str, target: str, data: bytes) -> bool:
-        if (sender, target) == (VEHICLE_LINK, "rover1") and data[7] == IDS["STATUSTEXT"]:
-            told.append(reader.decode(bytearray(data)).text)
-        return False
-
-    world.watched.loses = hear
-    world.from_vehicle_side(companion.packed(onboard_heartbeat()), peer="rover1")
-    world.run(0.1)
-    refused = mavros.arm()
-    world.run(1)
-    assert refused.answer == (DENIED, R.NOT_ALLOWED)
-    assert not world.rover.autopilot.armed
-    words = "address 1/191 is taken on the rover's side: change this client's component id"
-    assert mavros.client.texts().count(words) == 1
-    both = "component 1/191 on its side and the client at mavros have one address"
-    assert [both in str(e) for e in world.events(VehicleNoted)].count(True) == 1
-    assert both in "".join(told), "in the name of a component of the companion's own system"
-    stopped = mavros.client.stop(target=(1, 1))
-    world.run(0.2)
-    assert stopped.answer is not None
-    assert stopped.answer[0] == ACCEPTED
-    other = Mavros(world, "other", component=195)
-    world.run(1)
-    assert other.state[0]
-    assert not [text for text in other.client.texts() if "address" in text]
-
-
-def test_its_heartbeat_does_not_come_back_by_another_link(make_world: MakeWorld) -> None:
-    """A rover forwards what is for everybody to its other radio, where the server listens, too."""
-    world = make_world()
-    passed = world.passed_on((1, 191))
-    mavros = Mavros(world)
-    world.run(3)
-    assert IDS["TIMESYNC"] in passed
-    assert IDS["HEARTBEAT"] not in passed
-    assert mavros.state[0]
-
-
-@pytest.mark.parametrize("halt", [HOLD, None], ids=["HOLD", "disarm"])
+@for_each("halt", [HOLD, None])
 def test_it_arms_right_after_its_own_halt(make_world: MakeWorld, halt: int | None) -> None:
     """Each arming of mavros says that it is a repeat, and none is."""
     world = make_world()

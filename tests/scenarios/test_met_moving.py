@@ -9,24 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks.in_memory import VEHICLE_LINK
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.personas import Mode, Persona
 from tests.kit.car import Car
-from tests.kit.client import ACCEPTED
-from tests.kit.gateways.engines import FleetWorld
+from tests.kit.cases import anew, for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_restart import REMAINDER, UTC, release, restart
 
-COMMAND_LONG = 76
-SET_INTERVAL = (511).to_bytes(2, "little")  # where COMMAND_LONG has its command
-POSITIONS = (30, 32)  # ATTITUDE, LOCAL_POSITION_NED
 AWAY = 0.4  # s, of a server that a supervisor starts again at once
 
 CARS = {
@@ -36,12 +30,10 @@ CARS = {
 OTHERS = {"ArduPilot": PROMPT, "PX4": PROMPT_PX4}
 EVERY = {**OTHERS, **CARS}
 
-personas = pytest.mark.parametrize("persona", EVERY.values(), ids=EVERY.keys())
-cars = pytest.mark.parametrize("persona", CARS.values(), ids=CARS.keys())
-others = pytest.mark.parametrize("persona", OTHERS.values(), ids=OTHERS.keys())
+personas = for_each("persona", EVERY.values())
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
@@ -63,19 +55,6 @@ def phase_of(world: World) -> str:
     """Return the phase of the server's control, "" before it has met the rover."""
     found = world.server.engine.snapshot(now=world.now).vehicles
     return found[0].control if found else ""
-
-
-class AskedFor:
-    """Loses the positions on one link until a message is requested there."""
-
-    def __init__(self, link: str) -> None:
-        self._link = link
-        self._is_asked = False
-
-    def __call__(self, source: str, target: str, data: bytes) -> bool:
-        if source == self._link and data[7] == COMMAND_LONG and data[38:40] == SET_INTERVAL:
-            self._is_asked = True
-        return target == self._link and not self._is_asked and data[7] in POSITIONS
 
 
 class Met:
@@ -123,43 +102,6 @@ def test_it_is_braked_and_gets_hold_when_it_stands(
     assert abs(world.truth.north - 20.0) < 0.3
 
 
-@cars
-def test_stop_just_after_it_was_met_brakes_it_in_the_same_way(
-    make_world: MakeWorld, path: Path, persona: Persona
-) -> None:
-    world = driving(make_world, path, persona)
-    met = Met(world, path)
-    world.until(lambda: phase_of(world) == "CONTROL", within=1.5)
-    stop = world.client.stop()
-    world.run(0.1)
-    assert stop.result == ACCEPTED
-    assert phase_of(world) == "STOPPING"
-    met.stands()
-    assert world.paused() is R.STOPPED
-    assert world.state(1)[0] is S.KILLED
-    world.run(2)
-    assert not in_control_mode(world)
-
-
-@others
-def test_one_that_was_stopped_just_before_is_braked_too(
-    make_world: MakeWorld, path: Path, persona: Persona
-) -> None:
-    """The server died in the moment of the STOP, and nothing of that came to the rover.
-
-    Whether it steers as a car the new server does not know yet.
-    """
-    world = driving(make_world, path, persona)
-    world.watched.loses = lambda _source, target, _data: target == "rover1"
-    stop = world.client.stop()
-    world.run(0.1)
-    assert stop.result == ACCEPTED
-    met = Met(world, path, away=0.2)
-    world.watched.loses = lambda *_: False
-    met.stands()
-    assert world.paused() is R.STOPPED
-
-
 @personas
 def test_without_a_position_it_gets_hold_soon(
     make_world: MakeWorld, path: Path, persona: Persona
@@ -191,36 +133,3 @@ def test_who_switches_it_to_manual_meanwhile_has_it(make_world: MakeWorld, path:
     assert phase_of(world) == "IDLE"
     assert world.rover.autopilot.mode is Mode.MANUAL
     assert "HOLD" not in world.observer.sent_since(at + 1.1)  # after its next heartbeat
-
-
-@personas
-@pytest.mark.parametrize("streams", [True, False], ids=["with streams", "without"])
-@pytest.mark.parametrize("on_takeover", ["hold", "resume"])
-def test_a_gateway_that_gets_it_brakes_it_in_the_same_way(
-    tmp_path: Path, persona: Persona, on_takeover: str, *, streams: bool
-) -> None:
-    """A real ArduPilot streams positions on each link only if they were requested there."""
-    body = partial(Car, radius=1.2)
-    settings = Settings(on_takeover=on_takeover)
-    world = FleetWorld(tmp_path, persona=persona, body=body, settings=settings)
-    clients = {"server": world.client}
-    clients["b"] = world.add_client("client b", system_id=254, server="b:clients")
-    first = world.holder()
-    world.run(4.0)
-    others = [name for name in world.gateways if name != first.name]
-    if not streams and persona.autopilot == PROMPT.autopilot:
-        world.watched.loses = AskedFor(VEHICLE_LINK.replace("server", others[0]))
-    clients[first.name].move(20, speed=1.0)
-    world.until(lambda: world.truth.forward_speed > 0.9, within=20)
-    world.kill(first.name)
-    at, north = world.now, world.truth.north
-    world.until(lambda: abs(world.truth.forward_speed) < 0.15, within=3)
-    took = [now for each in world.gateways.values() for now, _ in each.got if now > at]
-    assert len(took) == 1
-    assert world.truth.north - north < (took[0] - at) + 0.9
-    assert in_control_mode(world)  # HOLD has not stopped it
-    world.until(lambda: world.stands() and not in_control_mode(world), within=3)
-    if on_takeover == "resume":
-        world.until(lambda: world.truth.forward_speed > 0.9, within=10)
-        world.until(lambda: abs(world.truth.north - 20.0) < 0.2 and world.stands(), within=40)
-    world.check()

@@ -1,8 +1,7 @@
 """Plans: uploaded, looked at, started, driven, cleared."""
 
-from math import hypot, inf, nan
+from math import nan
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import PeerChanged
@@ -11,20 +10,19 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
     DENIED,
     HOLD,
     TEMPORARILY_REJECTED,
-    FakeClient,
     set_mode,
     sticks,
 )
 from tests.kit.mission import Download, Item, Upload, acks, currents, reached
-from tests.kit.px4 import PROMPT_PX4
 from tests.kit.store import LateStore
-from tests.kit.world import World, at, is_at, near_pose
+from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, DELAY, SPEED, JUMP, SERVO, MODE, OPTIONS = 16, 93, 178, 177, 183, 176, 54014
@@ -76,49 +74,12 @@ def test_a_plan_waits_until_it_is_started_and_is_driven(world: World) -> None:
     assert (last.seq, last.total, last.state, last.mission_id) == (3, 4, COMPLETE, 1)
 
 
-def test_the_end_is_told_some_times_for_who_has_missed_it(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(10)
-    assert reached(world.client) == [1, 2, 3, 3, 3, 3, 3, 3]
-
-
-def test_a_mission_that_is_started_again_is_not_told_the_end_of_the_last(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(1.2)
-    told = len(reached(world.client))
-    assert start(world) == (ACCEPTED, 2)
-    world.run(2.5)
-    assert 3 not in reached(world.client)[told:]
-
-
-def test_at_the_task_server_it_is_queued_at_once_and_so_is_the_next(world: World) -> None:
-    first = uploaded(world, place(1, 0), place(1, 1), target=(1, 191))
-    second = uploaded(world, place(0, 0), target=(1, 191))
-    assert (first.opaque_id, second.opaque_id) == (1, 2)
-    world.until_state(2, S.COMPLETED, within=60)
-    assert world.state(1)[0] is S.COMPLETED
-    assert is_at(world, 0.0, 0.0)
-
-
 def test_the_same_plan_again_a_moment_later_is_the_same_task(world: World) -> None:
     plan = (place(1, 0), place(1, 1))
     first = uploaded(world, *plan, target=(1, 191))
     world.run(2)
     again = uploaded(world, *plan, target=(1, 191))
     assert (again.result, again.opaque_id) == (0, first.opaque_id)
-    assert len(world.tasks()) == 1
-
-
-def test_of_copies_of_a_plan_the_last_one_counts(world: World) -> None:
-    """Each of their acks may have been lost, and a long plan takes its time."""
-    plan = (place(1, 0), place(1, 1))
-    for _ in range(3):
-        uploaded(world, *plan, target=(1, 191))
-        world.run(8)
     assert len(world.tasks()) == 1
 
 
@@ -134,8 +95,8 @@ def test_it_comes_back_as_it_was(world: World) -> None:
         assert message.pack(mav)[10:] == sent.pack(mav)[10:]
 
 
-@pytest.mark.parametrize(
-    ("bad", "result"),
+@for_each(
+    "bad, result",
     [
         (Item(MODE, frame=2), 3),
         (Item(WAYPOINT, x=910000000, y=5), 10),
@@ -165,15 +126,6 @@ def test_a_loop_in_which_nothing_is_driven_is_refused(world: World) -> None:
     assert world.tasks() == ()
 
 
-def test_a_jump_may_lead_ahead_of_all_items_that_have_come_by_then(world: World) -> None:
-    jump = Item(JUMP, param1=4, param2=1, frame=2)
-    assert uploaded(world, HOME, place(1, 0), jump, place(1, 3), place(1, 1)).result == 0
-    assert start(world) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert reached(world.client) == [1, 4]
-    assert is_at(world, 1.0, 1.0)
-
-
 def test_a_refused_plan_leaves_the_one_before(world: World) -> None:
     uploaded(world)
     uploaded(world, HOME, Item(MODE))
@@ -192,15 +144,6 @@ def test_another_plan_replaces_the_one_that_waits(world: World) -> None:
     world.until_state(2, S.COMPLETED)
 
 
-def test_another_plan_does_not_disturb_the_one_that_is_driven(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.EXECUTING)
-    second = uploaded(world, HOME, place(0.5, 0, hold=0.1))
-    world.until_state(1, S.COMPLETED, within=60)
-    assert world.state(second.opaque_id)[0] is S.BLOCKED
-
-
 def test_two_wishes_to_start_are_one_and_later_it_is_another_task(world: World) -> None:
     uploaded(world, HOME, place(0.3, 0, hold=0.1))
     world.client.mode(AUTO)
@@ -213,7 +156,7 @@ def test_two_wishes_to_start_are_one_and_later_it_is_another_task(world: World) 
     assert currents(world.client)[-1].mission_id == 2
 
 
-@pytest.mark.parametrize("how", ["command", "message"])
+@for_each("how", ["command", "message"])
 def test_hold_pauses_it_and_auto_goes_on(world: World, how: str) -> None:
     uploaded(world)
     start(world)
@@ -232,7 +175,7 @@ def test_hold_pauses_it_and_auto_goes_on(world: World, how: str) -> None:
     assert reached(world.client) == [1, 2, 3]
 
 
-@pytest.mark.parametrize(("what", "reason"), [("STOP", R.STOPPED), ("disarmed", R.DISARMED)])
+@for_each("what, reason", [("STOP", R.STOPPED), ("disarmed", R.DISARMED)])
 def test_after_a_stop_or_while_it_may_not_be_armed_a_start_is_refused(
     world: World, what: str, reason: R
 ) -> None:
@@ -251,14 +194,7 @@ def test_a_start_without_a_plan_is_refused(world: World) -> None:
     assert start(world) == (DENIED, R.NOT_FOUND)
 
 
-def test_it_can_be_started_and_gone_on_with_at_any_item(world: World) -> None:
-    uploaded(world)
-    world.client.command(START, 3, target=(1, 1))
-    world.until_state(1, S.COMPLETED, within=60)
-    assert reached(world.client) == [3]
-
-
-@pytest.mark.parametrize("how", ["command", "message"])
+@for_each("how", ["command", "message"])
 def test_another_item_is_gone_on_with(world: World, how: str) -> None:
     uploaded(world)
     start(world)
@@ -274,27 +210,6 @@ def test_another_item_is_gone_on_with(world: World, how: str) -> None:
         assert currents(world.client)[before].seq == 3
     world.until_state(1, S.COMPLETED, within=60)
     assert reached(world.client) == [3]
-
-
-def test_an_item_that_is_not_there_is_not_answered_as_by_an_ardupilot(world: World) -> None:
-    """MAVSDK gives up after 2.5 s without MISSION_CURRENT; others go on to get it."""
-    other = world.add_client("other")
-    uploaded(world)
-    world.run(1.5)
-    before, others = len(currents(world.client)), len(currents(other))
-    world.client.send(set_current(77))
-    world.run(2.8)
-    assert len(currents(world.client)) == before
-    assert len(currents(other)) > others
-    assert [text for text in world.client.texts() if "item 77" in text]
-    world.run(2)
-    assert {each.seq for each in currents(world.client)[before:]} == {0}
-
-
-def test_without_a_mission_no_item_is_chosen(world: World) -> None:
-    world.client.send(set_current(1))
-    world.run(0.1)
-    assert "there is no mission: upload one first" in world.client.texts()
 
 
 def test_an_upload_ends_with_the_connection_of_its_client(world: World) -> None:
@@ -324,14 +239,6 @@ def test_clearing_takes_away_what_waits_and_not_what_is_driven(world: World) -> 
     world.until_state(2, S.COMPLETED, within=60)
 
 
-def test_a_plan_of_home_alone_is_none(world: World) -> None:
-    uploaded(world)
-    again = uploaded(world, HOME)
-    assert (again.result, again.opaque_id) == (0, 0)
-    assert world.state(1) == (S.CANCELLED, R.CLEARED)
-    assert start(world) == (DENIED, R.NOT_FOUND)
-
-
 def test_a_second_client_is_denied_while_the_first_one_uploads(world: World) -> None:
     other = world.add_client("other")
     world.run(1)
@@ -342,36 +249,6 @@ def test_a_second_client_is_denied_while_the_first_one_uploads(world: World) -> 
     assert len(world.tasks()) == 1
 
 
-def test_options_are_those_of_the_whole_plan(world: World) -> None:
-    options = Item(OPTIONS, param1=9, param2=30.0, param3=60.0, param4=0, frame=2)
-    uploaded(world, options, place(0.5, 0, hold=0.1), target=(1, 191))
-    task = world.task(1)
-    assert (task.priority, task.state) == (9, S.SCHEDULED)
-    assert task.terms.deadline is not None
-
-
-def test_what_the_rover_will_not_do_of_a_plan_is_told_and_the_plan_goes_on(world: World) -> None:
-    uploaded(world, HOME, place(1, 0), Item(PICTURE, frame=2, param4=0.0), place(1.5, 0, hold=0.1))
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert "Rover 1 refused command 2000 of the plan (result 3)" in world.client.texts()
-
-
-def test_moves_and_turns_can_be_items(world: World) -> None:
-    move = Item(MOVE, param1=1.0, param4=0, frame=2)
-    turn = Item(54001, param1=90.0, param4=0, frame=2)
-    uploaded(world, move, turn, target=(1, 191))
-    world.until_state(1, S.COMPLETED, within=60)
-    assert near_pose(world.pose(), (1.0, 0.0, 90.0), metres=0.04)
-
-
-def test_what_the_rover_says_about_missions_is_not_shown(world: World) -> None:
-    uploaded(world)
-    world.run(5)
-    assert {current.mission_id for current in currents(world.client)} <= {0, 1}
-    assert currents(world.client)[-1].total == 4
-
-
 def test_without_the_claim_missions_are_the_rovers_own(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(claim=False))
     world.client.send(clear_all())
@@ -380,8 +257,8 @@ def test_without_the_claim_missions_are_the_rovers_own(make_world: MakeWorld) ->
     assert acks(world.client)
 
 
-@pytest.mark.parametrize("wait", [0.0, 1.5])
-@pytest.mark.parametrize("persona", [ARDUPILOT, None])
+@for_each("wait", [0.0, 1.5])
+@for_each("persona", [ARDUPILOT, None])
 def test_a_script_that_arms_and_starts_is_obeyed_as_by_an_autopilot(
     make_world: MakeWorld, wait: float, persona: Persona | None
 ) -> None:
@@ -409,7 +286,7 @@ def ordered(world: World, since: float = 0.0) -> list[float]:
     ]
 
 
-@pytest.mark.parametrize("what", ["STOP", "disarm"])
+@for_each("what", ["STOP", "disarm"])
 def test_nothing_more_is_ordered_after_a_stop_or_a_takeover(world: World, what: str) -> None:
     uploaded(world, HOME, place(1, 0), servo(5, 1100), servo(5, 1900), servo(6), place(6, 0))
     start(world)
@@ -423,51 +300,6 @@ def test_nothing_more_is_ordered_after_a_stop_or_a_takeover(world: World, what: 
     at_stop = world.now
     world.run(3)
     assert ordered(world, at_stop) == []
-
-
-def test_many_orders_in_a_row_all_reach_the_rover(world: World) -> None:
-    orders = [servo(1 + n % 8, 1000.0 + n) for n in range(25)]
-    uploaded(world, HOME, place(1, 0), *orders, place(3, 0))
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert ordered(world) == [1000.0 + n for n in range(25)]
-
-
-def test_an_order_with_a_number_that_is_none_never_reaches_the_rover(world: World) -> None:
-    assert uploaded(world, HOME, place(1, 0), servo(5, inf)).result == 7
-    uploaded(world, HOME, servo(5, nan), place(0.5, 0))
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert ordered(world) == [0.0]
-
-
-def test_a_distance_is_that_to_the_place_also_while_it_is_faced(world: World) -> None:
-    near = Item(114, param1=3.0, frame=2)
-    uploaded(world, HOME, place(1, 0, hold=0.1), near, servo(5), place(1, 8))
-    start(world)
-    world.until(lambda: ordered(world), within=60)
-    assert 7.0 > hypot(world.truth.north - 1, world.truth.east) > 4.7
-
-
-def test_clearing_ends_a_started_mission_that_still_waits(world: World) -> None:
-    world.client.move(3)
-    world.run(1)
-    uploaded(world)
-    start(world)
-    world.client.send(clear_all())
-    world.run(0.3)
-    assert world.state(2) == (S.CANCELLED, R.CLEARED)
-
-
-def test_a_start_drives_on_after_a_takeover(world: World) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.EXECUTING)
-    world.run(1.5)
-    world.operator_mode(Mode.MANUAL)
-    world.run(3)
-    assert start(world) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED, within=60)
 
 
 def test_a_start_does_not_allow_what_a_disarm_has_forbidden(world: World) -> None:
@@ -487,16 +319,6 @@ def test_a_start_does_not_allow_what_a_disarm_has_forbidden(world: World) -> Non
     assert not world.rover.autopilot.armed
 
 
-def test_another_plan_also_replaces_one_that_was_started_and_waits(world: World) -> None:
-    world.client.move(3)
-    world.run(1)
-    uploaded(world)
-    start(world)
-    uploaded(world, HOME, place(0.5, 0))
-    world.run(0.2)
-    assert world.state(2) == (S.CANCELLED, R.REPLACED)
-
-
 def test_a_start_while_it_is_being_cancelled_is_refused_and_then_it_is_another(
     world: World,
 ) -> None:
@@ -510,29 +332,7 @@ def test_a_start_while_it_is_being_cancelled_is_refused_and_then_it_is_another(
     assert start(world) == (ACCEPTED, 2)
 
 
-def test_in_a_paused_queue_a_started_mission_runs_alone(world: World) -> None:
-    world.client.pause()
-    world.client.move(5)
-    uploaded(world, HOME, place(0.5, 0.5))
-    start(world)
-    world.until_state(2, S.COMPLETED)
-    world.run(5)
-    assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.OPERATOR)
-
-
-def test_auto_goes_on_with_a_mission_of_the_task_server_too(world: World) -> None:
-    uploaded(world, place(3, 0), target=(1, 191))
-    world.until_state(1, S.EXECUTING)
-    world.run(1)
-    world.client.mode(HOLD)
-    world.run(3)
-    sent = world.client.mode(AUTO)
-    world.until_state(1, S.COMPLETED)
-    assert sent.answer == (ACCEPTED, 1)
-    assert "mode10" not in world.observer.sent_since(0)
-
-
-@pytest.mark.parametrize("how", ["moving", "sticks"])
+@for_each("how", ["moving", "sticks"])
 def test_nobody_is_taken_the_sticks_from_by_a_start(world: World, how: str) -> None:
     uploaded(world)
     world.operator_arm(True)
@@ -550,7 +350,7 @@ def test_nobody_is_taken_the_sticks_from_by_a_start(world: World, how: str) -> N
     assert world.observer.sent_since(at_start) in ([], ["MANUAL_CONTROL"])
 
 
-@pytest.mark.parametrize("what", ["clear", "empty upload", "fence"])
+@for_each("what", ["clear", "empty upload", "fence"])
 def test_what_is_not_stored_in_time_is_as_it_was(make_world: MakeWorld, what: str) -> None:
     store = LateStore(delay=0.0)
     world = make_world(store=store)
@@ -585,56 +385,8 @@ def test_a_start_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> Non
     assert start(world) == (ACCEPTED, 1)
 
 
-@pytest.mark.parametrize("kind", [3, 77, 255])
+@for_each("kind", [3, 77, 255])
 def test_a_plan_of_a_strange_kind_is_refused(world: World, kind: int) -> None:
     upload = Upload(world.client, (), kind=kind)
     world.until(lambda: upload.result is not None, within=3)
     assert upload.result == 3
-
-
-def test_a_start_of_another_rover_does_not_make_one_meant_again(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    uploaded(world, HOME, place(0.3, 0))
-    other = Upload(world.client, (HOME, place(0.5, 4)), target=(2, 1))
-    world.until(lambda: other.result == 0, within=5)
-    assert start(world) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED)
-    world.run(3)
-    world.client.command(START, target=(2, 1))
-    world.run(1)
-    answer = start(world)
-    assert answer is not None
-    assert answer[1] > 2, "the mission that is over is another task"
-
-
-def test_a_mission_on_board_is_warned_of_once(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    direct = FakeClient(world.net, "direct", server="rover1")
-    world.join(direct)
-    upload = Upload(direct, (place(1, 0), place(2, 0)))
-    world.until(lambda: upload.result is not None, within=5)
-    world.run(5)
-    words = "Rover 1 has its own mission on board (2 items): its mission mode runs that"
-    assert world.client.texts().count(words) == 1
-
-
-@pytest.mark.parametrize("by_command", [True, False])
-def test_an_item_chosen_of_a_finished_plan_stays_shown_and_begins_the_next_start(
-    world: World, by_command: bool
-) -> None:
-    uploaded(world)
-    start(world)
-    world.until_state(1, S.COMPLETED, within=60)
-    world.run(3)
-    world.client.received.clear()
-    if by_command:
-        world.client.command(SET_CURRENT, 2, target=(1, 1))
-    else:
-        world.client.send(set_current(2))
-    world.run(3)
-    shown = {(each.seq, each.state) for each in currents(world.client)}
-    assert shown == {(2, NOT_STARTED)}
-    assert world.client.texts() == ["The mission will start with item 2"]
-    assert start(world) == (ACCEPTED, 2)
-    world.until_state(2, S.COMPLETED, within=60)
-    assert set(reached(world.client)) == {2, 3}, "item 1 is left out"

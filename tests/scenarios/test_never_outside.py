@@ -4,16 +4,13 @@ from collections.abc import Callable
 from math import cos, nan, pi, sin
 from random import Random
 
-import pytest
-
-from mav_tasks.engine.missions.fence_items import fence_of
 from mav_tasks.links.memory import Conditions
-from mav_tasks.services.mission_item import Item as StoredItem
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.fence import LocalFence
+from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
 from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.client import DRIVE, MOVE
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
@@ -46,12 +43,12 @@ def random_fence(random: Random) -> list[Item]:
     return items
 
 
-def as_the_server_reads_it(items: list[Item]) -> LocalFence:
-    stored = tuple(
-        StoredItem(i.frame, i.command, i.current, i.autocontinue, *i[3:7], i.x, i.y, i.z)
-        for i in items
-    )
-    return LocalFence(fence_of(stored), ORIGIN)
+def drawn(items: list[Item]) -> LocalFence:
+    corners = tuple(GlobalPlace(i.x, i.y) for i in items if i.command == CORNER)
+    ponds = [GlobalPlace(i.x, i.y) for i in items if i.command == CIRCLE_OUT]
+    radii = [i.param1 for i in items if i.command == CIRCLE_OUT]
+    circles = [Circle(place, radius, False) for place, radius in zip(ponds, radii, strict=True)]
+    return LocalFence(Fence((Polygon(corners, True), *circles)), ORIGIN)
 
 
 def fenced(world: World, items: list[Item]) -> int | None:
@@ -91,16 +88,16 @@ def tasks(world: World, random: Random) -> list[Callable[[], object]]:
     ]
 
 
-@pytest.mark.parametrize("seed", range(tries(3, long=30)))
-@pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
+@for_each("seed", range(tries(3, long=30)))
+@for_each("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC])
 def test_no_rover_is_ever_outside(make_world: MakeWorld, persona: Persona, seed: int) -> None:
     random = Random(seed)
     net = Conditions(delay=random.choice((0.002, 0.05)), loss=random.choice((0.0, 0.05)))
     world = make_world(seed=seed, persona=persona, conditions=net)
     items = random_fence(random)
-    while not as_the_server_reads_it(items).allows(LocalPlace(0.0, 0.0)):
+    while not drawn(items).allows(LocalPlace(0.0, 0.0)):
         items = random_fence(random)
-    fence = as_the_server_reads_it(items)
+    fence = drawn(items)
     # over a bad net the rover may not have it in time, and then it is refused
     assert any(fenced(world, items) == 0 for _ in range(20))
     moved = 0.0

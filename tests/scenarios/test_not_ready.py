@@ -2,31 +2,23 @@
 
 from collections.abc import Callable
 
-import pytest
-from pymavlink.dialects.v20 import common
-
 from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode, Persona
 from tests.kit import px4
-from tests.kit.client import ACCEPTED
+from tests.kit.cases import anew, for_each
 from tests.kit.volume import some
 from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL = 54010
 NOT_READY = Faults(refuse_arm=True)
-MAKES = {"ardupilot": PROMPT, "px4": px4.PROMPT_PX4}
+MAKES = [PROMPT, px4.PROMPT_PX4]
 
 
-@pytest.fixture(params=MAKES)
-def persona(request: pytest.FixtureRequest) -> Persona:
-    return MAKES[request.param]
-
-
-@pytest.fixture
+@anew
 def waiting(make_world: MakeWorld, persona: Persona) -> World:
     """A world in which a task waits for a rover that will not arm, and two wait behind it."""
     world = make_world(persona=persona)
@@ -41,6 +33,7 @@ def arm_requests(world: World, *, since: float) -> int:
     return world.observer.sent_since(since).count("arm")
 
 
+@for_each("persona", MAKES)
 def test_tasks_wait_until_it_is_ready_and_are_driven_then(waiting: World) -> None:
     world = waiting
     world.run(30)
@@ -52,6 +45,7 @@ def test_tasks_wait_until_it_is_ready_and_are_driven_then(waiting: World) -> Non
     assert near_pose(world.pose(), (0.9, 0.0, 0.0), metres=0.05)
 
 
+@for_each("persona", MAKES)
 def test_it_says_so_in_the_rovers_own_words(waiting: World) -> None:
     world = waiting
     words = "Arm: refused by a simulated fault"
@@ -66,27 +60,7 @@ def test_it_says_so_in_the_rovers_own_words(waiting: World) -> None:
     assert said == 1, "once, as long as nothing changes"
 
 
-def test_another_text_of_the_rover_is_another_reason(waiting: World) -> None:
-    world = waiting
-    rover = common.MAVLink(None, 1, 1)
-    for words in (b"PreArm: GPS 1: Bad fix", b"EKF3 IMU0 is using GPS"):
-        text = common.MAVLink_statustext_message(4, words)
-        world.from_vehicle_side(text.pack(rover), peer="rover1")
-    world.run(0.2)
-    world.client.request_status(1)
-    world.run(0.1)
-    assert "not ready: PreArm: GPS 1: " in world.client.statuses(1)[-1].text
-
-
-def test_it_is_asked_again_each_few_seconds(waiting: World) -> None:
-    world = waiting
-    at = world.now
-    world.run(60)
-    assert 10 <= arm_requests(world, since=at) <= 60
-    for second in range(0, 60, 6):
-        assert arm_requests(world, since=at + second) > 0
-
-
+@for_each("persona", MAKES)
 def test_after_a_time_it_fails_as_refused(make_world: MakeWorld, persona: Persona) -> None:
     world = make_world(persona=persona, settings=Settings(watch=Watch(ready_timeout=20.0)))
     world.fault(NOT_READY)
@@ -107,8 +81,9 @@ HALTS: dict[str, tuple[Callable[[World], object], tuple[S, R]]] = {
 }
 
 
-@pytest.mark.parametrize("phase", some([0.0, 1.0, 2.0, 4.5], 1, 3))
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("persona", MAKES)
+@for_each("phase", some([0.0, 1.0, 2.0, 4.5], 1, 3))
+@for_each("halt", HALTS)
 def test_what_halts_a_task_halts_one_that_waits(waiting: World, halt: str, phase: float) -> None:
     world = waiting
     do, becomes = HALTS[halt]
@@ -124,13 +99,3 @@ def test_what_halts_a_task_halts_one_that_waits(waiting: World, halt: str, phase
     assert arm_requests(world, since=at + 0.1) == 0
     assert not world.rover.autopilot.armed
     assert near_pose(world.pose(), (0.0, 0.0, 0.0))
-
-
-def test_a_rover_that_has_just_started_is_waited_for(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(1.5)
-    sent = world.client.move(0.3)
-    world.until_idle(tasks=1)
-    assert sent.result == ACCEPTED
-    assert world.state(1)[0] is S.COMPLETED

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import pytest
 from pymavlink.dialects.v20 import common
 
+from tests.kit.cases import for_each
 from tests.kit.client import (
     AUTO,
     GUIDED,
@@ -95,63 +96,12 @@ def arming(armed: int) -> object:
     return command_long(400, armed, target=(1, 1))
 
 
-def test_good_driving_is_no_violation() -> None:
-    story = Story().driving().later(0.05).moves(0.0)
-    story.sends(mode_request(HOLD)).later(0.1).rover(HOLD, armed=True)
-    story.sends(arming(0)).later(0.1).rover(HOLD, armed=False)
-    story.observer.check()
-
-
-def test_a_stop_well_done_is_no_violation() -> None:
-    story = Story().driving().later(0.01).asks(command_long(STOP))
-    story.sends(mode_request(HOLD)).moves(0.0).later(0.05).moves(0.0).rover(HOLD, armed=True)
-    story.later(3).asks(command_long(PAUSE_CONTINUE, 1)).answers(PAUSE_CONTINUE, 0)
-    story.sends(mode_request(GUIDED)).observer.check()
-
-
-def test_a_pause_that_is_hold_is_no_violation_after_a_takeover() -> None:
-    story = Story().driving().rover(AUTO, armed=True).later(1).asks(PAUSE)
-    story.moves(0.0).sends(mode_request(HOLD)).later(0.05).moves(0.0).observer.check()
-
-
-def test_sticks_while_it_is_brought_to_a_stand_are_no_takeover() -> None:
-    story = Story().driving().later(0.05).moves(0.0).later(0.02).asks(sticks(500))
-    story.later(0.03).moves(0.0).later(0.05).moves(0.0).observer.check()
-
-
-def test_news_of_hold_in_the_step_in_which_a_client_asks_for_it_is_no_takeover() -> None:
-    story = Story().driving().later(0.05).in_batches()
-    story.asks(mode_request(HOLD)).rover(HOLD, armed=True)
-    story.moves(0.0).sends(mode_request(HOLD)).later(0.05).moves(0.0).observer.check()
-
-
-@pytest.mark.parametrize(("mode", "later"), [(AUTO, 0.0), (HOLD, 0.01)])
+@for_each("mode, later", [(AUTO, 0.0), (HOLD, 0.01)])
 def test_news_of_another_mode_or_of_another_step_is_a_takeover(mode: int, later: float) -> None:
     story = Story().driving().later(0.05).in_batches()
     story.asks(mode_request(HOLD)).later(later).rover(mode, armed=True)
     with pytest.raises(AssertionError, match="after a takeover"):
         story.moves(0.0).observer.check()
-
-
-def test_a_client_that_is_handed_the_rover_between_two_zeros_may_drive_it() -> None:
-    story = Story().driving()
-    for _ in range(8):
-        story.later(0.05).moves(0.0)
-    story.sends(mode_request(GUIDED), CLIENT).later(0.05).moves(0.0).moves(0.0)
-    story.sends(setpoint(1.0), CLIENT).observer.check()
-
-
-def test_a_rover_that_is_stopped_when_it_is_found_is_no_violation() -> None:
-    story = Story().asks(command_long(STOP)).later(1).rover(AUTO, armed=True)
-    story.moves(0.0).sends(mode_request(HOLD)).later(1).observer.check()
-
-
-def test_a_continue_that_was_refused_ends_no_stop() -> None:
-    story = Story().rover(HOLD, armed=True).asks(command_long(STOP))
-    story.sends(mode_request(HOLD)).moves(0.0).later(1)
-    story.asks(command_long(PAUSE_CONTINUE, 1)).answers(PAUSE_CONTINUE, 1)
-    with pytest.raises(AssertionError, match="in spite of STOP"):
-        story.sends(mode_request(GUIDED)).observer.check()
 
 
 SINS: dict[str, tuple[str, Callable[[Story], object]]] = {
@@ -291,7 +241,7 @@ PASSED = [
 ]
 
 
-@pytest.mark.parametrize("sin", SINS)
+@for_each("sin", SINS)
 def test_each_sin_is_caught(sin: str) -> None:
     words, tell = SINS[sin]
     story = Story()
@@ -300,7 +250,7 @@ def test_each_sin_is_caught(sin: str) -> None:
         story.observer.check()
 
 
-@pytest.mark.parametrize("message", PASSED, ids=lambda m: m.get_type())
+@for_each("message", PASSED)
 def test_whatever_moves_and_passes_after_a_stop_is_caught(message: object) -> None:
     story = Story().rover(HOLD, armed=True).asks(command_long(STOP))
     story.sends(mode_request(HOLD)).moves(0.0).later(0.5).sends(message, CLIENT)

@@ -3,13 +3,12 @@
 from dataclasses import replace
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import GENERIC, PX4, Mode, Persona
+from rover_sim.personas import PX4, Mode, Persona
 from rover_sim.realism import EXACT, Drive
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, setpoint
 from tests.kit.px4 import HOLD, OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
 from tests.kit.world import World
@@ -18,10 +17,10 @@ from tests.scenarios.conftest import MakeWorld
 VELOCITY_NED = 2503  # MAVSDK's mask: velocity and yaw
 
 
-@pytest.fixture(params=[PROMPT_PX4, PROMPT_GENERIC], ids=lambda persona: persona.name)
-def world(make_world: MakeWorld, request: pytest.FixtureRequest) -> World:
+@anew
+def world(make_world: MakeWorld, persona: Persona) -> World:
     """An armed rover and a client that streams."""
-    world = make_world(persona=request.param)
+    world = make_world(persona=persona)
     world.client.arm()
     world.run(0.3)
     world.client.stream(northwards(0.5), rate=20)
@@ -36,6 +35,7 @@ def northwards(speed: float) -> Any:
     )
 
 
+@for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 def test_drives_the_rover_from_when_it_is_asked_for_until_hold(world: World) -> None:
     sent = ask_mode(world.client, OFFBOARD)
     world.run(0.2)
@@ -54,24 +54,8 @@ def test_drives_the_rover_from_when_it_is_asked_for_until_hold(world: World) -> 
     assert world.stands(), "the stream goes on, and is not passed"
 
 
-@pytest.mark.parametrize("persona", [PX4, GENERIC], ids=lambda persona: persona.name)
-def test_works_also_before_it_was_heard_that_the_rover_is_armed(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world = make_world(persona=persona)  # shows it within a second
-    world.client.stream(northwards(0.5), rate=20)
-    world.until(lambda: world.rover.autopilot.armed is False, within=1)
-    world.client.arm()
-    world.run(0.1)
-    sent = ask_mode(world.client, OFFBOARD)
-    world.run(3)
-    assert sent.answer is not None
-    assert sent.answer[0] == ACCEPTED
-    assert world.truth.forward_speed > 0.4
-
-
-@pytest.mark.parametrize("drive", [Drive.EXACT, Drive.REAL])
-@pytest.mark.parametrize("again", [False, True], ids=["once", "each again"])
+@for_each("drive", [Drive.EXACT, Drive.REAL])
+@for_each("again", [False, True])
 def test_the_recipe_of_stream_mode_and_arming_drives(
     make_world: MakeWorld, drive: Drive, *, again: bool
 ) -> None:
@@ -103,6 +87,7 @@ def test_the_recipe_of_stream_mode_and_arming_drives(
     ]
 
 
+@for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 def test_is_refused_by_the_rover_without_a_stream(world: World) -> None:
     world.client.end_streams()
     world.run(1)
@@ -113,6 +98,7 @@ def test_is_refused_by_the_rover_without_a_stream(world: World) -> None:
     assert world.rover.autopilot.mode is Mode.HOLD
 
 
+@for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 def test_does_not_come_back_when_a_task_has_ended(world: World) -> None:
     ask_mode(world.client, OFFBOARD)
     world.run(1)
@@ -131,27 +117,7 @@ def test_does_not_come_back_when_a_task_has_ended(world: World) -> None:
     assert abs(world.truth.north - where) < 0.02
 
 
-@pytest.mark.parametrize("lost", [1.0, 5.0])
-def test_is_not_opened_for_a_stream_that_would_not_pass(make_world: MakeWorld, lost: float) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    world.rover.autopilot.parameters["COM_OF_LOSS_T"] = lost
-    world.client.move(60, speed=1.5)
-    world.until(lambda: world.truth.forward_speed > 1.4, within=20)
-    world.operator_mode(Mode.MANUAL)
-    world.run(5)
-    assert world.paused() is R.TAKEOVER
-    where = world.truth.north
-    world.client.stream(northwards(0.0), rate=20)
-    world.run(0.5)
-    ask_mode(world.client, OFFBOARD)
-    modes = set()
-    for _ in range(160):
-        world.run(0.05)
-        modes.add(world.rover.autopilot.mode)
-    assert abs(world.truth.north - where) < 0.1
-    assert Mode.GUIDED not in modes
-
-
+@for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 def test_of_two_clients_whoever_asked_last_drives(world: World) -> None:
     """Two streams at once would be two drivers; who is to drive is asked for, not raced for."""
     second = world.add_client("second", system_id=201)

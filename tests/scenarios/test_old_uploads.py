@@ -7,6 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from rover_sim.personas import ARDUPILOT, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import FakeClient, Received
 from tests.kit.mission import MISSION_ACK, REQUEST, REQUEST_INT, Ack, Download
 from tests.kit.px4 import PROMPT_PX4
@@ -60,9 +61,9 @@ class DroneKit:
 PLACES = [(0.0, 0.0), (20.0, 0.0), (20.0, 20.0)]
 
 
-@pytest.mark.parametrize("system", [0, 1])
-@pytest.mark.parametrize(
-    ("persona", "knows", "within"),
+@for_each("system", [0, 1])
+@for_each(
+    "persona, knows, within",
     [
         (ARDUPILOT, REQUEST, 0.2),
         (ARDUPILOT, REQUEST_INT, 0.5),
@@ -85,19 +86,6 @@ def stored(world: World) -> int:
     download = Download(world.client)
     world.until(lambda: download.is_done, within=3)
     return len(download.items)
-
-
-def test_a_rover_asks_as_its_autopilot_does(make_world: MakeWorld) -> None:
-    for persona, kind in ((ARDUPILOT, "MISSION_REQUEST"), (PROMPT_PX4, "MISSION_REQUEST_INT")):
-        world = make_world(persona=persona)
-        world.client.send(common.MAVLink_mission_count_message(1, 1, 2))
-        world.run(0.1)
-        asked = [m.get_type() for m in all_requests(world)]
-        assert asked == [kind]
-
-
-def all_requests(world: World) -> list[common.MAVLink_message]:
-    return world.client.of_type("MISSION_REQUEST") + world.client.of_type("MISSION_REQUEST_INT")
 
 
 def test_a_download_is_answered_in_the_form_in_which_it_is_asked_for(world: World) -> None:

@@ -1,21 +1,18 @@
 """A client's own stop, HOLD, return, "go to" or mission ends what it drives by setpoints."""
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
     GUIDED,
     RTL,
-    TEMPORARILY_REJECTED,
     FakeClient,
     Sent,
     setpoint,
 )
 from tests.kit.client import HOLD as AP_HOLD
-from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD, MISSION, OFFBOARD, PROMPT_PX4, REPOSITION, RETURN, ask_mode
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
@@ -23,7 +20,6 @@ from tests.scenarios.conftest import MakeWorld
 AT_ONCE = 0.25  # s, two steps of the clock and the commit
 NO_LONGER = 2.0  # s after a client's last setpoint, in which tasks waited for it
 CRITICAL = 2  # MAV_SEVERITY
-WAYPOINT = 16
 
 AP, PX = ARDUPILOT, PROMPT_PX4
 
@@ -50,8 +46,8 @@ def ask(client: FakeClient, persona: Persona, what: str) -> Sent:
     return ask_mode(client, modes[what])
 
 
-@pytest.mark.parametrize("persona", [AP, PX], ids=lambda persona: persona.name)
-@pytest.mark.parametrize("first", ["", "hold"])
+@for_each("persona", [AP, PX])
+@for_each("first", ["", "hold"])
 def test_a_return_is_taken_at_once_and_ends_the_clients_setpoints(
     make_world: MakeWorld, persona: Persona, first: str
 ) -> None:
@@ -70,7 +66,7 @@ def test_a_return_is_taken_at_once_and_ends_the_clients_setpoints(
     assert abs(world.truth.north) < 0.2 < far
 
 
-@pytest.mark.parametrize("persona", [AP, PX], ids=lambda persona: persona.name)
+@for_each("persona", [AP, PX])
 def test_a_go_to_begins_at_once_and_without_a_failsafe(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -85,37 +81,6 @@ def test_a_go_to_begins_at_once_and_without_a_failsafe(
     severities = {t.severity for t in world.client.of_type("STATUSTEXT")}
     assert min(severities, default=6) > CRITICAL, world.client.texts()
     assert world.now > asked_at
-
-
-@pytest.mark.parametrize("persona", [AP, PX], ids=lambda persona: persona.name)
-def test_a_mission_begins_at_once(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    upload = Upload(world.client, [Item(WAYPOINT, **at(n, 0.0)) for n in (0.0, 2.0, 4.0)])
-    world.until(lambda: upload.result is not None, within=5)
-    world.client.arm()
-    world.run(1.2)
-    world.client.stream(setpoint(0.6), rate=20)
-    world.run(0.3)
-    ask(world.client, persona, "drive")
-    world.run(2.0)
-    sent = ask(world.client, persona, "mission")
-    world.run(AT_ONCE)
-    assert world.state(sent.task_id)[0] is S.STARTING
-
-
-@pytest.mark.parametrize("persona", [AP, PX], ids=lambda persona: persona.name)
-def test_a_return_that_another_client_asks_for_does_not_take_the_rover_from_who_drives(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world = drives(make_world, persona)
-    other = world.add_client("other", system_id=201)
-    world.run(1.2)
-    sent = ask(other, persona, "return")
-    world.run(AT_ONCE)
-    assert sent.answer is not None
-    assert sent.answer[0] == TEMPORARILY_REJECTED
-    world.run(0.5)
-    assert world.truth.forward_speed > 0.4
 
 
 def test_a_queue_that_is_cleared_leaves_no_velocity_of_the_clients_behind(

@@ -11,9 +11,9 @@ from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import ParametersChanged
 from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.settings import Driving, Settings
-from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
+from tests.kit.cases import for_each
 from tests.kit.client import FakeClient
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World
@@ -54,9 +54,7 @@ def errors(client: FakeClient) -> list[tuple[str, int]]:
     return [(each.param_id, each.error) for each in client.of_type("PARAM_ERROR")]
 
 
-@pytest.mark.parametrize(
-    ("component", "ours", "the_rovers"), [(0, True, True), (1, False, True), (191, True, False)]
-)
+@for_each("component, ours, the_rovers", [(0, True, True), (1, False, True), (191, True, False)])
 def test_a_list_is_of_who_is_asked(
     world: World, component: int, ours: bool, the_rovers: bool
 ) -> None:
@@ -73,13 +71,6 @@ def test_a_list_is_of_who_is_asked(
         assert {each.param_count for each in values} == {len(PARAMETERS)}
         assert {each.param_type for each in values} == {REAL32}
         assert ("TSK_SPEED", 0.5) in told(world.client)
-
-
-def test_every_vehicles_server_lists_them(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.send(ask_all(0, system=0))
-    world.run(0.5)
-    assert len(told(world.client, (1, 191))) == len(told(world.client, (2, 191))) > 0
 
 
 def test_lists_are_not_sent_faster_than_anybody_reads_them(world: World) -> None:
@@ -117,14 +108,6 @@ def test_of_one_that_is_not_there_the_client_is_told_so(world: World) -> None:
     assert "TSK_NONE: no such parameter" in world.client.texts()
 
 
-def test_who_begins_with_a_digest_gets_the_list(make_world: MakeWorld) -> None:
-    """A ground station that finds the rover's parameters in its cache never asks for a list."""
-    world = make_world()
-    world.client.send(ask(0, "_HASH_CHECK"))
-    world.run(0.2)
-    assert len(told(world.client)) == len(PARAMETERS)
-
-
 def test_who_reads_the_rovers_from_a_file_gets_the_list(make_world: MakeWorld) -> None:
     """QGroundControl 4.4 asks an ArduPilot for a file, and then for no list."""
     world = make_world()
@@ -134,12 +117,6 @@ def test_who_reads_the_rovers_from_a_file_gets_the_list(make_world: MakeWorld) -
     world.client.send(ask_all(0))  # there is no such file, as on the simulated rover
     world.run(0.1)
     assert len(told(world.client)) == 2 * len(PARAMETERS)
-
-
-def test_who_reads_another_file_gets_no_list(world: World) -> None:
-    open_file(world.client, b"@SYS/threads.txt")
-    world.run(0.2)
-    assert told(world.client) == []
 
 
 def test_a_change_has_effect_and_everybody_is_told(world: World) -> None:
@@ -154,17 +131,8 @@ def test_a_change_has_effect_and_everybody_is_told(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-def test_a_lower_limit_slows_down_what_is_being_driven(world: World) -> None:
-    world.client.move(10, speed=1.5)
-    world.until(lambda: world.truth.forward_speed > 1.4, within=10)
-    world.client.send(put("TSK_SPEED_MAX", 0.6))
-    world.run(3)
-    assert world.truth.forward_speed < 0.65
-    assert world.state(1)[0] is S.EXECUTING
-
-
-@pytest.mark.parametrize(
-    ("message", "says"),
+@for_each(
+    "message, says",
     [
         (put("TSK_SPEED", 50.0), "TSK_SPEED 50: not in 0.05..10"),
         (put("TSK_SPEED", nan), "TSK_SPEED nan: not in 0.05..10"),
@@ -207,16 +175,6 @@ def test_what_was_kept_and_is_out_of_range_now_is_named() -> None:
     assert engine.not_in_force == ("TSK_SPEED_MAX 50: not in 0.05..10",)
 
 
-def test_it_is_not_told_before_it_is_stored(make_world: MakeWorld) -> None:
-    store = LateStore(delay=0.2)
-    world = make_world(store=store)
-    world.client.send(put("TSK_SPEED", 0.8))
-    world.run(0.1)
-    assert told(world.client) == []
-    world.run(0.3)
-    assert told(world.client) == [("TSK_SPEED", 0.8)]
-
-
 def test_what_is_not_stored_in_time_is_not_set(make_world: MakeWorld) -> None:
     store = LateStore()
     world = make_world(store=store)
@@ -226,63 +184,6 @@ def test_what_is_not_stored_in_time_is_not_set(make_world: MakeWorld) -> None:
     assert told(world.client) == [("TSK_SPEED", 0.5)]
     assert errors(world.client) == [("TSK_SPEED", NOT_ALLOWED)]
     assert [event.value for event in world.events(ParameterSet)] == [0.8, None]
-
-
-def kept(world: World) -> dict[str, float | None]:
-    """What a restart would find."""
-    return {event.name: event.value for event in world.events(ParameterSet)}
-
-
-def test_what_is_told_is_what_is_kept_though_an_earlier_wish_came_to_nothing(
-    make_world: MakeWorld,
-) -> None:
-    store = LateStore()
-    world = make_world(store=store)
-    store.delay = 5.0
-    world.client.send(put("TSK_SPEED", 0.8))
-    world.run(0.3)
-    world.client.send(put("TSK_SPEED", 0.4))
-    world.run(0.2)
-    assert errors(world.client) == [("TSK_SPEED", NOT_ALLOWED)]
-    store.delay = 0.0
-    world.run(0.2)
-    assert told(world.client)[-1] == ("TSK_SPEED", 0.4)
-    assert kept(world) == {"TSK_SPEED": 0.4}
-
-
-def test_what_is_told_is_what_is_kept_though_a_later_wish_comes_to_nothing(
-    make_world: MakeWorld,
-) -> None:
-    store = LateStore()
-    world = make_world(store=store)
-    store.delay = 0.2
-    world.client.send(put("TSK_SPEED", 0.4))
-    world.run(0.15)
-    world.client.send(put("TSK_SPEED", 0.8))
-    world.run(0.08)
-    assert told(world.client) == [("TSK_SPEED", 0.4)]
-    store.delay = 5.0
-    world.run(0.6)
-    assert told(world.client)[-1] == ("TSK_SPEED", 0.4)
-    assert kept(world) == {"TSK_SPEED": 0.4}
-
-
-def test_nothing_is_set_within_a_bound_that_was_not_stored(make_world: MakeWorld) -> None:
-    store = LateStore()
-    world = make_world(store=store)
-    store.delay = 5.0
-    world.client.send(put("TSK_SPEED_MAX", 4.0))
-    world.run(0.3)
-    world.client.send(put("TSK_SPEED", 3.0))
-    world.run(0.2)
-    store.delay = 0.0
-    world.run(0.2)
-    assert errors(world.client) == [("TSK_SPEED_MAX", NOT_ALLOWED), ("TSK_SPEED", OUT_OF_RANGE)]
-    world.client.send(put("TSK_SPEED_MAX", 5.0))
-    world.client.send(ask(191, "TSK_SPEED"))
-    world.run(0.2)
-    assert ("TSK_SPEED", 3.0) not in told(world.client)
-    assert kept(world) == {"TSK_SPEED_MAX": 5.0, "TSK_SPEED": None}
 
 
 def test_it_comes_before_what_is_configured(make_world: MakeWorld) -> None:
@@ -303,16 +204,6 @@ def test_the_rovers_own_parameters_are_the_rovers(world: World) -> None:
     assert dict(told(world.client, ROVER)) == {"WP_SPEED": 3.0, "SYSID_THISMAV": 1.0}
     assert told(world.client) == []
     assert world.rover.autopilot.parameters["WP_SPEED"] == 3.0
-
-
-def test_where_the_rover_has_a_191_itself_they_are_at_the_next(world: World) -> None:
-    mav = common.MAVLink(None, srcSystem=1, srcComponent=191)
-    beat = common.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
-    world.from_vehicle_side(beat.pack(mav), peer="rover1")
-    world.run(0.1)
-    world.client.send(ask_all(192))
-    world.run(0.3)
-    assert len(told(world.client, (1, 192))) == len(PARAMETERS)
 
 
 def test_a_parameter_that_was_set_at_another_gateway_is_in_force_and_told(

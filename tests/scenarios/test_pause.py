@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from random import Random
 
-import pytest
-
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, PAUSE_CONTINUE, ROTATE, set_mode
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -21,7 +21,7 @@ PAUSES: dict[str, Callable[[World], object]] = {
 }
 
 
-@pytest.mark.parametrize("way", PAUSES)
+@for_each("way", PAUSES)
 def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str) -> None:
     world.client.move(3)
     world.until_state(1, S.EXECUTING)
@@ -43,7 +43,7 @@ def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str
     assert near_pose(world.pose(), (3.0, 0.0, 20.0))
 
 
-@pytest.mark.parametrize("seed", range(8))
+@for_each("seed", range(4))
 def test_the_end_is_the_same_with_any_pattern_of_pauses(make_world: MakeWorld, seed: int) -> None:
     world = make_world(seed=seed)
     random = Random(seed)
@@ -63,18 +63,8 @@ def test_the_end_is_the_same_with_any_pattern_of_pauses(make_world: MakeWorld, s
     assert near_pose(world.pose(), (2.0 + diagonal, diagonal, -135.0), metres=0.04)
 
 
-def test_pausing_an_empty_queue_keeps_what_is_submitted_then(world: World) -> None:
-    paused = world.client.pause()
-    world.client.move(1)
-    world.run(2)
-    assert paused.answer == (ACCEPTED, 0)
-    assert world.state(1) == (S.QUEUED, R.NONE)
-    world.client.proceed()
-    world.until_idle(tasks=1)
-
-
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4])
-@pytest.mark.parametrize("has_driven", [False, True])
+@for_each("persona", [ARDUPILOT, PX4])
+@for_each("has_driven", [False, True])
 def test_pausing_an_idle_armed_rover_keeps_what_is_submitted_then(
     make_world: MakeWorld, persona: Persona, has_driven: bool
 ) -> None:
@@ -109,20 +99,6 @@ def test_neither_0_nor_1_is_denied(world: World) -> None:
     assert world.client.acks_of(PAUSE_CONTINUE) == [(DENIED, R.BAD_PARAMETER)] * 4
 
 
-def test_continue_while_driving_changes_nothing(world: World) -> None:
-    world.client.move(1)
-    world.until_state(1, S.EXECUTING)
-    for _ in range(30):
-        world.client.proceed()
-        world.run(0.013)
-    world.until_idle(tasks=1)
-    assert world.history(1) == [
-        (S.STARTING, R.NONE),
-        (S.EXECUTING, R.NONE),
-        (S.COMPLETED, R.NONE),
-    ]
-
-
 def test_a_pause_while_starting_resumes(world: World) -> None:
     world.client.move(1)
     world.run(0.012)
@@ -133,3 +109,56 @@ def test_a_pause_while_starting_resumes(world: World) -> None:
     world.client.proceed()
     world.until_idle(tasks=1)
     assert near_pose(world.pose(), (1.0, 0.0, 0.0))
+
+
+# no ground station is heard any more
+
+
+PAUSE = replace(Settings(), operator_lost="pause")
+
+
+LIMIT = PAUSE.watch.operator_lost
+
+
+def test_the_rover_stands_and_goes_on_only_when_told(make_world: MakeWorld) -> None:
+    world = make_world(settings=PAUSE)
+    world.client.move(10)
+    world.client.move(1, nonce=7)
+    world.until_state(1, S.EXECUTING)
+    world.run(2)
+    world.client.heartbeats = False
+    world.run(LIMIT - 1.5)
+    assert world.state(1)[0] is S.EXECUTING
+    world.until_state(1, S.PAUSED, within=1.6)
+    assert (world.state(1)[1], world.paused()) == (R.OPERATOR, R.OPERATOR)
+    world.run(4)
+    assert world.stands()
+
+    world.client.heartbeats = True
+    world.run(5)
+    assert world.state(1)[0] is S.PAUSED
+    assert world.client.proceed().answer is None
+    world.until_idle(tasks=2)
+    assert abs(world.truth.north - 11.0) < 0.04
+
+
+def test_a_script_without_heartbeats_is_no_operator(make_world: MakeWorld) -> None:
+    world = make_world(settings=PAUSE)
+    world.client.heartbeats = False
+    world.run(LIMIT + 1)
+    sent = world.client.move(3)
+    world.until_idle(tasks=1)
+    assert (sent.answer, world.state(1)[0]) == ((ACCEPTED, 1), S.COMPLETED)
+
+
+@for_each("settings", [Settings(), PAUSE])
+def test_what_waits_waits_only_by_that_setting(make_world: MakeWorld, settings: Settings) -> None:
+    world = make_world(settings=settings)
+    world.client.command(54000, 1.0, 0, 0, 0, 0, LIMIT + 3, 5)
+    world.run(0.5)
+    world.client.heartbeats = False
+    world.run(LIMIT + 10)
+    if settings is PAUSE:
+        assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.OPERATOR)
+    else:
+        assert world.state(1)[0] is S.COMPLETED

@@ -12,7 +12,8 @@ from mav_tasks.settings import Roles, Settings, VehicleProfile
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.car import Car
-from tests.kit.mission import Item, Upload, reached
+from tests.kit.cases import anew, for_each
+from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World, at, is_at
 from tests.scenarios.conftest import MakeWorld
@@ -96,7 +97,7 @@ def turned_round(track: list[Seen], north: float, east: float, *, within: float)
 MakeRover = Callable[[Persona, VehicleProfile | None], World]
 
 
-@pytest.fixture
+@anew
 def make_rover(make_world: MakeWorld) -> MakeRover:
     def make(persona: Persona, profile: VehicleProfile | None) -> World:
         if profile is None:
@@ -107,10 +108,9 @@ def make_rover(make_world: MakeWorld) -> MakeRover:
     return make
 
 
-@pytest.mark.parametrize(
-    ("persona", "profile", "radius"),
+@for_each(
+    "persona, profile, radius",
     [(PROMPT, None, 1.5), (PROMPT, ARDUPILOT_CAR, -2.0), (PROMPT_PX4, None, -1.5)],
-    ids=["ardupilot", "ardupilot car", "px4"],
 )
 def test_a_circle_is_driven_as_a_circle(
     make_rover: MakeRover, persona: Persona, profile: VehicleProfile | None, radius: float
@@ -123,18 +123,7 @@ def test_a_circle_is_driven_as_a_circle(
     assert hypot(world.truth.north - 3, world.truth.east) == pytest.approx(abs(radius), abs=0.25)
 
 
-def test_a_circle_over_the_fence_is_not_begun(world: World) -> None:
-    corners = [(-3, -3), (-3, 3), (3, 3), (3, -3)]
-    fence = [Item(5001, **at(*corner), param1=4, param4=0, frame=0) for corner in corners]
-    kept = Upload(world.client, fence, kind=1)
-    world.until(lambda: kept.result == 0, within=5)
-    upload = Upload(world.client, [circle(2, 0, turns=1, radius=2)], target=(1, 191))
-    world.until(lambda: upload.result is not None, within=5)
-    world.until_state(1, S.FAILED, within=10)
-    assert hypot(world.truth.north, world.truth.east) < 0.05
-
-
-@pytest.mark.parametrize("profile", [None, ARDUPILOT_CAR], ids=["skid", "car"])
+@for_each("profile", [None, ARDUPILOT_CAR])
 def test_what_is_to_be_driven_backwards_is(
     make_rover: MakeRover, profile: VehicleProfile | None
 ) -> None:
@@ -151,18 +140,7 @@ def test_what_is_to_be_driven_backwards_is(
     assert hypot(world.truth.north - 1, world.truth.east) < 0.2
 
 
-def test_what_cannot_reverse_is_told_so(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    assert "item 2: this rover cannot reverse: leave" in refused(world, place(2, 0), do(REVERSE, 1))
-
-
-def test_a_tag_is_gone_on_from(world: World) -> None:
-    items = (do(TAG, 3), place(0.3, 0), place(0.9, 0), do(JUMP_TO_TAG, 3, 1), place(0.5, 0))
-    driven(world, *items)
-    assert reached(world.client)[:5] == [1, 2, 1, 2, 4]
-
-
-@pytest.mark.parametrize(("params", "until"), [((0, 12, 0, 9), 9.0), ((-1, -1, -1, 8), 8.0)])
+@for_each("params, until", [((0, 12, 0, 9), 9.0), ((-1, -1, -1, 8), 8.0)])
 def test_it_stands_until_a_time_of_day(
     make_world: MakeWorld, params: tuple[float, ...], until: float
 ) -> None:
@@ -172,22 +150,7 @@ def test_it_stands_until_a_time_of_day(
     assert until < moved_at < until + 2
 
 
-def test_a_time_of_day_that_comes_while_it_is_paused_is_not_waited_for_till_tomorrow(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(wall_offset=NOON)
-    upload = Upload(world.client, (do(DELAY, -1, 12, 0, 8), place(0.5, 0)), target=(1, 191))
-    world.until(lambda: upload.result is not None, within=5)
-    world.until_state(1, S.EXECUTING)
-    world.client.command(PAUSE, 0)
-    world.run(10.0)
-    world.client.command(PAUSE, 1)
-    world.until_state(1, S.COMPLETED, within=20)
-
-
-@pytest.mark.parametrize(
-    ("persona", "wish", "speed"), [(PROMPT, 0.0, 0.3), (PROMPT_PX4, -1.0, 0.5)]
-)
+@for_each("persona, wish, speed", [(PROMPT, 0.0, 0.3), (PROMPT_PX4, -1.0, 0.5)])
 def test_no_speed_means_what_it_means_to_the_autopilot(
     make_world: MakeWorld, persona: Persona, wish: float, speed: float
 ) -> None:
@@ -196,13 +159,6 @@ def test_no_speed_means_what_it_means_to_the_autopilot(
     track = driven(world, slow, place(1, 0), same, place(4, 0))
     late = [seen.speed for seen in track if 2 < seen.north < 3]
     assert max(late) == pytest.approx(speed, abs=0.08)
-
-
-def test_a_waypoint_without_a_place_is_here(world: World) -> None:
-    here = Item(WAYPOINT, param1=3.0)
-    track = driven(world, place(2, 0), here, place(3, 0))
-    stood = [seen.at for seen in track if 1.5 < seen.north < 2.5 and abs(seen.speed) < 0.01]
-    assert stood[-1] - stood[0] > 2.5
 
 
 def test_a_gate_holds_back_a_command_until_it_is_passed(world: World) -> None:

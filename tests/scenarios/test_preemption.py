@@ -3,13 +3,12 @@
 from math import hypot
 from random import Random
 
-import pytest
-
 from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import MOVE, ROTATE
 from tests.kit.volume import tries
 from tests.kit.world import World, near_pose
@@ -66,24 +65,8 @@ def test_a_preemptive_task_interrupts_whatever_its_priority_but_not_a_firm_one(
     assert near_pose(world.pose(), (4.0, 0.0, 0.0), metres=0.03, angle=1.5)
 
 
-def test_a_stop_kills_the_one_that_runs_and_keeps_the_interrupted_one(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(settings=GAP)
-    world.client.move(2, priority=1)
-    world.run(3)
-    world.client.rotate(90, priority=9)
-    world.until_state(2, S.EXECUTING)
-    world.client.stop()
-    world.run(3)
-    assert [world.state(i)[0] for i in (1, 2)] == [S.PAUSED, S.KILLED]
-    world.client.proceed()
-    world.until_idle(tasks=2)
-    assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=1.5)
-
-
-@pytest.mark.parametrize("goal", ["move", "back", "rotate", "turns"])
-@pytest.mark.parametrize("seed", range(tries(2, long=20)))
+@for_each("goal", ["move", "back", "rotate", "turns"])
+@for_each("seed", range(tries(2, long=20)))
 def test_whatever_interrupts_it_ends_where_it_would_have_ended(
     make_world: MakeWorld, goal: str, seed: int
 ) -> None:

@@ -3,17 +3,13 @@
 from dataclasses import replace
 from functools import partial
 
-import pytest
-
-from mav_tasks.probe.profile import profile_of
-from mav_tasks.settings import Driving, Settings, VehicleProfile
+from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, PX4
 from tests.kit.bodies import WeakBrakes
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE
-from tests.kit.probing import ProbeWorld
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -78,8 +74,8 @@ def test_a_px4_that_was_measured_to_turn_is_turned(make_world: MakeWorld) -> Non
     assert any("uses the profile of 2026-11-20" in text for text in world.client.texts())
 
 
-@pytest.mark.parametrize(
-    ("change_of", "words"),
+@for_each(
+    "change_of, words",
     [
         ({"uid": "2"}, "ignores the profile: it is of another rover"),
         ({"firmware": "1.14.0 99c40407"}, "ignores the profile: it is of firmware 1.14.0 99c40407"),
@@ -95,24 +91,11 @@ def test_a_profile_of_something_else_is_told_and_not_used(
     assert noted(world) == [words]
 
 
-def test_the_profile_of_another_system_is_no_matter(make_world: MakeWorld) -> None:
-    world = make_world(persona=TURNING, settings=known(replace(PX4_PROFILE, system_id=2)))
-    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    assert noted(world) == []
-
-
 def test_of_two_of_one_rover_the_later_counts(make_world: MakeWorld) -> None:
     later = replace(PX4_PROFILE, yaw_rate="ignored", probed="2026-11-21T10:00:00Z")
     world = make_world(persona=TURNING, settings=known(later, PX4_PROFILE))
     assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     assert noted(world) == ["uses the profile of 2026-11-21"]
-
-
-def test_what_a_profile_does_not_say_stays_as_the_settings_have_it(make_world: MakeWorld) -> None:
-    settings = replace(known(replace(PX4_PROFILE, yaw_rate="")), yaw_rate="honoured")
-    world = make_world(persona=TURNING, settings=settings)
-    assert rotate(world) == (ACCEPTED, 1)
-    world.until_idle(tasks=1)
 
 
 def test_an_ardupilot_that_does_not_turn_on_the_spot_is_steered_by_course(
@@ -127,7 +110,7 @@ def test_an_ardupilot_that_does_not_turn_on_the_spot_is_steered_by_course(
     assert near_pose(world.pose(), (1, 0, 0), metres=0.05)
 
 
-@pytest.mark.parametrize("ask", [(ROTATE, 90.0), (115, 90.0, 0.0, 1.0, 0.0)])
+@for_each("ask", [(ROTATE, 90.0), (115, 90.0, 0.0, 1.0, 0.0)])
 def test_a_car_is_not_turned_on_the_spot_and_its_client_reads_why(
     make_world: MakeWorld, ask: tuple[float, ...]
 ) -> None:
@@ -160,16 +143,6 @@ def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
     assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
 
 
-def test_another_rover_in_its_place_does_not_inherit_it(make_world: MakeWorld) -> None:
-    world = make_world(settings=known(replace(ARDUPILOT_PROFILE, yaw_rate="ignored")))
-    world.run(10)
-    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    world.replace_rover(switched_on=world.now - 5.0)  # its clock begins anew: it is asked again
-    world.until(lambda: "ignores the profile: it is of another rover" in noted(world), within=15)
-    assert rotate(world) == (ACCEPTED, 1)
-    world.until_idle(tasks=1)
-
-
 def test_a_rover_that_was_seen_not_to_stop_by_itself_is_not_driven(make_world: MakeWorld) -> None:
     world = make_world(settings=known(replace(ARDUPILOT_PROFILE, loss_stop="no")))
     sent = world.client.move(1.0)
@@ -184,12 +157,6 @@ class TestBrakes:
 
     body = staticmethod(partial(WeakBrakes, braking=0.2))
 
-    def measured(self) -> VehicleProfile:
-        world = ProbeWorld(drive=True, body=self.body)
-        found = world.finish().findings
-        assert world.driven.ended == ""
-        return profile_of(found, probed="2026-11-21T10:00:00Z")
-
     def farthest(self, make_world: MakeWorld, settings: Settings) -> float:
         world = make_world(body=self.body, settings=settings)
         assert fenced(world, *YARD) == 0
@@ -198,19 +165,7 @@ class TestBrakes:
         world.until(world.stands, within=20)
         return world.truth.north
 
-    def test_the_probe_measures_it_and_then_it_stays_inside_its_fence(
-        self, make_world: MakeWorld
-    ) -> None:
+    def test_what_was_measured_keeps_it_inside_its_fence(self, make_world: MakeWorld) -> None:
+        measured = replace(ARDUPILOT_PROFILE, speed=1.0, stopping_distance=2.6, stopping_time=5.2)
         assert self.farthest(make_world, Settings()) > 3.0, "without, it would be no test"
-        assert 1.0 < self.farthest(make_world, known(self.measured())) < 3.0
-
-    @pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
-    def test_good_brakes_change_nothing(self, make_world: MakeWorld, persona: object) -> None:
-        assert persona in (ARDUPILOT, PX4)
-        chosen = ARDUPILOT if persona is ARDUPILOT else PX4
-        probed = ProbeWorld(drive=True, persona=chosen)
-        profile = profile_of(probed.finish().findings, probed="2026-11-21T10:00:00Z")
-        world = make_world(persona=chosen, settings=known(profile))
-        tasks = world.server.engine._fleet.of(1)
-        assert tasks.terms._stop == (profile.speed, profile.stopping_distance)
-        assert tasks.terms.driving == Driving()
+        assert 1.0 < self.farthest(make_world, known(measured)) < 3.0

@@ -1,49 +1,42 @@
 """PX4 and generic rovers: armed in HOLD, driven by velocities over ground; what they cannot do."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from math import cos, degrees, nan, radians, remainder, sin, tau
+from math import cos, degrees, radians, sin
 from struct import pack, unpack
 
 import pytest
 from pymavlink.dialects.v20 import common
 from pymavlink.generator.mavcrc import x25crc
 
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim import offboard, steering
-from rover_sim.estimate import Estimate
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import GENERIC, PX4, Mode, Persona
 from rover_sim.realism import EXACT, Drive
-from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED
+from tests.kit.cases import anew, for_each
+from tests.kit.client import ACCEPTED, DENIED
 from tests.kit.mission import Item, Upload, reached
-from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, REPOSITION, SET_MODE, go_to
+from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, SET_MODE, go_to
 from tests.kit.world import MODE_COMMAND, World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 MOVE, ROTATE, DRIVE = 54000, 54001, 54002
 WAYPOINT, YAW, YAW_SPEED, START = 16, 115, 213, 300
-NO_PLACE = 0x7FFFFFFF
 
 ALL = [PX4, GENERIC, PROMPT_PX4, PROMPT_GENERIC]
 
-every = pytest.mark.parametrize("persona", ALL, ids=lambda p: f"{p.name}-{p.announces_changes}")
+every = for_each("persona", ALL)
 each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world(persona=PROMPT_PX4)
 
 
-@pytest.mark.parametrize(
-    ("modes", "shown"),
-    [(1 << 14 | 0b10000, 1 << 14 | 0b11000), (0b101, 0b101), (None, None)],
-    ids=["Hold is possible", "Hold is not", "zeros are left out"],
-)
+@for_each("modes, shown", [(1 << 14 | 0b10000, 1 << 14 | 0b11000), (0b101, 0b101), (None, None)])
 def test_its_checks_allow_a_mission_wherever_they_allow_hold(
     world: World, modes: int | None, shown: int | None
 ) -> None:
@@ -81,24 +74,13 @@ class TestDriving:
         assert not world.rover.autopilot.armed
         assert world.rover.autopilot.mode is Mode.HOLD
 
-    def test_a_move_ends_where_it_was_to_end(self, world: World) -> None:
-        world.client.move(2.0)
-        world.until_idle(tasks=1)
-        assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=2)
-
-    @pytest.mark.parametrize(("north", "east"), [(2, 0), (-2, 0), (0, 1.5), (-1, -1), (0.3, 0)])
+    @for_each("north, east", [(2, 0), (-2, 0), (0, 1.5), (-1, -1), (0.3, 0)])
     def test_a_place_is_driven_to_without_turning_on_the_spot_first(
         self, world: World, north: float, east: float
     ) -> None:
         go_to(world, north, east)
         world.until_idle(tasks=1)
         assert is_at(world, north, east)
-
-    def test_a_heading_at_the_end_is_left_out(self, world: World) -> None:
-        go_to(world, 2.0, 0.0, yaw=1.5)
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
-        assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=5)
 
     @every
     def test_a_plan_is_driven(self, make_world: MakeWorld, persona: Persona) -> None:
@@ -113,56 +95,11 @@ class TestDriving:
         assert reached(world.client) == [0, 1, 2, 3], "no item is home"
         assert is_at(world, 0.0, 0.0)
 
-    def test_on_a_task_that_is_paused_it_goes_on_exactly(self, world: World) -> None:
-        world.client.move(3.0)
-        world.until(lambda: world.truth.north > 1.0, within=20)
-        world.client.pause()
-        world.run(3)
-        assert world.stands()
-        assert world.rover.autopilot.mode is Mode.HOLD
-        world.client.proceed()
-        world.until_idle(tasks=1)
-        assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.03, angle=2)
-
-    def test_one_that_was_pre_empted_comes_back_to_its_line(self, make_world: MakeWorld) -> None:
-        queueing = Queueing(preemption_gap=3, preemption_rest=0.3)
-        world = make_world(persona=PROMPT_PX4, settings=Settings(queueing=queueing))
-        world.client.move(3.0, priority=1)
-        world.until(lambda: world.truth.north > 1.0, within=20)
-        world.client.command_int(WAYPOINT, **at(1.0, 2.0), frame=6)
-        world.until_idle(tasks=2)
-        assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
-        assert near_pose(world.pose(), (3.0, 0.0, 0.0), metres=0.05, angle=3)
-
-    def test_one_that_turns_at_a_rate_does_what_others_do(self, make_world: MakeWorld) -> None:
-        persona = replace(PROMPT_PX4, honours_yaw_rate=True)
-        world = make_world(persona=persona, settings=Settings(yaw_rate="honoured"))
-        world.client.move(-1.0)
-        world.run(0.05)
-        world.client.rotate(90)
-        world.until_idle(tasks=2)
-        assert near_pose(world.pose(), (-1.0, 0.0, 90.0), metres=0.04, angle=1)
-
-    @pytest.mark.parametrize("radius", [0.5, 1.5, 3.0])
-    def test_a_place_within_its_turning_circle_ends_the_task(
-        self, world: World, monkeypatch: pytest.MonkeyPatch, radius: float
-    ) -> None:
-        def as_a_car(estimate: Estimate, yaw: float, speed: float) -> steering.Demand:
-            if speed == 0.0:
-                return steering.STOP
-            most = abs(estimate.forward_speed) / radius
-            wanted = 2.4 * remainder(yaw - estimate.yaw, tau)
-            return steering.Demand(speed, max(-most, min(most, wanted)))
-
-        monkeypatch.setattr(offboard, "turn_then_drive", as_a_car)
-        go_to(world, 0.0, 0.5)
-        world.until(lambda: world.state(1)[0] in (S.COMPLETED, S.FAILED), within=300)
-
 
 class TestTurning:
     """A differential rover turns on the spot to the course of a set-point of 1 mm/s."""
 
-    @pytest.mark.parametrize("angle", [90.0, -45.0, 170.0, -270.0, 400.0])
+    @for_each("angle", [90.0, -45.0, 170.0, -270.0, 400.0])
     def test_by_an_angle(self, world: World, angle: float) -> None:
         world.run(2.0)  # until it has said that it can
         world.client.rotate(angle)
@@ -170,22 +107,11 @@ class TestTurning:
         assert world.state(1)[0] is S.COMPLETED
         assert near_pose(world.pose(), (0.0, 0.0, angle), metres=0.02, angle=1)
 
-    @pytest.mark.parametrize(("heading", "yaw"), [(90.0, 90.0), (-161.0, 30.0)])
-    def test_to_a_heading(self, make_world: MakeWorld, heading: float, yaw: float) -> None:
-        world = make_world(persona=PX4)
-        world.run(2.0)
-        world.client.rotate(heading)
-        world.until_idle(tasks=1)
-        world.client.command(YAW, yaw)
-        world.until_idle(tasks=2)
-        assert world.state(2)[0] is S.COMPLETED
-        assert near_pose(world.pose(), (0.0, 0.0, yaw), metres=0.02, angle=1)
-
 
 class TestMovingBackwards:
     """It does not reverse: a differential one turns round, drives, and turns back."""
 
-    @pytest.mark.parametrize("heading", [0.0, 120.0])
+    @for_each("heading", [0.0, 120.0])
     def test_it_ends_behind_with_the_heading_that_it_had(
         self, make_world: MakeWorld, heading: float
     ) -> None:
@@ -199,45 +125,11 @@ class TestMovingBackwards:
         assert "Task 1 queued: move -1 m" in world.client.texts()
         assert any("it turns round, drives, turns back" in t for t in world.client.texts())
 
-    @pytest.mark.parametrize("after", [1.5, 4.0, 7.0])
-    def test_paused_in_each_part_it_goes_on_where_it_was(
-        self, make_world: MakeWorld, after: float
-    ) -> None:
-        world = make_world(persona=PX4)
-        world.run(2.0)
-        world.client.move(-1.0)
-        world.until_state(1, S.EXECUTING, within=10)
-        world.run(after)
-        world.client.pause()
-        world.run(3.0)
-        world.client.proceed()
-        world.until_idle(tasks=1, within=60)
-        assert world.state(1)[0] is S.COMPLETED
-        assert near_pose(world.pose(), (-1.0, 0.0, 0.0), metres=0.06, angle=3)
-
-    def test_in_a_plan_too(self, world: World) -> None:
-        world.run(2.0)
-        items = [Item(MOVE, param1=-1.0, frame=2, param4=0.0), Item(WAYPOINT, **at(1, 0))]
-        upload = Upload(world.client, items)
-        world.until(lambda: upload.result is not None, within=5)
-        assert upload.result == 0
-
-    def test_what_lies_behind_the_fence_is_not_driven_to(self, world: World) -> None:
-        world.run(2.0)
-        corners = [(-0.5, -3.0), (3.0, -3.0), (3.0, 3.0), (-0.5, 3.0)]
-        fence = [Item(5001, **at(*corner), param1=4, param4=0, frame=0) for corner in corners]
-        upload = Upload(world.client, fence, kind=1)
-        world.until(lambda: upload.result is not None, within=5)
-        world.client.move(-1.0)
-        world.run(6.0)
-        assert world.state(1)[1] in (R.OUTSIDE_FENCE, R.FENCE)
-        assert near_pose(world.pose(), (0.0, 0.0, 0.0), metres=0.05, angle=5)
-
 
 class TestStanding:
     """A real PX4 takes zero velocity for "to the north or south" (1.17, SITL)."""
 
-    @pytest.mark.parametrize("frame", [Frame.DIFFERENTIAL, Frame.ACKERMANN])
+    @for_each("frame", [Frame.DIFFERENTIAL, Frame.ACKERMANN])
     def test_a_move_begins_and_ends_with_the_heading_that_it_had(
         self, make_world: MakeWorld, frame: Frame
     ) -> None:
@@ -259,8 +151,8 @@ class TestStanding:
 
 
 class TestWhatItCannotDo:
-    @pytest.mark.parametrize(
-        ("command", "params", "words"),
+    @for_each(
+        "command, params, words",
         [
             (DRIVE, (-0.5, 0.0, 2.0), "reverse"),
             (DRIVE, (0.5, 10.0, 2.0), "yaw rate"),
@@ -276,21 +168,8 @@ class TestWhatItCannotDo:
         assert any(words in text for text in world.client.texts())
         assert world.tasks() == ()
 
-    @pytest.mark.parametrize(
-        ("item", "result"),
-        [
-            (Item(DRIVE, param1=-0.5, param3=2.0, frame=2, param4=0.0), 6),  # INVALID_PARAM1
-        ],
-    )
-    def test_is_refused_in_a_plan_at_its_item(self, world: World, item: Item, result: int) -> None:
-        upload = Upload(
-            world.client, [Item(WAYPOINT, **at(1, 0)), item, Item(WAYPOINT, **at(2, 0))]
-        )
-        world.until(lambda: upload.result is not None, within=5)
-        assert (upload.result, upload.requests) == (result, [0, 1])
-
-    @pytest.mark.parametrize(
-        ("command", "params", "words"),
+    @for_each(
+        "command, params, words",
         [
             (MOVE, (-1.0,), "reverse"),
             (ROTATE, (90.0,), "turn on the spot"),
@@ -309,11 +188,6 @@ class TestWhatItCannotDo:
         assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
         assert any(words in text for text in world.client.texts())
 
-    def test_of_a_waypoint_only_the_heading_is_left_out(self, world: World) -> None:
-        upload = Upload(world.client, [Item(WAYPOINT, **at(1, 0), param4=90.0)])
-        world.until(lambda: upload.result is not None, within=5)
-        assert upload.result == 0
-
 
 class TestStop:
     @every
@@ -327,24 +201,6 @@ class TestStop:
         assert world.stands()
         assert world.rover.autopilot.mode is Mode.HOLD
         assert world.control() == "IDLE"
-
-    @each
-    def test_ends_what_another_station_sent_it_to_in_hold(
-        self, make_world: MakeWorld, persona: Persona
-    ) -> None:
-        world = make_world(persona=persona)
-        world.rover.autopilot.parameters["RO_SPEED_LIM"] = 1.0
-        world.operator_arm(True)
-        other = world.net.link("other station")
-        place = common.MAVLink_command_int_message(
-            1, 1, 6, REPOSITION, 0, 0, -1, 1, 0, nan, *at(30.0, 0.0).values(), 0
-        )
-        other.send("rover1", place.pack(common.MAVLink(None, 255, 190)))
-        world.run(3)
-        assert not world.stands()
-        world.client.stop()
-        world.run(4)
-        assert world.stands()
 
     def test_disarms_a_generic_rover_that_does_not_hear_of_hold(
         self, make_world: MakeWorld
@@ -367,28 +223,6 @@ class TestStop:
         assert not world.rover.autopilot.armed
         assert world.stands()
         assert world.control() == "IDLE"
-
-
-class TestPausing:
-    @pytest.mark.parametrize(
-        "pause",
-        [
-            lambda w: w.client.command(REPOSITION, -1, 1, 0, nan, nan, nan, nan, target=(1, 1)),
-            lambda w: w.client.command_int(
-                REPOSITION, -1, 1, 0, nan, x=NO_PLACE, y=NO_PLACE, frame=6, target=(1, 1)
-            ),
-        ],
-        ids=["COMMAND_LONG", "COMMAND_INT"],
-    )
-    def test_a_go_to_without_a_place_is_one(
-        self, world: World, pause: Callable[[World], object]
-    ) -> None:
-        world.client.move(3)
-        world.until_state(1, S.EXECUTING)
-        pause(world)
-        world.run(0.1)
-        assert world.client.acks_of(REPOSITION) == [(ACCEPTED, 1)]
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
 class TestOneThatWouldDriveByItselfWithoutUs:
@@ -415,29 +249,6 @@ class TestOneThatWouldDriveByItselfWithoutUs:
         assert why(world) == R.LOSS_FAILSAFE
         assert any("waits: it might drive on without setpoints" in t for t in world.client.texts())
         assert not world.rover.autopilot.armed
-
-    def test_what_is_to_run_at_once_is_refused(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world, Settings(guided="now"))
-        sent = world.client.command_int(
-            REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=6, target=(1, 1)
-        )
-        world.run(0.5)
-        assert sent.answer == (TEMPORARILY_REJECTED, R.LOSS_FAILSAFE)
-        assert any("mav-tasks probe --set-failsafe" in text for text in world.client.texts())
-
-    def test_is_driven_when_it_is_mended(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world)
-        world.client.move(1)
-        world.run(1)
-        world.client.send(set_action(5))
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
-
-    def test_is_driven_all_the_same_where_that_is_accepted(self, make_world: MakeWorld) -> None:
-        world = self.make(make_world, Settings(loss_failsafe="accept"))
-        world.client.move(1)
-        world.until_idle(tasks=1)
-        assert world.state(1)[0] is S.COMPLETED
 
     def test_one_that_never_says_what_it_does_is_driven_after_it_was_asked_for_a_while(
         self, make_world: MakeWorld

@@ -7,7 +7,6 @@ from shutil import copy
 from typing import Any
 
 import pytest
-from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Settings
@@ -15,13 +14,13 @@ from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, TEMPORARILY_REJECTED
 from tests.kit.px4 import HOLD, PROMPT_PX4, SET_MODE, ask_mode
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import COMMAND_ID, MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
 
-HEARTBEAT = 0
 RELEASE, AGAIN = 54013, 0
 
 
@@ -39,7 +38,7 @@ def is_mode_request(data: bytes) -> bool:
     return data[7] == MODE_COMMAND and data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
 
 
-@pytest.mark.parametrize("lost", [1.0, 5.0])
+@for_each("lost", [1.0, 5.0])
 def test_a_server_that_is_started_again_leaves_it_standing(
     make_world: MakeWorld, tmp_path: Path, lost: float
 ) -> None:
@@ -60,7 +59,7 @@ def test_a_server_that_is_started_again_leaves_it_standing(
     assert world.paused() is R.RESTARTED
 
 
-@pytest.mark.parametrize("lost", [1.0, 5.0])
+@for_each("lost", [1.0, 5.0])
 def test_a_server_whose_machine_slept_leaves_it_standing(
     make_world: MakeWorld, lost: float
 ) -> None:
@@ -73,8 +72,8 @@ def test_a_server_whose_machine_slept_leaves_it_standing(
     assert abs(world.truth.north - where) < 0.2
 
 
-@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
-@pytest.mark.parametrize("lost", [1.0, 5.0])
+@for_each("persona", [PX4, PROMPT_PX4])
+@for_each("lost", [1.0, 5.0])
 def test_once_a_takeover_is_told_it_does_not_drive_on(
     make_world: MakeWorld, lost: float, persona: Persona
 ) -> None:
@@ -115,24 +114,6 @@ def test_its_hold_is_not_taken_for_one_that_was_asked_for(make_world: MakeWorld)
     assert not seen & {("IDLE", Mode.GUIDED), ("LEADING_IN", Mode.GUIDED)}
 
 
-@pytest.mark.parametrize("beats_lost", [False, True])
-def test_who_takes_it_by_hand_just_before_our_mode_is_asked_for_keeps_it(
-    make_world: MakeWorld, beats_lost: bool
-) -> None:
-    world = make_world(persona=PX4)  # shows a change within a second
-    world.client.move(20, speed=1.0)
-    world.until(lambda: world.control() == "LEADING_IN", within=5)
-    world.run(0.3)
-    end = world.now + 1.2
-    world.watched.loses = lambda source, target, data: (
-        beats_lost and source == "rover1" and data[7] == HEARTBEAT and world.now < end
-    )
-    world.operator_mode(Mode.MANUAL)
-    world.run(8)
-    assert world.rover.autopilot.mode is Mode.MANUAL
-    assert world.stands()
-
-
 def test_a_server_that_stalls_while_zeros_stream_begins_that_again(make_world: MakeWorld) -> None:
     world = make_world(persona=PROMPT_PX4)
     world.client.move(2)
@@ -141,22 +122,6 @@ def test_a_server_that_stalls_while_zeros_stream_begins_that_again(make_world: M
     world.suspend_server(0.4)
     world.run(8)
     assert world.state(1)[0] in (S.EXECUTING, S.COMPLETED)
-
-
-def test_a_task_is_not_continued_while_the_failsafe_is_off(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    world.client.move(5)
-    world.run(4)
-    world.rover.autopilot.parameters["COM_OF_LOSS_T"] = 60.0
-    world.client.send(common.MAVLink_param_request_read_message(1, 1, b"COM_OF_LOSS_T", -1))
-    world.run(0.2)
-    world.client.pause()
-    world.run(2)
-    sent = world.client.proceed()
-    world.run(0.5)
-    assert sent.answer is not None
-    assert sent.answer[1] == R.LOSS_FAILSAFE
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
 
 
 class TestOneThatDrivesHomeWithoutUs:
@@ -200,16 +165,6 @@ class TestOneThatDrivesHomeWithoutUs:
         assert any("wrong mode, set HOLD first" in text for text in world.client.texts())
         ask_mode(world.client, HOLD)
         world.until(world.stands, within=5)
-        released = world.client.command(RELEASE, 1, AGAIN)
-        world.run(0.2)
-        assert released.answer == (ACCEPTED, 1)
-        world.client.proceed()
-        world.until_state(1, S.EXECUTING)
-
-    def test_one_that_has_disarmed_itself_at_home_is_released_at_once(self, world: World) -> None:
-        self.restart(world, away=25.0)
-        world.operator_arm(False)
-        world.run(4.0)
         released = world.client.command(RELEASE, 1, AGAIN)
         world.run(0.2)
         assert released.answer == (ACCEPTED, 1)

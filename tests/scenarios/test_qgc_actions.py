@@ -2,12 +2,11 @@
 
 import json
 
-import pytest
-
 from mav_tasks.qgc_actions import ACTIONS, file_of
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, Sent
 from tests.kit.world import World
 
@@ -24,8 +23,8 @@ def press(world: World, label: str) -> Sent:
     return sent
 
 
-@pytest.mark.parametrize(
-    ("label", "goal"),
+@for_each(
+    "label, goal",
     [
         ("Forward 1 m", Move(1.0)),
         ("Back 1 m", Move(-1.0)),
@@ -59,8 +58,8 @@ def test_what_runs_is_paused_continued_stopped_and_called_off(world: World) -> N
     assert world.paused() is R.NONE
 
 
-@pytest.mark.parametrize(
-    ("label", "ends"),
+@for_each(
+    "label, ends",
     [("Held: again", S.COMPLETED), ("Held: remainder", S.COMPLETED), ("Held: skip", S.CANCELLED)],
 )
 def test_a_held_task_is_decided_about(world: World, label: str, ends: S) -> None:

@@ -7,6 +7,7 @@ import pytest
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.qgc.joined import (
     degrees,
@@ -18,12 +19,11 @@ from tests.kit.qgc.joined import (
     slowest_ack,
 )
 from tests.kit.qgc.party import QgcParty
-from tests.kit.qgc.profile import V4, Profile
+from tests.kit.qgc.profile import MASTER, V4, Profile
 from tests.kit.world import PROMPT, World, is_at
 from tests.scenarios.conftest import MakeWorld
 
 PAUSE_CONTINUE, STOP, MOVE, DRIVE = 193, 54003, 54000, 54002
-WHILE_DRIVING = {"disarm", "emergency stop", "go to", "pause", "return", "mode", "actions"}
 
 
 def driving(world: World, profile: Profile) -> QgcParty:
@@ -35,9 +35,9 @@ def driving(world: World, profile: Profile) -> QgcParty:
     return party
 
 
-@each_version
-@each_guided
 class TestWhileDriving:
+    @each_version
+    @each_guided
     def test_pause_stops_it_and_an_action_goes_on(
         self, make_world: MakeWorld, persona: Persona, profile: Profile
     ) -> None:
@@ -56,39 +56,9 @@ class TestWhileDriving:
         assert len(world.tasks()) == 1
         assert party.qgc.screen.complaints == []
 
-    def test_return_goes_home(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = driving(world, profile)
-        party.operator.return_home()
-        world.until_state(2, S.COMPLETED, within=60)
-        assert is_at(world, 0.0, 0.0)
-        assert world.state(1) == (S.PAUSED, R.OPERATOR)
-        assert party.qgc.count_sent("SET_MODE") <= 1
-        assert party.qgc.screen.complaints == []
 
-
-@each_pair
 class TestAlsoWhileDriving:
-    def test_the_buttons_are_there(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = driving(world, profile)
-        assert party.operator.offers >= WHILE_DRIVING
-        assert party.qgc.screen.complaints == []
-
-    def test_the_speed_is_changed(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = driving(world, profile)
-        party.operator.change_speed(0.2, is_offered=False)
-        world.run(3)
-        assert world.truth.forward_speed == pytest.approx(0.2, abs=0.05)
-        assert party.qgc.screen.complaints == []
-
+    @each_pair
     def test_the_mode_menu_is_obeyed(
         self, make_world: MakeWorld, persona: Persona, profile: Profile
     ) -> None:
@@ -104,29 +74,7 @@ class TestAlsoWhileDriving:
         assert party.qgc.screen.complaints == []
 
 
-@pytest.mark.parametrize(
-    "persona",
-    [PROMPT, PROMPT_PX4],
-    ids=lambda p: p.name,
-)
-def test_a_rover_that_has_driven_may_be_sent_to_a_place(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    """It stands armed in HOLD, and nothing of it but its status tells that from having landed."""
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.operator.set_mode(persona.modes.numbers[Mode.HOLD])
-    world.run(1.2)
-    party.operator.arm()
-    world.run(1.2)
-    party.operator.action(MOVE, 0.3, component=191)
-    world.until_idle(tasks=1)
-    world.run(2)
-    assert world.rover.autopilot.armed
-    assert party.operator.offers >= {"go to", "emergency stop"}
-
-
-@pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
+@for_each("persona", [ARDUPILOT, PX4])
 def test_a_mode_is_shown_at_once_also_of_a_rover_that_shows_it_once_a_second(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -233,3 +181,46 @@ def test_a_joystick_takes_the_rover_over(make_world: MakeWorld, persona: Persona
     assert len(own) == (persona is not PROMPT), "a PX4 rover itself says so, and stands"
     assert party.popups == own
     assert party.qgc.screen.violations == []
+
+
+# clicks on the map
+
+
+def armed(world: World, party: QgcParty) -> None:
+    party.operator.arm()
+    world.until(lambda: "go to" in party.operator.offers, within=3)
+
+
+class TestGoTo:
+    @each_version
+    def test_of_px4_is_one_task(self, make_world: MakeWorld, profile: Profile) -> None:
+        world = make_world(persona=PROMPT_PX4)
+        party = join(world, profile)
+        armed(world, party)
+        party.operator.go_to(*degrees(2, 0))
+        world.until_state(1, S.COMPLETED, within=40)
+        assert is_at(world, 2.0, 0.0)
+        assert len(world.tasks()) == 1
+        party.check()
+
+
+@for_each("persona, profile", [(PROMPT, V4), (ARDUPILOT, MASTER)])
+@for_each("before", [Mode.MANUAL, Mode.HOLD, Mode.GUIDED])
+def test_a_go_to_of_ardupilot_in_all_its_forms_is_one_task(
+    make_world: MakeWorld, persona: Persona, profile: Profile, before: Mode
+) -> None:
+    """A command and an item; from another mode a change of mode between the two."""
+    world = make_world(persona=persona)
+    party = join(world, profile)
+    party.operator.set_mode({Mode.MANUAL: 0, Mode.HOLD: 4, Mode.GUIDED: 15}[before])
+    world.run(1.2)
+    party.operator.arm()
+    world.run(1.2)
+    assert "go to" in party.operator.offers
+    party.operator.go_to(*degrees(2, 0))
+    world.until_state(1, S.COMPLETED, within=40)
+    world.run(3)
+    assert is_at(world, 2.0, 0.0)
+    assert len(world.tasks()) == 1
+    assert [state for state, _ in world.history(1)].count(S.EXECUTING) == 1
+    party.check()

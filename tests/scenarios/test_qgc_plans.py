@@ -2,17 +2,16 @@
 
 from math import hypot
 
-import pytest
-
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from rover_sim.personas import Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.mission import ITEM_INT, REQUEST, REQUEST_INT
 from tests.kit.qgc.joined import each_guided, each_make, each_version, join, place, slowest_ack
 from tests.kit.qgc.party import QgcParty
-from tests.kit.qgc.plan_master import RUNS, Plan
-from tests.kit.qgc.profile import MASTER, V4, Profile
+from tests.kit.qgc.plan_master import Plan
+from tests.kit.qgc.profile import V4, Profile
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
@@ -20,8 +19,6 @@ FENCE = [place(n, e) for n, e in ((-9, -9), (-9, 9), (9, 9), (9, -9))]
 FIRST = Plan(place(0, 0), [place(1.5, 0), place(1.5, 1)], fence=FENCE, rally=[place(0, 0.5)])
 NEXT = FIRST._replace(waypoints=[place(0.5, 1)], speed=0.4)
 ALL_WELL = {0: True, 1: True, 2: True}
-
-each_slow = pytest.mark.parametrize("persona", [ARDUPILOT, PX4], ids=lambda p: p.name)
 
 
 def is_near(world: World, north: float, east: float) -> bool:
@@ -79,34 +76,6 @@ def test_from_the_upload_to_the_removal(
     assert world.state(1)[0] is world.state(2)[0] is S.COMPLETED
 
 
-@each_make
-def test_of_a_whole_field_with_fence_and_rally_points(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world = make_world(persona=persona)
-    party = join(world, MASTER)
-    field = [place(i % 10 * 0.5, i // 10 * 0.5) for i in range(100)]
-    upload(world, party, FIRST._replace(waypoints=field))
-    another = join(world, V4, "another")
-    assert_read_back(another, FIRST._replace(waypoints=field), party.vehicle.state.firmware)
-    party.check()
-    another.check()
-
-
-@each_slow
-def test_a_rover_that_shows_its_mode_once_a_second_starts_without_a_popup(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    upload(world, party, FIRST)
-    party.operator.start()
-    world.until_state(1, S.EXECUTING, within=20)
-    world.run(4)
-    assert party.qgc.count_sent("SET_MODE") <= 1
-    party.check()
-
-
 @each_version
 @each_guided
 def test_is_interrupted_and_gone_on_with(
@@ -133,21 +102,6 @@ def test_is_interrupted_and_gone_on_with(
     party.check()
 
 
-@each_guided
-def test_is_not_held_up_by_the_mode_that_is_shown(make_world: MakeWorld, persona: Persona) -> None:
-    """The rover's own mission mode is shown for a moment only: else a next plan is refused."""
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    upload(world, party, FIRST)
-    party.operator.start()
-    world.until_state(1, S.EXECUTING, within=15)
-    world.run(1.3)
-    assert not party.vehicle.state.is_in_mission_mode
-    upload(world, party, NEXT)
-    assert RUNS not in party.popups
-    party.check()
-
-
 @each_make
 def test_a_bad_item_is_named(make_world: MakeWorld, persona: Persona) -> None:
     world = make_world(persona=persona)
@@ -165,7 +119,7 @@ def test_a_bad_item_is_named(make_world: MakeWorld, persona: Persona) -> None:
 
 
 @each_version
-@pytest.mark.parametrize("lost", [(ITEM_INT,), (REQUEST, REQUEST_INT)], ids=["item", "request"])
+@for_each("lost", [(ITEM_INT,), (REQUEST, REQUEST_INT)])
 def test_what_is_lost_of_an_upload_is_asked_for_again_in_time(
     make_world: MakeWorld, profile: Profile, lost: tuple[int, ...]
 ) -> None:

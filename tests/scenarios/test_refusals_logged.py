@@ -6,7 +6,7 @@ from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.client import RTL, UNSUPPORTED, setpoint
+from tests.kit.client import setpoint
 from tests.kit.mission import Download, Item, Upload, acks
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
@@ -52,31 +52,6 @@ def test_a_mission_that_is_paused_is_cleared_as_on_an_autopilot(world: World) ->
     assert (download.items, refusals(world)) == ([], [])
 
 
-def test_what_has_no_acknowledgement_has_its_line_too(world: World) -> None:
-    world.client.send(common.MAVLink_mission_set_current_message(1, 1, 7))
-    world.run(0.1)
-    world.client.stop()
-    world.run(2)
-    world.client.send(common.MAVLink_set_mode_message(1, 1, RTL))
-    world.run(0.1)
-    first, second = refusals(world)
-    assert f"message {SET_CURRENT} by" in first
-    assert "there is no mission: upload one first" in first
-    assert f"message {SET_MODE} by" in second
-    assert "STOP" in second
-
-
-def test_a_command_that_the_server_does_not_know_has_its_line(world: World) -> None:
-    sent = world.client.command(SERVO, 1, 1500)
-    world.run(0.1)
-    assert sent.result == UNSUPPORTED
-    (line,) = refusals(world)
-    assert line == (
-        f"rover 1: command {SERVO} by 255/190@client refused: "
-        f"command {SERVO}: not supported in this version"
-    )
-
-
 def test_a_stream_that_does_not_pass_has_one_line_in_half_a_minute(world: World) -> None:
     world.client.stream(setpoint(0.5), rate=20)
     world.run(20)
@@ -97,11 +72,3 @@ def test_what_nobody_can_verify_has_no_line_as_a_refusal_whoever_it_says_it_is_o
         world.client.send_raw(header + b"\x07\0\0")
     world.run(1)
     assert refusals(world) == []
-
-
-def test_what_a_role_may_not_pass_on_has_its_line(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(roles=Roles(unsigned="observer")))
-    world.client.send(setpoint(0.5))
-    world.run(3)
-    (line,) = refusals(world)
-    assert "role observer may not send this message to a rover; operator may" in line

@@ -1,9 +1,9 @@
 """The autopilot's address has one mission: what drives is what was uploaded last, as on it."""
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Persona
+from tests.kit.cases import anew, for_each
 from tests.kit.client import AUTO, HOLD
 from tests.kit.mission import Item, Upload
 from tests.kit.observer import ARDUPILOT_WAYS
@@ -15,10 +15,10 @@ from tests.scenarios.conftest import MakeWorld
 WAYPOINT, MISSION_START = 16, 300
 
 
-@pytest.fixture(params=[PROMPT, PROMPT_PX4], ids=lambda persona: persona.name)
-def world(make_world: MakeWorld, request: pytest.FixtureRequest) -> World:
+@anew
+def world(make_world: MakeWorld, persona: Persona) -> World:
     """A rover that drives the first mission, northwards, in sight of a stock client."""
-    world = make_world(persona=request.param)
+    world = make_world(persona=persona)
     world.client.reads_dialect = False
     upload(world, 3.0, 6.0)
     start(world)
@@ -50,8 +50,9 @@ def ask(world: World, ardupilot: int, px4: int) -> None:
         ask_mode(world.client, px4)
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
-@pytest.mark.parametrize("by", ["mode", "MISSION_START"])
+@for_each("persona", [PROMPT, PROMPT_PX4])
+@for_each("halt", ["HOLD", "pause"])
+@for_each("by", ["mode", "MISSION_START"])
 def test_paused_edited_uploaded_and_started(world: World, halt: str, by: str) -> None:
     if halt == "pause":
         world.client.pause(target=(1, 1))
@@ -76,28 +77,7 @@ def test_paused_edited_uploaded_and_started(world: World, halt: str, by: str) ->
     assert is_at(world, -2.0, 0.0)
 
 
-def test_one_that_comes_to_a_stop_still_leaves_no_pause_behind_when_it_is_replaced(
-    world: World,
-) -> None:
-    ask(world, HOLD, PX4_HOLD)
-    world.run(0.1)
-    upload(world, -2.0)
-    ask(world, AUTO, MISSION)
-    world.until(lambda: world.state(2)[0] is S.COMPLETED, within=60)
-    assert is_at(world, -2.0, 0.0)
-    assert world.paused() is R.NONE
-
-
-def test_a_resume_names_no_mission_that_was_replaced(world: World) -> None:
-    ask(world, HOLD, PX4_HOLD)
-    world.run(0.1)
-    upload(world, -2.0)
-    world.client.proceed()
-    world.run(0.1)
-    assert [text for text in world.client.texts() if text.startswith("Queue resumed")]
-    assert not [text for text in world.client.texts() if "task 1 is next" in text]
-
-
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_one_that_drives_is_told_of_and_ends_when_the_new_one_starts(world: World) -> None:
     upload(world, -2.0)
     told = [text for text in world.client.texts() if text.startswith("Task 2 ready to start")]

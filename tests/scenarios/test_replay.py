@@ -7,7 +7,6 @@ from collections.abc import Callable
 from json import loads
 from pathlib import Path
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
@@ -15,6 +14,7 @@ from mav_tasks.settings import Clients, Queueing, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import rc_override
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
@@ -168,7 +168,7 @@ def replayed(path: Path, *options: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("kind", WORLDS)
+@for_each("kind", WORLDS)
 def test_a_recorded_world_decides_the_same_again(
     make_world: MakeWorld, tmp_path: Path, kind: str
 ) -> None:

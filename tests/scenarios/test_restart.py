@@ -1,7 +1,6 @@
 """A server ends, well or not, and another one goes on from what it had stored."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from shutil import copy
 
@@ -12,8 +11,8 @@ from mav_tasks.settings import Queueing, Settings
 from mav_tasks.tasks.events import TaskProgressed
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, TEMPORARILY_REJECTED, command_long
 from tests.kit.mission import Download, Item, Upload, reached
 from tests.kit.store import PromptSqliteStore
@@ -29,12 +28,12 @@ TO_LAUNCH = 20  # the command
 STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld, path: Path) -> World:
     store = PromptSqliteStore(path, wall_offset=UTC)
     settings = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
@@ -97,7 +96,7 @@ def test_what_ran_is_held_and_the_rover_is_put_to_hold(world: World, path: Path)
     assert world.pose() == where
 
 
-@pytest.mark.parametrize("how", [AGAIN, REMAINDER, SKIP])
+@for_each("how", [AGAIN, REMAINDER, SKIP])
 def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, how: int) -> None:
     world.client.move(5.0)
     world.run(0.1)
@@ -115,56 +114,6 @@ def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, 
     assert world.state(1) == ((S.CANCELLED, R.SKIPPED) if how == SKIP else (S.COMPLETED, R.NONE))
 
 
-def test_a_copy_of_a_release_does_not_release_what_is_held_since(world: World, path: Path) -> None:
-    """Its ack was lost, say; "again" drives all of the task once more from where the rover is."""
-    world.client.move(3)
-    world.run(3)
-    restart(world, path)
-    assert release(world, 0, AGAIN) == (ACCEPTED, 1)
-    world.until(lambda: world.truth.forward_speed > 0.1, within=2)
-    world.fault(Faults(position_jump=(5.0, 0.0)))
-    world.until_state(1, S.HELD, within=0.5)
-    assert release(world, 0, AGAIN) == (TEMPORARILY_REJECTED, R.STALE)
-    world.run(0.5)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    world.run(3.5)
-    assert release(world, 0, AGAIN) == (ACCEPTED, 1)
-    assert world.state(1)[0] in (S.STARTING, S.EXECUTING)
-
-
-def test_who_set_a_nonce_is_told_also_by_the_next_server(world: World, path: Path) -> None:
-    script = world.add_client("script", system_id=245, reads_dialect=False)
-    script.move(1, nonce=77)
-    world.run(0.5)
-    restart(world, path)
-    script.received.clear()
-    assert release(world, 0, SKIP) == (ACCEPTED, 1)
-    world.run(0.5)
-    assert script.statuses(1)[-1].state == S.CANCELLED
-
-
-def test_a_copy_of_what_the_server_before_has_heard_lets_nothing_go(
-    world: World, path: Path
-) -> None:
-    """The pause between them was acknowledged, and only the server before knew of the first."""
-    world.client.move(5)
-    world.run(3)
-    world.client.proceed()
-    world.run(0.3)
-    paused = world.add_client("person").pause()
-    world.run(2)
-    assert paused.result == ACCEPTED
-    restart(world, path, well=True, away=0.5, settles=1.0)
-    late = world.client.proceed()
-    world.run(3)
-    assert late.answer == (TEMPORARILY_REJECTED, R.STALE)
-    assert world.paused() is R.OPERATOR
-    world.run(1)
-    meant = world.client.proceed()
-    world.run(1)
-    assert meant.answer == (ACCEPTED, 1)
-
-
 def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> None:
     world.client.move(2.0)
     world.run(3)
@@ -179,16 +128,6 @@ def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> No
     world.run(0.1)
     assert again.answer == (DENIED, R.WRONG_STATE)
     assert any("release it (again" in text for text in world.client.texts())
-
-
-def test_a_turn_of_which_nobody_knows_how_far_it_came_is_not_resumed(
-    world: World, path: Path
-) -> None:
-    world.client.rotate(700)
-    world.run(4)
-    restart(world, path)
-    assert release(world, 1, REMAINDER) == (DENIED, R.WRONG_STATE)
-    assert release(world, 1, SKIP) == (ACCEPTED, 1)
 
 
 def test_the_stop_latch_is_kept(world: World, path: Path) -> None:
@@ -250,7 +189,7 @@ def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
 
 
-@pytest.mark.parametrize("is_restarted", [False, True])
+@for_each("is_restarted", [False, True])
 def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
     world: World, path: Path, *, is_restarted: bool
 ) -> None:
@@ -270,22 +209,8 @@ def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
     world.until_state(1, S.COMPLETED)
 
 
-def test_a_rover_that_somebody_had_taken_is_left_to_it_after_a_restart(
-    world: World, path: Path
-) -> None:
-    """It shows our mode still: it was disarmed in it, and nothing of ours drove it since."""
-    world.client.move(2)
-    world.run(3)
-    world.operator_arm(False)
-    world.run(2)
-    assert (in_mode(world), world.paused()) == (Mode.GUIDED, R.TAKEOVER)
-    restart(world, path)
-    world.run(3)
-    assert in_mode(world) is Mode.GUIDED
-
-
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
-@pytest.mark.parametrize("ends", [1, 2])
+@for_each("halt", ["HOLD", "pause"])
+@for_each("ends", [1, 2])
 def test_a_rover_that_was_told_to_stand_just_before_a_kill_is_told_again(
     world: World, path: Path, halt: str, ends: int
 ) -> None:
@@ -306,38 +231,7 @@ def test_a_rover_that_was_told_to_stand_just_before_a_kill_is_told_again(
     assert stays(world, 3)
 
 
-def test_a_rover_that_is_found_long_after_a_halt_and_a_kill_is_left_to_whoever_has_it(
-    world: World, path: Path
-) -> None:
-    away_from_home(world)
-    world.client.pause()
-    world.run(1)
-    world.operator_mode(Mode.RTL)
-    at = world.now
-    world.watched.loses = lambda source, _target, _data: source == "rover1"
-    restart(world, path, away=0.5, settles=18.0)
-    world.watched.loses = lambda *_: False
-    world.run(4)
-    assert in_mode(world) is Mode.RTL
-    assert "HOLD" not in world.observer.sent_since(at)
-
-
-@pytest.mark.parametrize("other", ["long before", "by hand"])
-def test_a_rover_that_somebody_drives_after_a_halt_and_a_kill_is_left_to_it(
-    world: World, path: Path, other: str
-) -> None:
-    away_from_home(world)
-    world.client.pause()
-    world.run(1)
-    away = 15.0 if other == "long before" else 1.0
-    world.operator_mode(Mode.RTL if other == "long before" else Mode.MANUAL)
-    at = world.now
-    restart(world, path, away=away)
-    assert in_mode(world) is (Mode.RTL if other == "long before" else Mode.MANUAL)
-    assert "HOLD" not in world.observer.sent_since(at)
-
-
-@pytest.mark.parametrize("answers_lost", [0, 1, 1000])
+@for_each("answers_lost", [0, 1, 1000])
 def test_another_rover_of_the_same_id_runs_nothing_unasked(
     world: World, path: Path, answers_lost: int
 ) -> None:
@@ -361,7 +255,7 @@ def test_another_rover_of_the_same_id_runs_nothing_unasked(
     assert (world.state(1)[0], world.paused()) == (S.QUEUED, R.RESTARTED)
 
 
-@pytest.mark.parametrize(("idle", "paused"), [(60.0, R.NONE), (700.0, R.RESTARTED)])
+@for_each("idle, paused", [(60.0, R.NONE), (700.0, R.RESTARTED)])
 def test_after_a_good_end_waiting_tasks_go_on_unless_it_was_long_ago(
     world: World, path: Path, idle: float, paused: R
 ) -> None:
@@ -398,31 +292,6 @@ def test_a_submission_is_known_again(world: World, path: Path) -> None:
     new = world.client.move(4)
     world.run(0.3)
     assert new.task_id == 3
-
-
-def test_the_speed_that_was_set_and_a_modified_task_are_kept(world: World, path: Path) -> None:
-    world.client.pause()
-    world.client.move(4)
-    world.run(0.2)
-    world.client.command(54012, 1, 1, 9)
-    world.client.command(178, 1, 0.9, -1)
-    world.run(0.3)
-    restart(world, path)
-    assert world.task(1).priority == 9
-    world.client.proceed()
-    world.run(3)
-    assert world.truth.forward_speed > 0.55
-
-
-def test_a_place_on_earth_is_driven_to_after_a_restart(world: World, path: Path) -> None:
-    world.client.pause()
-    x, y = -353_632_484, 149_165_2370
-    world.client.command_int(192, -1, 1, 0, float("nan"), x=x, y=y, frame=0)
-    world.run(0.3)
-    restart(world, path)
-    world.client.proceed()
-    world.until_idle(tasks=1)
-    assert world.pose()[0] == pytest.approx(1.51, abs=0.04)
 
 
 def upload(
@@ -478,15 +347,7 @@ def test_after_a_kill_the_progress_of_the_last_second_is_known(world: World, pat
     assert kept == []  # by this server
 
 
-def test_the_progress_of_what_is_driven_is_stored_once_a_second(world: World) -> None:
-    world.client.move(8, speed=1.0)
-    world.until_idle(tasks=1)
-    at = [event.at for event in world.events(TaskProgressed)]
-    assert 8 <= len(at) <= 12  # of 12 s
-    assert min(later - earlier for earlier, later in pairwise(at)) >= 1.0
-
-
-@pytest.mark.parametrize("is_frame_lost", [False, True])
+@for_each("is_frame_lost", [False, True])
 def test_the_remainder_after_an_orderly_end_is_right_within_5_cm(
     world: World, path: Path, is_frame_lost: bool
 ) -> None:
@@ -508,22 +369,3 @@ def test_the_remainder_after_an_orderly_end_is_right_within_5_cm(
         world.client.proceed()
     world.until_idle(tasks=1)
     assert world.truth.north == pytest.approx(8.0, abs=0.05)
-
-
-@pytest.mark.parametrize("after", [0.7, 1.5])
-def test_a_release_just_after_a_crash_waits_for_the_rover(
-    world: World, path: Path, after: float
-) -> None:
-    """The rover may not have been heard yet, or still show the mode in which it was left."""
-    world.client.move(5.0)
-    world.run(3)
-    restart(world, path, away=0.3, settles=after)
-    seen = world.client.request_status(1)
-    world.until(lambda: seen.answer is not None, within=2)
-    world.run(0.05)
-    sent = world.client.command(RELEASE, 1, REMAINDER, world.client.statuses(1)[-1].halt_epoch)
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 1)
-    world.until_idle(tasks=1)
-    assert world.state(1) == (S.COMPLETED, R.NONE)
-    assert near_pose(world.pose(), (5.0, 0.0, 0.0), metres=0.04)

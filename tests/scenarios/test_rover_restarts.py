@@ -4,29 +4,24 @@ from dataclasses import replace
 
 import pytest
 
-from mav_tasks.settings import Roles, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import PX4, Mode, Persona
-from rover_sim.realism import ARDUPILOT_BOOT, EXACT
 from tests.kit import px4
-from tests.kit.client import ACCEPTED, DENIED, Sent
+from tests.kit.cases import anew, for_each
+from tests.kit.client import ACCEPTED, Sent
 from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
 POSITION = 32
-MAKES = {"ardupilot": PROMPT, "px4": px4.PROMPT_PX4}
+MAKES = [PROMPT, px4.PROMPT_PX4]
 UP = 6.0  # s, until a rover that restarts has shown everything
 
 
-@pytest.fixture(params=MAKES)
-def persona(request: pytest.FixtureRequest) -> Persona:
-    return MAKES[request.param]
-
-
-@pytest.fixture
+@anew
 def driving(make_world: MakeWorld, persona: Persona) -> World:
     """A world in which a task drives and another waits."""
     world = make_world(persona=persona)
@@ -53,6 +48,7 @@ def proceed(world: World) -> Sent:
     return sent
 
 
+@for_each("persona", MAKES)
 def test_it_is_told_what_to_do(driving: World) -> None:
     world = driving
     restart(world)
@@ -66,7 +62,8 @@ def test_it_is_told_what_to_do(driving: World) -> None:
     ) in texts
 
 
-@pytest.mark.parametrize("how", [AGAIN, REMAINDER])
+@for_each("persona", MAKES)
+@for_each("how", [AGAIN, REMAINDER])
 def test_release_and_continue(driving: World, how: int) -> None:
     world = driving
     restart(world)
@@ -82,50 +79,8 @@ def test_release_and_continue(driving: World, how: int) -> None:
     assert world.state(2)[0] is S.COMPLETED
 
 
-@pytest.mark.parametrize("how", [AGAIN, REMAINDER])
-def test_continue_and_release(driving: World, how: int) -> None:
-    world = driving
-    restart(world)
-    where = world.pose()
-    assert proceed(world).result == ACCEPTED
-    assert any("keeps task 1 on hold: press" in text for text in world.client.texts())
-    world.run(5)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    assert near_pose(world.pose(), where), "what is held moves nothing"
-    assert release(world, how).answer == (ACCEPTED, 1)
-    world.until_idle(tasks=2)
-    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
-
-
-def test_release_and_continue_at_once(driving: World) -> None:
-    world = driving
-    restart(world)
-    assert release(world, REMAINDER).result == ACCEPTED
-    assert proceed(world).result == ACCEPTED
-    world.until_idle(tasks=2)
-    assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
-
-
-def test_skip_and_continue(driving: World) -> None:
-    world = driving
-    restart(world)
-    assert release(world, SKIP).result == ACCEPTED
-    world.run(3)
-    assert not world.rover.autopilot.armed
-    assert proceed(world).result == ACCEPTED
-    world.until_idle(tasks=2)
-    assert [task.state for task in world.tasks()] == [S.CANCELLED, S.COMPLETED]
-
-
-def test_a_release_at_the_moment_that_it_is_held_waits_for_the_rover(driving: World) -> None:
-    world = driving
-    world.rover.autopilot.reboot(now=world.now)
-    world.until_state(1, S.HELD, within=3)
-    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED)
-
-
-@pytest.mark.parametrize("order", ["release first", "continue between"])
+@for_each("persona", MAKES)
+@for_each("order", ["release first", "continue between"])
 def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str) -> None:
     world = driving
     world.fault(Faults(withheld=frozenset({POSITION})))
@@ -144,6 +99,7 @@ def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str)
     world.until_state(1, S.COMPLETED)
 
 
+@for_each("persona", MAKES)
 def test_a_release_that_waits_too_long_is_to_be_given_again(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -175,7 +131,8 @@ HALTS = {
 }
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("persona", MAKES)
+@for_each("halt", HALTS)
 def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
     world = driving
     world.fault(Faults(withheld=frozenset({POSITION})))
@@ -192,7 +149,8 @@ def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
     assert world.state(1)[0] in (S.HELD, S.KILLED, S.CANCELLED)
 
 
-@pytest.mark.parametrize("is_first", [True, False])
+@for_each("persona", MAKES)
+@for_each("is_first", [True, False])
 def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_first: bool) -> None:
     world = driving
     if is_first:
@@ -216,45 +174,6 @@ def test_what_a_person_disarmed_is_armed_by_no_release(driving: World, *, is_fir
     assert [task.state for task in world.tasks()] == [S.COMPLETED] * 2
 
 
-def test_who_may_not_continue_arms_nothing_by_a_release(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    settings = Settings(roles=Roles(unsigned="submitter"))
-    world = make_world(persona=persona, settings=settings)
-    world.client.move(4)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
-    restart(world)
-    at = world.now
-    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
-    world.run(3)
-    assert "arm" not in world.observer.sent_since(at)
-    assert world.state(1)[0] is S.HELD
-
-
-def test_nothing_to_continue_is_told_with_what_to_do(driving: World) -> None:
-    world = driving
-    restart(world)
-    proceed(world)
-    world.run(4)
-    assert proceed(world).answer == (DENIED, R.WRONG_STATE)
-    assert any("release it (again" in text for text in world.client.texts())
-
-
-@pytest.mark.parametrize("after", [0.0, 0.3, 0.7, 1.2])
-def test_a_task_of_which_nothing_was_driven_begins_when_the_rover_is_back(
-    make_world: MakeWorld, persona: Persona, after: float
-) -> None:
-    """It was submitted before anybody could know that the rover had restarted."""
-    world = make_world(persona=persona)
-    world.run(2.0)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(after)
-    world.client.move(1.0)
-    world.until_state(1, S.COMPLETED, within=60)
-    assert world.paused() is R.NONE
-    assert S.HELD not in [state for state, _ in world.history(1)]
-
-
 def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
     make_world: MakeWorld,
 ) -> None:
@@ -274,42 +193,10 @@ def test_a_heartbeat_after_the_clock_has_told_of_the_restart_is_no_takeover(
     world.until_state(1, S.COMPLETED, within=60)
 
 
-def test_another_origin_holds_no_task_of_which_nothing_was_driven(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    """A PX4 that boots has an origin of its own a second after it can be spoken to."""
-    world = make_world(persona=persona)
-    world.rover.autopilot.set_faults(Faults(refuse_arm=True))
-    world.client.move(1.0)
-    world.run(2.0)
-    assert world.state(1)[0] is S.STARTING
-    world.fault(Faults(refuse_arm=True, position_jump=(5.0, 3.0)))
-    world.run(2.0)
-    world.fault(Faults(position_jump=(5.0, 3.0)))
-    world.until_state(1, S.COMPLETED, within=60)
-
-
-def test_it_is_not_armed_any_more_once_its_clock_tells_of_the_restart(driving: World) -> None:
-    """The heartbeat that says so comes later, and what was shown before it is not so any more."""
-    world = driving
-    world.fault(Faults(withheld=frozenset({0})))
-    restart(world, up=1.5)
-    assert world.state(1) == (S.HELD, R.FRAME_RESET)
-    at = world.now
-    proceed(world)
-    assert release(world, REMAINDER).answer == (ACCEPTED, 1)
-    world.run(1.0)
-    assert "move" not in world.observer.sent_since(at), "nobody has seen it armed since"
-    world.fault(Faults())
-    world.until_state(1, S.COMPLETED, within=60)
-
-
 EVERYTHING, ALL_BUT_HEARTBEATS = frozenset(range(300)), frozenset(range(1, 300))
-HEARTBEATS = frozenset({0})
-HANDED_BACK = 6.0  # s after a task, in which the server has HOLD shown and disarms
 
 
-@pytest.fixture
+@anew
 def idle(make_world: MakeWorld, persona: Persona) -> World:
     """A world in which the rover has driven a task, and stands disarmed in HOLD."""
     world = make_world(persona=persona)
@@ -320,8 +207,9 @@ def idle(make_world: MakeWorld, persona: Persona) -> World:
     return world
 
 
-@pytest.mark.parametrize("unheard", [0.0, 2.2, 6.0])
-@pytest.mark.parametrize("unstamped", [0.0, 1.2, 4.5])
+@for_each("persona", MAKES)
+@for_each("unheard", [0.0, 2.2, 6.0])
+@for_each("unstamped", [0.0, 1.2, 4.5])
 def test_a_rover_that_restarts_between_two_tasks_is_driven(
     idle: World, unheard: float, unstamped: float
 ) -> None:
@@ -337,32 +225,8 @@ def test_a_rover_that_restarts_between_two_tasks_is_driven(
     world.until_state(2, S.COMPLETED, within=40)
 
 
-@pytest.mark.parametrize("moment", ["RELEASING", "armed by a client"])
-@pytest.mark.parametrize("withheld", [None, ALL_BUT_HEARTBEATS, HEARTBEATS, EVERYTHING])
-def test_a_rover_that_restarts_armed_between_two_tasks_is_driven(
-    make_world: MakeWorld, persona: Persona, moment: str, withheld: frozenset[int] | None
-) -> None:
-    """Nobody has disarmed it, and nothing was held that a person would have to decide about."""
-    world = make_world(persona=persona)
-    world.client.move(0.5)
-    world.until_state(1, S.COMPLETED)
-    if moment == "armed by a client":
-        world.client.arm()
-        world.run(HANDED_BACK)
-    else:
-        world.until(lambda: world.control() == moment, within=10)
-    assert world.rover.autopilot.armed
-    world.rover.autopilot.reboot(now=world.now)
-    world.fault(Faults(withheld=withheld or frozenset()))
-    world.run(2.2)
-    world.fault(Faults())
-    world.run(0.2)
-    world.client.move(0.5, nonce=2)
-    world.until_state(2, S.COMPLETED, within=40)
-    assert world.paused() is R.NONE
-
-
-@pytest.mark.parametrize("moment", ["before it", "after it"])
+@for_each("persona", MAKES)
+@for_each("moment", ["before it", "after it"])
 def test_a_rover_that_a_person_disarmed_stays_so_across_its_restart(
     idle: World, moment: str
 ) -> None:
@@ -387,39 +251,8 @@ def test_a_rover_that_a_person_disarmed_stays_so_across_its_restart(
     world.until_state(2, S.COMPLETED, within=30)
 
 
-def test_a_rover_that_is_silent_for_longer_than_it_was_up_before_is_driven(idle: World) -> None:
-    """As after a change of its battery: its new clock is ahead of the old one."""
-    world = idle
-    world.run(30)
-    world.rover.autopilot.reboot(now=world.now)
-    world.fault(Faults(withheld=EVERYTHING))
-    world.run(90)
-    world.fault(Faults())
-    world.run(10)
-    assert "Rover 1 restarted" in world.client.texts()
-    world.client.move(0.5, nonce=2)
-    world.until_state(2, S.COMPLETED, within=40)
-
-
-def test_a_task_that_is_submitted_while_the_rover_boots_waits_until_it_is_ready(
-    make_world: MakeWorld,
-) -> None:
-    """It says so: nobody has to set a mode, or to resume."""
-    world = make_world(realism=replace(EXACT, boot=ARDUPILOT_BOOT.scaled(0.5)))
-    world.run(30)
-    world.rover.autopilot.reboot(now=world.now)
-    world.until(lambda: world.rover.autopilot.mode is Mode.INITIALISING, within=3)
-    world.run(1.1)
-    assert world.rover.autopilot.mode is Mode.INITIALISING
-    world.client.move(0.5)
-    world.run(0.1)
-    world.client.request_status(1)
-    world.run(0.1)
-    assert world.client.statuses(1)[-1].why == (S.QUEUED, R.NOT_READY)
-    world.until_state(1, S.COMPLETED, within=60)
-
-
-@pytest.mark.parametrize("restarts", ["before it", "after it", "long after it", "never"])
+@for_each("persona", MAKES)
+@for_each("restarts", ["before it", "after it", "long after it", "never"])
 def test_a_mode_that_a_person_sets_on_a_disarmed_rover_is_no_restart(
     idle: World, restarts: str
 ) -> None:
@@ -438,39 +271,3 @@ def test_a_mode_that_a_person_sets_on_a_disarmed_rover_is_no_restart(
     assert any(text.startswith("Task 2 waits: disarmed") for text in world.client.texts())
     assert proceed(world).result == ACCEPTED
     world.until_state(2, S.COMPLETED, within=30)
-
-
-def test_a_mode_without_a_clock_is_a_persons_after_5_s(idle: World) -> None:
-    world = idle
-    world.fault(Faults(withheld=ALL_BUT_HEARTBEATS))
-    world.operator_mode(Mode.MANUAL)
-    world.run(1.2)
-    at = world.now
-    world.client.move(0.5, nonce=2)
-    world.run(8)
-    world.fault(Faults())
-    world.run(8)
-    assert world.state(2) == (S.QUEUED, R.NONE)
-    assert "arm" not in world.observer.sent_since(at)
-    assert proceed(world).result == ACCEPTED
-    world.until_state(2, S.COMPLETED, within=30)
-
-
-@pytest.mark.parametrize("word", ["move", "resume", "arm"])
-def test_a_word_is_newer_than_the_mode_that_was_seen_before_it(idle: World, word: str) -> None:
-    """The server decides first what the mode change was: a resume after it counts."""
-    world = idle
-    world.fault(Faults(withheld=ALL_BUT_HEARTBEATS))
-    world.operator_mode(Mode.MANUAL)
-    world.run(1.2)
-    at = world.now
-    if word == "resume":
-        proceed(world)
-    elif word == "arm":
-        world.operator_arm(True)
-        world.run(1.2)
-    world.client.move(0.5, nonce=2)
-    world.fault(Faults())
-    world.run(12)
-    assert ("arm" in world.observer.sent_since(at)) is (word == "resume")
-    assert (world.state(2)[0] is S.COMPLETED) is (word == "resume")

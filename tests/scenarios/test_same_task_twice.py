@@ -4,7 +4,11 @@ import pytest
 
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Queueing, Settings
+from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from mav_tasks.tasks.restored import Restored
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
@@ -18,7 +22,7 @@ from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 
-@pytest.fixture
+@anew
 def paused(world: World) -> World:
     """A world in which tasks only pile up."""
     world.client.pause()
@@ -66,7 +70,7 @@ def test_a_nonce_counts_from_another_port_of_the_same_address_too(paused: World)
     assert [s.task_id for s in (first, again, own)] == [1, 1, 2]
 
 
-@pytest.mark.parametrize(("after", "task_id"), [(2.4, 1), (9.9, 1), (10.1, 2)])
+@for_each("after, task_id", [(2.4, 1), (9.9, 1), (10.1, 2)])
 def test_confirmation_above_0_is_a_repeat_for_10_s(
     paused: World, after: float, task_id: int
 ) -> None:
@@ -77,7 +81,7 @@ def test_confirmation_above_0_is_a_repeat_for_10_s(
     assert again.task_id == task_id
 
 
-@pytest.mark.parametrize(("after", "task_id"), [(2.4, 1), (2.6, 2)])
+@for_each("after, task_id", [(2.4, 1), (2.6, 2)])
 def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, task_id: int) -> None:
     paused.client.move(1)
     paused.run(after)
@@ -88,14 +92,6 @@ def test_an_equal_payload_is_a_repeat_for_2_5_s(paused: World, after: float, tas
     assert told == ["repeated command, no new task: see task 1, queued"] * (2 - task_id)
 
 
-def test_a_client_that_goes_on_repeating_is_told_once(paused: World) -> None:
-    """DroneKit sends its "go to" ten times a second."""
-    paused.client.stream(command_long(MOVE, 1.0), rate=10)
-    paused.run(12)
-    assert len(paused.tasks()) == 1
-    assert len([text for text in paused.client.texts() if "repeated" in text]) == 1
-
-
 def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:
     ids = []
     for distance in (1.0, 2.0, 1.0):
@@ -103,14 +99,6 @@ def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:
         paused.run(0.1)
         ids.append(sent.task_id)
     assert ids == [1, 2, 3]
-
-
-def test_a_b_a_is_two_tasks_if_b_is_another_command(paused: World) -> None:
-    sent = [paused.client.move(1), paused.client.rotate(9)]
-    paused.run(0.1)
-    sent.append(paused.client.move(1))
-    paused.run(0.1)
-    assert [s.task_id for s in sent] == [1, 2, 1]
 
 
 def test_two_clients_may_ask_for_the_same(paused: World) -> None:
@@ -136,7 +124,7 @@ def test_what_was_refused_can_be_tried_again_at_once(make_world: MakeWorld) -> N
     assert again.answer == (ACCEPTED, 2)
 
 
-@pytest.mark.parametrize("seed", range(25))
+@for_each("seed", range(6))
 def test_repeats_over_a_bad_net_give_one_task_each(make_world: MakeWorld, seed: int) -> None:
     bad = Conditions(delay=0.005, jitter=0.1, loss=0.25, duplication=0.2)
     world = make_world(seed=seed, conditions=bad)
@@ -174,3 +162,49 @@ def test_each_command_is_answered_once_in_time_and_never_later(world: World) -> 
     assert len(world.client.acks) == len(sent)
     assert all(s.acked_at - at[s.message.command] <= 0.5 for s in sent)
     assert all(ack.result <= 4 for ack in world.client.acks)
+
+
+# nonces
+
+
+NONCE = 5
+
+
+KEPT = 600.0  # s after its end, in which a task is known by its nonce
+
+
+def done(world: World) -> int:
+    task = world.client.move(0.5, nonce=NONCE)
+    world.run(0.2)
+    world.until_state(task.task_id, S.COMPLETED)
+    return task.task_id
+
+
+def test_an_old_nonce_does_not_swallow_an_equal_task(world: World) -> None:
+    first = done(world)
+    world.run(KEPT + 1.0)
+    before = world.truth.north
+    assert done(world) == first + 1
+    assert world.truth.north - before == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.volume
+@for_each("late", [20.0, KEPT - 30.0])
+def test_a_late_copy_is_still_the_same_task(world: World, late: float) -> None:
+    first = done(world)
+    world.run(late)
+    assert done(world) == first
+
+
+@for_each("away, task_id", [(20.0, 1), (KEPT + 60.0, 2)])
+def test_after_a_restart_too(world: World, away: float, task_id: int) -> None:
+    assert done(world) == 1
+    task = world.task(1)
+    world.end_server()
+    world.run(away)
+    restored = Restored(tasks=(task,), next_id=2)
+    world.start_server(MemoryStore(), restored)
+    world.run(5.0)
+    again = world.client.move(0.5, nonce=NONCE)
+    world.run(0.2)
+    assert again.task_id == task_id

@@ -1,25 +1,23 @@
 """Tasks that repeat: a day of runs, crashes, STOP, outages, clocks that are set."""
 
-from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 from shutil import copy
-from struct import unpack
 
 import pytest
 
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.mavlink.label import text_pieces
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import Event, TaskModified, TaskSubmitted, VehicleNoted
+from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED, TEMPORARILY_REJECTED, Sent
-from tests.kit.mission import Item, Upload
 from tests.kit.store import LateStore, PromptSqliteStore
-from tests.kit.world import World, at
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
@@ -29,7 +27,7 @@ HOUR, DAY = 3600, 86_400
 GOES_ON = Settings(on_restart="continue")
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
@@ -115,27 +113,6 @@ def test_runs_follow_each_other_without_drift_and_each_is_a_task(world: World) -
     assert noted(world) == []
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
-def test_a_day_of_hourly_runs(make_world: MakeWorld) -> None:
-    """Most of the time nothing happens; so an hour has a minute here, and a run drives less."""
-    world = make_world()
-    every(world, 30, distance=0.1)
-    world.run(24 * 30.0)
-    made = runs(world)
-    assert len(made) == 25
-    assert [each.state for each in made[:-1]] == [S.COMPLETED] * 24
-
-
-def test_a_task_status_shows_series_and_repetition(world: World) -> None:
-    task = every(world, HOUR, delay=30)
-    world.client.request_status(task)
-    world.run(0.1)
-    payload = [p.payload for p in world.client.of_id(54000)][-1].ljust(200, b"\0")
-    series, repeat = unpack("<I64s", payload[132:200])
-    assert (series, repeat.rstrip(b"\0")) == (task, b"3600")
-
-
 def test_a_cron_expression_sets_the_start_by_the_wall_clock(world: World) -> None:
     set_clock(world, UTC)
     task = submit(world)
@@ -150,8 +127,8 @@ def test_a_cron_expression_sets_the_start_by_the_wall_clock(world: World) -> Non
     assert following.terms.start_utc == UTC + 4 * DAY
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
+@for_each(
+    "text, words",
     [("61 9 * * *", "bad minute"), ("0 9 * * * Mars/X", "time zone"), ("0 9 30 2 *", "day-of-m")],
 )
 def test_an_invalid_expression_changes_nothing(world: World, text: str, words: str) -> None:
@@ -163,38 +140,13 @@ def test_an_invalid_expression_changes_nothing(world: World, text: str, words: s
     assert world.task(task).terms == before
 
 
-@pytest.mark.parametrize("period", [9, 0.5, 1e9, float("nan"), -60])
+@for_each("period", [9, 0.5, 1e9, float("nan"), -60])
 def test_an_invalid_period_is_refused(world: World, period: float) -> None:
     submit(world)
     sent = world.client.command(MODIFY, 1, EVERY, period)
     world.run(0.05)
     assert sent.answer == (DENIED, R.BAD_PARAMETER)
     assert world.task(1).terms.repeat == ""
-
-
-def test_a_run_that_takes_longer_than_its_period_is_not_doubled(world: World) -> None:
-    every(world, 10, distance=6.0)  # takes 13 s or so
-    world.run(60)
-    check_each_series_once(world)
-    made = runs(world)
-    assert [each.terms.start_at - made[0].terms.start_at for each in made[:3]] == [0, 20, 40]  # type: ignore[operator]
-    assert noted(world)[0].startswith("left out 1 run while task 1 waited or ran; task 2 is next")
-
-
-def test_a_run_in_a_paused_queue_waits_and_none_comes_behind_it(world: World) -> None:
-    task = every(world, 20, delay=10)
-    world.client.pause()
-    world.run(70)
-    assert [each.id for each in runs(world)] == [task]
-    assert world.state(task)[0] is S.QUEUED
-    world.client.proceed()
-    world.until_state(task, S.COMPLETED)
-    world.run(0.1)
-    (following,) = waiting(world)
-    assert following.terms.start_at == pytest.approx(world.task(task).terms.start_at + 80)  # type: ignore[operator]
-    assert noted(world) == [
-        f"left out 3 runs while task 1 waited or ran; task {following.id} is next"
-    ]
 
 
 def test_cancel_ends_one_run_and_the_series_goes_on(world: World) -> None:
@@ -214,7 +166,7 @@ def test_cancel_ends_one_run_and_the_series_goes_on(world: World) -> None:
     assert [each.terms.start_at for each in waiting(world)] == [start + 120]
 
 
-@pytest.mark.parametrize("named", ["first", "present"])
+@for_each("named", ["first", "present"])
 def test_cancelling_the_series_ends_it_by_the_id_of_any_run(world: World, named: str) -> None:
     task = every(world, 20)
     world.run(45)
@@ -230,16 +182,7 @@ def test_cancelling_the_series_ends_it_by_the_id_of_any_run(world: World, named:
     assert again.answer == (DENIED, R.WRONG_STATE)
 
 
-def test_a_series_can_end_after_its_present_run(world: World) -> None:
-    task = every(world, 20)
-    world.until_state(task, S.EXECUTING)
-    world.client.command(MODIFY, task, EVERY, 0)
-    world.until_state(task, S.COMPLETED)
-    world.run(40)
-    assert [each.id for each in runs(world)] == [task]
-
-
-@pytest.mark.parametrize("state", [S.SCHEDULED, S.QUEUED, S.EXECUTING])
+@for_each("state", [S.SCHEDULED, S.QUEUED, S.EXECUTING])
 def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     """Hours after it, and long after a resume, nothing may start by itself."""
     task = every(world, 30, distance=2.0, delay=10 if state is S.SCHEDULED else 0)
@@ -264,42 +207,6 @@ def test_a_stop_ends_every_series_of_its_rover(world: World, state: S) -> None:
     assert waiting(world) == []
 
 
-def test_a_stop_of_one_rover_leaves_the_series_of_another(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    for number in (1, 2):
-        sent = world.client.command(54000, 0.2, 0, 0, 0, 0, 20, 5, target=(number, 191))
-        world.run(0.05)
-        world.client.command(MODIFY, sent.task_id, EVERY, 60, target=(number, 191))
-        world.run(0.05)
-    world.client.stop(target=(1, 191))
-    world.run(0.1)
-    assert [(each.vehicle, each.state) for each in runs(world)] == [
-        (1, S.KILLED),
-        (2, S.SCHEDULED),
-    ]
-
-
-@pytest.mark.parametrize("everything", [False, True])
-def test_a_cleared_queue_repeats_nothing(world: World, everything: bool) -> None:
-    driven, _later = every(world, 30, distance=3.0), every(world, 30, delay=20)
-    world.until_state(driven, S.EXECUTING)
-    world.client.command(CLEAR, float(everything))
-    world.until_state(driven, S.CANCELLED if everything else S.COMPLETED, within=20)
-    world.run(60)
-    assert waiting(world) == []
-    assert len(runs(world)) == 2
-
-
-def test_a_kill_ends_the_series(world: World) -> None:
-    task = every(world, 20)
-    world.until_state(task, S.EXECUTING)
-    world.client.command(CANCEL, task, 1)
-    world.run(30)
-    assert world.state(task)[0] is S.KILLED
-    assert waiting(world) == []
-    assert noted(world) == [f"will not repeat task {task}: killed"]
-
-
 def test_a_deadline_counts_from_each_start_and_its_end_is_one_run_only(world: World) -> None:
     task = every(world, 30, delay=5)
     world.client.command(MODIFY, task, DEADLINE, 4)
@@ -312,15 +219,6 @@ def test_a_deadline_counts_from_each_start_and_its_end_is_one_run_only(world: Wo
     world.run(10)
     assert world.state(following.id) == (S.EXPIRED, R.DEADLINE)
     assert len(waiting(world)) == 1
-
-
-def test_a_staged_plan_cannot_repeat(world: World) -> None:
-    places = [Item(16, **at(north, 0)) for north in (0, 0, 3)]
-    upload = Upload(world.client, places)
-    world.until(lambda: upload.result == 0, within=5)
-    sent = world.client.command(MODIFY, 1, EVERY, 60)
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.WRONG_STATE)
 
 
 def test_that_a_task_repeats_is_acknowledged_once_it_is_stored(make_world: MakeWorld) -> None:
@@ -342,7 +240,7 @@ def test_that_a_task_repeats_is_acknowledged_once_it_is_stored(make_world: MakeW
 # restarts
 
 
-@pytest.mark.parametrize("well", [False, True])
+@for_each("well", [False, True])
 def test_a_restart_between_two_runs_changes_nothing(
     make_world: MakeWorld, path: Path, well: bool
 ) -> None:
@@ -359,7 +257,7 @@ def test_a_restart_between_two_runs_changes_nothing(
     check_each_series_once(world)
 
 
-@pytest.mark.parametrize("away", [20.0, 200.0])
+@for_each("away", [20.0, 200.0])
 def test_times_that_passed_in_an_outage_are_left_out(
     make_world: MakeWorld, path: Path, away: float
 ) -> None:
@@ -404,77 +302,7 @@ def test_a_run_that_was_driven_at_a_crash_is_held_and_the_series_waits_for_it(
     assert len(waiting(world)) == 1
 
 
-def test_an_end_without_a_run_behind_it_gets_one_after_a_restart(
-    make_world: MakeWorld, path: Path
-) -> None:
-    """As a gateway stores it that has no task id left."""
-    world = make_world(store=PromptSqliteStore(path, wall_offset=UTC), settings=GOES_ON)
-    task = every(world, 40)
-    world.until_state(task, S.EXECUTING)
-    ids = world.server.engine._registry.ids
-    ids.share()
-    world.until_state(task, S.COMPLETED)
-    world.run(1.0)
-    assert [each.id for each in runs(world)] == [task]
-    restart(world, path)
-    assert [each.terms.series for each in waiting(world)] == [task]
-    restart(world, path.with_name(f"{path.stem}+{path.suffix}"))
-    assert len(runs(world)) == 2
-    check_each_series_once(world)
-
-
-def test_when_ids_are_granted_again_the_next_run_is_made(world: World) -> None:
-    task = every(world, 40)
-    world.until_state(task, S.EXECUTING)
-    ids = world.server.engine._registry.ids
-    ids.share()
-    world.until_state(task, S.COMPLETED)
-    world.run(1.0)
-    assert waiting(world) == []
-    ids.grant(50, 10)
-    world.run(0.5)
-    assert [each.id for each in waiting(world)] == [50]
-
-
-def test_the_end_of_a_run_and_the_next_one_are_stored_in_one_append(
-    make_world: MakeWorld, path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    store = PromptSqliteStore(path, wall_offset=UTC)
-    batches: list[list[Event]] = []
-    append = store.append
-
-    def noting(events: Sequence[Event]) -> None:
-        batches.append(list(events))
-        append(events)
-
-    monkeypatch.setattr(store, "append", noting)
-    world = make_world(store=store)
-    every(world, 20)
-    world.run(90)
-    with_runs = [
-        b for b in batches if any(isinstance(e, TaskSubmitted) and e.task.is_made for e in b)
-    ]
-    assert len(with_runs) >= 3
-    for batch in with_runs:
-        assert any(getattr(event, "new", None) in TERMINAL for event in batch)
-
-
 # clocks
-
-
-def test_a_clock_that_is_set_forward_leaves_out_what_it_passed(world: World) -> None:
-    set_clock(world, UTC)
-    submit(world)
-    cron(world, "0 * * * *", 1)
-    assert world.task(1).terms.start_utc == UTC + HOUR
-    set_clock(world, UTC + DAY + 60)
-    world.run(0.1)
-    assert world.state(1)[0] is S.SCHEDULED
-    assert world.task(1).terms.start_utc == UTC + DAY + HOUR
-    assert noted(world) == [
-        "left out 24 runs that passed meanwhile; task 1 starts 2027-01-16 09:00 UTC"
-    ]
-    assert len(world.events(TaskModified)) >= 1
 
 
 def test_a_clock_that_is_set_back_far_counts_from_now_and_a_little_does_not(world: World) -> None:
@@ -493,32 +321,3 @@ def test_a_clock_that_is_set_back_far_counts_from_now_and_a_little_does_not(worl
     world.run(0.1)
     assert world.task(following.id).terms.start_utc == UTC - DAY + HOUR
     check_each_series_once(world)
-
-
-def test_a_step_of_the_clock_changes_no_period(world: World) -> None:
-    set_clock(world, UTC)
-    task = every(world, 60, delay=30)
-    set_clock(world, UTC + DAY)
-    world.run(1)
-    assert world.state(task)[0] is S.SCHEDULED
-    set_clock(world, UTC - DAY)
-    world.until_state(task, S.COMPLETED, within=40)
-    assert noted(world) == []
-
-
-def test_a_deadline_moves_with_a_start_by_the_clock(world: World) -> None:
-    set_clock(world, UTC)
-    submit(world)
-    cron(world, "0 * * * *", 1)
-    world.client.command(MODIFY, 1, DEADLINE, 30)
-    world.run(0.1)
-    set_clock(world, UTC - 2 * HOUR)  # the run is now three hours ahead
-    world.run(60)
-    assert world.state(1)[0] is S.SCHEDULED
-    world.client.pause()
-    world.run(0.1)
-    set_clock(world, UTC + HOUR)
-    world.run(1)
-    assert world.state(1)[0] is S.QUEUED
-    world.run(31)
-    assert world.state(1) == (S.EXPIRED, R.DEADLINE)

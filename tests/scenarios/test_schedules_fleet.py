@@ -60,20 +60,6 @@ def test_a_takeover_makes_neither_two_runs_nor_none(fleet: Fleet, how: str) -> N
         assert {each.submitter for each in found} == {found[0].submitter}
 
 
-def test_a_run_that_a_dead_gateway_drove_is_held_and_followed_once(fleet: Fleet) -> None:
-    task = every(fleet, 30, metres=5.0)
-    fleet.drives(task)
-    fleet.world.kill(fleet.first.name)
-    assert fleet.world.holder() is fleet.other
-    fleet.world.until(fleet.world.stands, within=5)
-    fleet.world.run(5.0)
-    assert [each.state for each in runs(fleet, task)] == [S.HELD]
-    sent = fleet.clients[fleet.other.name].command(54013, task, 2)  # skip
-    fleet.world.run(0.5)
-    assert sent.result == ACCEPTED
-    assert [each.state for each in runs(fleet, task)] == [S.CANCELLED, S.SCHEDULED]
-
-
 def test_a_client_at_another_gateway_lets_a_task_repeat_and_ends_that(fleet: Fleet) -> None:
     fleet.world.run(3.0)
     far = fleet.clients[fleet.other.name]

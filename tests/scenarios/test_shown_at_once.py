@@ -3,17 +3,14 @@
 from dataclasses import replace
 from typing import Any
 
-import pytest
-
 from rover_sim.commands import CommandParts, CommandTable
 from rover_sim.personas import ARDUPILOT, GENERIC, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, heartbeat, set_mode
 from tests.kit.world import World, asks_for_heartbeat
 from tests.scenarios.conftest import MakeWorld
 
-MAKES = pytest.mark.parametrize(
-    "persona", [ARDUPILOT, PX4, GENERIC], ids=lambda persona: persona.name
-)
+MAKES = for_each("persona", [ARDUPILOT, PX4, GENERIC])
 SOON = 0.1  # s; beats are a second apart
 
 
@@ -42,7 +39,7 @@ def test_a_mode_that_is_set_by_command(make_world: MakeWorld, persona: Persona) 
         assert shown(world).custom_mode == number
 
 
-@pytest.mark.parametrize("persona", [PX4, GENERIC], ids=lambda persona: persona.name)
+@for_each("persona", [PX4, GENERIC])
 def test_a_mode_that_is_set_by_message(make_world: MakeWorld, persona: Persona) -> None:
     world = away_from_a_beat(make_world(persona=persona))
     for mode in (Mode.MANUAL, Mode.HOLD):
@@ -50,23 +47,6 @@ def test_a_mode_that_is_set_by_message(make_world: MakeWorld, persona: Persona) 
         world.client.send(set_mode(number))
         world.run(SOON)
         assert shown(world).custom_mode == number
-
-
-@MAKES
-def test_arming(make_world: MakeWorld, persona: Persona) -> None:
-    world = away_from_a_beat(make_world(persona=persona))
-    for armed in (True, False):
-        world.client.arm(armed)
-        world.run(SOON)
-        assert bool(shown(world).base_mode & 128) is armed
-
-
-def test_a_rover_is_taken_without_waiting_for_its_second(make_world: MakeWorld) -> None:
-    world = away_from_a_beat(make_world(persona=ARDUPILOT))
-    at = world.now
-    world.client.move(1.0)
-    world.until(lambda: world.truth.forward_speed > 0.05, within=3)
-    assert world.now - at < 0.8  # mode, zero, arming, zeros and the first of its speed
 
 
 def refusing(persona: Persona) -> Persona:
@@ -81,7 +61,7 @@ def refusing(persona: Persona) -> Persona:
     return replace(persona, commands=commands)
 
 
-@pytest.mark.parametrize("refuses", [True, False], ids=["refused", "silent"])
+@for_each("refuses", [True, False])
 def test_one_that_shows_nothing_on_request_is_not_asked_for_ever(
     make_world: MakeWorld, refuses: bool
 ) -> None:

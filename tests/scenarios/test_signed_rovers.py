@@ -2,22 +2,19 @@
 
 from pathlib import Path
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, Packets
-from mav_tasks.errors import RecordError
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.mavlink.signing import Key, is_signed_with
-from mav_tasks.recording.reading import read
-from mav_tasks.recording.replay import Replay
 from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -61,7 +58,7 @@ def test_all_that_drives_it_is_signed_with_its_key(make_world: MakeWorld) -> Non
     assert all(packet.is_signed and is_signed_with(packet, ROVERS.secret) for packet in packets)
 
 
-@pytest.mark.parametrize("forged", ["unsigned", "another key"])
+@for_each("forged", ["unsigned", "another key"])
 def test_nobody_else_is_taken_for_it(make_world: MakeWorld, forged: str) -> None:
     """Neither who pretends to be armed and elsewhere, nor who knows a key of clients."""
     world = signed_world(make_world)
@@ -114,18 +111,6 @@ def test_without_its_key_it_is_lost_and_stands(make_world: MakeWorld) -> None:
     assert world.stands()
 
 
-def test_the_server_s_own_packets_are_no_second_controller_s(make_world: MakeWorld) -> None:
-    """Who overhears them sends them back, and has no key."""
-    world = signed_world(make_world)
-    sent = sent_to_rover(world)
-    move = world.client.move(1.0)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    overheard = Packets(VEHICLE_LINK, [("attacker", data) for data in sent[-40:]])
-    world.server.pump.handle(overheard, now=world.now)
-    world.until_idle(tasks=1)
-    assert world.state(move.task_id)[0] is S.COMPLETED
-
-
 def test_a_stop_reaches_it_though_its_key_was_revoked(make_world: MakeWorld) -> None:
     """It is not believed any more; but it hears nobody else, and must not be left driving."""
     world = signed_world(make_world)
@@ -135,39 +120,3 @@ def test_a_stop_reaches_it_though_its_key_was_revoked(make_world: MakeWorld) -> 
     world.client.stop()
     world.until(lambda: world.rover.autopilot.mode is Mode.HOLD, within=1.0)
     world.until(world.stands, within=2.0)
-
-
-def test_with_another_secret_of_that_name_it_is_that_one_which_counts(
-    make_world: MakeWorld,
-) -> None:
-    world = signed_world(make_world)
-    sent = sent_to_rover(world)
-    another = Key("rovers", OTHER.secret)
-    world.server.pump.handle(KeysChanged((another,)), now=world.now)
-    world.run(1.5)
-    packets = [packet for data in sent for packet in split_datagram(data)]
-    assert packets
-    assert all(is_signed_with(packet, another.secret) for packet in packets)
-
-
-def test_its_record_is_replayed_with_the_secrets_and_only_so(
-    make_world: MakeWorld, tmp_path: Path
-) -> None:
-    world = signed_world(make_world, records=tmp_path)
-    world.client.move(1.0)
-    world.until_idle(tasks=1)
-    (path,) = world.end_records()
-    data = path.read_bytes()
-    assert ROVERS.secret not in data
-    assert ROVERS.secret.hex().encode() not in data
-    record = read(path)
-    whole = Replay(record, secrets={key.fingerprint: key.secret for key in (ROVERS, OTHER)})
-    assert len(list(whole.events())) > 3
-    assert whole.difference is None
-    with pytest.raises(RecordError, match=r"signed with key rovers \(.*its secret is missing"):
-        list(Replay(record).events())
-    wrong = Replay(
-        record, secrets=dict.fromkeys((ROVERS.fingerprint, OTHER.fingerprint), b"x" * 32)
-    )
-    list(wrong.events())
-    assert wrong.difference is not None

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks import Client, Move, NoAnswer, NoSuchVehicle, Refused, TaskReason, TaskState
+from mav_tasks import Client, Move, NoAnswer, Refused, TaskReason, TaskState
 from mav_tasks.settings import Settings
 from rover_sim.faults import Faults
 from rover_sim.testing.options import RoverOptions
@@ -68,15 +68,6 @@ def test_every_question_is_answered_while_its_rover_is_silent(make_world: MakeWo
         assert tasks.queue().paused is TaskReason.OPERATOR
 
 
-def test_of_two_rovers_the_silent_one_is_found_too(make_world: MakeWorld) -> None:
-    world = make_world(count=2)
-    fall_silent(world, 1)
-    with world.sync_client() as tasks:
-        assert [(rover.id, rover.is_heard) for rover in tasks.vehicles()] == [(1, True), (2, False)]
-        with pytest.raises(NoSuchVehicle, match="rovers 1, 2"):
-            tasks.queue()
-
-
 def test_a_server_that_has_not_heard_its_rover_yet_tells_of_its_tasks(
     make_world: MakeWorld,
 ) -> None:
@@ -123,9 +114,3 @@ def test_a_script_that_submits_just_after_the_server_came_back_is_not_refused(
             return (await tasks.submit(Move(1.0))).id
 
     assert world.run(script()) == 2
-
-
-def test_a_server_without_a_rover_says_that_it_is_there(make_world: MakeWorld) -> None:
-    world = make_world(is_silent=True)
-    with pytest.raises(NoAnswer, match="the task server has heard no rover"), world.sync_client():
-        pass

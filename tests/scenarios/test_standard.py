@@ -1,6 +1,5 @@
 """The commands that stock clients send without knowing of tasks become tasks all the same."""
 
-from dataclasses import replace
 from math import nan
 from typing import Any
 
@@ -11,6 +10,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, AUTO, DENIED, RTL, set_mode
 from tests.kit.world import World, at, is_at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
@@ -18,11 +18,10 @@ from tests.scenarios.conftest import MakeWorld
 WAYPOINT, LOITER_TIME, RETURN, TAKEOFF, DELAY = 16, 19, 20, 22, 93
 YAW, SPEED, REPOSITION, YAW_SPEED = 115, 178, 192, 213
 GLOBAL, LOCAL, GLOBAL_RELATIVE_INT = 0, 1, 6
-RELEASE = 54013
 
 
-@pytest.mark.parametrize("target", [(1, 1), (1, 191), (1, 0)])
-@pytest.mark.parametrize("frame", [GLOBAL, 5, GLOBAL_RELATIVE_INT])
+@for_each("target", [(1, 1), (1, 191), (1, 0)])
+@for_each("frame", [GLOBAL, 5, GLOBAL_RELATIVE_INT])
 def test_go_to_drives_to_the_place(world: World, target: tuple[int, int], frame: int) -> None:
     sent = world.client.command_int(
         REPOSITION, -1, 1, 0, nan, **at(1.5, -2.0), frame=frame, target=target
@@ -54,27 +53,6 @@ def test_go_to_in_three_forms_is_one_task(world: World) -> None:
     assert len(world.tasks()) == 1
 
 
-def test_each_form_is_answered_though_none_is_stored_yet(world: World) -> None:
-    place = at(2.0, 0.5)
-    sent = [
-        world.client.command_int(command, **place, frame=GLOBAL, target=target)
-        for command in (REPOSITION, WAYPOINT)
-        for target in ((1, 1), (1, 191))
-    ]
-    world.run(0.3)
-    assert [each.answer for each in sent] == [(ACCEPTED, 1)] * 4
-    assert len(world.tasks()) == 1
-
-
-def test_without_a_place_it_is_a_pause(world: World) -> None:
-    world.client.move(2)
-    world.run(2)
-    sent = world.client.command(REPOSITION, -1, 1, 0, nan, nan, nan, nan, target=(1, 1))
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 1)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
-
-
 def test_go_to_now_runs_at_once_and_the_other_goes_on_when_continued(
     make_world: MakeWorld,
 ) -> None:
@@ -96,7 +74,7 @@ def test_go_to_now_runs_at_once_and_the_other_goes_on_when_continued(
     assert near_pose(world.pose(), (3.3, 0.0, 0.0), metres=0.04)
 
 
-@pytest.mark.parametrize("how", ["command", "mode", "old mode message"])
+@for_each("how", ["command", "mode", "old mode message"])
 def test_return_drives_home(world: World, how: str) -> None:
     put_home(world, 0.0, 0.0)
     world.client.move(1.0)
@@ -114,14 +92,6 @@ def test_return_drives_home(world: World, how: str) -> None:
     assert world.paused() is R.NONE, "nothing waits"
 
 
-def test_return_interrupts_what_runs(world: World) -> None:
-    world.client.move(3)
-    world.run(4)
-    world.client.mode(RTL)
-    world.until_state(2, S.COMPLETED)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
-
-
 def test_a_client_that_wants_auto_gets_it_and_that_is_a_takeover(world: World) -> None:
     world.client.move(3)
     world.run(3)
@@ -130,8 +100,8 @@ def test_a_client_that_wants_auto_gets_it_and_that_is_a_takeover(world: World) -
     assert world.paused() is R.TAKEOVER
 
 
-@pytest.mark.parametrize(
-    ("params", "yaw"),
+@for_each(
+    "params, yaw",
     [((90, 20, 0, 0), 90.0), ((90, 0, -1, 0), 90.0), ((30, 0, 1, 1), 30.0), ((30, 0, -1, 1), -30)],
 )
 def test_a_heading_is_turned_to(
@@ -184,8 +154,8 @@ def test_the_speed_is_changed_of_what_runs_and_of_what_comes(world: World) -> No
     assert world.truth.forward_speed == pytest.approx(0.5, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("command", "params", "kw", "named"),
+@for_each(
+    "command, params, kw, named",
     [
         (REPOSITION, (-1, 1, 0, nan), {"x": 910_000_000, "y": 0, "frame": 0}, "latitude"),
         (REPOSITION, (-1, 1, 0, nan), {"x": 1, "y": 1_900_000_000, "frame": 0}, "longitude"),
@@ -218,53 +188,6 @@ def test_another_origin_holds_what_runs(world: World) -> None:
     world.run(0.2)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     world.until(world.stands, within=3)
-
-
-def test_the_remainder_of_a_way_to_a_place_in_a_lost_frame_is_not_driven(world: World) -> None:
-    world.client.command_int(REPOSITION, -1, 1, 0, nan, x=30_000, y=0, frame=LOCAL)
-    world.until(lambda: world.truth.north > 1.0, within=20)
-    moved = common.MAVLink_gps_global_origin_message(-353_600_000, 1_491_600_000, 0)
-    world.from_vehicle_side(moved.pack(common.MAVLink(None, 1, 1)), peer="rover1")
-    world.until_state(1, S.HELD, within=10)
-    world.run(3)
-    remainder = world.client.command(RELEASE, 1, 1)
-    world.run(0.2)
-    assert remainder.answer == (DENIED, R.WRONG_STATE)
-    again = world.client.command(RELEASE, 1, 0)
-    world.run(0.2)
-    assert again.answer == (ACCEPTED, 1)
-
-
-def test_while_stopped_they_wait(world: World) -> None:
-    world.client.stop()
-    world.run(1)
-    world.client.command(RETURN, target=(1, 1))
-    world.run(0.6)
-    world.client.command_int(REPOSITION, -1, 1, 0, nan, **at(1, 0), frame=0, target=(1, 1))
-    world.run(0.6)
-    rtl = world.client.mode(RTL)
-    world.run(2)
-    assert rtl.result == 1
-    assert [world.state(i)[0] for i in (1, 2)] == [S.QUEUED, S.QUEUED]
-    assert world.stands()
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
-def test_a_clients_default_priority_is_that_of_its_standard_commands(
-    make_world: MakeWorld,
-) -> None:
-    priorities = {"255/190": 7, "245/190": 2, "245/190@script": 9}
-    clients = replace(Settings().clients, priorities=priorities)
-    world = make_world(settings=replace(Settings(), clients=clients))
-    others = [world.add_client(name, system_id=245) for name in ("script", "another")]
-    world.add_client("nobody", system_id=7).command(DELAY, 1.0)
-    for client in (world.client, *others):
-        world.run(0.1)
-        client.command(DELAY, 1.0)
-    world.run(0.1)
-    world.client.command(54000, 1.0, 0, 0, 0, 0, 0, nan)
-    world.run(0.1)
-    assert [task.priority for task in world.tasks()] == [5, 7, 9, 2, 5]
 
 
 def test_a_place_beyond_all_reach_is_refused(world: World) -> None:

@@ -2,13 +2,12 @@
 
 from itertools import pairwise
 
-import pytest
-
 from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -24,7 +23,7 @@ def shown(world: World, task_id: int) -> tuple[int, int]:
     return world.client.statuses(task_id)[-1].why
 
 
-@pytest.mark.parametrize("arming", ["auto", "server"])
+@for_each("arming", ["auto", "server"])
 def test_the_server_arms_where_it_may(make_world: MakeWorld, arming: str) -> None:
     world = make_world(settings=Settings(arming=arming))
     world.client.move(0.3)
@@ -46,7 +45,7 @@ def test_with_arming_by_the_operator_a_task_waits_for_it(make_world: MakeWorld) 
     assert world.rover.autopilot.armed
 
 
-@pytest.mark.parametrize("mode", [Mode.AUTO, Mode.RTL, Mode.GUIDED, Mode.MANUAL])
+@for_each("mode", [Mode.AUTO, Mode.RTL, Mode.GUIDED, Mode.MANUAL])
 def test_an_armed_rover_in_a_mode_that_is_not_ours_is_waited_for(world: World, mode: Mode) -> None:
     world.operator_arm(True)
     world.operator_mode(mode)
@@ -88,21 +87,8 @@ def test_for_a_silent_rover_a_task_waits(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-def test_a_task_that_waits_says_when_the_rover_falls_silent(world: World) -> None:
-    world.operator_arm(True)
-    world.operator_mode(Mode.AUTO)
-    world.rover.autopilot.parameters["WP_SPEED"] = 0.5
-    world.run(1)
-    world.client.move(0.3)
-    world.run(1)
-    assert shown(world, 1) == (S.QUEUED, R.WRONG_MODE)
-    world.fault(Faults(silent=True))
-    world.run(4)
-    assert shown(world, 1) == (S.QUEUED, R.VEHICLE_SILENT)
-
-
-@pytest.mark.parametrize(
-    ("faults", "reason"),
+@for_each(
+    "faults, reason",
     [(Faults(refuse_arm=True), R.ARM_REFUSED), (Faults(refuse_mode=True), R.MODE_REFUSED)],
 )
 def test_a_refusal_fails_the_task_in_about_a_second_and_the_queue_goes_on(
@@ -129,16 +115,6 @@ def test_a_refusal_fails_the_task_in_about_a_second_and_the_queue_goes_on(
     assert world.state(3)[0] is S.COMPLETED
 
 
-@pytest.mark.parametrize("phase", ["mode", "arm"])
-def test_what_is_refused_at_first_is_asked_for_again(world: World, phase: str) -> None:
-    world.fault(Faults(refuse_mode=phase == "mode", refuse_arm=phase == "arm"))
-    world.client.move(0.3)
-    world.run(0.5)
-    world.fault(Faults())
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-
-
 def test_a_rover_that_answers_nothing_fails_the_task(world: World) -> None:
     world.fault(Faults(deaf=True))
     at = world.now
@@ -146,16 +122,6 @@ def test_a_rover_that_answers_nothing_fails_the_task(world: World) -> None:
     world.until_state(1, S.FAILED)
     assert world.now - at < 6.0  # four times, each on a heartbeat that shows whose it is
     assert world.state(1)[1] is R.MODE_REFUSED
-
-
-def test_behind_another_and_behind_a_pause(world: World) -> None:
-    world.client.move(2)
-    world.client.rotate(10)
-    world.run(1)
-    assert shown(world, 2) == (S.QUEUED, R.BEHIND_OTHERS)
-    world.client.pause()
-    world.run(1)
-    assert shown(world, 2) == (S.QUEUED, R.QUEUE_PAUSED)
 
 
 def test_mode_zero_arm_zeros_motion(world: World) -> None:

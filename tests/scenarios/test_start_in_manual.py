@@ -6,11 +6,10 @@ mission come in any order.
 
 from typing import NamedTuple
 
-import pytest
-
 from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, AUTO, Sent
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import MISSION, ask_mode
@@ -58,8 +57,8 @@ def ask_for_mission(world: World, persona: Persona) -> Sent:
     return world.client.mode(AUTO)
 
 
-@pytest.mark.parametrize(
-    ("persona", "case"),
+@for_each(
+    "persona, case",
     [
         (ARDUPILOT, STORE_LATE),
         (ARDUPILOT, SHOWN_LATE),
@@ -67,7 +66,7 @@ def ask_for_mission(world: World, persona: Persona) -> Sent:
         (PX4, LINK_LATE),
     ],
 )
-@pytest.mark.parametrize("arms_first", [True, False], ids=["arm, mission", "mission, arm"])
+@for_each("arms_first", [True, False])
 def test_a_mission_that_was_accepted_starts(
     make_world: MakeWorld, persona: Persona, case: Case, *, arms_first: bool
 ) -> None:

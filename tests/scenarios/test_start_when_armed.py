@@ -1,11 +1,9 @@
 """PX4's way to start a mission: the mode and arming, in either order."""
 
-import pytest
-from pymavlink.dialects.v20 import common
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, set_mode
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, RETURN, ask_mode
@@ -15,7 +13,7 @@ from tests.scenarios.conftest import MakeWorld
 WAYPOINT, CANCEL, CLEAR = 16, 54010, 54011
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     """A rover at which a plan waits."""
     world = make_world(persona=PROMPT_PX4)
@@ -50,7 +48,7 @@ def mark(world: World, by: str) -> None:
         assert sent.answer == (ACCEPTED, 1)
 
 
-@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
+@for_each("by", ["DO_SET_MODE", "SET_MODE"])
 def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
     mark(world, by)
     assert shown(world) == MISSION, "at once"
@@ -64,7 +62,7 @@ def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
     assert shown(world) != MISSION
 
 
-@pytest.mark.parametrize("by", ["DO_SET_MODE", "SET_MODE"])
+@for_each("by", ["DO_SET_MODE", "SET_MODE"])
 def test_armed_before_the_mode_starts(world: World, by: str) -> None:
     world.client.arm()
     world.run(0.3)
@@ -86,7 +84,7 @@ def test_armed_too_late_does_not_start(world: World) -> None:
     assert shown(world) == HOLD
 
 
-@pytest.mark.parametrize("other", ["STOP", "pause", "HOLD", "another mode", "hold of another"])
+@for_each("other", ["STOP", "pause", "HOLD", "another mode", "hold of another"])
 def test_another_wish_removes_the_mark(world: World, other: str) -> None:
     ask_mode(world.client, MISSION)
     world.run(0.5)
@@ -111,14 +109,6 @@ def test_another_wish_removes_the_mark(world: World, other: str) -> None:
     assert waits_for_start(world)
 
 
-def test_without_a_plan_the_mode_is_the_rovers_own_affair(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    sent = ask_mode(world.client, MISSION)
-    world.run(0.3)
-    assert sent.answer is not None
-    assert sent.answer[0] != ACCEPTED, "it has none, either"
-
-
 def test_a_return_is_shown_and_driven(world: World) -> None:
     world.client.arm()
     world.run(0.3)
@@ -131,7 +121,7 @@ def test_a_return_is_shown_and_driven(world: World) -> None:
     assert near_pose(world.pose(), (0.0, 0.0, 180.0), metres=0.05, angle=5)
 
 
-@pytest.mark.parametrize("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])
+@for_each("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])
 def test_a_mission_that_was_called_off_does_not_start(
     world: World, call_off: tuple[int, ...]
 ) -> None:
@@ -146,28 +136,7 @@ def test_a_mission_that_was_called_off_does_not_start(
     assert len(world.tasks()) == 1, "nor does another task of it"
 
 
-def test_another_plan_than_the_one_that_was_meant_does_not_start(world: World) -> None:
-    other = world.add_client("other")
-    ask_mode(world.client, MISSION)
-    world.run(1.2)
-    upload = Upload(other, [Item(WAYPOINT, **at(-2.0, 0.0))])
-    world.until(lambda: upload.result is not None, within=5)
-    other.arm()
-    world.run(4)
-    assert abs(world.truth.north) < 0.05
-
-
-def test_a_restart_of_the_rover_removes_the_mark(world: World) -> None:
-    ask_mode(world.client, MISSION)
-    world.run(0.3)
-    world.rover.autopilot.reboot(now=world.now)
-    world.run(6)
-    world.operator_arm(True)
-    world.run(3)
-    assert waits_for_start(world)
-
-
-@pytest.mark.parametrize("persona", [PX4, PROMPT_PX4], ids=["1 Hz", "prompt"])
+@for_each("persona", [PX4, PROMPT_PX4])
 def test_a_person_who_arms_to_drive_by_hand_keeps_the_rover(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -182,11 +151,3 @@ def test_a_person_who_arms_to_drive_by_hand_keeps_the_rover(
     world.run(4)
     assert world.rover.autopilot.mode is Mode.MANUAL
     assert world.stands()
-
-
-def test_what_is_shown_ends_with_the_plan(world: World) -> None:
-    ask_mode(world.client, MISSION)
-    world.run(0.3)
-    world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 0))
-    world.run(2.0)
-    assert shown(world) == HOLD

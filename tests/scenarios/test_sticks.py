@@ -3,15 +3,13 @@
 from dataclasses import replace
 from functools import partial
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
-from rover_sim.modes import Mode
 from rover_sim.realism import EXACT, Drive, Wire
-from tests.kit.client import ACCEPTED, rc_override, sticks
+from tests.kit.cases import for_each
+from tests.kit.client import ACCEPTED, sticks
 from tests.kit.observer import SERVER
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
@@ -49,8 +47,8 @@ def stands_after(world: World) -> float:
     return moved - began
 
 
-@pytest.mark.parametrize(
-    ("frame", "when", "within"),
+@for_each(
+    "frame, when, within",
     [
         (Frame.SKID, "starting", 1.5),
         (Frame.SKID, "driving", 1.5),
@@ -76,22 +74,6 @@ def test_a_stick_held_forward_ends_in_hold(
     assert len(said) == 1
 
 
-def test_a_stick_that_is_still_held_when_somebody_continues_is_a_takeover_again(
-    make_world: MakeWorld,
-) -> None:
-    world = with_transmitter(make_world, Frame.SKID)
-    world.client.move(4.0)
-    world.run(4.0)
-    world.rover.autopilot.operator_pulses(FORWARD, CENTRE)
-    world.run(4.0)
-    north = world.truth.north
-    world.client.proceed()
-    world.run(6.0)
-    assert world.paused() is R.TAKEOVER
-    assert world.stands()
-    assert abs(world.truth.north - north) < 0.5
-
-
 def test_the_task_goes_on_when_the_stick_is_centred_and_somebody_says_continue(
     make_world: MakeWorld,
 ) -> None:
@@ -107,22 +89,6 @@ def test_the_task_goes_on_when_the_stick_is_centred_and_somebody_says_continue(
     assert sent.answer is not None
     assert sent.answer[0] == ACCEPTED
     assert abs(world.truth.north - 4.0) < 0.1
-
-
-@pytest.mark.parametrize("message", [rc_override(1500, 1500, 1700, 1500), sticks(z=300)])
-def test_sticks_of_a_ground_station_leave_no_speed_behind(
-    make_world: MakeWorld, message: object
-) -> None:
-    """In GUIDED the rover would drive on by stick and setpoint, and nobody could steer it."""
-    world = with_transmitter(make_world, Frame.SKID)
-    world.client.move(20.0, speed=1.2)
-    world.run(5.0)
-    north = world.truth.north
-    world.client.stream(message, rate=5)
-    assert stands_after(world) <= 1.5
-    assert world.truth.north - north < 1.0
-    assert world.rover.autopilot.mode is Mode.HOLD
-    assert world.paused() is R.TAKEOVER
 
 
 def test_who_disarms_a_rover_that_somebody_drives_by_hand_sends_it_nothing_else(

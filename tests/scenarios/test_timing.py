@@ -4,21 +4,19 @@ import asyncio
 import struct
 from dataclasses import replace
 from itertools import pairwise
-from math import isnan
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
 from mav_tasks import Move, Refused
-from mav_tasks.settings import Queueing, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.timing import Timing
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
-from tests.kit.client import ACCEPTED, DENIED, MOVE, REQUEST
+from tests.kit.client import ACCEPTED, REQUEST
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import SETPOINT, World
 from tests.scenarios.conftest import MakeWorld
@@ -53,7 +51,7 @@ def ask(world: World, task_id: float) -> TaskTiming:
     return TaskTiming._make(struct.unpack("<4I4f2B", shown[0].payload.ljust(34, b"\0")))
 
 
-def of_journal(world: World, new: S) -> Timing:
+def of_journal(world: World, new: S) -> Any:
     (event,) = [e for e in world.events(TaskChanged) if e.old is S.EXECUTING and e.new is new]
     assert event.timing is not None
     return event.timing
@@ -121,40 +119,6 @@ def test_the_interval_for_which_a_task_is_held_is_in_its_event(world: World) -> 
     world.until(world.stands, within=3)
 
 
-def test_a_pre_empted_task_keeps_its_own_figures(make_world: MakeWorld) -> None:
-    queueing = Queueing(preemption_gap=3, preemption_rest=0.3)
-    world = make_world(settings=Settings(queueing=queueing))
-    world.client.move(2.0, priority=2)
-    world.until_state(1, S.EXECUTING)
-    world.run(1)
-    world.client.rotate(90, priority=9)
-    world.until_state(2, S.COMPLETED)
-    first, second = of_journal(world, S.PAUSED), world.task(2).timing
-    assert second is not None
-    assert first.count > 10
-    world.until_state(1, S.COMPLETED)
-    whole = world.task(1).timing
-    assert whole is not None
-    assert whole.count > first.count
-    assert whole.longest < 2 * TICK
-
-
-@pytest.mark.parametrize("task_id", [7, -1, 0.5, float("nan"), 2**24, 0])
-def test_of_what_is_not_there_nothing_is_shown(world: World, task_id: float) -> None:
-    sent = world.client.command(REQUEST, TASK_TIMING, task_id)
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.NOT_FOUND)
-    assert list(world.client.of_id(TASK_TIMING)) == []
-
-
-def test_a_task_that_waits_has_no_intervals(world: World) -> None:
-    world.client.command(MOVE, 1.0, 0, 0, 0, 0, 60, 5)
-    world.run(0.2)
-    asked = ask(world, 1)
-    assert (asked.intervals, asked.late, asked.rate) == (0, 0, 20.0)
-    assert all(isnan(figure) for figure in (asked.p50, asked.p99, asked.longest))
-
-
 def test_a_restart_forgets_no_figures(make_world: MakeWorld, tmp_path: Path) -> None:
     path = tmp_path / "tasks.sqlite3"
     world = make_world(store=PromptSqliteStore(path, wall_offset=UTC))
@@ -185,21 +149,6 @@ def test_a_restart_forgets_no_figures(make_world: MakeWorld, tmp_path: Path) -> 
     assert whole.count > half.count + 10
     assert whole.longest < 2 * TICK
     assert replace(whole, spread=()) == whole
-
-
-def test_a_script_without_asyncio_asks_for_them() -> None:
-    world = RoverWorld(RoverOptions(noise="off"), seed=1, settings=Settings())
-    try:
-        world.server.start()
-        world.until(lambda: world.server.is_ready)
-        with world.sync_client() as client:
-            task = client.submit(Move(0.5))
-            task.done()
-            timing = task.timing()
-            assert timing.count > 10
-            assert client.timing(task.id) == timing
-    finally:
-        world.close()
 
 
 def test_a_script_asks_for_them() -> None:

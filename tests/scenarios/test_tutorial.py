@@ -1,10 +1,9 @@
 """The tutorial's three tasks, from submission to the last standstill."""
 
-import pytest
-
 from mav_tasks.links.memory import Conditions
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.volume import tries
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -39,7 +38,7 @@ def test_of_those_that_wait_a_later_one_overtakes_if_it_is_more_urgent(world: Wo
     assert finished == [1, 3, 2]
 
 
-@pytest.mark.parametrize("seed", range(tries(10, long=100)))
+@for_each("seed", range(tries(4, long=100)))
 def test_all_of_it_is_done_in_order_over_a_bad_net(make_world: MakeWorld, seed: int) -> None:
     world = make_world(seed=seed, conditions=BAD_NET)
     first = world.client.move(0.6, priority=3, repeats=PATIENT, nonce=1)

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
@@ -10,6 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.body import Pose
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.fleet import Fleet, Layout
 from tests.kit.world import near_pose, twin_of
@@ -42,7 +42,7 @@ def silence(fleet: Fleet, *ways: str) -> None:
     fleet.watched.loses = lambda source, target, _data: source in ways or target in ways
 
 
-@pytest.mark.parametrize("layout", [TWO_LINKS, ONE_LINK], ids=["two links", "one link"])
+@for_each("layout", [TWO_LINKS, ONE_LINK])
 def test_when_one_radio_dies_the_task_goes_on_by_the_other_within_a_second(
     make_fleet: MakeFleet, layout: Layout
 ) -> None:
@@ -100,42 +100,7 @@ def test_a_radio_on_which_nothing_reaches_the_rover_is_left_too(make_fleet: Make
     assert near_pose(fleet.pose_of(1), (1.0, 0.0, 0.0))
 
 
-def test_two_good_radios_are_not_used_in_turns(make_fleet: MakeFleet) -> None:
-    fleet = with_two(make_fleet)
-    fleet.run(20)
-    silence(fleet, "b")
-    fleet.run(10)
-    silence(fleet)
-    fleet.run(10)
-    assert notes(fleet) == []
-    assert [each.text for each in fleet.events(VehicleSeen)].count("is now at b") == 0
-
-
-def test_a_rover_that_was_silent_on_both_is_heard_again_on_either(make_fleet: MakeFleet) -> None:
-    fleet = with_two(make_fleet)
-    silence(fleet, "a", "b")
-    fleet.run(10)
-    silence(fleet, "a")
-    fleet.client.move(1, target=(1, 191))
-    fleet.until_state(1, S.COMPLETED)
-
-
-def test_a_rover_that_restarts_at_once_at_another_place_is_heard_again(
-    make_fleet: MakeFleet,
-) -> None:
-    """A simulated autopilot gets another port; a restart takes it less than a second."""
-    fleet = make_fleet(TWO_LINKS)
-    fleet.run(6)
-    fleet.radios["a"].vehicles.clear()
-    fleet.run(0.5)
-    again = twin_of(1, start=Pose(north=0.5), now=fleet.now, is_same=True)
-    fleet.radios["b"].vehicles.append(again)
-    fleet.run(15)
-    assert not any("shares its id" in text for text in notes(fleet))
-    assert "is now at b" in [each.text for each in fleet.events(VehicleSeen)]
-
-
-@pytest.mark.parametrize("switched_on", ["later", "at the same time"])
+@for_each("switched_on", ["later", "at the same time"])
 def test_a_stranger_with_the_id_is_never_driven_whatever_it_says(
     make_fleet: MakeFleet, switched_on: str
 ) -> None:

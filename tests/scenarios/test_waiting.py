@@ -2,11 +2,11 @@
 
 import pytest
 
-from mav_tasks.engine.commands import translate
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, MOVE
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -72,7 +72,7 @@ def test_a_utc_start_is_exact_and_moves_with_the_clock_and_nothing_else_does(wor
     world.until_idle(tasks=2)
 
 
-@pytest.mark.parametrize("step", [DAY, -DAY, 2.0, -2.0])
+@for_each("step", [DAY, -DAY, 2.0, -2.0])
 def test_a_step_of_the_clock_changes_no_motion_no_delay_and_no_deadline(
     world: World, step: float
 ) -> None:
@@ -92,16 +92,6 @@ def test_a_step_of_the_clock_changes_no_motion_no_delay_and_no_deadline(
     world.until_state(driven, S.COMPLETED, within=20)
     states = [state for state, _ in world.history(driven)]
     assert states == [S.STARTING, S.EXECUTING, S.COMPLETED]  # and 20 Hz: the observer looks at it
-
-
-def test_a_utc_start_in_a_float_is_refused(world: World) -> None:
-    task = submit(world, 3)
-    waiting = submit(world)
-    sent = world.client.command(MODIFY, waiting, START_UTC, 0, 0, 1.8e9)
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.BAD_PARAMETER)
-    assert any("COMMAND_INT" in text for text in world.client.texts())
-    assert world.state(task)[0] in (S.STARTING, S.EXECUTING)
 
 
 def test_a_deadline_ends_what_has_not_begun(world: World) -> None:
@@ -134,8 +124,8 @@ def test_a_task_is_as_urgent_as_who_waits_for_it(world: World) -> None:
     assert order_of_start(world) == [running, needed, immediate, usual]
 
 
-@pytest.mark.parametrize(
-    ("prop", "value", "answer"),
+@for_each(
+    "prop, value, answer",
     [
         (PRIORITY, 11, (DENIED, R.BAD_PARAMETER)),
         (RUN_AFTER, 3, (DENIED, R.CYCLE)),
@@ -158,13 +148,6 @@ def test_a_bad_modification_changes_nothing(
     assert world.task(second) == before
 
 
-def test_a_modified_priority_counts_at_once(world: World) -> None:
-    tasks = [submit(world, d) for d in (1, 0.2, 0.3)]
-    world.client.command(MODIFY, tasks[2], PRIORITY, 8)
-    world.until_idle(tasks=3)
-    assert order_of_start(world) == [tasks[0], tasks[2], tasks[1]]
-
-
 def test_a_dependency_can_be_set_and_lifted_again(world: World) -> None:
     running, other = submit(world, 1), submit(world)
     world.client.command(MODIFY, other, RUN_AFTER, running)
@@ -173,18 +156,6 @@ def test_a_dependency_can_be_set_and_lifted_again(world: World) -> None:
     world.client.command(MODIFY, other, RUN_AFTER, 0)
     world.run(0.1)
     assert world.state(other)[0] is S.QUEUED
-
-
-@pytest.mark.patches_core
-def test_a_place_that_is_too_far_back_to_be_told_is_the_last_that_can_be(
-    world: World, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(translate, "position", lambda *_: 70_000)  # of 100,000 that there may be
-    submit(world, 2)
-    waiting = submit(world, 1)
-    world.client.request_status(waiting)
-    world.run(0.1)
-    assert world.client.statuses(waiting)[-1].queue_position == 65_534
 
 
 def test_estimates_are_given_on_request(world: World) -> None:
@@ -201,14 +172,6 @@ def test_estimates_are_given_on_request(world: World) -> None:
     assert world.now - at == pytest.approx(begin, rel=0.35)
     world.until_state(waiting, S.COMPLETED)
     assert world.now - at == pytest.approx(end, rel=0.35)
-
-
-def test_when_a_scheduled_task_begins_is_told_unasked(world: World) -> None:
-    world.client.command(MOVE, 1, 0, 0, 0, 0, 60, 5)
-    world.run(0.2)
-    status = world.client.statuses(1)[-1]
-    assert status.time_to_start == pytest.approx(60, abs=0.5)
-    assert status.time_to_finish > status.time_to_start
 
 
 RUN_BEFORE = 11

@@ -1,19 +1,18 @@
 """After each halt a person at QGroundControl finds the way on; what drives is on the screen."""
 
-from math import hypot
-
 import pytest
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode, Persona
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.qgc.joined import degrees, join, place
 from tests.kit.qgc.party import QgcParty
 from tests.kit.qgc.plan_master import Plan
 from tests.kit.qgc.profile import V4
 from tests.kit.qgc.vehicle import APM
-from tests.kit.world import PROMPT, World, is_at, put_home
+from tests.kit.world import PROMPT, World, is_at
 from tests.scenarios.conftest import MakeWorld
 
 PAUSE_CONTINUE, MOVE, STOP = 193, 54000, 54003
@@ -21,8 +20,8 @@ WARNING = 4  # this severity and smaller ones are red
 FAR = degrees(20, 0)
 ROUND = Plan(place(0, 0), [place(3, 0), place(3, 1)])
 
-one = pytest.mark.parametrize("persona", [PROMPT], ids=lambda each: each.name)
-both = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda each: each.name)
+one = for_each("persona", [PROMPT])
+both = for_each("persona", [PROMPT, PROMPT_PX4])
 
 
 def texts(party: QgcParty, *, since: float, worst: int = WARNING) -> list[str]:
@@ -98,7 +97,7 @@ def test_an_emergency_stop_ends_a_go_to_and_the_next_click_drives(
 
 
 @both
-@pytest.mark.parametrize("button", ["emergency stop", "disarm"])
+@for_each("button", ["emergency stop", "disarm"])
 def test_a_plan_goes_on_by_the_station_own_button(
     make_world: MakeWorld, persona: Persona, button: str
 ) -> None:
@@ -116,23 +115,7 @@ def test_a_plan_goes_on_by_the_station_own_button(
 
 
 @both
-def test_return_drives_after_an_emergency_stop_in_a_plan(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = driving_plan(make_world, persona)
-    party.operator.emergency_stop()
-    world.run(4)
-    arm(world, party)
-    put_home(world, 0, 0)
-    party.operator.return_home()
-    world.until_state(2, S.COMPLETED, within=40)
-    assert hypot(world.truth.north, world.truth.east) < 0.15, "a PX4 one slides a little"
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
-    party.check()
-
-
-@both
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.AUTO, Mode.HOLD], ids=lambda mode: mode.name)
+@for_each("mode", [Mode.MANUAL, Mode.AUTO, Mode.HOLD])
 def test_return_drives_from_any_mode_and_leaves_the_queue_running(
     make_world: MakeWorld, persona: Persona, mode: Mode
 ) -> None:
@@ -154,39 +137,8 @@ def test_return_drives_from_any_mode_and_leaves_the_queue_running(
     party.check()
 
 
-@one
-def test_start_drives_from_manual_before_what_waits_there(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = joined(make_world, persona, ROUND)
-    choose(world, party, Mode.MANUAL)
-    arm(world, party)
-    party.operator.action(MOVE, -2.0, component=191)
-    world.run(2)
-    party.operator.go_on()
-    world.until_state(1, S.COMPLETED, within=60)
-    assert is_at(world, 3.0, 1.0)
-    assert world.state(2)[0] is S.QUEUED
-    party.check()
-
-
 @both
-def test_a_click_in_manual_drives_without_a_warning(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = joined(make_world, persona)
-    choose(world, party, Mode.MANUAL)
-    arm(world, party)
-    at = world.now
-    party.operator.go_to(*degrees(1, 0))
-    world.until_state(1, S.COMPLETED, within=30)
-    assert texts(party, since=at) == []
-    assert len(world.tasks()) == 1
-    party.check()
-
-
-@both
-@pytest.mark.parametrize("taken", ["hold", "manual at the rover"])
+@for_each("taken", ["hold", "manual at the rover"])
 def test_hold_and_a_click_replace_the_click_before(
     make_world: MakeWorld, persona: Persona, taken: str
 ) -> None:
@@ -212,55 +164,6 @@ def test_hold_and_a_click_replace_the_click_before(
 
 def party_texts(party: QgcParty) -> list[str]:
     return [each.text for each, _ in party.qgc.screen.texts]
-
-
-@one
-def test_a_click_does_not_end_the_pause_of_somebody_else(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = driving_far(make_world, persona)
-    world.client.pause()
-    world.run(3)
-    party.operator.go_to(*degrees(0, 1))
-    world.run(3)
-    assert world.stands()
-    assert world.state(2)[0] is S.QUEUED
-
-
-@one
-def test_what_an_emergency_stop_leaves_waits_and_continue_names_it(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = driving_far(make_world, persona)
-    world.client.move(-1.0)
-    world.run(0.5)
-    party.operator.emergency_stop()
-    world.run(4)
-    arm(world, party)
-    world.run(4)
-    assert world.state(2)[0] is S.QUEUED, "nothing of it is on the screen"
-    party.operator.go_to(*degrees(0, 1))
-    world.until_state(3, S.COMPLETED, within=40)
-    party.operator.action(PAUSE_CONTINUE, 1)
-    world.until_state(2, S.COMPLETED, within=30)
-    assert "Queue resumed by a ground station: task 2 is next, move -1 m" in party_texts(party)
-    party.check()
-
-
-@one
-def test_a_resume_says_that_a_click_waits_behind_the_plan(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    """The marker of that click is gone since the rover left Guided."""
-    world, party = driving_plan(make_world, persona)
-    party.operator.go_to(*degrees(0, 1))
-    world.run(1)
-    choose(world, party, Mode.HOLD)
-    world.run(2)
-    party.operator.go_on()
-    world.run(1)
-    (said,) = [text for text in party_texts(party) if "is next" in text]
-    assert said.endswith("task 1 is next, plan of 2 items; 1 task waits behind it")
 
 
 @one
@@ -303,42 +206,3 @@ def test_start_and_return_drive_beside_a_held_task_and_one_warning_names_it(
         'Rover 1 keeps task 2 on hold: press "Held: remainder", "Held: again" or "Held: skip"'
     ]
     assert texts(party, since=at, worst=3) == []
-
-
-def test_a_click_behind_a_driven_task_says_so(make_world: MakeWorld) -> None:
-    world, party = driving_far(make_world, PROMPT)
-    party.operator.go_to(*degrees(0, 5))
-    world.run(1)
-    assert any(text.startswith("Task 2 queued behind task 1: go to") for text in party_texts(party))
-
-
-@both
-def test_start_finishes_the_plan_that_a_late_server_holds(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    """It is what "Continue the mission from the current waypoint" says."""
-    world, party = driving_plan(make_world, persona)
-    world.observer.expects_gaps = True
-    world.suspend_server(3.0)
-    world.until(lambda: world.state(1) == (S.HELD, R.LATE), within=10)
-    world.run(4)
-    at = world.now
-    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
-    world.until_state(1, S.COMPLETED, within=60)
-    assert is_at(world, 3.0, 1.0)
-    assert len(world.tasks()) == 1
-    assert texts(party, since=at, worst=3) == []
-
-
-@one
-def test_start_finishes_the_plan_of_a_restarted_rover(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = driving_plan(make_world, persona)
-    world.rover.autopilot.reboot(now=world.now)
-    world.until(lambda: world.state(1) == (S.HELD, R.FRAME_RESET), within=20)
-    world.run(8)
-    party.operator.start()
-    world.until_state(1, S.COMPLETED, within=60)
-    assert len(world.tasks()) == 1
-    assert world.paused() is R.NONE

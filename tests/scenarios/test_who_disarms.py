@@ -1,32 +1,28 @@
 """When the server disarms a rover: who armed it, and who has said that it has done with it."""
 
-import pytest
-
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, Mode, Persona
+from rover_sim.personas import ARDUPILOT, Persona
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     GUIDED,
     HOLD,
     RTL,
-    TEMPORARILY_REJECTED,
     Sent,
     setpoint,
-    sticks,
 )
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import OFFBOARD, PROMPT_PX4, RETURN, ask_mode
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
-BOTH = pytest.mark.parametrize("persona", [ARDUPILOT, PROMPT_PX4], ids=lambda each: each.name)
+BOTH = for_each("persona", [ARDUPILOT, PROMPT_PX4])
 START, WAYPOINT, RETURN_ITEM, LAND, TAKEOFF = 300, 16, 20, 21, 22
 HANDED_BACK = 6.0  # s after a task, in which the server has HOLD shown and disarms
 
 
 @BOTH
-@pytest.mark.parametrize("at", [S.STARTING, S.EXECUTING])
+@for_each("at", [S.STARTING, S.EXECUTING])
 def test_a_rover_that_a_client_arms_while_a_task_drives_stays_armed(
     make_world: MakeWorld, persona: Persona, at: S
 ) -> None:
@@ -99,24 +95,6 @@ def test_a_return_ends_disarmed_whoever_armed_the_rover(
 
 
 @BOTH
-def test_a_return_from_a_task_that_waits_to_go_on_ends_disarmed_too(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world = armed_by_client(make_world, persona)
-    world.client.move(3.0)
-    world.until_state(1, S.EXECUTING, within=10)
-    world.run(2)
-    returns(world, persona)
-    world.run(HANDED_BACK)
-    assert not world.rover.autopilot.armed
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)
-    world.client.proceed()
-    world.until_state(1, S.COMPLETED, within=30)
-    world.run(HANDED_BACK)
-    assert not world.rover.autopilot.armed, "the server armed it for the rest"
-
-
-@BOTH
 def test_a_mission_whose_last_item_is_the_return_ends_disarmed(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -151,18 +129,6 @@ def test_takeoff_and_land_are_both_accepted_and_land_disarms(
 
 
 @BOTH
-def test_land_waits_for_what_is_being_driven(make_world: MakeWorld, persona: Persona) -> None:
-    world = armed_by_client(make_world, persona)
-    world.client.move(2.0)
-    world.until_state(1, S.EXECUTING, within=10)
-    assert land(world).result == ACCEPTED
-    world.until_state(1, S.COMPLETED, within=20)
-    assert world.rover.autopilot.armed
-    world.run(HANDED_BACK)
-    assert not world.rover.autopilot.armed
-
-
-@BOTH
 def test_land_ends_what_its_client_drives_by_setpoints(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -175,13 +141,3 @@ def test_land_ends_what_its_client_drives_by_setpoints(
     land(world)
     world.run(HANDED_BACK)
     assert (world.stands(), world.rover.autopilot.armed) == (True, False)
-
-
-def test_land_takes_the_rover_out_of_nobodys_hands(world: World) -> None:
-    world.operator_mode(Mode.MANUAL)
-    world.operator_arm(True)
-    world.client.stream(sticks(z=600), rate=10)
-    world.run(1.5)
-    assert land(world).result == TEMPORARILY_REJECTED
-    world.run(1)
-    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.MANUAL, True)

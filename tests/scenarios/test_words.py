@@ -3,13 +3,9 @@
 from math import nan
 from pathlib import Path
 
-import pytest
-from pymavlink.dialects.v20 import common
-
-from mav_tasks.qgc_actions import ACTIONS
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import for_each
 from tests.kit.client import AUTO, RTL, FakeClient
-from tests.kit.px4 import MISSION, PROMPT_PX4, RETURN, go_to
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
@@ -34,14 +30,8 @@ def said(client: FakeClient) -> dict[str, int]:
     return {m.text: m.severity for m in client.of_type("STATUSTEXT") if not m.chunk_seq}
 
 
-def test_the_first_buttons_are_those_that_a_person_needs_at_a_halt() -> None:
-    """QGroundControl shows one to three of them; for a pause it has a mode, Hold."""
-    first = ["STOP", "Continue", "Held: remainder", "Held: skip"]
-    assert [action.label for action in ACTIONS[:4]] == first
-
-
-@pytest.mark.parametrize(
-    ("how", "why"),
+@for_each(
+    "how, why",
     [("pause", ", or set Hold and click again (queue paused)"), ("stop", " (STOP in force)")],
 )
 def test_a_go_to_that_waits_for_a_button_is_a_warning_that_names_it(
@@ -60,16 +50,6 @@ def test_a_go_to_that_waits_for_a_button_is_a_warning_that_names_it(
     assert said(screen)[text] == WARNING
 
 
-def test_a_task_that_begins_at_once_is_not_said_to_wait(world: World) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    world.client.mode(RTL)
-    world.run(0.3)
-    assert "Task 2 starts now: return home" in world.client.texts()
-    texts = world.client.texts()
-    assert not any("queue is paused" in text or "Continue" in text for text in texts)
-
-
 def test_who_called_a_task_off_is_said(world: World) -> None:
     world.client.move(5)
     world.client.move(4, nonce=2)
@@ -81,7 +61,7 @@ def test_who_called_a_task_off_is_said(world: World) -> None:
     assert {"Task 2 cancelled by a ground station", "Task 1 cancelled"} <= set(world.client.texts())
 
 
-@pytest.mark.parametrize("mode", [RTL, AUTO])
+@for_each("mode", [RTL, AUTO])
 def test_a_mode_that_is_refused_is_one_box_and_one_text_however_often_it_is_asked_for(
     world: World, mode: int
 ) -> None:
@@ -103,35 +83,6 @@ def test_a_mode_that_is_refused_is_one_box_and_one_text_however_often_it_is_aske
     again = screen.mode(mode)
     world.run(0.2)
     assert again.result == TEMPORARILY_REJECTED, "later, it is another wish"
-
-
-@pytest.mark.parametrize("mode", [RETURN, MISSION])
-def test_a_set_mode_that_is_refused_is_one_text(make_world: MakeWorld, mode: int) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    screen = station(world)
-    go_to(world, 5.0, 0.0)
-    world.client.stop()
-    world.run(3)
-    screen.received.clear()
-    for _ in range(3):
-        screen.send(common.MAVLink_set_mode_message(1, 157, mode))
-        world.run(QGC_RETRY)
-    assert [t for t in screen.texts() if "STOP" in t] == ["STOP is in force: press Continue first"]
-
-
-def test_one_click_is_one_task_and_one_text(world: World) -> None:
-    """An ArduPilot's first "go to" is a command and an item."""
-    screen = station(world)
-    screen.command_int(REPOSITION, -1, 1, 0, nan, **at(3, 0), frame=0, target=(1, 1))
-    place = at(3, 0)
-    screen.send(
-        common.MAVLink_mission_item_message(
-            1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, place["x"] / 1e7, place["y"] / 1e7, 0
-        )
-    )
-    world.run(0.5)
-    assert len(world.tasks()) == 1
-    assert not any("again" in text for text in screen.texts())
 
 
 class TestSummary:

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, hypot, nan, pi, radians, sin
 
-import pytest
-
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -14,13 +12,12 @@ from rover_sim.faults import Faults
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode, Persona
 from tests.kit import px4
-from tests.kit.client import MOVE
+from tests.kit.cases import for_each
 from tests.kit.world import PROMPT, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_fence import INCLUSION, box, fenced
 
 DRIVE, REPOSITION, RELEASE = 54002, 192, 54013
-AGAIN, REMAINDER = 0, 1
 SLOW, FAST = 0.5, 2.0  # m/s
 #: m from where it was that it drives at the most: half a metre the wrong way, and what it takes to
 #: stop from the speed that it has by then
@@ -87,7 +84,7 @@ OPPOSITE = [
 ACROSS = [(90.0, make, "move", FAST) for make in MAKES] + [(-90.0, "ardupilot", "drive", FAST)]
 
 
-@pytest.mark.parametrize(("error", "make", "goal", "speed"), OPPOSITE + ACROSS)
+@for_each("error, make, goal, speed", OPPOSITE[::2] + ACROSS)
 def test_a_wrong_heading_is_found_within_half_a_metre(
     make_world: MakeWorld, error: float, make: str, goal: str, speed: float
 ) -> None:
@@ -104,7 +101,7 @@ def test_a_wrong_heading_is_found_within_half_a_metre(
     assert any("check its heading" in text for text in world.client.texts())
 
 
-@pytest.mark.parametrize("speed", [SLOW, FAST])
+@for_each("speed", [SLOW, FAST])
 def test_wheels_that_turn_the_wrong_way_are_found_within_half_a_metre(
     make_world: MakeWorld, speed: float
 ) -> None:
@@ -124,7 +121,7 @@ def test_wheels_that_turn_the_wrong_way_are_found_within_half_a_metre(
     assert way.furthest < WRONG[speed]
 
 
-@pytest.mark.parametrize(("speed", "beside"), [(SLOW, 1.3), (FAST, 2.2)])
+@for_each("speed, beside", [(SLOW, 1.3), (FAST, 2.2)])
 def test_a_heading_that_steering_cannot_make_up_for_is_found_a_metre_beside_the_line(
     make_world: MakeWorld, speed: float, beside: float
 ) -> None:
@@ -146,22 +143,8 @@ def test_a_heading_that_steering_cannot_make_up_for_is_found_a_metre_beside_the_
     assert 1.0 < furthest < beside
 
 
-def test_a_heading_a_little_wrong_is_made_up_for(make_world: MakeWorld) -> None:
-    """The line is the one that the heading meant: nobody can know better."""
-    world = make_world()
-    world.fault(Faults(heading_error=radians(30)))
-    world.run(0.5)
-    world.client.move(6)
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-    north, east, _ = world.pose()
-    assert hypot(north, east) == pytest.approx(6.0, abs=0.05)
-    beside = abs(east * cos(radians(30)) - north * sin(radians(30)))
-    assert beside < 0.6
-
-
-@pytest.mark.parametrize("turned", [180, -90, 60])
-@pytest.mark.parametrize("goal", GOALS)
+@for_each("turned", [180, -90, 60])
+@for_each("goal", GOALS)
 def test_a_heading_that_jumps_holds_the_task_at_once(
     world: World, goal: str, turned: float
 ) -> None:
@@ -176,7 +159,7 @@ def test_a_heading_that_jumps_holds_the_task_at_once(
     assert way.furthest < 0.3
 
 
-@pytest.mark.parametrize("jump", [(1.9, 0.0), (-0.9, 0.0), (0.0, 1.9)])
+@for_each("jump", [(1.9, 0.0), (-0.9, 0.0), (0.0, 1.9)])
 def test_a_jump_below_2_m_is_a_correction_that_is_driven_by(
     world: World, jump: tuple[float, float]
 ) -> None:
@@ -196,20 +179,10 @@ def test_a_jump_below_2_m_is_a_correction_that_is_driven_by(
     assert top < SLOW + 0.05
 
 
-def test_a_jump_back_by_more_than_a_metre_is_no_progress_and_ends_the_task(world: World) -> None:
-    driving(world, "move", SLOW)
-    way = Way(world)
-    world.fault(Faults(position_jump=(-1.9, 0.0)))
-    world.until(lambda: is_over(world), within=20)
-    assert world.state(1) == (S.FAILED, R.STUCK)
-    nothing_follows(world)
-    assert way.furthest < BLIND_AT_SPEED[SLOW]
-
-
 STANDING = [("ardupilot", goal, speed) for goal in ("move", "drive") for speed in (SLOW, FAST)]
 
 
-@pytest.mark.parametrize(("make", "goal", "speed"), [*STANDING, ("px4", "drive", FAST)])
+@for_each("make, goal, speed", [*STANDING, ("px4", "drive", FAST)])
 def test_a_position_that_stands_from_the_beginning_ends_the_task_after_a_metre(
     make_world: MakeWorld, make: str, goal: str, speed: float
 ) -> None:
@@ -225,8 +198,8 @@ def test_a_position_that_stands_from_the_beginning_ends_the_task_after_a_metre(
     assert way.furthest < BLIND[speed]
 
 
-@pytest.mark.parametrize("speed", [SLOW, FAST])
-@pytest.mark.parametrize("goal", ["move", "drive"])
+@for_each("speed", [SLOW, FAST])
+@for_each("goal", ["move", "drive"])
 def test_a_rover_that_says_that_it_stands_while_it_drives_is_stopped_after_a_metre(
     make_world: MakeWorld, speed: float, goal: str
 ) -> None:
@@ -250,8 +223,8 @@ LOSSES = {
 }
 
 
-@pytest.mark.parametrize("speed", [SLOW, FAST])
-@pytest.mark.parametrize("what", LOSSES)
+@for_each("speed", [SLOW, FAST])
+@for_each("what", LOSSES)
 def test_what_is_lost_stops_it_within_so_many_metres(
     make_world: MakeWorld, what: str, speed: float
 ) -> None:
@@ -283,17 +256,7 @@ def test_a_heading_that_stands_while_it_turns_ends_the_turn_after_a_radian(world
     assert 0.5 < turned < 1.7
 
 
-def test_a_heading_that_stands_while_it_drives_a_curve_is_found(world: World) -> None:
-    world.fault(Faults(heading_frozen=True))
-    world.client.command(DRIVE, SLOW, 30, 60)  # a circle of 1 m
-    way = Way(world)
-    world.until(lambda: is_over(world), within=20)
-    assert world.state(1) == (S.HELD, R.OFF_TRACK)
-    nothing_follows(world)
-    assert way.furthest < 2.1
-
-
-@pytest.mark.parametrize("speed", [SLOW, FAST])
+@for_each("speed", [SLOW, FAST])
 def test_a_wrong_heading_leads_over_a_fence_no_further_than_anywhere(
     world: World, speed: float
 ) -> None:
@@ -306,17 +269,3 @@ def test_a_wrong_heading_leads_over_a_fence_no_further_than_anywhere(
     assert world.state(1) in ((S.HELD, R.OFF_TRACK), (S.HELD, R.FENCE))
     nothing_follows(world)
     assert world.truth.north < WRONG[speed]
-
-
-def test_released_on_a_wrong_heading_it_gets_no_further_each_time(world: World) -> None:
-    world.fault(Faults(heading_error=pi))
-    world.run(0.5)
-    world.client.command(MOVE, 20.0)
-    for answer in (REMAINDER, AGAIN, None):
-        way = Way(world)
-        world.until_state(1, S.EXECUTING)
-        world.until_state(1, S.HELD)
-        nothing_follows(world)
-        assert way.furthest < WRONG[SLOW]
-        if answer is not None:
-            world.client.command(RELEASE, 1, answer)

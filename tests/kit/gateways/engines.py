@@ -6,9 +6,9 @@ from dataclasses import replace
 from math import inf
 from pathlib import Path
 from random import Random
+from struct import Struct
 from typing import Any
 
-from mav_tasks.engine.clients.elsewhere import ARRIVED, BACK, TOWARDS
 from mav_tasks.engine.inputs import (
     FLEET_LINK,
     FleetChanged,
@@ -25,7 +25,6 @@ from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import MemoryLink
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.signing import Key
-from mav_tasks.pump import Pump
 from mav_tasks.settings import Settings
 from mav_tasks.store import (
     Evicted,
@@ -39,11 +38,13 @@ from mav_tasks.store import (
 from mav_tasks.tasks.events import Event, TaskChanged, TaskModified, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.lifecycle import TERMINAL, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.signing_lead import MOST_LEAD, STEP
 from mav_tasks.tasks.task import Task
 from tests.kit.gateways.database import Database
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
+
+TOWARDS, BACK, ARRIVED = "to", "from", Struct(">d")  # of packets between gateways
+STEP, MOST_LEAD = 3.0, 50.0  # s, of the lead of signatures
 
 STOP = 54003
 BLOCK = 1_000  # task ids
@@ -333,7 +334,7 @@ class Gateway:
         return self.server.engine
 
     @property
-    def pump(self) -> Pump:
+    def pump(self) -> Any:
         return self.server.pump
 
     def next_deadline(self) -> float:

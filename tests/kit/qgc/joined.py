@@ -2,9 +2,8 @@
 
 from math import inf
 
-import pytest
-
 from rover_sim.geo import DEFAULT_ORIGIN
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4
 from tests.kit.qgc.party import QgcParty
 from tests.kit.qgc.profile import MASTER, V4, Profile
@@ -12,16 +11,12 @@ from tests.kit.world import PROMPT, World
 
 CONNECTED_WITHIN = 2.0  # s; a real one needs 0.42 with everything answered at once [11.1]
 
-each_make = pytest.mark.parametrize(
-    "persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name
-)
+each_make = for_each("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC])
 #: makes that the station can guide [1.5]
-each_guided = pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
-each_version = pytest.mark.parametrize("profile", [V4, MASTER], ids=lambda p: p.name)
+each_guided = for_each("persona", [PROMPT, PROMPT_PX4])
+each_version = for_each("profile", [V4, MASTER])
 #: for behaviour that both versions share
-each_pair = pytest.mark.parametrize(
-    ("persona", "profile"), [(PROMPT, V4), (PROMPT_PX4, MASTER)], ids=lambda p: p.name
-)
+each_pair = for_each("persona, profile", [(PROMPT, V4), (PROMPT_PX4, MASTER)])
 
 
 def join(world: World, profile: Profile, name: str = "qgc") -> QgcParty:

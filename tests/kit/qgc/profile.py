@@ -1,6 +1,6 @@
 """The differences between QGroundControl versions in use."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 HOME_POSITION, EXTENDED_SYS_STATE = 242, 245
 
@@ -43,7 +43,6 @@ V4 = Profile(
     repositions=True,
     sets_item_by_command=False,
 )
-V42 = replace(V4, name="v4.2", in_progress="final", repositions=False)
 MASTER = Profile(
     name="master",
     ack_timeout=1.2,

@@ -3,11 +3,11 @@
 A rover answers the requests for its messages one by one, over a radio ten a second.
 """
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Roles, Settings
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, REQUEST, TEMPORARILY_REJECTED, FakeClient, command_long
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -18,7 +18,7 @@ AUTOPILOT_VERSION, BATTERY = 148, 147
 FLOOD = 150.0  # requests a second
 OBSERVER, OTHER, OPERATOR = 9, 10, 12  # system ids
 #: one message, for which requests can be shared, and fifty, for which none can
-FLOODS = pytest.mark.parametrize("messages", [(BATTERY,), tuple(range(200, 250))])
+FLOODS = for_each("messages", [(BATTERY,), tuple(range(200, 250))])
 ADDRESSES = {"9/190": "observer", "10/190": "observer", "12/190": "operator"}
 
 
@@ -58,16 +58,6 @@ def test_an_operators_requests_are_answered_beside_an_observers_flood(
     assert answers(world, operator) == [ACCEPTED] * 20
 
 
-@FLOODS
-def test_another_observers_requests_are_answered_too(
-    make_world: MakeWorld, messages: tuple[int, ...]
-) -> None:
-    world = flooded(make_world, messages)
-    other = world.add_client("other", system_id=OTHER)
-    world.run(2.0)
-    assert answers(world, other) == [ACCEPTED] * 20
-
-
 def test_what_is_too_much_is_called_busy_and_never_unsupported(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(roles=Roles(addresses=ADDRESSES)), conditions=RADIO)
     flooder = world.add_client("flooder", system_id=OBSERVER)
@@ -81,7 +71,7 @@ def test_what_is_too_much_is_called_busy_and_never_unsupported(make_world: MakeW
     assert any("busy" in text for text in told), told
 
 
-@pytest.mark.parametrize("message_id", [BATTERY, AUTOPILOT_VERSION])
+@for_each("message_id", [BATTERY, AUTOPILOT_VERSION])
 def test_the_rover_is_not_asked_more_often_than_it_answers(
     make_world: MakeWorld, message_id: int
 ) -> None:

@@ -11,6 +11,7 @@ from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
+from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import MEASURED, PROMPT, World
 from tests.scenarios.conftest import MakeWorld
@@ -26,8 +27,8 @@ def drives(world: World, *, distance: float = 4.0) -> None:
     world.until(lambda: world.truth.forward_speed > 0.4, within=15)
 
 
-@pytest.mark.parametrize("days", [1, 24, 25, 30, 49])
-@pytest.mark.parametrize("persona", MAKES, ids=lambda p: p.name)
+@for_each("days", [1, 24, 25, 30, 49])
+@for_each("persona", MAKES)
 def test_a_restart_holds_the_task_however_long_the_rover_was_up(
     make_world: MakeWorld, persona: Persona, days: float
 ) -> None:
@@ -45,7 +46,7 @@ def test_a_restart_holds_the_task_however_long_the_rover_was_up(
     assert world.truth.north == pytest.approx(where, abs=0.01)
 
 
-@pytest.mark.parametrize("persona", MAKES, ids=lambda p: p.name)
+@for_each("persona", MAKES)
 def test_a_clock_that_overflows_while_it_drives_interrupts_nothing(
     make_world: MakeWorld, persona: Persona
 ) -> None:
@@ -58,8 +59,8 @@ def test_a_clock_that_overflows_while_it_drives_interrupts_nothing(
     assert world.truth.north == pytest.approx(4.0, abs=0.03)
 
 
-@pytest.mark.parametrize("times", [1, 5])
-@pytest.mark.parametrize("late", [1.1, 4.0, 20.0])
+@for_each("times", [1, 5])
+@for_each("late", [1.1, 4.0, 20.0])
 def test_what_is_delivered_again_late_interrupts_nothing(
     make_world: MakeWorld, late: float, times: int
 ) -> None:

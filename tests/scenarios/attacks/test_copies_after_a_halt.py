@@ -9,11 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, PAUSE_CONTINUE, FakeClient, command_long
 from tests.kit.mission import Item
 from tests.kit.px4 import REPOSITION
@@ -39,9 +39,9 @@ def go_to(north: float) -> object:
     )
 
 
-@pytest.mark.parametrize("copies", [3, 4])
-@pytest.mark.parametrize("way", ["command", "item"])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("copies", [3, 4])
+@for_each("way", ["command", "item"])
+@for_each("halt", HALTS)
 def test_copies_of_what_runs_at_once_undo_no_newer_halt(
     make_world: MakeWorld, halt: str, way: str, copies: int
 ) -> None:
@@ -80,19 +80,6 @@ def continued(world: World) -> tuple[FakeClient, list[tuple[float, bytes]]]:
     assert script.acks[-1].result == ACCEPTED
     assert world.truth.forward_speed > 0.2
     return script, sent
-
-
-@pytest.mark.parametrize("halt", ["pause", "HOLD"])
-def test_packets_that_a_net_brings_once_more_undo_no_newer_halt(world: World, halt: str) -> None:
-    script, sent = continued(world)
-    HALTS[halt](world, world.add_client("person"))
-    world.run(4)
-    late = world.now - sent[0][0]
-    for when, packet in sent:
-        world.run(when + late - world.now)
-        script.send_raw(packet)
-    world.run(1)
-    assert stays(world, 5)
 
 
 def test_who_means_it_anew_is_heard_4_s_later_all_the_same(world: World) -> None:

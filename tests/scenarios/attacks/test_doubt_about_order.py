@@ -7,9 +7,8 @@ again.
 
 from collections.abc import Callable
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     HOLD,
@@ -36,7 +35,7 @@ HALTS: dict[str, Callable[[FakeClient], Sent]] = {
 }
 
 
-@pytest.fixture
+@anew
 def other(world: World) -> FakeClient:
     """Another station than the one that halts."""
     return world.add_client("other", system_id=245)
@@ -51,9 +50,9 @@ def paused_while_driving(world: World) -> None:
     world.run(4)
 
 
-@pytest.mark.parametrize("late", [2.0, 6.0, 15.0])
-@pytest.mark.parametrize("before", some([0.1, 0.5, 0.8], 0, 2))
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("late", [2.0, 6.0, 15.0])
+@for_each("before", some([0.1, 0.5, 0.8], 0, 2))
+@for_each("halt", HALTS)
 def test_what_left_within_the_second_before_a_halt(
     world: World, other: FakeClient, halt: str, before: float, late: float
 ) -> None:
@@ -73,8 +72,8 @@ def test_what_left_within_the_second_before_a_halt(
     assert world.paused() is not R.NONE
 
 
-@pytest.mark.parametrize("first", ["pause", "HOLD", "STOP", "cancel"])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("first", ["pause", "HOLD", "STOP", "cancel"])
+@for_each("halt", HALTS)
 def test_a_second_copy_of_an_older_halt_takes_no_later_ones_place(
     world: World, other: FakeClient, halt: str, first: str
 ) -> None:
@@ -99,8 +98,8 @@ def test_a_second_copy_of_an_older_halt_takes_no_later_ones_place(
     assert stays(world, 5)
 
 
-@pytest.mark.parametrize(("rate", "late"), [(25, 6.5), (10, 14.0)])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("rate, late", [(25, 6.5), (10, 14.0)])
+@for_each("halt", HALTS)
 def test_what_its_senders_eight_bits_call_far_ahead(
     world: World, other: FakeClient, halt: str, rate: float, late: float
 ) -> None:
@@ -117,27 +116,8 @@ def test_what_its_senders_eight_bits_call_far_ahead(
     assert stays(world, 4)
 
 
-def test_a_copy_after_hundreds_of_other_words(world: World, other: FakeClient) -> None:
-    """A gimbal is turned by commands, 20 a second, while the net holds the copy."""
-    paused_while_driving(world)
-    copy = other.send(CONTINUE)
-    world.run(0.5)
-
-    def turn_gimbal(seconds: float) -> None:
-        for number in range(int(seconds * 20)):
-            other.send(command_long(GIMBAL, 0.1 * number, target=(1, 154)))
-            world.run(0.05)
-
-    turn_gimbal(2.0)
-    halted = world.client.pause()
-    turn_gimbal(14.0)
-    assert halted.result == ACCEPTED
-    other.send_raw(copy)
-    assert stays(world, 4)
-
-
-@pytest.mark.parametrize("gap", [0.5, 2.0])
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("gap", [0.5, 2.0])
+@for_each("halt", HALTS)
 def test_the_same_packet_from_another_port(
     world: World, other: FakeClient, halt: str, gap: float
 ) -> None:
@@ -155,40 +135,7 @@ def test_the_same_packet_from_another_port(
     assert world.paused() is not R.NONE
 
 
-@pytest.mark.parametrize("halt", HALTS)
-def test_the_same_packet_by_a_slower_second_link(
-    world: World, other: FakeClient, halt: str
-) -> None:
-    paused_while_driving(world)
-    copy = other.send(CONTINUE)
-    world.run(0.5)
-    halted = HALTS[halt](world.client)
-    world.run(12)
-    assert halted.result == ACCEPTED
-    elsewhere = world.add_client("second link", system_id=245)
-    elsewhere.heartbeats = elsewhere.reads_dialect = False
-    elsewhere.send_raw(copy)
-    assert stays(world, 4)
-    assert world.paused() is not R.NONE
-
-
-def test_a_script_that_is_run_again_from_another_port_is_heard(
-    world: World, other: FakeClient
-) -> None:
-    paused_while_driving(world)
-    other.heartbeats = False
-    copy = other.send(CONTINUE)
-    world.run(0.5)
-    world.client.pause()
-    world.run(5)
-    again = world.add_client("run again", system_id=245)
-    again.heartbeats = again.reads_dialect = False
-    again.send_raw(copy)
-    world.run(3)
-    assert world.truth.forward_speed > 0.3
-
-
-@pytest.mark.parametrize("halt", ["HOLD", "everything"])
+@for_each("halt", ["HOLD", "everything"])
 def test_a_submission_that_had_left_before_somebody_elses_halt(
     world: World, other: FakeClient, halt: str
 ) -> None:
@@ -200,32 +147,3 @@ def test_a_submission_that_had_left_before_somebody_elses_halt(
     assert halted.result == ACCEPTED
     other.send_raw(late)
     assert stays(world, 6)
-
-
-@pytest.mark.parametrize("halt", ["cancel", "everything"])
-def test_a_second_copy_of_a_submission_that_was_called_off(
-    world: World, other: FakeClient, halt: str
-) -> None:
-    world.run(3)
-    copy = other.send(command_long(MOVE, 10, 0.5, 0, 0, 0, 0, 5))
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    word = command_long(CANCEL, 0) if halt == "cancel" else command_long(CLEAR, 1)
-    world.client.send(word)
-    world.run(6)
-    other.send_raw(copy)
-    assert stays(world, 6)
-
-
-@pytest.mark.parametrize("word", [command_long(CLEAR, 1), command_long(CANCEL, 0)])
-def test_who_does_not_count_may_call_off_what_runs_twice(world: World, word: object) -> None:
-    same = world.client.packed(word)  # the next message has the same number
-    world.client.move(20, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    world.client.send_raw(same)
-    world.run(2)
-    world.client.move(21, speed=0.5, nonce=3)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    world.run(0.5)
-    world.client.send_raw(same)
-    world.run(2)
-    assert stays(world, 3)

@@ -8,12 +8,9 @@ that waited for arming, outlived a change of the position reference and the last
 
 from dataclasses import replace
 
-import pytest
-
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -29,10 +26,8 @@ from tests.kit.mission import Item, Upload
 from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
 from tests.kit.world import World, at
 from tests.scenarios.attacks.test_left_waiting import WAYPOINT, stays
-from tests.scenarios.attacks.test_old_backlog import in_the_standstill
 from tests.scenarios.conftest import MakeWorld
 
-RELEASE, AGAIN_OR_REMAINDER = 54013, 1
 HALTS = {
     "pause": command_long(PAUSE_CONTINUE, 0),
     "HOLD": command_long(SET_MODE, 1, HOLD, target=(1, 1)),
@@ -41,7 +36,7 @@ HALTS = {
 }
 
 
-@pytest.fixture
+@anew
 def driving(world: World) -> World:
     world.client.move(30)
     world.client.move(5)
@@ -49,8 +44,8 @@ def driving(world: World) -> World:
     return world
 
 
-@pytest.mark.parametrize("halt", ["pause", "HOLD", "STOP"])
-@pytest.mark.parametrize("apart", [0.02, 0.1, 0.19])
+@for_each("halt", ["pause", "HOLD", "STOP"])
+@for_each("apart", [0.02, 0.1, 0.19])
 def test_a_continue_from_between_two_quick_halts_is_older_than_the_second(
     driving: World, halt: str, apart: float
 ) -> None:
@@ -67,11 +62,11 @@ def test_a_continue_from_between_two_quick_halts_is_older_than_the_second(
 
 def uncounted(client: FakeClient, message: Message) -> None:
     """Send a message as a script does that gives all its packets the number 0."""
-    client._mav.seq = 0
+    client.count_anew()
     client.send(message)
 
 
-@pytest.mark.parametrize("halt", ["pause", "HOLD", "disarm"])
+@for_each("halt", ["pause", "HOLD", "disarm"])
 def test_a_halt_of_one_that_does_not_count_its_packets_is_carried_out_each_time(
     driving: World, halt: str
 ) -> None:
@@ -87,25 +82,6 @@ def test_a_halt_of_one_that_does_not_count_its_packets_is_carried_out_each_time(
     driving.run(1.8)
     assert [ack.result for ack in script.acks[before:]] == [ACCEPTED]
     assert stays(driving, 5)
-
-
-def test_a_release_does_not_outlive_a_change_of_the_position_reference(world: World) -> None:
-    world.client.move(20)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    world.observer.expects_gaps = True
-    in_the_standstill(world)
-    world.run(3)
-    assert world.state(1) == (S.HELD, R.LATE)
-    world.add_client("person").pause()
-    world.run(1)
-    released = world.client.command(RELEASE, 1, AGAIN_OR_REMAINDER)
-    world.run(1)
-    assert released.answer == (ACCEPTED, 1)
-    world.fault(Faults(position_jump=(5.0, 0.0)))
-    world.run(3)
-    world.client.proceed()
-    world.run(0.5)
-    assert stays(world, 5)
 
 
 def test_a_mission_does_not_begin_at_an_arming_that_no_station_sees(make_world: MakeWorld) -> None:

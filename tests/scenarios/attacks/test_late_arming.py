@@ -7,11 +7,10 @@ answered that it is disarmed, drove off.
 
 from struct import unpack_from
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, GUIDED, HOLD, command_long
 from tests.kit.world import World
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
@@ -58,7 +57,7 @@ def mode_of(world: World) -> Mode:
     return world.rover.autopilot.mode
 
 
-@pytest.fixture
+@anew
 def waiting(world: World) -> World:
     """A rover that a client has disarmed, and a task that waits for its arming."""
     world.operator_mode(Mode.HOLD)
@@ -86,15 +85,6 @@ def test_an_arming_that_its_disarming_has_overtaken_begins_no_task(waiting: Worl
     assert waiting.paused() is R.OPERATOR
 
 
-def test_who_arms_it_after_that_means_it(waiting: World) -> None:
-    catch_arming(waiting)
-    waiting.client.arm()
-    waiting.run(0.1)
-    disarmed_at_last(waiting)
-    waiting.client.arm()
-    waiting.until_state(1, S.EXECUTING)
-
-
 def test_our_own_arming_is_called_back_as_well(world: World) -> None:
     caught = catch_arming(world)
     world.client.move(5, speed=0.5)
@@ -118,17 +108,6 @@ def test_nor_does_one_arm_it_that_comes_after_a_stop(world: World) -> None:
     world.run(2)
     assert stays(world, 3)
     assert not world.rover.autopilot.armed
-
-
-def test_a_person_at_the_rover_arms_it_all_the_same(waiting: World) -> None:
-    """Though a client had asked for that before its disarming."""
-    catch_arming(waiting)
-    waiting.client.arm()
-    waiting.run(0.1)
-    disarmed_at_last(waiting)
-    waiting.run(5)
-    waiting.operator_arm(armed=True)
-    waiting.until_state(1, S.EXECUTING)
 
 
 def test_a_second_copy_of_a_return_does_not_undo_a_hold(world: World) -> None:
@@ -172,8 +151,8 @@ def test_a_pause_stops_what_a_client_has_armed_just_now(world: World) -> None:
     assert mode_of(world) is Mode.HOLD
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
-@pytest.mark.parametrize("late", [2.0, 2.6, 3.0, 3.4])
+@for_each("phase", [0.0, 0.2, 0.4, 0.6, 0.8])
+@for_each("late", [2.0, 2.6, 3.0, 3.4])
 def test_an_arming_that_shows_only_with_the_next_heartbeat(
     make_world: MakeWorld, late: float, phase: float
 ) -> None:

@@ -9,23 +9,20 @@ from collections.abc import Callable
 import pytest
 
 from mav_tasks.in_memory import VEHICLE_LINK
-from mav_tasks.links.memory import Queue, Radio
+from mav_tasks.links.memory import Queue
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
-from tests.kit.client import ACCEPTED, DRIVE, SET_INTERVAL
+from tests.kit.cases import for_each
+from tests.kit.client import DRIVE
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.volume import some
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 
 FENCE, CORNER = 1, 5001
 DOWN, UP = ("rover1", VEHICLE_LINK), (VEHICLE_LINK, "rover1")
-BAUD = 57_600 / 10  # bytes/s: eight bits, a start and a stop bit
-BUFFER = 16 * 1024  # bytes
-TELEMETRY = (1, 22, 24, 30, 32, 33, 36, 42, 62, 65, 74, 85, 147, 241, 242, 245)
 BRISK = Settings(driving=Driving(acceleration=1.0))
 
 Delay = Callable[[float], float]
@@ -59,65 +56,18 @@ GROWS: dict[str, Delay] = {
 }
 
 
-@pytest.mark.parametrize(
-    ("growth", "begins"),
-    [
-        *((growth, 8.0) for growth in GROWS),
-        *(("and shrinks", 8.0 + n / 2) for n in some(range(1, 8), 0, 2, 5)),
-    ],
-)
-@pytest.mark.parametrize("persona", [PROMPT, PROMPT_PX4], ids=lambda p: p.name)
+@for_each("growth", GROWS)
+@for_each("persona", [PROMPT, PROMPT_PX4])
 def test_a_delay_that_grows_leads_nobody_over_a_fence(
-    make_world: MakeWorld, persona: Persona, growth: str, begins: float
+    make_world: MakeWorld, persona: Persona, growth: str
 ) -> None:
     world = make_world(settings=BRISK, persona=persona)
     fenced(world, 40)
-    begin = world.now + begins
+    begin = world.now + 8.0
     world.net.buffers[DOWN] = Queue(lambda now: GROWS[growth](now - begin))
     reached = drive_at(world, 2.0, seconds=90)
     print(f"{growth}: reached {reached:.3f} m of 40 m")
     assert 2 < reached < 40
-
-
-@pytest.mark.parametrize("way", [DOWN, UP], ids=["telemetry", "setpoints"])
-@pytest.mark.parametrize("since", ["the start", "then"])
-@pytest.mark.parametrize("delay", [0.5, 1.0, 2.0])
-def test_nothing_is_driven_over_a_fence_on_data_that_are_always_late(
-    make_world: MakeWorld, delay: float, since: str, way: tuple[str, str]
-) -> None:
-    """One delay from the start on shows in the time that an exchange of the clocks takes."""
-    world = make_world(settings=BRISK)
-    fenced(world, 15)
-    begin = world.now + (0.0 if since == "the start" else 8.0)  # at about 5 m
-    world.net.buffers[way] = Queue(lambda now: delay if now >= begin else 0.0)
-    if since == "the start":
-        world.run(40)  # longer than any difference of the clocks is remembered
-    reached = drive_at(world, 1.0, seconds=60)
-    print(f"{delay} s since {since}: reached {reached:.1f} m of 15 m")
-    assert reached < 15
-
-
-@pytest.mark.parametrize("load", ["an observer's rates", "other traffic"])
-def test_a_radio_that_is_full_leads_nobody_over_a_fence(make_world: MakeWorld, load: str) -> None:
-    world = make_world(settings=BRISK)
-    world.net.buffers[DOWN] = Radio(bytes_per_second=BAUD, buffer=BUFFER)
-    world.net.buffers[UP] = Radio(bytes_per_second=BAUD, buffer=BUFFER)
-    fenced(world, 30)
-    world.run(5)
-    world.client.command(DRIVE, 2.0, 0, 300, 0, 0, 0, 5)
-    world.until(lambda: abs(world.truth.north) > 8, within=20)
-    observer = world.add_client("observer", system_id=77)
-    farthest, end = 0.0, world.now + 60
-    for number in TELEMETRY if load.startswith("an") else ():
-        observer.command(SET_INTERVAL, number, 20_000, target=(1, 1))
-    while world.now < end:
-        world.run(0.05)
-        if not load.startswith("an"):
-            world.net.send(*DOWN, bytes(250))  # 5 kB/s beside the telemetry
-        farthest = max(farthest, abs(world.truth.north))
-    print(f"{load}: reached {farthest:.1f} m of 30 m")
-    assert world.stands()
-    assert 8 < farthest < 30
 
 
 def test_what_comes_in_time_again_drives_on_to_the_exact_end(make_world: MakeWorld) -> None:
@@ -131,15 +81,3 @@ def test_what_comes_in_time_again_drives_on_to_the_exact_end(make_world: MakeWor
     assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
     world.until_state(1, S.COMPLETED, within=40)
     assert world.truth.north == pytest.approx(4.0, abs=0.03)
-
-
-def test_a_link_that_is_merely_slow_is_driven_over_as_ever(make_world: MakeWorld) -> None:
-    """0.08 s each way is a telemetry radio's own; nothing of that is a queue."""
-    world = make_world()
-    for way in (DOWN, UP):
-        world.net.buffers[way] = Queue(lambda _: 0.08)
-    sent = world.client.move(4)
-    world.until_state(1, S.COMPLETED, within=30)
-    assert sent.result == ACCEPTED
-    assert S.PAUSED not in [state for state, _ in world.history(1)]
-    assert world.truth.north == pytest.approx(4.0, abs=0.05)

@@ -6,22 +6,18 @@ own words among them, may still come for some seconds; so may what a rover has s
 
 from struct import unpack_from
 
-import pytest
-
-from mav_tasks.in_memory import VEHICLE_LINK
-from mav_tasks.links.memory import MemoryNet
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
-from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, FakeClient, command_long, setpoint
+from tests.kit.cases import for_each
+from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, FakeClient, command_long
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.volume import some
 from tests.kit.world import World, at
-from tests.scenarios.attacks.test_late_arming import catch_arming, mode_of
+from tests.scenarios.attacks.test_late_arming import mode_of
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
 from tests.scenarios.attacks.test_words_passed_on import go_to
 from tests.scenarios.conftest import MakeWorld
@@ -51,7 +47,7 @@ def mend(world: World) -> None:
     world.watched.loses = lambda *_: False
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@for_each("halt", ["HOLD", "pause"])
 def test_a_mode_that_comes_twice(world: World, halt: str) -> None:
     person = world.add_client("person")
     away_from_home(world)
@@ -69,42 +65,6 @@ def test_a_mode_that_comes_twice(world: World, halt: str) -> None:
     world.run(3)
     assert halted.result == ACCEPTED
     assert mode_of(world) is Mode.HOLD
-
-
-def test_the_word_before_the_last(world: World) -> None:
-    person = world.add_client("person")
-    away_from_home(world)
-    caught = catch(world, RETURN)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(0.1)
-    mend(world)
-    world.client.mode(GUIDED)
-    world.run(1)
-    person.mode(HOLD)
-    world.run(0.5)
-    world.bring_late(caught[0])
-    world.run(2)
-    assert mode_of(world) is Mode.HOLD
-    assert stays(world, 3)
-
-
-def test_a_place_to_go_to(world: World) -> None:
-    """It is entered by the mode in which clients drive, too."""
-    person = world.add_client("person")
-    away_from_home(world)
-    world.client.mode(HOLD)
-    world.run(4)
-    caught = catch(world, GO_TO)
-    world.client.send(go_to(20, 0, ELSEWHERE))
-    world.run(0.1)
-    mend(world)
-    held = person.mode(HOLD)
-    world.run(0.9)
-    world.bring_late(caught[0])
-    world.run(2)
-    assert held.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
-    assert stays(world, 3)
 
 
 def armed_px4(make_world: MakeWorld) -> tuple[World, FakeClient]:
@@ -144,8 +104,8 @@ def test_a_px4_that_a_place_moves_in_hold_is_held_before_its_next_heartbeat(
     assert stays(world, 3)
 
 
-@pytest.mark.parametrize("phase", some([0.0, 0.2, 0.4, 0.6, 0.8], 0, 3))
-@pytest.mark.parametrize("late", [2.8, 3.0, 3.2, 3.4])
+@for_each("phase", some([0.0, 0.2, 0.4, 0.6, 0.8], 0, 3))
+@for_each("late", [2.8, 3.0, 3.2, 3.4])
 def test_a_mode_that_shows_only_with_the_next_heartbeat(
     make_world: MakeWorld, late: float, phase: float
 ) -> None:
@@ -164,23 +124,6 @@ def test_a_mode_that_shows_only_with_the_next_heartbeat(
     world.run(6)
     assert halted.result == ACCEPTED
     assert mode_of(world) is Mode.HOLD
-
-
-@pytest.mark.parametrize("late", [2.6, 3.0, 3.4])
-def test_a_px4_that_a_place_moves_in_hold_only_some_time_later(
-    make_world: MakeWorld, late: float
-) -> None:
-    world, person = armed_px4(make_world)
-    caught = catch(world, GO_TO)
-    world.client.send(go_to(40, 0))
-    world.run(0.05)
-    mend(world)
-    halted = ask_mode(person, PX4_HOLD)
-    world.run(late)
-    world.bring_late(caught[0])
-    world.run(9)
-    assert halted.result == ACCEPTED
-    assert abs(world.truth.forward_speed) < 0.05
 
 
 def test_our_own_mode(world: World) -> None:
@@ -205,56 +148,7 @@ def test_our_own_mode(world: World) -> None:
     assert mode_of(world) is Mode.HOLD
 
 
-def test_armings_that_come_one_after_another(world: World) -> None:
-    caught: list[bytes] = []
-    world.client.move(5, speed=0.5)
-    for _ in range(3):  # our own request is repeated
-        more = catch_arming(world)
-        world.until(lambda found=more: bool(found), within=5)  # type: ignore[misc]
-        caught += more
-    mend(world)
-    world.client.stop()
-    world.run(0.5)
-    for each in caught:
-        world.bring_late(each)
-        world.run(0.8)
-    world.run(1)
-    assert not world.rover.autopilot.armed
-
-
-@pytest.mark.parametrize("kill", [False, True])
-def test_an_arming_for_a_task_that_was_called_off(world: World, *, kill: bool) -> None:
-    caught = catch_arming(world)
-    world.client.move(5, speed=0.5)
-    world.until(lambda: bool(caught), within=5)
-    mend(world)
-    world.client.command(CANCEL, 1, kill)
-    world.run(1)
-    world.bring_late(caught[0])
-    world.run(3)
-    assert not world.rover.autopilot.armed
-
-
-def test_a_disarming_that_is_lost_and_seems_to_be_answered(world: World) -> None:
-    """By the answer to the arming before it."""
-    world.operator_mode(Mode.HOLD)
-    world.run(2)
-    world.client.command(MOVE, 5, 0.5, 0, 0, 0, 4, 5)  # begins in 4 s
-    acks = world.lose_acks()
-    world.client.arm()
-    world.run(0.5)
-    catch(world, 400)
-    disarmed = world.client.arm(False)
-    world.run(0.2)
-    for each in acks:
-        MemoryNet.send(world.net, "rover1", VEHICLE_LINK, each)
-    world.run(0.3)
-    assert disarmed.result == ACCEPTED
-    mend(world)
-    assert stays(world, 8)
-
-
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@for_each("halt", ["HOLD", "pause"])
 def test_the_way_to_the_rover_is_lost_for_longer_than_hold_was_asked_for(
     world: World, halt: str
 ) -> None:
@@ -272,30 +166,7 @@ def test_the_way_to_the_rover_is_lost_for_longer_than_hold_was_asked_for(
     assert mode_of(world) is Mode.HOLD
 
 
-def test_a_set_point_of_a_client_after_everything_was_called_off(world: World) -> None:
-    world.client.arm()
-    world.run(1)
-    world.client.mode(GUIDED)
-    world.run(1)
-    caught: list[bytes] = []
-
-    def keeps(_source: str, target: str, data: bytes) -> bool:
-        caught.extend([data] if target == "rover1" and data[7] == SETPOINT else [])
-        return False
-
-    world.watched.loses = keeps
-    world.client.stream(setpoint(vx=0.5), rate=10)
-    world.run(1.5)
-    cleared = world.client.command(CLEAR, 1)
-    world.run(1)
-    mend(world)
-    world.bring_late(caught[-1])
-    world.run(0.5)
-    assert cleared.result == ACCEPTED
-    assert stays(world, 3)
-
-
-@pytest.mark.parametrize("halt", ["HOLD", "everything"])
+@for_each("halt", ["HOLD", "everything"])
 def test_a_submission_that_its_senders_halt_has_overtaken(world: World, halt: str) -> None:
     late = world.client.packed(command_long(MOVE, 3, 0, 0, 7.0, 0, 0, 5, target=(1, 191)))
     world.client.send(command_long(512, 148))  # has the next number
@@ -308,7 +179,7 @@ def test_a_submission_that_its_senders_halt_has_overtaken(world: World, halt: st
     assert stays(world, 4)
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "everything"])
+@for_each("halt", ["HOLD", "everything"])
 def test_an_upload_that_has_begun_before_a_halt(world: World, halt: str) -> None:
     held: list[int] = []
     world.watched.loses = lambda _s, target, data: (
@@ -326,52 +197,3 @@ def test_an_upload_that_has_begun_before_a_halt(world: World, halt: str) -> None
 
 
 # a person at the rover
-
-
-@pytest.mark.parametrize("what", ["takes it", "disarms it"])
-def test_a_person_has_it_while_a_kill_stops_it(world: World, what: str) -> None:
-    world.client.move(20, speed=0.8)
-    world.client.move(5, speed=0.5)
-    world.until(lambda: world.truth.forward_speed > 0.7, within=20)
-    world.client.command(CANCEL, 1, 1)
-    world.run(0.2)
-    if what == "takes it":
-        world.operator_mode(Mode.MANUAL)
-        world.run(4)
-        assert mode_of(world) is Mode.MANUAL
-    else:
-        world.operator_arm(False)
-        world.run(4)
-        assert not world.rover.autopilot.armed
-    assert world.paused() is R.TAKEOVER
-    assert world.state(2)[0] is S.QUEUED
-
-
-def test_a_person_drives_a_rover_whose_stop_was_not_confirmed(world: World) -> None:
-    world.client.move(20, speed=0.8)
-    world.until(lambda: world.truth.forward_speed > 0.7, within=20)
-    world.client.command(CANCEL, 1)
-    world.run(0.3)
-    world.fault(Faults(position_frozen=True))
-    world.until(lambda: world.state(1)[0] is S.HELD, within=30)
-    world.fault(Faults())
-    world.run(6)
-    world.operator_mode(Mode.MANUAL)
-    world.run(0.1)
-    world.rover.autopilot.operator_sticks(0.6, 0.0)
-    world.run(3)
-    assert mode_of(world) is Mode.MANUAL
-    assert world.truth.forward_speed == pytest.approx(0.6, abs=0.1)
-
-
-def test_a_person_who_turns_the_switch_to_manual_has_it(world: World) -> None:
-    """Though a client had asked for the same mode just before a HOLD."""
-    world.client.arm()
-    world.run(1)
-    world.client.mode(0)
-    world.run(1)
-    world.add_client("person").mode(HOLD)
-    world.run(1)
-    world.operator_mode(Mode.MANUAL)
-    world.run(1.5)
-    assert mode_of(world) is Mode.MANUAL

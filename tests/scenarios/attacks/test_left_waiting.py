@@ -11,20 +11,20 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
-from math import nan
 from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import KeysChanged
-from mav_tasks.mavlink.signing import Key
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
+    DENIED,
     GUIDED,
     HOLD,
     MOVE,
@@ -35,11 +35,10 @@ from tests.kit.client import (
 )
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
-from tests.kit.px4 import MISSION, PROMPT_PX4, REPOSITION, ask_mode
+from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at, put_home
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_signing import ALICE, BOB, put, signing
 
 UTC = 1.8e9
 WAYPOINT, OPTIONS, START, RETURN, STANDARD_MODE = 16, 54014, 300, 20, 262
@@ -106,7 +105,7 @@ def started_under_a_pause(world: World, delay: float) -> None:
     assert started.result == ACCEPTED
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("halt", HALTS)
 def test_a_plan_that_was_started_does_not_begin_after_a_halt(world: World, halt: str) -> None:
     person = world.add_client("person")
     started_under_a_pause(world, 25)
@@ -118,32 +117,7 @@ def test_a_plan_that_was_started_does_not_begin_after_a_halt(world: World, halt:
     assert going.result == ACCEPTED
 
 
-def test_nor_where_no_ground_station_is_heard_any_more(make_world: MakeWorld) -> None:
-    world = make_world(settings=replace(Settings(), operator_lost="pause"))
-    started_under_a_pause(world, 40)
-    world.client.heartbeats = False
-    assert stays(world, 60)
-
-
-def test_a_task_that_waits_for_the_rover_is_paused_without_a_ground_station(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(settings=replace(Settings(guided="now"), operator_lost="pause"))
-    world.client.mode(HOLD)
-    world.client.arm()
-    world.run(2)
-    place = at(20.0, 0.0)
-    world.client.command_int(REPOSITION, -1, 1, 0, nan, **place, frame=6, target=(1, 1))
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    unheard(world)
-    world.run(3)
-    world.client.heartbeats = False
-    world.run(8)
-    world.watched.loses = lambda _source, _target, _data: False
-    assert stays(world, 10)
-
-
-@pytest.mark.parametrize("hears", [True, False])
+@for_each("hears", [True, False])
 def test_disarming_ends_what_waits_for_a_silent_rover(world: World, hears: bool) -> None:
     """Whether it was carried out nobody knows until the rover is heard again."""
     person = world.add_client("person")
@@ -163,7 +137,7 @@ def test_disarming_ends_what_waits_for_a_silent_rover(world: World, hears: bool)
     assert world.paused() is R.OPERATOR
 
 
-@pytest.mark.parametrize("halt", ["disarm", "pause", "switch"])
+@for_each("halt", ["disarm", "pause", "switch"])
 def test_a_mission_does_not_begin_at_an_arming_after_a_halt(
     make_world: MakeWorld, halt: str
 ) -> None:
@@ -181,7 +155,7 @@ def test_a_mission_does_not_begin_at_an_arming_after_a_halt(
     assert stays(world, 8)
 
 
-@pytest.mark.parametrize("halt", ["disarm", "switch"])
+@for_each("halt", ["disarm", "switch"])
 def test_a_stream_does_not_drive_on_when_the_rover_may_move_again(world: World, halt: str) -> None:
     """Both at the rover itself: no client has said anything."""
     world.client.mode(GUIDED)
@@ -204,19 +178,7 @@ def test_a_stream_does_not_drive_on_when_the_rover_may_move_again(world: World, 
     assert world.truth.forward_speed > 0.3, "its client has asked for the mode again"
 
 
-def test_nor_after_a_pause_of_another_client(world: World) -> None:
-    world.client.mode(GUIDED)
-    world.run(1)
-    world.client.stream(setpoint(0.5), rate=10)
-    world.run(1)
-    paused = world.add_client("person").pause()
-    world.run(2)
-    assert paused.result == ACCEPTED
-    world.operator_arm(True)
-    assert stays(world, 4)
-
-
-@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.GUIDED])
+@for_each("mode", [Mode.MANUAL, Mode.GUIDED])
 def test_a_rover_that_somebody_drove_and_parked_stays_there(world: World, mode: Mode) -> None:
     """In GUIDED by another radio than ours."""
     world.client.arm()
@@ -249,7 +211,7 @@ def restarted(world: World, path: Path) -> None:
     world.start_server(later, later.load())
 
 
-@pytest.mark.parametrize("who", ["client", "person at the rover"])
+@for_each("who", ["client", "person at the rover"])
 def test_what_somebody_has_disarmed_is_not_armed_by_the_next_run(
     make_world: MakeWorld, tmp_path: Path, who: str
 ) -> None:
@@ -275,7 +237,7 @@ def test_what_somebody_has_disarmed_is_not_armed_by_the_next_run(
     world.until_state(2, S.COMPLETED, within=60)
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause", "STOP"])
+@for_each("halt", ["HOLD", "pause", "STOP"])
 def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
     make_world: MakeWorld, halt: str
 ) -> None:
@@ -292,55 +254,6 @@ def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
     halted = halts[halt]()
     world.run(0.1)
     assert halted.result == ACCEPTED
-    assert stays(world, 6)
-
-
-@pytest.mark.parametrize("halt", ["HOLD", "pause", "STOP"])
-def test_nor_a_return_behind_another(world: World, halt: str) -> None:
-    person = world.add_client("person")
-    away_from_home(world)
-    person.mode(HOLD)
-    world.run(1)
-    world.lose_acks()
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(0.55)
-    world.client.send(command_long(RETURN, 1, target=ELSEWHERE))
-    world.run(0.05)
-    halted = {"HOLD": lambda: person.mode(HOLD), "pause": person.pause, "STOP": person.stop}[halt]()
-    world.run(0.3)
-    assert halted.result == ACCEPTED
-    for _ in range(40):
-        world.run(0.1)
-        assert world.rover.autopilot.mode is Mode.HOLD
-
-
-def test_a_mission_of_a_key_that_counts_no_more_does_not_begin_at_the_arming(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    put(world, ALICE)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    upload = Upload(
-        client,
-        (Item(WAYPOINT, **at(3.0, 0.0)), Item(WAYPOINT, **at(0.0, 0.0))),
-        target=(1, 1),
-    )
-    world.until(lambda: upload.result == 0, within=5)
-    ask_mode(client, MISSION)
-    world.run(0.5)
-    world.operator_arm(True)
-    world.until_state(1, S.COMPLETED, within=90)
-    world.run(5)
-    world.operator_arm(False)
-    world.run(2)
-    marked = ask_mode(client, MISSION)
-    world.run(0.5)
-    assert marked.result == ACCEPTED
-    revoked = Key("alice", b"", "operator", ALICE.fingerprint)
-    world.server.pump.handle(KeysChanged((revoked, BOB)), now=world.now)
-    world.run(1)
-    world.operator_arm(True)
     assert stays(world, 6)
 
 
@@ -371,3 +284,79 @@ def test_a_disarming_that_only_the_record_of_halts_took_is_not_undone(
     world.start_server(later, later.load())
     assert stays(world, 40)
     assert not world.rover.autopilot.armed
+
+
+# a release under a pause
+
+
+RELEASE, AGAIN, REMAINDER = 54013, 0, 1
+
+
+PAUSES = ("pause", "HOLD", "takeover")
+
+
+def held_and_paused(world: World, how: str) -> None:
+    """Have a task held, and then the queue paused."""
+    world.client.move(10)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
+    world.fault(Faults(position_jump=(5.0, 0.0)))
+    world.until_state(1, S.HELD, within=2)
+    world.run(3)
+    if how == "pause":
+        world.add_client("person").pause()
+    elif how == "HOLD":
+        world.add_client("person").mode(HOLD)
+    else:
+        world.operator_mode(Mode.MANUAL)
+        world.run(2)
+        world.operator_mode(Mode.HOLD)
+    world.run(5)
+
+
+@for_each("how", PAUSES)
+def test_it_waits_for_the_continue_and_then_goes_on(world: World, how: str) -> None:
+    held_and_paused(world, how)
+    before = world.pose()
+    released = world.client.command(RELEASE, 1, AGAIN)
+    world.run(5)
+    assert released.answer == (ACCEPTED, 1)
+    assert world.pose() == pytest.approx(before, abs=0.001)
+    assert world.state(1)[0] is S.HELD
+    assert "Task 1 waits: released; press Continue to start it" in world.client.texts()
+    world.client.proceed()
+    world.until_state(1, S.EXECUTING, within=5)
+
+
+@for_each("how", PAUSES)
+def test_the_next_halt_takes_it_back(world: World, how: str) -> None:
+    held_and_paused(world, how)
+    world.client.command(RELEASE, 1, AGAIN)
+    world.run(1)
+    world.add_client("another").pause()
+    world.run(5)
+    before = world.pose()
+    world.client.proceed()
+    world.run(4)
+    assert world.pose() == pytest.approx(before, abs=0.001)
+    assert world.state(1)[0] is S.HELD
+
+
+def test_a_submitter_who_may_not_continue_does_not_drive_by_a_release(
+    make_world: MakeWorld,
+) -> None:
+    roles = Roles(addresses={"245/190": "submitter"})
+    world = make_world(settings=Settings(roles=roles))
+    script = world.add_client("script", system_id=245)
+    script.move(10)
+    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
+    world.fault(Faults(position_jump=(5.0, 0.0)))
+    world.until_state(1, S.HELD, within=2)
+    world.run(3)
+    world.client.pause()
+    world.run(4)
+    before = world.pose()
+    continued = script.proceed()
+    script.command(RELEASE, 1, AGAIN)
+    world.run(5)
+    assert continued.result == DENIED
+    assert world.pose() == pytest.approx(before, abs=0.001)

@@ -4,13 +4,10 @@ Attack D4: after 20 s of standstill a continue came after a newer STOP, sticks a
 of 20 s ago reached the rover, and a submission was driven that its client had given up on.
 """
 
-import pytest
-from pymavlink.dialects.v20 import common
-
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -26,9 +23,7 @@ from tests.kit.client import (
     setpoint,
     sticks,
 )
-from tests.kit.mission import Item, Upload
-from tests.kit.world import World, at
-from tests.scenarios.conftest import MakeWorld
+from tests.kit.world import World
 
 STOOD = 20.0  # s
 WAYPOINT, CANCEL, START = 16, 54010, 300
@@ -55,7 +50,7 @@ def moved(world: World, seconds: float) -> float:
     return abs(world.pose()[0] - north) + abs(world.pose()[1] - east)
 
 
-@pytest.mark.parametrize("halt", ["STOP", "HOLD"])
+@for_each("halt", ["STOP", "HOLD"])
 def test_a_continue_from_before_a_stop_does_not_go_on_after_it(world: World, halt: str) -> None:
     person = world.add_client("person")
     world.client.move(20)
@@ -83,8 +78,8 @@ def test_a_halt_in_the_backlog_counts(world: World) -> None:
     assert moved(world, 3) < 0.001
 
 
-@pytest.mark.parametrize(
-    ("mode", "words"),
+@for_each(
+    "mode, words",
     [
         (Mode.MANUAL, [sticks(0, 0, 800)] * 50),
         (Mode.MANUAL, [rc_override(1500, 1500, 1900)] * 5),
@@ -92,7 +87,6 @@ def test_a_halt_in_the_backlog_counts(world: World) -> None:
         (Mode.HOLD, [command_long(SET_MODE, 1, GUIDED, target=(1, 1)), *[setpoint(1.0)] * 20]),
         (Mode.GUIDED, [setpoint(1.0)] * 20),
     ],
-    ids=["sticks", "radio", "manual", "guided", "set-points"],
 )
 def test_old_sticks_modes_and_set_points_do_not_move_an_armed_rover(
     world: World, mode: Mode, words: list[object]
@@ -140,17 +134,6 @@ def test_a_submission_that_waited_for_a_second_is_taken_in(world: World) -> None
     assert submitted.answer == (ACCEPTED, 1)
 
 
-@pytest.mark.parametrize("guided", ["queue", "now"])
-def test_a_place_as_a_plan_item_is_not_driven_to_either(make_world: MakeWorld, guided: str) -> None:
-    world = make_world(settings=Settings(guided=guided))
-    world.client.mode(HOLD)
-    world.client.arm()
-    world.run(2)
-    in_the_standstill(world, Item(WAYPOINT, **at(5.0, 0.0), current=2).message(0, 0, (1, 1)))
-    assert moved(world, 8) < 0.01
-    assert world.tasks() == ()
-
-
 def test_a_cancel_of_what_is_held_since_lets_nothing_else_go(world: World) -> None:
     """It was driven when its sender called it off; now somebody has to look first."""
     world.client.move(20)
@@ -161,22 +144,3 @@ def test_a_cancel_of_what_is_held_since_lets_nothing_else_go(world: World) -> No
     assert moved(world, 6) < 0.01
     assert world.state(1) == (S.HELD, R.LATE)
     assert world.client.acks_of(CANCEL) == [(TEMPORARILY_REJECTED, R.STALE)]
-
-
-def test_a_clearing_of_a_mission_held_since_lets_nothing_else_go(world: World) -> None:
-    drive = (Item(WAYPOINT, frame=0, current=1), Item(WAYPOINT, **at(20.0, 0.0)))
-    upload = Upload(world.client, drive, target=(1, 1))
-    world.until(lambda: upload.result == 0, within=5)
-    started = world.client.command(START, target=(1, 1))
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    assert started.result == ACCEPTED
-    world.client.move(20)
-    world.run(1)
-    world.observer.expects_gaps = True
-    in_the_standstill(world, common.MAVLink_mission_clear_all_message(1, 1, 0))
-    world.run(0.5)
-    assert moved(world, 8) < 0.001
-    assert world.state(1) == (S.HELD, R.LATE)
-    assert "clear: delayed by the server; task 1 is held now: clear again" in "".join(
-        world.client.texts()
-    )

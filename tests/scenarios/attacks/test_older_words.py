@@ -6,11 +6,10 @@ its copies come and by whatever way; the person who means it sends it anew, and 
 
 from collections.abc import Callable
 
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -18,7 +17,6 @@ from tests.kit.client import (
     GUIDED,
     HOLD,
     PAUSE_CONTINUE,
-    RTL,
     SET_MODE,
     TEMPORARILY_REJECTED,
     FakeClient,
@@ -63,7 +61,7 @@ def driven_since(world: World, seconds: float) -> float:
     return abs(after[0] - before[0]) + abs(after[1] - before[1])
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("halt", HALTS)
 def test_copies_of_a_continue_undo_no_newer_halt(world: World, halt: str) -> None:
     """D1: what a script repeats for 10 s is older than what a person has done in between."""
     script, person = world.add_client("script", system_id=245), world.add_client("person")
@@ -85,8 +83,8 @@ def test_copies_of_a_continue_undo_no_newer_halt(world: World, halt: str) -> Non
         assert set(script.acks_of(PAUSE_CONTINUE)[-15:]) == {STALE}
 
 
-@pytest.mark.parametrize("halt", ["HOLD", "pause", "disarm", "mode switch"])
-@pytest.mark.parametrize("way", ["MISSION_START", "DO_SET_MODE", "SET_MODE"])
+@for_each("halt", ["HOLD", "pause", "disarm", "mode switch"])
+@for_each("way", ["MISSION_START", "DO_SET_MODE", "SET_MODE"])
 def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str) -> None:
     """D1: ground stations repeat the start of a mission, and the mode for it, without an answer."""
     station, person = world.client, world.add_client("person")
@@ -108,23 +106,6 @@ def test_copies_of_a_start_undo_no_newer_halt(world: World, halt: str, way: str)
     assert driven_since(world, 2) < 0.001
 
 
-@pytest.mark.parametrize(("mode", "target"), [(GUIDED, (1, 1)), (RTL, (1, 1))])
-def test_copies_of_a_mode_undo_no_newer_hold(
-    world: World, mode: int, target: tuple[int, int]
-) -> None:
-    station, person = world.client, world.add_client("person")
-    station.arm()
-    world.run(1)
-    word = command_long(SET_MODE, 1, mode, target=target)
-    station.send(word)
-    world.run(1)
-    person.mode(HOLD)
-    world.run(1)
-    copies(station, word, 4, world, each=1.0)
-    world.run(1)
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
 def test_copies_of_an_arming_do_not_arm_what_was_disarmed_since(world: World) -> None:
     station, person = world.client, world.add_client("person")
     word = command_long(ARM, 1, target=(1, 1))
@@ -137,25 +118,8 @@ def test_copies_of_an_arming_do_not_arm_what_was_disarmed_since(world: World) ->
     assert not world.rover.autopilot.armed
 
 
-def test_a_copy_that_the_net_delivers_20_s_late_undoes_nothing(world: World) -> None:
-    """Its sender's numbers show that it had left long before."""
-    script, person = world.add_client("script", system_id=245), world.add_client("person")
-    script.move(20)
-    world.until_state(1, S.EXECUTING)
-    person.pause()
-    world.run(4)
-    late = script.packed(command_long(PAUSE_CONTINUE, 1, confirmation=3))
-    script.send(command_long(PAUSE_CONTINUE, 1))
-    world.run(3)
-    person.pause()
-    world.run(20)
-    script.send_raw(late)
-    assert driven_since(world, 3) < 0.001
-    assert world.paused() is R.OPERATOR
-
-
-@pytest.mark.parametrize("apart", [0.0, 0.02, 5.0])
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+@for_each("apart", [0.0, 0.02, 5.0])
+@for_each("halt", ["STOP", "HOLD", "pause"])
 def test_a_continue_that_its_senders_own_halt_has_overtaken_does_not_count(
     world: World, halt: str, apart: float
 ) -> None:
@@ -187,7 +151,7 @@ def test_halts_of_one_moment_come_first_whatever_link_they_came_on(world: World)
         assert world.paused() is R.STOPPED
 
 
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "disarm"])
+@for_each("halt", ["STOP", "HOLD", "disarm"])
 def test_what_mavsdk_repeats_by_itself_does_not_undo_its_own_halt(world: World, halt: str) -> None:
     """Its repetitions have a number of their own, and no count."""
     client = world.client
@@ -208,18 +172,7 @@ def test_what_mavsdk_repeats_by_itself_does_not_undo_its_own_halt(world: World, 
 # people are not locked out
 
 
-def test_who_held_it_may_go_on_at_once(world: World) -> None:
-    world.client.move(20)
-    world.until_state(1, S.EXECUTING)
-    for _ in range(5):
-        world.client.pause()
-        world.run(0.3)
-        going = world.client.proceed()
-        world.run(0.5)
-        assert going.answer == (ACCEPTED, 1)
-
-
-@pytest.mark.parametrize("drives", [AUTO, GUIDED])
+@for_each("drives", [AUTO, GUIDED])
 def test_a_mode_that_drives_counts_at_once_after_the_hold_of_the_same_client(
     world: World, drives: int
 ) -> None:
@@ -238,7 +191,7 @@ def test_a_script_that_is_run_again_from_the_same_port_is_heard(world: World) ->
     """MAVSDK at 14540, say: each run counts its packets from 0, and sends the very same ones."""
     for _ in range(3):
         script = world.client
-        script._mav.seq = 0
+        script.count_anew()
         script.send(command_long(512, 148, target=(1, 1)))
         world.run(0.1)
         script.send(command_long(512, 148, target=(1, 1)))
@@ -252,7 +205,7 @@ def test_a_script_that_is_run_again_from_the_same_port_is_heard(world: World) ->
             script.send(command_long(512, 148, target=(1, 1)))
         script.heartbeats = False
         world.run(4)
-        script.heartbeats, script._next_heartbeat = True, world.now
+        script.heartbeats = True
 
 
 def test_a_refusal_says_what_came_and_what_to_do_and_4_s_later_it_counts(world: World) -> None:

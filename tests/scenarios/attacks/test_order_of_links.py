@@ -4,12 +4,11 @@ Fault C1: a client's "continue" arrived before another client's STOP, but its li
 millisecond later. The STOP was acknowledged, and the rover drove on.
 """
 
-import pytest
-
 from mav_tasks.engine.inputs import Packets
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     ARM,
@@ -51,7 +50,7 @@ HALTS = {
 }
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     """Return a world whose rover has driven the first metres of a mission, and is paused."""
     world = make_world(more_links=(SECOND,)).ready()
@@ -82,8 +81,8 @@ def driven_since(world: World, seconds: float) -> float:
     return abs(after[0] - before[0]) + abs(after[1] - before[1])
 
 
-@pytest.mark.parametrize("halt", HALTS)
-@pytest.mark.parametrize("word", GO_WORDS)
+@for_each("halt", HALTS)
+@for_each("word", GO_WORDS)
 def test_an_older_word_of_another_link_undoes_no_halt(world: World, word: str, halt: str) -> None:
     person, script = world.add_client("person"), world.add_client("script", system_id=245)
     now = world.now
@@ -97,7 +96,7 @@ def test_an_older_word_of_another_link_undoes_no_halt(world: World, word: str, h
     assert world.paused() is not R.NONE
 
 
-@pytest.mark.parametrize("halt", HALTS)
+@for_each("halt", HALTS)
 def test_a_newer_word_of_another_link_counts_however_late_it_is_read(
     world: World, halt: str
 ) -> None:
@@ -111,27 +110,6 @@ def test_a_newer_word_of_another_link_counts_however_late_it_is_read(
         assert world.paused() is R.NONE
     else:
         assert driven_since(world, 6) > 1.0
-
-
-def test_copies_of_an_older_word_undo_no_halt(world: World) -> None:
-    """The first copy counts, also when the next one arrives after the halt."""
-    person, script = world.add_client("person"), world.add_client("script", system_id=245)
-    now = world.now
-    read(world, CLIENT_LINK, person, HALTS["STOP"], arrived=now + MS / 2, at=now + MS)
-    read(world, SECOND, script, GO_WORDS["continue"], arrived=now, at=now + 2 * MS)
-    for copy in (1, 2, 3):
-        again = command_long(PAUSE_CONTINUE, 1, confirmation=copy)
-        read(world, SECOND, script, again, arrived=now + copy, at=now + copy)
-    assert driven_since(world, 3) < 0.001
-    assert world.paused() is R.STOPPED
-
-
-def test_who_sent_both_in_order_is_obeyed_though_they_are_read_late(world: World) -> None:
-    """A script that does not wait for the answers: its own numbers tell the order."""
-    script, now = world.add_client("script", system_id=245), world.now
-    read(world, SECOND, script, HALTS["pause"], arrived=now, at=now + MS)
-    read(world, SECOND, script, GO_WORDS["continue"], arrived=now + MS / 2, at=now + 3 * MS)
-    assert driven_since(world, 4) > 1.0
 
 
 def test_a_new_task_of_before_a_halt_is_refused_where_it_would_be_driven(world: World) -> None:

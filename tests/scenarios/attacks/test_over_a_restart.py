@@ -5,34 +5,28 @@ What had left before the halt may still come, to the new server as well as to th
 
 from pathlib import Path
 from shutil import copy
-from struct import unpack_from
-
-import pytest
 
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, HOLD, MOVE, PAUSE_CONTINUE, command_long
+from tests.kit.cases import anew, for_each
+from tests.kit.client import ACCEPTED, HOLD, MOVE, command_long
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.attacks.test_late_arming import is_arming, mode_of
-from tests.scenarios.attacks.test_late_to_the_rover import catch, mend
+from tests.scenarios.attacks.test_late_to_the_rover import mend
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
 from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
-SETPOINT, MODE, DISARM = 84, 176, 400
-COMMANDS, NUMBER = (75, 76), 38
-CONTINUE = command_long(PAUSE_CONTINUE, 1)
-ENDS = pytest.mark.parametrize("ends", ["well", "killed"])
+ENDS = for_each("ends", ["well", "killed"])
 
 
-@pytest.fixture
+@anew
 def path(tmp_path: Path) -> Path:
     return tmp_path / "tasks.sqlite3"
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld, path: Path) -> World:
     return make_world(store=PromptSqliteStore(path, wall_offset=UTC))
 
@@ -65,7 +59,7 @@ def returning(world: World) -> None:
 
 
 @ENDS
-@pytest.mark.parametrize("halt", ["HOLD", "pause", "HOLD, then disarm"])
+@for_each("halt", ["HOLD", "pause", "HOLD, then disarm"])
 def test_a_halt_that_has_not_come_is_asked_for_again(
     world: World, path: Path, halt: str, ends: str
 ) -> None:
@@ -85,28 +79,7 @@ def test_a_halt_that_has_not_come_is_asked_for_again(
 
 
 @ENDS
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
-def test_a_return_that_comes_late_after_it(world: World, path: Path, halt: str, ends: str) -> None:
-    person = world.add_client("person")
-    away_from_home(world)
-    world.client.mode(HOLD)
-    world.run(4)
-    caught = catch(world, RETURN)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(0.1)
-    mend(world)
-    halted = {"STOP": person.stop, "pause": person.pause}.get(halt, lambda: person.mode(HOLD))()
-    world.run(0.3)
-    assert halted.result == ACCEPTED
-    restart(world, path, ends=ends)
-    world.run(1.2)
-    world.bring_late(caught[0])
-    world.run(4)
-    assert mode_of(world) is Mode.HOLD
-
-
-@ENDS
-@pytest.mark.parametrize("on_restart", ["pause", "continue"])
+@for_each("on_restart", ["pause", "continue"])
 def test_an_arming_that_comes_late_after_it(
     make_world: MakeWorld, path: Path, ends: str, on_restart: str
 ) -> None:
@@ -139,43 +112,7 @@ def test_an_arming_that_comes_late_after_it(
 
 
 @ENDS
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
-def test_our_own_mode_and_set_point_that_come_late_after_it(
-    world: World, path: Path, halt: str, ends: str
-) -> None:
-    person = world.add_client("person")
-    modes: list[bytes] = []
-    set_points: list[bytes] = []
-
-    def sees(_source: str, target: str, data: bytes) -> bool:
-        if target == "rover1" and data[7] in COMMANDS:
-            is_mode = unpack_from("<H", data + bytes(40), NUMBER)[0] == MODE
-            modes.extend([data] if is_mode else [])
-        if target == "rover1" and data[7] == SETPOINT:
-            set_points.append(data)
-        return False
-
-    world.watched.loses = sees
-    world.client.move(20, speed=1.0)
-    world.until(lambda: world.truth.forward_speed > 0.5, within=20)
-    halted = {"STOP": person.stop, "pause": person.pause}.get(halt, lambda: person.mode(HOLD))()
-    mode, set_point = modes[0], set_points[-3]
-    world.run(1.0)
-    mend(world)
-    assert halted.result == ACCEPTED
-    restart(world, path, ends=ends)
-    world.run(1.2)
-    world.bring_late(mode)
-    world.run(0.05)
-    world.bring_late(set_point)
-    north = world.truth.north
-    world.run(6)
-    assert abs(world.truth.north - north) < 0.5
-    assert mode_of(world) is Mode.HOLD
-
-
-@ENDS
-@pytest.mark.parametrize("halt", ["STOP", "HOLD", "pause"])
+@for_each("halt", ["STOP", "HOLD", "pause"])
 def test_a_halt_after_it_lets_no_older_continue_through(
     world: World, path: Path, halt: str, ends: str
 ) -> None:
@@ -200,29 +137,3 @@ def test_a_halt_after_it_lets_no_older_continue_through(
     assert halted.result == ACCEPTED
     assert late.result != ACCEPTED
     assert stays(world, 5)
-
-
-@ENDS
-@pytest.mark.parametrize("wait", [6.0, 15.0])
-def test_a_continue_whose_sender_has_spoken_since(
-    world: World, path: Path, ends: str, wait: float
-) -> None:
-    """Its number is from before the first that the new server has heard of its sender."""
-    script = world.add_client("script", system_id=245)
-    person = world.add_client("person", system_id=254)
-    world.run(1)
-    world.client.move(20)
-    world.until(lambda: world.truth.forward_speed > 0.4, within=20)
-    script.pause()
-    world.run(3)
-    late = script.send_repeated(CONTINUE)
-    world.run(0.5)
-    halted = person.pause()
-    world.run(0.5)
-    assert halted.result == ACCEPTED
-    restart(world, path, ends=ends)
-    world.run(wait)
-    script.send_raw(late)
-    world.run(0.2)
-    assert stays(world, 4)
-    assert world.paused() is not R.NONE

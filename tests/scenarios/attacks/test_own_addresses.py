@@ -6,13 +6,13 @@ out who has sent it.
 
 from collections.abc import Callable
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import DENIED, GUIDED, FakeClient, heartbeat, set_mode
 from tests.kit.world import World
 
@@ -52,8 +52,8 @@ def borrowed(world: World, source: tuple[int, int]) -> FakeClient:
     return client
 
 
-@pytest.mark.parametrize("source", OWN)
-@pytest.mark.parametrize("what", SENT)
+@for_each("source", OWN)
+@for_each("what", SENT)
 def test_nothing_is_done_for_who_calls_itself_the_server_or_a_rover(
     world: World, source: tuple[int, int], what: str
 ) -> None:
@@ -86,7 +86,7 @@ def of_source(world: World, source: tuple[int, int]) -> list[object]:
     return [packet for packet in world.observer.reached if packet.source == source]
 
 
-@pytest.mark.parametrize("source", OWN)
+@for_each("source", OWN)
 def test_its_stop_stops_all_the_same(world: World, source: tuple[int, int]) -> None:
     task = world.client.move(20.0)
     client = borrowed(world, source)

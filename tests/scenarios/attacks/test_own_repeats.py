@@ -3,9 +3,8 @@
 from collections.abc import Callable
 from struct import unpack_from
 
-import pytest
-
 from rover_sim.personas import ARDUPILOT, PX4, Mode
+from tests.kit.cases import for_each
 from tests.kit.world import World
 from tests.scenarios.attacks.test_late_arming import mode_of
 
@@ -21,8 +20,8 @@ def is_answer(source: str, datagram: bytes, command: int) -> bool:
     return bool(unpack_from("<H", datagram + bytes(2), 10)[0] == command)
 
 
-@pytest.mark.parametrize("phase", [0.45, 0.6, 0.75, 0.9])
-@pytest.mark.parametrize("after", [0.05, 0.15, 0.25])
+@for_each("phase", [0.45, 0.6, 0.75, 0.9])
+@for_each("after", [0.05, 0.15, 0.25])
 def test_who_disarms_a_rover_while_an_arming_is_unanswered_keeps_it_disarmed(
     make_world: Callable[..., World], phase: float, after: float
 ) -> None:
@@ -37,8 +36,8 @@ def test_who_disarms_a_rover_while_an_arming_is_unanswered_keeps_it_disarmed(
     assert not world.rover.autopilot.armed
 
 
-@pytest.mark.parametrize("phase", [0.0, 0.2, 0.4])
-@pytest.mark.parametrize("after", [0.06, 0.1, 0.2, 0.3])
+@for_each("phase", [0.0, 0.2, 0.4])
+@for_each("after", [0.06, 0.1, 0.2, 0.3])
 def test_who_sets_hold_while_a_mode_is_unanswered_keeps_it(
     make_world: Callable[..., World], phase: float, after: float
 ) -> None:

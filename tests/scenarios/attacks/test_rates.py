@@ -5,8 +5,6 @@ more than the link carries. A radio that is fed too much delays the telemetry th
 by.
 """
 
-from math import hypot
-
 import pytest
 from pymavlink.dialects.v20 import common
 
@@ -29,8 +27,6 @@ BUDGET = 0.7 * CAPACITY  # of it, for what is streamed
 OWN = 3_300.0  # bytes/s, that the server asks for by itself, and heartbeats
 #: all that ArduPilot streams
 STREAMED = (1, 24, 26, 27, 29, 30, 32, 33, 36, 62, 65, 74, 116, 125, 129, 147, 152, 163, 178, 193)
-ATTITUDE = 30
-PARAM_REQUEST_LIST, PARAM_VALUE = 21, 22
 FASTEST = 20_000  # µs
 
 
@@ -140,23 +136,6 @@ def test_telemetry_over_a_radio_with_a_buffer_stays_fresh(make_world: MakeWorld)
     assert abs(world.truth.north - 8.0) < 0.1
 
 
-def test_nor_do_ten_of_them(make_world: MakeWorld) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    for number in range(10):
-        client = world.add_client(f"observer {number}", system_id=OBSERVER)
-        world.run(1.0)
-        wish_for_all(world, client)
-    assert Meter(world).rate(10.0) < BUDGET
-
-
-def test_on_a_wide_link_its_wishes_stay_modest(make_world: MakeWorld) -> None:
-    world = make_world(settings=SETTINGS)
-    meter = Meter(world)
-    before = meter.rate(10.0)
-    wish_for_all(world, join(world, OBSERVER))
-    assert meter.rate(10.0) < before + 5_000
-
-
 def test_when_it_has_left_everything_is_as_before(make_world: MakeWorld) -> None:
     world = make_world(settings=SETTINGS)
     meter = Meter(world)
@@ -171,91 +150,6 @@ def test_when_it_has_left_everything_is_as_before(make_world: MakeWorld) -> None
     assert after == pytest.approx(before, rel=0.02)
 
 
-def test_an_operators_wish_ends_with_it_too(make_world: MakeWorld) -> None:
-    world = make_world(settings=SETTINGS)
-    meter = Meter(world)
-    before = meter.hertz(10.0)
-    operator = join(world, OPERATOR)
-    wish_for_all(world, operator)
-    assert meter.hertz(10.0) > 2 * before
-    leave(operator)
-    world.run(110.0)
-    assert meter.hertz(10.0) == pytest.approx(before, rel=0.02)
-
-
-def test_an_observer_takes_nothing_from_an_operators_wish(make_world: MakeWorld) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    meter = Meter(world)
-    operator = join(world, OPERATOR)
-    operator.command(SET_INTERVAL, ATTITUDE, 1e6 / 35, target=(1, 1))
-    world.run(5.0)
-    before = meter.hertz(10.0, ATTITUDE)
-    assert before > 30
-    wish_for_all(world, join(world, OBSERVER))
-    assert meter.hertz(10.0, ATTITUDE) >= before - 0.2
-
-
-def test_it_is_shown_what_is_there_anyway(make_world: MakeWorld) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    observer = join(world, OBSERVER)
-    wish_for_all(world, observer)
-    seen = [p for p in observer.received if p.message_id == ATTITUDE and p.at > world.now - 10]
-    assert len(seen) / 10 >= 24
-
-
-def test_wishes_that_change_all_the_time_are_not_all_passed_on(make_world: MakeWorld) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    observer, meter = join(world, OBSERVER), Meter(world)
-    for number in range(400):
-        for message_id in STREAMED[:5]:
-            interval = FASTEST + 50_000 * (number % 7)
-            observer.send(command_long(SET_INTERVAL, message_id, interval, target=(1, 1)))
-        world.run(0.1)
-    asked = [data for data in meter.went if data[7] == 76]
-    assert len(asked) < 40 * 1.5, f"{len(asked)} in 40 s"
-
-
-def list_of(client: FakeClient) -> None:
-    client.send(common.MAVLink_param_request_list_message(1, 1))
-
-
-def lists_towards(meter: Meter) -> int:
-    return sum(data[7] == PARAM_REQUEST_LIST for data in meter.went)
-
-
-def test_an_observers_parameter_list_does_not_fill_the_radio_of_a_rover_that_drives(
-    make_world: MakeWorld,
-) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    observer, operator = join(world, OBSERVER), join(world, OPERATOR)
-    task = world.client.move(5.0)
-    world.run(0.2)
-    world.until_state(task.task_id, S.EXECUTING)
-    meter = Meter(world)
-    list_of(observer)
-    world.run(1.0)
-    assert lists_towards(meter) == 0
-    assert any("slow link" in text for text in observer.texts()), observer.texts()
-    list_of(operator)
-    world.run(1.0)
-    assert lists_towards(meter) == 1
-
-
-def test_lists_of_observers_come_one_at_a_time(make_world: MakeWorld) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    first, second = join(world, OBSERVER), join(world, OTHER)
-    meter = Meter(world)
-    for _ in range(20):
-        list_of(first)
-        list_of(second)
-        world.run(0.5)
-    assert lists_towards(meter) == 1
-    world.run(30.0)
-    list_of(second)
-    world.run(0.5)
-    assert lists_towards(meter) == 2
-
-
 def test_questions_of_an_observer_do_not_fill_a_radio(make_world: MakeWorld) -> None:
     world = radio(make_world(settings=SETTINGS))
     observer = join(world, OBSERVER)
@@ -267,18 +161,3 @@ def test_questions_of_an_observer_do_not_fill_a_radio(make_world: MakeWorld) -> 
     world.run(10.0)
     assert meter.rate(10.0) < before + 0.1 * CAPACITY
     assert sum(map(len, meter.went)) / 10 < 0.1 * CAPACITY
-
-
-@pytest.mark.parametrize("attacks", [False, True])
-def test_a_task_ends_where_it_would_have_ended(make_world: MakeWorld, attacks: bool) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    observer = join(world, OBSERVER)
-    task = world.client.move(3.0)
-    world.run(0.2)
-    if attacks:
-        for message_id in STREAMED:
-            observer.send(command_long(SET_INTERVAL, message_id, FASTEST, target=(1, 1)))
-        observer.stream(common.MAVLink_param_request_list_message(1, 1), rate=10)
-        observer.stream(command_long(REQUEST, 148, target=(1, 1)), rate=100)
-    world.until_state(task.task_id, S.COMPLETED)
-    assert hypot(world.truth.north - 3.0, world.truth.east) < 0.03

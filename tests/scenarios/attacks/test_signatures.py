@@ -4,35 +4,23 @@ A packet held back, one meant for another server, a clock that is ahead, a key t
 while its task drives.
 """
 
-from dataclasses import replace
-from pathlib import Path
-
-import pytest
-
-from mav_tasks.engine.inputs import KeysChanged, WallClock
+from mav_tasks.engine.inputs import KeysChanged
 from mav_tasks.mavlink.signing import timestamp_at
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.server_events import SignaturesSeen, SignatureTime
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
-from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_signing import ALICE, BOB, REVOKED, UTC, put, restart, signing
+from tests.scenarios.test_signing import ALICE, BOB, REVOKED, UTC, put, signing
 
-TASK_CANCEL = 54010
 HOUR, YEAR = 3600.0, 365 * 86_400.0
 
 
 def at_time(client: FakeClient, utc: float) -> FakeClient:
     """Have a client's clock say this."""
-    client._mav.signing.timestamp = timestamp_at(utc)
+    client.set_clock(timestamp_at(utc))
     return client
-
-
-def set_clock(world: World, utc_offset: float) -> None:
-    world.server.pump.handle(WallClock(utc_offset), now=world.now)
-    world.server.pump.turn(now=world.now)
 
 
 def held_back(world: World, client: FakeClient) -> bytes:
@@ -54,41 +42,6 @@ def test_a_command_held_back_for_half_an_hour_is_not_done(world: World) -> None:
     client.send_raw(raw)
     world.run(0.3)
     assert world.tasks() == ()
-
-
-@pytest.mark.parametrize("offset", [-3 * HOUR, 3 * HOUR])
-def test_nor_one_of_a_client_whose_clock_is_hours_off(world: World, offset: float) -> None:
-    put(world, ALICE)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    set_clock(world, UTC + offset)
-    raw = held_back(world, client)
-    world.run(90.0)
-    client.send_raw(raw)
-    world.run(0.3)
-    assert world.tasks() == ()
-
-
-@pytest.mark.parametrize("offset", [-3 * HOUR, 3 * HOUR])
-def test_a_clock_that_is_hours_off_is_believed_as_long_as_it_goes_on(
-    world: World, offset: float
-) -> None:
-    """The server's clock is set while a client is there, whose own is as it was."""
-    put(world, ALICE)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    set_clock(world, UTC + offset)
-    client.heartbeats = False
-    world.run(90.0)  # longer than the window: silent, but its clock goes on
-    at_time(client, UTC + world.now)
-    sent = client.move(1.0)
-    world.run(1.0)
-    assert sent.result == ACCEPTED
-    world.run(90.0)
-    at_time(client, UTC + world.now)
-    assert client.stop().ack is None
-    world.run(0.3)
-    assert world.paused() is R.STOPPED
 
 
 def test_a_command_for_one_server_is_not_done_by_another_a_minute_later(
@@ -124,7 +77,7 @@ def ahead(world: World, seconds: float) -> FakeClient:
     return client
 
 
-@pytest.mark.parametrize("seconds", [90.0, HOUR, YEAR])
+@for_each("seconds", [90.0, HOUR, YEAR])
 def test_a_clock_ahead_shuts_nobody_out(world: World, seconds: float) -> None:
     put(world, ALICE, BOB)
     refused = ahead(world, seconds)
@@ -138,30 +91,6 @@ def test_a_clock_ahead_shuts_nobody_out(world: World, seconds: float) -> None:
     stopped = another.stop()
     world.run(0.3)
     assert (moved.result, stopped.result) == (ACCEPTED, ACCEPTED)
-    assert world.paused() is R.STOPPED
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "tasks.sqlite3"
-
-
-@pytest.mark.parametrize("poisoned", ["by a packet", "by an older version"])
-def test_nor_after_a_restart(make_world: MakeWorld, path: Path, poisoned: str) -> None:
-    store = PromptSqliteStore(path, wall_offset=UTC)
-    world = put(make_world(store=store), ALICE)
-    right = signing(world, ALICE)
-    world.run(1.5)
-    if poisoned == "by a packet":
-        ahead(world, YEAR)
-    else:
-        stream = SignatureTime(ALICE.fingerprint, 1, 255, 190, timestamp_at(UTC + YEAR))
-        store.append([SignaturesSeen((stream,), (), 0, world.now)])
-        store.take_outcomes()
-    restart(world, path, well=True)
-    sent = right.stop()
-    world.run(0.3)
-    assert sent.result == ACCEPTED
     assert world.paused() is R.STOPPED
 
 
@@ -188,49 +117,3 @@ def test_a_task_of_a_revoked_key_drives_no_further(world: World) -> None:
     assert told in operator.texts()
     operator.proceed()
     world.until(lambda: world.state(driven.task_id)[0] is S.EXECUTING, within=10)
-
-
-def test_nor_do_those_of_others_that_would_let_it_begin(world: World) -> None:
-    """One that waits behind another's is not begun either: the queue stands."""
-    put(world, ALICE, BOB)
-    client, operator = signing(world, ALICE), signing(world, BOB, name="operator")
-    world.run(1.5)
-    driven = operator.move(1.0)
-    waiting = client.move(1.0)
-    world.until_state(1, S.EXECUTING)
-    world.server.pump.handle(KeysChanged((REVOKED, BOB)), now=world.now)
-    world.run(6.0)
-    assert world.state(driven.task_id) == (S.PAUSED, R.OPERATOR)
-    assert world.state(waiting.task_id)[0] is S.QUEUED
-    operator.command(TASK_CANCEL, waiting.task_id)
-    operator.proceed()
-    world.until_idle(tasks=2)
-    assert world.state(driven.task_id)[0] is S.COMPLETED
-    assert world.truth.north == pytest.approx(1.0, abs=0.1)
-
-
-def test_a_key_that_came_or_has_another_role_pauses_nobody(world: World) -> None:
-    put(world, ALICE)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    client.move(1.0)
-    world.until_state(1, S.EXECUTING)
-    for keys in ((ALICE, BOB), (replace(ALICE, role="observer"), BOB)):
-        world.server.pump.handle(KeysChanged(keys), now=world.now)
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-
-
-def test_nor_does_it_drive_where_the_key_was_revoked_while_the_server_was_away(
-    make_world: MakeWorld, path: Path
-) -> None:
-    world = put(make_world(store=PromptSqliteStore(path, wall_offset=UTC)), ALICE, BOB)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    client.command(MOVE, 1.0, 0, 0, 0, 0, 10.0, 5)  # in 10 s
-    world.run(0.5)
-    restart(world, path, well=True, keys=(REVOKED, BOB))
-    world.run(15.0)
-    assert world.state(1)[0] is S.QUEUED
-    assert world.paused() is R.OPERATOR
-    assert world.truth.north == 0.0

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable
 
-import pytest
-
 from mav_tasks.settings import Settings
-from rover_sim.personas import ARDUPILOT, Mode
+from rover_sim.personas import Mode
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, RTL, command_long
-from tests.kit.world import PROMPT, World, put_home
+from tests.kit.world import World
 from tests.scenarios.attacks.test_late_arming import mode_of
 from tests.scenarios.attacks.test_late_to_the_rover import mend
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home
@@ -18,9 +17,9 @@ def cut(world: World) -> None:
     world.watched.loses = lambda source, target, _: "rover1" in (source, target)
 
 
-@pytest.mark.parametrize("claim", [True, False])
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
-@pytest.mark.parametrize("seconds", [4.0, 6.0, 45.0])
+@for_each("claim", [True, False])
+@for_each("halt", ["HOLD", "pause"])
+@for_each("seconds", [4.0, 6.0, 45.0])
 def test_a_halt_during_a_gap_counts_when_it_ends(
     make_world: Callable[..., World], halt: str, claim: bool, seconds: float
 ) -> None:
@@ -40,46 +39,3 @@ def test_a_halt_during_a_gap_counts_when_it_ends(
     mend(world)
     world.run(4)
     assert mode_of(world) is Mode.HOLD
-
-
-@pytest.mark.parametrize("persona", [ARDUPILOT, PROMPT], ids=["at 1 Hz", "prompt"])
-def test_one_that_drives_home_during_a_gap_is_stopped_after_it(
-    make_world: Callable[..., World], persona: object
-) -> None:
-    world = make_world(persona=persona)
-    person = world.add_client("person")
-    world.client.move(40, speed=2.0)
-    world.run(40)
-    world.client.arm()
-    world.run(2)
-    put_home(world, 0, 0)
-    world.run(1)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(1.5)
-    cut(world)
-    world.run(0.5)
-    said = person.mode(HOLD)
-    world.run(5)
-    assert said.result == ACCEPTED
-    assert abs(world.truth.forward_speed) > 0.5
-    mend(world)
-    world.run(2)
-    assert mode_of(world) is Mode.HOLD
-    world.run(8)
-    assert abs(world.truth.forward_speed) < 0.05
-
-
-def test_who_has_switched_it_during_a_gap_keeps_it(make_world: Callable[..., World]) -> None:
-    world = make_world()
-    person = world.add_client("person")
-    away_from_home(world)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(1)
-    cut(world)
-    person.mode(HOLD)
-    world.run(6)
-    world.operator_mode(Mode.MANUAL)
-    world.run(2)
-    mend(world)
-    world.run(5)
-    assert mode_of(world) is Mode.MANUAL

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Roles, Settings
+from tests.kit.cases import anew, for_each
 from tests.kit.client import FakeClient, Received
 from tests.kit.mission import MISSION_ACK, REQUEST, REQUEST_INT, Ack, Item, Upload
 from tests.kit.world import World, at
@@ -61,7 +61,7 @@ class SlowUpload:
             self.acks.append((now, Ack.of(packet.payload).result))
 
 
-@pytest.fixture
+@anew
 def world(make_world: MakeWorld) -> World:
     return make_world(settings=Settings(roles=Roles(unsigned="safety", addresses=ROLES)))
 
@@ -77,7 +77,7 @@ def result(world: World, upload: Upload) -> int | None:
     return upload.result
 
 
-@pytest.mark.parametrize("target", [(1, 1), (1, 191)])
+@for_each("target", [(1, 1), (1, 191)])
 def test_a_slow_submitter_keeps_no_operator_s_mission_out(
     world: World, target: tuple[int, int]
 ) -> None:
@@ -99,15 +99,6 @@ def test_a_slow_mission_keeps_no_fence_out(world: World) -> None:
     assert result(world, fence) == MISSION_ACCEPTED
     world.run(5.0)
     assert not slow.acks, "and goes on"
-
-
-def test_a_lower_role_displaces_nobody(world: World) -> None:
-    slow = SlowUpload(join(world, 12))
-    world.run(3.0)
-    submitter = join(world, 10)
-    assert result(world, Upload(submitter, PLAN)) == MISSION_DENIED
-    assert any("another client is uploading" in text for text in submitter.texts())
-    assert not slow.acks
 
 
 def test_an_upload_that_is_slow_for_ever_ends(world: World) -> None:

@@ -5,13 +5,13 @@ Named one by one, and not taken from the table that is to stop them.
 
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import ardupilotmega as ap
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from tests.kit.cases import anew, for_each
 from tests.kit.client import DENIED, TEMPORARILY_REJECTED, FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -65,15 +65,15 @@ def operator(world: World) -> FakeClient:
     return client
 
 
-@pytest.fixture
+@anew
 def with_operator(make_world: MakeWorld) -> World:
     """Return a world in which 12/190 is an operator, and the usual client in charge of safety."""
     roles = Roles(unsigned="safety", addresses={"12/190": "operator"})
     return make_world(settings=Settings(roles=roles))
 
 
-@pytest.mark.parametrize("what", BEYOND_OPERATORS)
-@pytest.mark.parametrize("component", [0, 1, 99])
+@for_each("what", BEYOND_OPERATORS)
+@for_each("component", [0, 1, 99])
 def test_a_command_that_does_more_than_move_is_of_safety_alone(
     with_operator: World, what: str, component: int
 ) -> None:
@@ -90,7 +90,7 @@ def test_a_command_that_does_more_than_move_is_of_safety_alone(
     assert number in passed, "who is in charge of safety may"
 
 
-@pytest.mark.parametrize("message", beyond_operators(), ids=lambda message: message.get_type())
+@for_each("message", beyond_operators())
 def test_a_message_that_does_more_than_move_is_of_safety_alone(
     with_operator: World, message: Any
 ) -> None:
@@ -105,8 +105,8 @@ def test_a_message_that_does_more_than_move_is_of_safety_alone(
     assert message.get_msgId() in passed, "who is in charge of safety may"
 
 
-@pytest.mark.parametrize("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT, FLASH])
-@pytest.mark.parametrize("component", [0, 1, 99])
+@for_each("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT, FLASH])
+@for_each("component", [0, 1, 99])
 def test_nobody_tests_or_services_a_rover_that_a_task_drives(
     world: World, number: int, component: int
 ) -> None:
@@ -121,7 +121,7 @@ def test_nobody_tests_or_services_a_rover_that_a_task_drives(
     assert world.state(1)[0] is S.EXECUTING
 
 
-@pytest.mark.parametrize("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT])
+@for_each("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT])
 def test_one_that_nothing_drives_is_tested_disarmed_but_not_under_stop(
     world: World, number: int
 ) -> None:

@@ -13,15 +13,14 @@ from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
-from tests.kit.client import ACCEPTED, RTL
-from tests.kit.client import HOLD as HOLD_MODE
+from tests.kit.cases import for_each
+from tests.kit.client import ACCEPTED
 from tests.kit.px4 import HOLD, PROMPT_PX4, REPOSITION, ask_mode
 from tests.kit.world import World, at
 from tests.scenarios.attacks.test_left_waiting import stays, unheard
 from tests.scenarios.conftest import MakeWorld
 
 CHANGE_MODE = 1  # of DO_REPOSITION
-HEARTBEAT = 0
 
 
 def drive_by_hand(world: World) -> None:
@@ -31,7 +30,7 @@ def drive_by_hand(world: World) -> None:
     world.run(20)
 
 
-@pytest.mark.parametrize("when", ["before", "meanwhile"])
+@for_each("when", ["before", "meanwhile"])
 def test_a_rover_that_a_person_parks_does_not_drive_off_with_what_waits(
     world: World, when: str
 ) -> None:
@@ -50,14 +49,6 @@ def test_a_rover_that_a_person_parks_does_not_drive_off_with_what_waits(
     going = world.client.proceed()
     world.until_state(1, S.COMPLETED)
     assert going.result == ACCEPTED
-
-
-def test_what_is_submitted_when_it_is_parked_begins(world: World) -> None:
-    drive_by_hand(world)
-    world.operator_mode(Mode.HOLD)
-    world.run(2)
-    world.client.move(1)
-    world.until_state(1, S.COMPLETED)
 
 
 def test_a_go_to_of_another_behind_the_same_router_does_not_undo_a_hold(
@@ -82,7 +73,7 @@ def test_a_go_to_of_another_behind_the_same_router_does_not_undo_a_hold(
     assert [task.goal for task in world.tasks()][1:], "the goal itself is queued"
 
 
-@pytest.mark.parametrize("way", ["put back", "turned round"])
+@for_each("way", ["put back", "turned round"])
 def test_a_rover_that_was_taken_and_parked_unheard_does_not_go_on_by_itself(
     world: World, way: str
 ) -> None:
@@ -103,40 +94,3 @@ def test_a_rover_that_was_taken_and_parked_unheard_does_not_go_on_by_itself(
     world.watched.loses = lambda *_: False
     assert stays(world, 10)
     assert world.state(1)[0] is S.HELD
-
-
-def test_one_that_only_its_link_was_away_from_goes_on(world: World) -> None:
-    world.client.move(10, speed=0.5)
-    world.until(lambda: world.truth.north > 3, within=40)
-    unheard(world)
-    world.run(10)
-    world.watched.loses = lambda *_: False
-    world.until_state(1, S.COMPLETED, within=60)
-
-
-def test_a_task_that_runs_though_the_queue_is_paused_is_taken_over_while_it_is_lost(
-    world: World,
-) -> None:
-    """Its position is; that somebody drives it by hand, and parks it, is seen."""
-    world.client.arm()
-    world.run(1)
-    world.client.mode(HOLD_MODE)
-    world.run(1)
-    world.client.move(20, speed=0.5)
-    world.until(lambda: world.truth.north > 8, within=40)
-    world.operator_mode(Mode.HOLD)
-    world.run(3)
-    assert world.paused() is R.TAKEOVER
-    world.client.mode(RTL)
-    world.run(5)
-    assert world.state(2)[0] is S.EXECUTING
-    world.watched.loses = lambda source, _target, data: source == "rover1" and data[7] != HEARTBEAT
-    world.run(4)
-    world.operator_mode(Mode.MANUAL)
-    world.run(2)
-    world.operator_mode(Mode.HOLD)
-    world.run(1)
-    world.watched.loses = lambda *_: False
-    world.run(1)
-    assert stays(world, 6)
-    assert world.state(2)[0] is S.PAUSED

@@ -8,13 +8,12 @@ towards a PX4 that had left before its own sender's HOLD, or was a copy from bef
 from math import nan
 from typing import Any
 
-import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
+from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -43,8 +42,8 @@ def go_to(north: float, east: float, target: tuple[int, int] = (1, 1)) -> Any:
     )
 
 
-@pytest.mark.parametrize("what", ["return", "go to"])
-@pytest.mark.parametrize("claim", [True, False])
+@for_each("what", ["return", "go to"])
+@for_each("claim", [True, False])
 def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
     make_world: MakeWorld, what: str, claim: bool
 ) -> None:
@@ -73,8 +72,8 @@ def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
     assert world.rover.autopilot.mode in (Mode.RTL, Mode.GUIDED), "it was meant"
 
 
-@pytest.mark.parametrize("way", ["command", "message", "elsewhere"])
-@pytest.mark.parametrize("halt", ["HOLD", "pause"])
+@for_each("way", ["command", "message", "elsewhere"])
+@for_each("halt", ["HOLD", "pause"])
 def test_what_the_net_to_the_rover_delivers_after_a_halt_does_not_undo_it(
     world: World, halt: str, way: str
 ) -> None:
@@ -122,59 +121,12 @@ def test_a_person_at_the_rover_has_it_all_the_same(world: World) -> None:
     assert world.rover.autopilot.mode is Mode.MANUAL
 
 
-def test_who_takes_it_for_a_return_while_a_task_drives_has_it(world: World) -> None:
-    """Though a client had asked for a mode before, and a task was called off just now."""
-    world.client.move(20)
-    world.client.move(21)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=20)
-    world.client.mode(GUIDED)
-    world.run(5)
-    world.client.command(CANCEL, 1)
-    world.until_state(2, S.EXECUTING)
-    world.run(0.3)
-    world.operator_mode(Mode.RTL)
-    world.run(3)
-    assert world.rover.autopilot.mode is Mode.RTL
-    assert world.paused() is R.TAKEOVER
-
-
-def test_a_pause_stops_what_somebody_has_taken_since_its_task_was_paused(world: World) -> None:
-    world.client.move(20)
-    world.until(lambda: world.truth.north > 3, within=40)
-    world.client.pause()
-    world.run(3)
-    world.operator_mode(Mode.RTL)
-    world.run(1.5)
-    assert world.truth.forward_speed > 0.3 or not world.stands()
-    paused = world.client.pause()
-    world.run(4)
-    assert paused.result == ACCEPTED
-    assert world.rover.autopilot.mode is Mode.HOLD
-    assert stays(world, 3)
-
-
-@pytest.fixture
+@anew
 def px4(make_world: MakeWorld) -> World:
     world = make_world(persona=PROMPT_PX4)
     world.client.move(20, speed=0.5)
     world.until(lambda: world.truth.forward_speed > 0.45, within=20)
     return world
-
-
-def test_a_pause_stops_a_paused_rover_that_another_station_has_sent_to_a_place(px4: World) -> None:
-    """A PX4 shows HOLD all the way there."""
-    px4.rover.autopilot.parameters["RO_SPEED_LIM"] = 1.0
-    px4.client.pause()
-    px4.run(3)
-    other = px4.net.link("other station")
-    other.send("rover1", go_to(30, 5).pack(common.MAVLink(None, 255, 190)))
-    px4.run(4)
-    assert px4.rover.autopilot.mode is Mode.HOLD
-    assert px4.truth.forward_speed > 0.3
-    paused = px4.client.pause()
-    px4.run(4)
-    assert paused.result == ACCEPTED
-    assert stays(px4, 4)
 
 
 def test_a_go_to_that_its_senders_hold_has_overtaken_does_not_undo_it(px4: World) -> None:
@@ -198,13 +150,3 @@ def test_nor_does_a_copy_of_one_from_before_that(px4: World) -> None:
     px4.client.send(go_to(5, 5))
     px4.run(2)
     assert stays(px4, 4)
-
-
-def test_a_go_to_after_its_senders_hold_undoes_it(px4: World) -> None:
-    """As MAVSDK sends both."""
-    ask_mode(px4.client, PX4_HOLD)
-    px4.run(0.2)
-    px4.client.send(go_to(5, 5))
-    px4.run(3)
-    assert px4.paused() is R.NONE
-    assert px4.truth.forward_speed > 0.3
