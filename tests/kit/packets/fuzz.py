@@ -12,7 +12,7 @@ from zlib import crc32
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from tests.kit.soak.targets import TARGETS, Target
+from tests.kit.packets.targets import TARGETS, Target
 
 CORPUS = Path(__file__).resolve().parents[2] / "vectors" / "fuzz"
 EXAMPLES = 400  # of one target, between two checks of the clock
