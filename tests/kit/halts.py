@@ -106,6 +106,7 @@ class Halts:
         self._mode_sent_at = -1e9  # when a mode request of the server reached the rover
         self._passed: dict[int, float] = {}  # when clients' commands reached the rover
         self._pauses = True  # of the last halt
+        self._wished_at = -1e9  # when the server read the latest submission
         self._is_by_itself = False  # in a mode of its own, which the server did not request
         self.halted: Counter[str] = Counter()  # by name
         self.refused: Counter[str] = Counter()  # go requests
@@ -164,6 +165,7 @@ class Halts:
         elif word.kind in (Kind.GO, Kind.MOTION):
             self._read_go(word, now=now)
         elif word.kind is Kind.WISH:
+            self._wished_at = now
             self._read_wish(word)
 
     def answered(self, peer: str, command: int, result: int, *, now: float) -> None:
@@ -223,6 +225,8 @@ class Halts:
         for go in self._gos:
             if go.read_at >= read_at and not self._ends(go.word, halt):
                 halt.note_older(go.word, now=now)
+        if not halt.pauses and self._wished_at >= read_at:
+            return  # it came after the HOLD of a rover without tasks, which pauses none
         if not newer:
             self._halt = halt
         elif not any(go.granted for go in newer):

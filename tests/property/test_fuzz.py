@@ -7,7 +7,7 @@ import pytest
 from tests.kit.packets import fuzz
 from tests.kit.packets.targets import TARGETS
 
-EXAMPLES = 250  # of each target; tools/soak.py --fuzz tries as many as there is time for
+EXAMPLES = 250  # of each target
 
 
 @pytest.mark.timeout(180)

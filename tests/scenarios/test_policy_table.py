@@ -55,7 +55,7 @@ def words() -> Iterator[Word]:
                 numbers = list(COMMANDS_OF_NOBODY)
             role = cells[1].partition(",")[0]
             for number in numbers:
-                if is_command or number in common.mavlink_map and number != FILE_TRANSFER:
+                if is_command or (number in common.mavlink_map and number != FILE_TRANSFER):
                     yield Word(number, is_command, role, cells[3])
 
 
