@@ -124,7 +124,8 @@ class _Player:
         world.ready()
         begins = self.begins = world.now
         for move in story.moves:
-            heapq.heappush(self._due, (begins + move.at, move.number, partial(self._do, move)))
+            act: Callable[[], object] = partial(self._do, move)
+            heapq.heappush(self._due, (begins + move.at, move.number, act))
         end = begins + (story.seconds if until is None else until)
         while self._due and self._due[0][0] <= end:
             when, _, act = heapq.heappop(self._due)
