@@ -133,6 +133,7 @@ class _Teller:
             (self._parked, 2),
             (self._halted_while_waiting, 4),
             (self._copy, 8),
+            (self._moved_start, 1),
         ]
 
     # parts of moves
@@ -226,7 +227,6 @@ class _Teller:
                 ("streams setpoints", (rover, 0.3)),
                 ("streams no more", ()),
                 ("parameter", (rover, pick("TSK_SPEED", "TSK_TURN", "TSK_ACCEL", "none"), 0.4)),
-                ("moves a start often", (rover,)),
             ),
         )
 
@@ -348,8 +348,10 @@ class _Teller:
 
     def _any_rover(self) -> Plan:
         """Tasks for any rover wait; a rover is halted and falls silent."""
+        is_later = self._random.random() < 0.5
         for _ in range(self._cast.rovers + 1):
-            yield 0.1, self._client(), *self._task(ANY)
+            task = ("later task", (ANY, 15.0)) if is_later else self._task(ANY)
+            yield 0.1, self._client(), *task
         rover = self._rover()
         if self._random.random() < 0.6:
             yield self._pick(*AFTER), self._client(), *self._halt(rover)
@@ -359,6 +361,12 @@ class _Teller:
         if self._random.random() < 0.3:
             yield 1.0, "server", "SIGTERM", (0.5,)
         yield 9.0, f"rover {rover}", "is well again", ()
+
+    def _moved_start(self) -> Plan:
+        """Somebody moves the start of a task again and again."""
+        rover, client = self._rover(), self._client()
+        yield 0.0, client, "later task", (rover, 30.0)
+        yield 1.0, client, "moves a start often", (rover,)
 
     def _parked(self) -> Plan:
         """A person drives while a task waits, and parks."""
