@@ -1,7 +1,7 @@
 """Faults that there were, to be put in again: does the simulation find them?
 
-Each is a line of the product and what stood there, or might as well have. ``README.md`` in this
-folder has how many seeds each takes.
+Each is a line of the product and what stood there, or might as well have. ``tools/simulate --fault
+NAME --seeds 24`` plays stories until one finds it.
 """
 
 import shutil
