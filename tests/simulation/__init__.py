@@ -1,5 +1,1 @@
-"""Random lives of whole worlds, mutated packets, and fuzzed text.
-
-The suite and ``tools/soak.py`` run the same code for different times. Every failure reports the
-seed that reproduces it.
-"""
+"""The deterministic simulation: stories of a seed, played in virtual time; see ``story.py``."""
