@@ -10,7 +10,7 @@ from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
 from tests.kit.halts import Halts
-from tests.kit.soak.words import Kind, Word
+from tests.kit.words import Kind, Word
 
 STEP = 0.025  # s
 ACCEPTED, DENIED = 0, 2

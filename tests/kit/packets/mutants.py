@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink import messages
 from tests.kit.client import command_long, heartbeat, rc_override, set_mode, setpoint, sticks
-from tests.kit.soak.whole import CRC_EXTRA
+from tests.kit.packets.whole import CRC_EXTRA
 
 SIGNED = 1
 SIGNATURE = 13  # bytes: link id, 48 bits of time, 48 bits of hash

@@ -5,9 +5,9 @@ from hashlib import sha256
 from random import Random
 
 from mav_tasks.mavlink.signing import Key
-from tests.kit.soak.battered import CALLERS, CLIENTS, UTC, Battered
-from tests.kit.soak.mutants import SIGNATURE, badly_signed
-from tests.kit.soak.whole import MAGIC_2, has_whole_packet
+from tests.kit.packets.battered import CALLERS, CLIENTS, UTC, Battered
+from tests.kit.packets.mutants import SIGNATURE, badly_signed
+from tests.kit.packets.whole import MAGIC_2, has_whole_packet
 
 KEY = Key("soak", bytes(range(32)), "safety")
 LINK_ID = 2

@@ -4,18 +4,15 @@ Hypothesis generates and shrinks them. A failing input becomes a file of the cor
 first from then on.
 """
 
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from zlib import crc32
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from tests.kit.soak.targets import TARGETS, Target
+from tests.kit.packets.targets import TARGETS, Target
 
 CORPUS = Path(__file__).resolve().parents[2] / "vectors" / "fuzz"
-EXAMPLES = 400  # of one target, between two checks of the clock
 LONGEST = 2_000  # bytes
 
 
@@ -57,31 +54,6 @@ def fuzz(name: str, *, examples: int, number: int) -> None:
     _try(target, samples, examples=examples, number=number)
 
 
-def fuzz_for(seconds: float, *, seed: int, say: Callable[[str], None]) -> list[str]:
-    """Fuzz all targets in turn for ``seconds``; return failures, and add them to the corpus."""
-    end = time.monotonic() + seconds
-    crashes: dict[str, str] = {}
-    tried = dict.fromkeys(TARGETS, 0)
-    said_at = 0.0
-    for number in _numbers(seed):
-        for name in TARGETS:
-            if time.monotonic() >= end:
-                say(", ".join(f"{each} {count}" for each, count in tried.items()))
-                return list(crashes.values())
-            if name in crashes:
-                continue
-            try:
-                fuzz(name, examples=EXAMPLES, number=number)
-            except Exception as error:  # noqa: BLE001 - any exception is a finding
-                crashes[name] = f"{name}, seed {number}: {type(error).__name__}: {error}"
-                say(crashes[name])
-            tried[name] += EXAMPLES
-        if time.monotonic() > said_at + 30:
-            said_at = time.monotonic()
-            say(f"{sum(tried.values())} inputs, {end - said_at:.0f} s left, {len(crashes)} failed")
-    raise AssertionError("numbers never end")
-
-
 def _try(target: Target, samples: list[bytes], *, examples: int, number: int) -> None:
     failed: list[bytes] = []
 
@@ -114,9 +86,3 @@ def keep(name: str, data: bytes) -> Path:
     path = CORPUS / name / f"crash-{crc32(data):08x}"
     path.write_bytes(data)
     return path
-
-
-def _numbers(first: int) -> Iterator[int]:
-    while True:
-        yield first
-        first += 1

@@ -28,11 +28,10 @@ from mav_tasks.engine.snapshot import Snapshot
 from mav_tasks.mavlink.signing import Key, timestamp_at
 from mav_tasks.settings import Clients, Queueing, Settings
 from mav_tasks.tasks.server_events import SignaturesSeen
+from tests.kit.bounds import Violation, entries, too_large
 from tests.kit.client import command_long
-from tests.kit.soak.bounds import containers, too_large
-from tests.kit.soak.mutants import Mutant, Mutants, Sign, badly_signed
-from tests.kit.soak.whole import LONGEST, has_whole_packet
-from tests.kit.soak.world import Violation
+from tests.kit.packets.mutants import Mutant, Mutants, Sign, badly_signed
+from tests.kit.packets.whole import LONGEST, has_whole_packet
 
 CLIENTS, CALLERS, ROVERS, LINES = "clients", "callers", "rovers", "lines"
 STREAMS = (CALLERS, LINES)
@@ -50,11 +49,6 @@ STEP = 0.02  # s, between two bursts
 BEAT = 0.5  # s, between two rounds of telemetry and station packets
 WALK = 10_000  # packets, between two size checks of the engine's memory
 SETPOINTS = (82, 84, 86)
-TASKS = (
-    "_registry",
-    "_fleet",
-    "_deduplicator",
-)  # where tasks are kept, whose number is bounded
 
 
 class Battered:
@@ -123,11 +117,7 @@ class Battered:
 
     def entries(self) -> int:
         """Return the total number of entries in all containers, except those for tasks."""
-        return sum(
-            len(container)
-            for path, container in containers(self.engine)
-            if not any(name in path for name in TASKS)
-        )
+        return entries(self.engine)
 
     def _take(self, mutant: Mutant) -> None:
         if self.index % BURST == 0:

@@ -9,6 +9,7 @@ MOST = 1_000
 #: by the name of the attribute; each bound has its own constant
 LARGER = {
     "_finished": 10_000,
+    "_heap": 200,  # start times, for as many tasks as there are here
     "_tasks": 12_000,
     "_last_event": 12_000,
     "_next": 1_100,  # sources of packets, see SequenceKeeper
@@ -16,6 +17,14 @@ LARGER = {
     "_sent": 1_024,  # packets to vehicles, by which their echoes are known
     "_last": 8_000,  # streams: about 30 messages for each possible component of a vehicle
 }
+
+
+class Violation(AssertionError):
+    """A rule was broken."""
+
+
+#: where tasks are kept, whose number is bounded
+TASKS = ("_registry", "_fleet", "_deduplicator")
 LEAVES = (str, bytes, int, float, bool, type(None))
 CONTAINERS = (list, dict, set, frozenset, deque, tuple)
 
@@ -26,6 +35,12 @@ def too_large(root: object) -> Iterator[str]:
         name = path.rpartition(".")[2]
         if len(container) > LARGER.get(name, MOST):
             yield f"{path} holds {len(container)}"
+
+
+def entries(root: object) -> int:
+    """Return the total number of entries in all containers, except those for tasks."""
+    found = containers(root)
+    return sum(len(each) for path, each in found if not any(name in path for name in TASKS))
 
 
 def containers(root: object) -> Iterator[tuple[str, Sized]]:
