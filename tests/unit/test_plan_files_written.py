@@ -44,10 +44,12 @@ FENCE = (
     FencePolygon(False, ((1, -1), (2, -2), (3, -3), (4, -4))),
 )
 
+#: not of a mission in a text file: jumps by number, fences, rally points
+NOT_OF_A_MISSION = (177, 5000, 5001, 5002, 5003, 5004, 5100)
 floats = st.floats(-(2.0**127), 2.0**127, width=32) | st.just(NAN)
 items = st.builds(
     PlanItem,
-    st.integers(0, 65535).filter(lambda command: command != 177),
+    st.integers(0, 65535).filter(lambda command: command not in NOT_OF_A_MISSION),
     st.sampled_from([0, 1, 3, 6]),
     st.tuples(floats, floats, floats, floats),
     st.integers(-90 * 10**7, 90 * 10**7),
