@@ -65,7 +65,10 @@ async def test_a_script_submits_watches_and_awaits(running: Stand) -> None:
         (rover,) = tasks.vehicles()
         assert (rover.id, rover.kind, rover.server_component) == (1, "ardupilot", 191)
 
-        first = await tasks.submit(Move(0.4), priority=3)
+        first = await tasks.submit(Move(0.8), priority=3)
+        async for status in first.updates(interval=0.1):
+            if status.state is S.EXECUTING:
+                break
         turn = await tasks.submit(Rotate(radians(30)), priority=8)
         way = await tasks.submit([GoTo(LocalPlace(0.0, 0.0), radius=0.3), Wait(0.3)], after=turn)
 
