@@ -270,6 +270,7 @@ def _ports_of_this_process() -> Iterator[int]:
     that, and take another test's rover for its own.
     """
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    worker += int(os.environ.get("PORTS_OF", "0"))  # of a second run beside this one (tools/test)
     own = PORTS[worker % WORKERS :: WORKERS]
     begin = os.getpid() * 97 % len(own)  # concurrent runs start at different ports
     return cycle((*own[begin:], *own[:begin]))
