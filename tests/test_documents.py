@@ -59,7 +59,7 @@ COMMANDS = {
         "tests/e2e/test_schedules.py"
     ),
     "mav-tasks keys add agent --role submitter --max-distance 50 --max-speed 0.5 --quota 5": (
-        "tests/e2e/test_agents.py"
+        "tests/e2e/test_keys.py"
     ),
     "mav-tasks submit move 3 --vehicle any": "tests/e2e/test_cli_fleet.py",
     "mav-tasks modify 12 --every never": "tests/e2e/test_schedules.py",

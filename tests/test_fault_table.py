@@ -1,4 +1,4 @@
-"""The table of faults in this folder's README names tests that exist: it cannot rot."""
+"""The table of faults in FAULTS.md names tests that exist: it cannot rot."""
 
 import ast
 import re
@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 TESTS = Path(__file__).resolve().parent
-README = (TESTS / "README.md").read_text(encoding="utf-8")
+FAULTS = (TESTS / "FAULTS.md").read_text(encoding="utf-8")
 HEAD = "| fault | what must happen | test |"
 NAMED = re.compile(r"`([\w/]+\.py)::(\w+)`")
 
 
 def rows() -> list[list[str]]:
     """Return the cells of the table, line by line."""
-    lines = README[README.index(HEAD) :].split("\n\n")[0].splitlines()[2:]
+    lines = FAULTS[FAULTS.index(HEAD) :].split("\n\n")[0].splitlines()[2:]
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 

@@ -1,9 +1,11 @@
-"""Who may import whom, and what pure packages may not touch: the rules of the architecture."""
+"""Who may import whom, what pure packages may not touch, and on which seams tests stand."""
 
 import ast
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+
+import mav_tasks
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -514,3 +516,114 @@ def test_the_simulator_itself_knows_neither_the_server_nor_its_plugin(tmp_path: 
     bad.write_text("import mav_tasks.in_memory\nimport rover_sim.testing.lossy\n", "utf-8")
     assert violations("rover_sim.bad", bad) == ["mav_tasks.in_memory", "rover_sim.testing.lossy"]
     assert violations("rover_sim.testing.bad", bad) == []
+
+
+# tests stand on seams
+
+#: what tests may import from the product; all else may change without them
+SEAMS = (
+    # the wire world: bytes in, bytes and events out of a server in virtual time
+    *("mav_tasks.in_memory", "mav_tasks.links.memory", "mav_tasks.engine.engine"),
+    *("mav_tasks.engine.inputs", "mav_tasks.engine.snapshot", "mav_tasks.settings"),
+    "mav_tasks.errors",
+    # its events and words, and the parameters that it publishes
+    *("mav_tasks.tasks.events", "mav_tasks.tasks.server_events", "mav_tasks.tasks.lifecycle"),
+    *("mav_tasks.tasks.task", "mav_tasks.tasks.goal", "mav_tasks.tasks.restored"),
+    *("mav_tasks.tasks.view", "mav_tasks.tasks.timing", "mav_tasks.services.parameter_table"),
+    # contracts that have several implementations
+    *("mav_tasks.store", "mav_tasks.links", "mav_tasks.fleet_io", "mav_tasks.observer"),
+    # what people and programs call
+    *("mav_tasks.client", "mav_tasks.cli", "mav_tasks.web", "mav_tasks.agents"),
+    *("mav_tasks.metrics", "mav_tasks.probe"),
+    # the codec
+    "mav_tasks.mavlink",
+    # pure functions of plain values, and of files
+    *("mav_tasks.tasks.driving", "mav_tasks.tasks.repetition", "mav_tasks.tasks.queue"),
+    *("mav_tasks.plan_files", "mav_tasks.qgc_actions", "mav_tasks.fleet", "mav_tasks.config"),
+    *("mav_tasks.setting_keys", "mav_tasks.recording", "mav_tasks.mcap_export"),
+    *("mav_tasks.key_ring", "mav_tasks.logs", "mav_tasks.tasks.frames", "mav_tasks.tasks.cron"),
+)
+#: public all the same: of named tuples, of the interpreter, of pymavlink's messages
+NOT_PRIVATE = frozenset({"_replace", "_make", "_asdict", "_exit", "_timestamp"})
+PUBLIC = frozenset(mav_tasks.__all__)
+#: files that reach below, and why
+BELOW = {
+    # the table of joint control: a walk over all its states, and the server beside it
+    "kit/joint/agreement.py": "the table",
+    "kit/joint/graph.py": "the table",
+    "kit/joint/judge.py": "the table",
+    "kit/joint/model.py": "the table",
+    "unit/engine/vehicles/test_control.py": "the table",
+    "scenarios/test_joint_control.py": "shows that the search in every state can fail",
+    "unit/engine/test_policy.py": "the table of rights, row by row",
+    "kit/packets/targets.py": "random bytes at each parser, also at those within",
+    "kit/asleep.py": "a process whose machine sleeps: its clock",
+    "kit/fleet.py": "a server without a runner says itself which links it has",
+    "kit/processes.py": "for how long a request counts as a copy",
+    "scenarios/test_streams.py": "links of a server in memory become streams",
+    "unit/links/test_tcp.py": "when connections are tried again, and who gives way",
+    "unit/test_runner.py": "nobody knows how to make a real engine fail",
+}
+
+
+def reaches_below(tree: ast.Module) -> Iterator[str]:
+    """Yield what a test imports below the seams, reads of others' privates, and patches."""
+    ours: set[str] = set()  # names of the product
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [(alias.name, alias.asname or alias.name.split(".")[0]) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [
+                (f"{node.module}.{each.name}", each.asname or each.name) for each in node.names
+            ]
+        else:
+            continue
+        for whole, name in names:
+            if whole.startswith("mav_tasks."):
+                ours.add(name)
+                is_seam = any(f"{whole}.".startswith(f"{seam}.") for seam in SEAMS)
+                if not is_seam and whole.removeprefix("mav_tasks.") not in PUBLIC:
+                    yield f"imports {whole}"
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(attr=name, value=value) if name[0] == "_" and name[1:2].isalpha():
+                is_own = isinstance(value, ast.Name) and value.id in ("self", "cls")
+                is_own |= isinstance(value, ast.Call) and ast.unparse(value) == "super()"
+                if not is_own and name not in NOT_PRIVATE:
+                    yield f"reads {name}"
+            case ast.Call(func=ast.Attribute(attr="setattr" | "setitem" | "delattr"), args=args):
+                first = args[0]
+                while isinstance(first, ast.Attribute):
+                    first = first.value
+                is_ours = isinstance(first, ast.Name) and first.id in ours
+                named = first.value if isinstance(first, ast.Constant) else ""
+                if is_ours or str(named).startswith("mav_tasks."):
+                    yield f"replaces {ast.unparse(args[0])}"
+
+
+def test_tests_stand_on_seams() -> None:
+    found = {}
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        found[str(path.relative_to(ROOT / "tests"))] = sorted(set(reaches_below(tree)))
+    below = {name: what for name, what in found.items() if what}
+    assert {name: what for name, what in below.items() if name not in BELOW} == {}
+    assert set(BELOW) - set(below) == set(), "they stand on seams now: take them out of BELOW"
+
+
+def test_the_rule_of_seams_is_able_to_fail() -> None:
+    source = """
+from mav_tasks.engine.vehicles import pilot
+from mav_tasks import runner
+def test(monkeypatch, world):
+    monkeypatch.setattr(runner.Loop, "turn", None)
+    monkeypatch.setattr("mav_tasks.runner.Loop", None)
+    assert world.server._tasks == self._own
+"""
+    assert list(reaches_below(ast.parse(source))) == [
+        "imports mav_tasks.engine.vehicles.pilot",
+        "imports mav_tasks.runner",
+        "replaces runner.Loop",
+        "replaces 'mav_tasks.runner.Loop'",
+        "reads _tasks",
+    ]

@@ -2,6 +2,7 @@
 
     tools/mutants.py --count 200 --seed 1 --out figures.json         by all tests that only compute
     tools/mutants.py --count 200 --seed 1 --only tests/scenarios     by these tests alone
+    tools/mutants.py --mutants figures.json --only tests/unit        the survivors of a run, again
     tools/mutants.py --show 17 --seed 1                              print one mutant
 
 The mutants are a random sample, the same for the same seed and source. First each test runs once,
@@ -36,7 +37,7 @@ LEFT_OUT = (
     *("unit/links", "unit/recording", "unit/store", "unit/test_runner.py", "unit/kit"),
     *("unit/test_runner_standstill.py", "unit/rover_sim", "unit/tools", "test_forbidden.py"),
 )
-BUDGET = 300.0  # s of a mutant's tests, after which it counts as one that survived
+BUDGET = 300.0  # s of processor time, after which a mutant counts as one that survived
 PROBE = "_reached_mutant"
 
 SWAPS: dict[type, type] = {
@@ -161,6 +162,16 @@ def sample(count: int, seed: int) -> list[Mutant]:
     ]
     print(f"{len(everything)} mutants in all", flush=True)
     return random.Random(seed).sample(everything, min(count, len(everything)))
+
+
+def survivors(figures: Path) -> list[Mutant]:
+    """Return the mutants that no test killed in an earlier run on the same source."""
+    fields = Mutant.__dataclass_fields__
+    return [
+        Mutant(**{name: result[name] for name in fields})
+        for result in json.loads(figures.read_text(encoding="utf-8"))
+        if not result["killed by"] and not result.get("unmeasured")
+    ]
 
 
 def mutated(mutant: Mutant) -> ast.Module:
@@ -324,9 +335,9 @@ class Loop:
         what = {"number": number, **vars(mutant), "reached by": len(tests), "killed by": None}
         if not put(mutated(mutant), mutant.path, [mutant.function]):
             return {**what, "unmeasured": True}
-        end = time.monotonic() + BUDGET
+        end = time.process_time() + BUDGET
         for _, index in tests:
-            if time.monotonic() > end:
+            if time.process_time() > end:
                 return {**what, "killed by": None, "budget": True}
             if not self.run(session, index):
                 return {**what, "killed by": session.items[index].nodeid}
@@ -390,10 +401,12 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", nargs="*", default=["tests"], metavar="PATH")
+    parser.add_argument("--mutants", type=Path, metavar="FILE")
     parser.add_argument("--show", type=int, metavar="N")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    mutants = sample(options.count, options.seed)
+    again = options.mutants
+    mutants = survivors(again) if again else sample(options.count, options.seed)
     if options.show is not None:
         mutant = mutants[options.show]
         print(mutant)

@@ -1,4 +1,4 @@
-"""The durable journal of events. ``mav_tasks.store.opening`` opens each kind of store."""
+"""The durable journal of events. ``open_store`` opens each kind of store, by its place."""
 
 from mav_tasks.store.base import (
     Evicted,
@@ -15,6 +15,7 @@ from mav_tasks.store.base import (
     Which,
 )
 from mav_tasks.store.memory import MemoryStore
+from mav_tasks.store.opening import kind_of, open_store
 
 __all__ = [
     "Evicted",
@@ -30,4 +31,6 @@ __all__ = [
     "TaskStates",
     "VehiclesLoaded",
     "Which",
+    "kind_of",
+    "open_store",
 ]

@@ -138,7 +138,7 @@ class VehicleTasks(Lineup):
             self.executor.pause(R.OPERATOR, actor=actor, now=now)
             self.set_aside(active.id)
         before = None if self.immediate is None else self.registry.get(self.immediate)
-        if before is not None and before.state in WAITING:
+        if before is not None and before.id != task.id and before.state in WAITING:
             self.room.end(before, S.CANCELLED, R.REPLACED, actor=actor, now=now)
         self.immediate = task.id
         if self.has_others:

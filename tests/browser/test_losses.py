@@ -1,21 +1,16 @@
 """What the page says and does while a rover, the server or the web process is away."""
 
 import signal
-import socket
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 
 import pytest
 
-from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.codec import Encoder
-from tests.browser.kit import HOSTILE, judge, move, opened, press_resume, says, text_of
-from tests.kit.processes import Process, Stand, free_udp_ports, process, stand, wait_until
+from tests.browser.kit import judge, move, opened, press_resume, says
+from tests.kit.processes import Process, Stand, process, stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
 pytestmark = pytest.mark.slow
@@ -157,67 +152,3 @@ def test_tasks_that_the_servers_end_interrupted_are_released(
 def is_beyond(it: Web, rover: int, start: float) -> bool:
     """Return whether a rover has driven some way to the north."""
     return bool(it.get(f"/vehicles/{rover}")["north"] > start + 0.3)
-
-
-def test_hostile_texts_names_and_files_and_a_rover_that_falls_silent(
-    chromium: Any, tmp_path: Path, shots: Path
-) -> None:
-    folder = tmp_path / "records"
-    folder.mkdir()
-    (folder / f"{HOSTILE}.tlog").write_bytes(b"x" * 100)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as rover:
-        rover.bind(("127.0.0.1", 0))
-        port = rover.getsockname()[1]
-        (client_port,) = free_udp_ports(1)
-        is_over = Event()
-        playing = Thread(target=_play, args=(rover, is_over))
-        serve = ("-m", "mav_tasks.cli", "serve", "--no-push", "--store", ":memory:")
-        ends = (
-            "--client",
-            f"udpin:127.0.0.1:{client_port}",
-            "--vehicle",
-            f"udpout:127.0.0.1:{port}",
-        )
-        with process(*serve, *ends, folder=tmp_path, name="server") as server:
-            playing.start()
-            try:
-                it = Stand(server, server, client_port, port, 0, tmp_path)
-                with (
-                    web(tmp_path, it, "--records", str(folder)) as shown,
-                    opened(chromium, shown, waits=False, may_fail=True) as page,
-                ):
-                    says(page, ".card .warn", f"PreArm: {HOSTILE}")
-                    page.click("#tab-texts")
-                    says(page, "#panel-texts li", f"rover 7: PreArm: {HOSTILE}")
-                    page.click("#tab-records")
-                    page.click(f"#panel-records .pick >> text={HOSTILE}")
-                    says(page, "#panel-records .failure", f"{HOSTILE}.tlog: not a telemetry log")
-                    assert str(folder) not in text_of(page, "#panel-records")
-                    assert page.query_selector("img[src=x]") is None
-                    is_over.set()
-                    says(
-                        page,
-                        ".card.silent",
-                        "Rover 7 is silent. Check the rover's radio and power.",
-                    )
-                    assert "not heard for" in text_of(page, ".card")
-                    judge(page, "silent")
-                    page.screenshot(path=str(shots / "silent.png"))
-            finally:
-                is_over.set()
-                playing.join()
-
-
-def _play(sock: socket.socket, is_over: Event) -> None:
-    """Play a rover that has nothing good to say, until told to stop."""
-    encoder = Encoder(Address(7, 1))
-    sock.settimeout(0.5)
-    where = None
-    while not is_over.wait(0.2):
-        try:
-            _, where = sock.recvfrom(2048)
-        except TimeoutError:
-            if where is None:
-                continue
-        sock.sendto(encoder.encode(m.Heartbeat(10, 3, 0, 4, 3, 3)), where)
-        sock.sendto(encoder.encode(m.Statustext(4, f"PreArm: {HOSTILE}".encode(), 0, 0)), where)

@@ -8,14 +8,13 @@ from typing import Any
 import pytest
 
 from mav_tasks import Move, SyncClient
-from tests.browser.kit import PHONE, judge, opened, says
+from tests.browser.kit import judge, opened, says
 from tests.kit.processes import stand, wait_until
 from tests.kit.web import Web, web
 
 pytestmark = pytest.mark.slow
 
 ROVERS, EACH = 20, 50
-WALL = (2560, 1440)
 LAPTOP = (1280, 800)
 #: how many elements of a kind are in sight as a whole
 IN_SIGHT = """(kind) => [...document.querySelectorAll(kind)].filter((each) => {
@@ -79,74 +78,3 @@ def test_all_of_them_are_shown_and_one_is_stopped(chromium: Any, many: Web, shot
             if each["control"] == "stopped"
         ]
         assert stopped == [7]
-
-
-@pytest.mark.parametrize("size", [PHONE, WALL])
-def test_they_are_shown_on_a_phone_and_on_a_wall(
-    chromium: Any, many: Web, shots: Path, size: tuple[int, int]
-) -> None:
-    with opened(chromium, many, size=size) as page:
-        page.wait_for_function(f"() => document.querySelectorAll('.card').length === {ROVERS}")
-        for view in ("rovers", "map", "side") if size == PHONE else ("",):
-            if view:
-                page.click(f"[data-show={view}]")
-            assert page.evaluate(CUT) == []
-            assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-            page.screenshot(path=str(shots / f"twenty rovers {size[0]} {view}.png"))
-        if size == WALL:
-            assert page.evaluate(IN_SIGHT, ".card") >= 12
-
-
-#: pixels of the map's canvas: of tracks, which are strong, and all, which are mostly of faint goals
-DRAWN = """() => { const canvas = document.querySelector('#map .leaflet-overlay-pane canvas');
-  if (!canvas) return [0, 0];
-  const {width, height} = canvas;
-  const pen = new OffscreenCanvas(width, height).getContext('2d', {willReadFrequently: true});
-  pen.drawImage(canvas, 0, 0);
-  const data = pen.getImageData(0, 0, width, height).data;
-  const alpha = data.filter((_, at) => at % 4 === 3);
-  return [alpha.filter((each) => each > 200).length, alpha.filter((each) => each > 0).length]; }"""
-BOTH = f"() => {{ const [strong, all] = ({DRAWN})(); return strong > 20 && all > strong + 100; }}"
-
-
-def test_tracks_and_goals_of_all_are_shown_if_they_are_wanted(
-    chromium: Any, many: Web, shots: Path
-) -> None:
-    goal = {"kind": "goto_global"}
-    driven = []
-    many.post("/vehicles/1/clear", {})  # the goals of the rover that is shown are drawn, too
-    for rover in range(2, 10):
-        there = many.get(f"/vehicles/{rover}")
-        place = {"latitude": there["latitude"] + 1e-5, "longitude": there["longitude"]}
-        body = {"goals": [goal | place], "priority": 9, "label": "away"}
-        many.post(f"/vehicles/{rover}/clear", {})
-        task = many.post(f"/vehicles/{rover}/tasks", body)
-        if rover < 5:
-            many.resume(rover)
-            driven.append(task["id"])
-    for each in driven:  # where 20 rovers and a browser share two processors, a server is late
-        while many.wait_for(each, "completed", "held")["state"] == "held":
-            body = {"how": "again", "epoch": many.task(each)["halt_epoch"]}
-            many.post(f"/tasks/{each}/release", body)
-    with opened(chromium, many, size=LAPTOP) as page:
-        page.wait_for_function(f"() => document.querySelectorAll('.card').length === {ROVERS}")
-        says(page, ".card.chosen", "Rover 1")
-        assert page.evaluate(DRAWN) == [0, 0]
-        box = page.get_by_label("Tracks and goals of all rovers")
-        box.check()
-        page.wait_for_function(BOTH)
-        judge(page, "tracks of all")
-        page.screenshot(path=str(shots / "tracks of all.png"))
-        page.reload()  # it is kept
-        page.wait_for_function(BOTH)
-        box.uncheck()
-        page.wait_for_function(f"() => ({DRAWN})()[1] === 0")
-    with opened(chromium, many, size=PHONE, scheme="dark") as page:
-        page.click("[data-show=map]")
-        box = page.get_by_label("Tracks and goals of all rovers")
-        box.check()
-        page.wait_for_function(BOTH)
-        left = [mark.bounding_box()["x"] for mark in page.query_selector_all(".rover-mark")]
-        assert max(left) - min(left) > PHONE[0] / 2  # though the map was hidden at first
-        assert page.evaluate(CUT) == []
-        page.screenshot(path=str(shots / "tracks of all 360.png"))

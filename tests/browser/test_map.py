@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.browser.kit import HOSTILE, PHONE, judge, move, opened, says, text_of
+from tests.browser.kit import HOSTILE, judge, move, opened, says, text_of
 from tests.kit.processes import stand, wait_until
 from tests.kit.web import Web, has_rover, web
 
@@ -193,19 +193,3 @@ def test_a_recorded_run_is_scrubbed_and_played(
         page.click("#panel-records >> text=← Back to the present")
         page.wait_for_selector("#map:not(.past)")
         page.wait_for_selector(".rover-mark")
-
-
-def test_a_recorded_run_on_a_phone_is_seen_as_a_whole(
-    chromium: Any, driven: tuple[Web, Path], shots: Path
-) -> None:
-    it, records = driven
-    (name,) = {path.name.removesuffix(".tlog") for path in records.glob("*.tlog")}
-    with opened(chromium, it, size=PHONE) as page:
-        page.click("[data-show=side]")
-        page.click("#tab-records")
-        page.click(f"#panel-records .pick >> text={name}")
-        page.wait_for_selector("#map.past", state="attached")
-        page.screenshot(path=str(shots / "recorded 360.png"))
-        page.click("[data-show=map]")
-        page.wait_for_function(f"() => ({BELOW})()")
-        page.screenshot(path=str(shots / "recorded map 360.png"))

@@ -71,15 +71,6 @@ def test_stop_acts_at_once_and_says_what_came_of_it(
     assert it.task(task["id"])["state"] == "killed"
 
 
-def test_caps_lock_does_not_keep_the_key_from_stopping(chromium: Any, it: Web) -> None:
-    with opened(chromium, it) as page:
-        page.evaluate(
-            "() => document.body.dispatchEvent(new KeyboardEvent('keydown',"
-            " {key: 's', shiftKey: true, bubbles: true}))"
-        )
-        says(page, "#stop-outcome", "STOP: acknowledged")
-
-
 @pytest.mark.parametrize("size", [DESKTOP, PHONE])
 def test_a_dialogue_covers_neither_stop_nor_its_outcome(
     chromium: Any, it: Web, size: tuple[int, int]
@@ -123,26 +114,6 @@ def test_stop_is_in_reach_above_a_dialogue(chromium: Any, it: Web, shots: Path) 
         page.keyboard.press("Escape")
         page.wait_for_selector(".box", state="detached")
         assert page.evaluate(FOCUSED) == "Add a task…"
-
-
-def test_a_keyboard_keeps_its_place_when_what_it_was_on_goes_away(chromium: Any, it: Web) -> None:
-    it.post("/vehicles/1/pause", {})
-    first = move(it, 0.1)["id"]
-    with opened(chromium, it) as page:
-        cancel = f"[data-task='{first}'] >> text=Cancel…"
-        for key, is_open in (("Enter", True), ("Escape", False), ("Enter", True)):
-            if key == "Enter":
-                page.focus(cancel)
-            page.keyboard.press(key)
-            page.wait_for_selector(".box", state="visible" if is_open else "detached")
-            assert (page.evaluate(FOCUSED) == "Cancel the task") is is_open
-        for _ in range(6):  # round and round: dialogue and STOP, and nothing behind them
-            assert page.evaluate("!!document.activeElement.closest('.box, .stops')")
-            page.keyboard.press("Tab")
-        page.focus(".box .main-word")
-        page.keyboard.press("Enter")
-        page.wait_for_selector(f"#panel-queue [data-task='{first}']", state="detached")
-        assert page.evaluate("document.activeElement.id") == "panel-queue"
 
 
 FOCUSED = "document.activeElement.textContent.trim()"
@@ -200,28 +171,6 @@ def test_tasks_of_every_kind_are_added_with_the_form(chromium: Any, it: Web) -> 
     assert it.get("/vehicles/1/queue")["waiting_count"] == len(GOALS)
 
 
-def test_the_form_says_what_is_wrong(chromium: Any, it: Web) -> None:
-    with opened(chromium, it, may_fail=True) as page:
-        page.click("text=Add a task…")
-        page.wait_for_selector(".box [name=speed][placeholder='0.5 m/s by default']")
-        page.select_option(".box [name=kind]", "face")
-        page.wait_for_selector(".box [name=rate][placeholder='40 deg/s by default']")
-        page.select_option(".box [name=kind]", "move")
-        page.click(".box >> text='Add the task'")
-        says(page, ".box .failure", "Distance (m): Please fill out this field.")
-        page.fill(".box [name=distance]", "1000000")
-        page.click(".box >> text='Add the task'")
-        says(page, ".box .failure", "param1 distance")
-        page.fill(".box [name=distance]", "0.2")
-        page.fill(".box [name=delay]", "600")
-        page.click(".box >> text='Add the task'")
-        page.wait_for_selector(".box", state="detached")
-        says(page, "#panel-queue .task", "move 0.2 m")
-        page.click("text=Add a task…")
-        page.click(".box >> text='Back'")
-        page.wait_for_selector(".box", state="detached")
-
-
 def test_order_by_arrows_and_by_dragging_leaves_priorities_alone(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     first, second, third = (move(it, 0.1 * n, priority=n)["id"] for n in (5, 4, 3))
@@ -276,62 +225,6 @@ def test_a_waiting_task_is_changed(chromium: Any, it: Web, shots: Path) -> None:
 
 
 ORDER = "[...document.querySelectorAll('#panel-queue [data-task]')].map((e) => e.dataset.task)"
-
-
-def test_a_finger_drags_a_task_by_its_handle_and_else_scrolls(
-    chromium: Any, it: Web, shots: Path
-) -> None:
-    it.post("/vehicles/1/pause", {})
-    ids = [move(it, 0.1)["id"] for _ in range(12)]
-    last, first = ids[-1], ids[0]
-    with opened(chromium, it, size=PHONE, touch=True) as page:
-        page.click("[data-show=side]")
-        finger = page.context.new_cdp_session(page)
-
-        def touch(kind: str, x: float = 0.0, y: float = 0.0) -> None:
-            points = [] if kind == "touchEnd" else [{"x": x, "y": y}]
-            finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-
-        def middle(selector: str) -> tuple[float, float]:
-            box = page.locator(selector).bounding_box()
-            return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-        row = "#panel-queue [data-task='{}']"
-        third = ids[2]
-        x, y = middle(f"{row.format(third)} .grip")
-        above = middle(row.format(first))[1]
-        touch("touchStart", x, y)
-        for part in (0.25, 0.5, 0.75, 1.0):
-            touch("touchMove", x, y + (above - y) * part)
-        says(page, "#panel-queue .said", f"Task {third} will run before task {first}.")
-        assert page.is_visible(f"{row.format(first)}.over-above")
-        page.screenshot(path=str(shots / "finger.png"))
-        touch("touchEnd")
-        page.wait_for_function(f"() => {ORDER}[0] === '{third}'")
-        assert not page.query_selector(".over-above, .dragged")
-
-        # at the edge of the list it scrolls
-        page.locator(row.format(first)).scroll_into_view_if_needed()
-        x, y = middle(f"{row.format(first)} .grip")
-        edge = page.locator(".side").bounding_box()
-        touch("touchStart", x, y)
-        for part in (0.5, 1.0):
-            touch("touchMove", x, y + (edge["y"] + edge["height"] - 10 - y) * part)
-        says(page, "#panel-queue .said", f"will run after task {last}.")
-        touch("touchEnd")
-        page.wait_for_function(f"() => {ORDER}.at(-1) === '{first}'")
-
-        # a finger beside the handle scrolls, and moves no task
-        order = page.evaluate(ORDER)
-        page.evaluate("() => document.querySelector('.side').scrollTo(0, 0)")
-        x, y = middle(f"{row.format(ids[3])} .whys")
-        touch("touchStart", x, y)
-        for step in range(1, 9):
-            touch("touchMove", x, y - 20 * step)
-        touch("touchEnd")
-        page.wait_for_function("() => document.querySelector('.side').scrollTop > 0")
-        assert page.evaluate(ORDER) == order
-        judge(page, "touch")
 
 
 def test_tasks_are_cancelled_one_by_one_and_all(chromium: Any, it: Web) -> None:
@@ -436,25 +329,6 @@ def test_a_plan_is_dropped_looked_at_and_queued(
         says(page, ".box", "chosen.txt: 3 items")
 
 
-def test_a_plan_on_a_phone_is_seen_on_the_map(
-    chromium: Any, it: Web, tmp_path: Path, shots: Path
-) -> None:
-    it.post("/vehicles/1/pause", {})
-    rover = it.get("/vehicles/1")
-    places = [(rover["latitude"] + north * 4e-5, rover["longitude"]) for north in range(4)]
-    rows = [ITEM.format(n, int(n == 0), 3 * (n > 0), *place) for n, place in enumerate(places)]
-    path = tmp_path / "yard.txt"
-    path.write_text("QGC WPL 110\n" + "".join(rows))
-    with opened(chromium, it, size=PHONE) as page:
-        page.click("[data-show=side]")
-        page.set_input_files("#plan-file", path)
-        says(page, ".box", "yard.txt: 3 items")
-        assert page.is_visible("#map")
-        page.screenshot(path=str(shots / "phone plan.png"))
-        page.keyboard.press("Escape")
-        page.wait_for_selector(".box", state="detached")
-
-
 def drop(page: Any, name: str, text: str) -> None:
     """Drop a file on the page, as a person does from a file manager."""
     transfer = page.evaluate_handle(
@@ -464,29 +338,3 @@ def drop(page: Any, name: str, text: str) -> None:
     )
     page.dispatch_event(".drop", "dragover", {"dataTransfer": transfer})
     page.dispatch_event(".drop", "drop", {"dataTransfer": transfer})
-
-
-def test_a_click_on_the_map_sends_turns_and_fences(chromium: Any, it: Web, shots: Path) -> None:
-    it.post("/vehicles/1/pause", {})
-    with opened(chromium, it) as page:
-        for word, title, button, shown in (
-            ("Go here", "Send rover 1 here", "Add the task", "go to"),
-            ("Face here", "Turn rover 1 to", "Add the task", "face"),
-        ):
-            page.click("#map", position={"x": 420, "y": 200})
-            page.click(f".leaflet-popup >> text={word}")
-            says(page, ".box h2", title)
-            page.click(f".box >> text='{button}'")
-            says(page, "#panel-queue .task", shown)
-        page.click("#map", position={"x": 420, "y": 200})
-        page.wait_for_selector(".leaflet-popup >> text=Fence here")
-        judge(page, "a click on the map")
-        page.screenshot(path=str(shots / "map click.png"))
-        page.click(".leaflet-popup >> text=Fence here")
-        says(page, ".box", "This replaces its present fence.")
-        page.fill(".box [name=radius]", "30")
-        page.click(".box >> text='Set the fence'")
-        page.wait_for_selector(".box", state="detached")
-        (shape,) = it.get("/vehicles/1/fence")["shapes"]
-        assert shape["radius"] == 30
-    it.send("DELETE", "/vehicles/1/fence", None)

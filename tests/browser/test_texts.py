@@ -11,7 +11,7 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
-from tests.browser.kit import PHONE, judge, opened, says
+from tests.browser.kit import judge, opened, says
 from tests.kit.processes import Stand, free_udp_ports, process, wait_until
 from tests.kit.web import Web, web
 
@@ -129,18 +129,3 @@ def test_older_texts_are_loaded_and_filtered(chromium: Any, talkative: Web, shot
         says(page, ".card.chosen", "Rover 8")
         page.wait_for_function(f"() => {LINES}().every((line) => line.includes('rover 8: '))")
         assert shown(page) == [n for n in wanted if n >= RARE and n % 2]
-
-
-def test_a_filter_looks_for_older_texts_too(chromium: Any, talkative: Web, shots: Path) -> None:
-    with opened(chromium, talkative, waits=False, size=PHONE, scheme="dark") as page:
-        page.wait_for_selector(".card >> nth=1")
-        page.click("[data-show=side]")
-        page.click("#tab-texts")
-        page.select_option("#panel-texts label:has-text('Level') select", "3")
-        says(page, "#panel-texts .empty", "No line of the latest ones fits these filters.")
-        page.screenshot(path=str(shots / "no such texts 360.png"))
-        page.click(OLDER)
-        says(page, "#panel-texts [role=status]", f"{RARE} older lines shown.")
-        assert shown(page) == [2, 1, 0]
-        assert not page.is_visible(OLDER)
-        page.screenshot(path=str(shots / "older errors 360.png"))

@@ -1,8 +1,6 @@
 """What the web page shows in a real Chromium: one task, the time line, its rights, its looks."""
 
 import gzip
-import os
-import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -110,62 +108,6 @@ def test_tabs_and_the_time_line_work_by_keyboard(chromium: Any, it: Web) -> None
         says(page, "#panel-task h2", f"Task {task['id']}")
 
 
-def test_the_time_line_is_lengthened_and_moved(chromium: Any, it: Web, shots: Path) -> None:
-    soon, late = (move(it, 0.1, delay=delay)["id"] for delay in (120, 2 * 3600))
-    bar = "#timeline .bar[title^='Task {}:']"
-    with opened(chromium, it) as page:
-        page.wait_for_selector(bar.format(soon))
-        assert page.query_selector(bar.format(late)) is None
-        page.select_option("#timeline select", label="6 h")
-        page.wait_for_selector(bar.format(late))
-        present, near, far, strip = (
-            page.locator(name).bounding_box()
-            for name in (
-                "#timeline .now-line",
-                bar.format(soon),
-                bar.format(late),
-                "#timeline .strip",
-            )
-        )
-        hour = strip["width"] / 6
-        assert 0 < near["x"] - present["x"] < hour / 10
-        assert far["x"] - present["x"] == pytest.approx(2 * hour, abs=3)
-        judge(page, "time line")
-        page.screenshot(path=str(shots / "6 hours.png"))
-        page.reload()  # it is kept
-        page.wait_for_selector(bar.format(late))
-        box = page.locator("#timeline .strip").bounding_box()
-        page.mouse.move(box["x"] + 20, box["y"] + 45)
-        page.mouse.wheel(0, -100)  # 1 h
-        page.wait_for_selector(bar.format(late), state="detached")
-        page.wait_for_selector(bar.format(soon))
-        page.focus(bar.format(soon))
-        page.keyboard.press("-")  # 6 h
-        page.wait_for_selector(bar.format(late))
-        page.keyboard.press("ArrowRight")
-        assert page.evaluate("document.activeElement.title").startswith(f"Task {late}:")
-        page.keyboard.press("ArrowLeft")
-        page.keyboard.press("+")  # 1 h
-        for _ in range(8):  # 2 h
-            page.keyboard.press("PageDown")
-        page.wait_for_selector(bar.format(late))
-        assert page.get_attribute("#timeline button:text-is('Now')", "aria-pressed") == "false"
-        assert not page.is_visible("#timeline .now-line")
-        page.click("#timeline button:text-is('Now')")
-        page.wait_for_selector("#timeline .now-line")
-        page.mouse.move(box["x"] + box["width"] - 20, box["y"] + 45)
-        page.mouse.down()
-        page.mouse.move(box["x"] + 20, box["y"] + 45, steps=4)  # almost an hour
-        page.mouse.up()
-        page.wait_for_selector("#timeline .now-line", state="hidden")
-    with opened(chromium, it, size=PHONE, scheme="dark") as page:
-        page.click("[data-show=map]")
-        page.select_option("#timeline select", label="24 h")
-        page.wait_for_selector(bar.format(late))
-        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
-        page.screenshot(path=str(shots / "24 hours 360.png"))
-
-
 def test_hostile_words_are_only_words(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     task = move(it, 0.1, label=HOSTILE)
@@ -211,55 +153,10 @@ def test_the_whole_page_is_small_and_soon_there(chromium: Any, it: Web) -> None:
 PAINTS = "performance.getEntriesByName('first-contentful-paint')"
 
 
-def test_after_a_restart_the_page_has_the_rights_that_it_has_now(
-    chromium: Any, both: tuple[Stand, Web], it: Web, tmp_path: Path, shots: Path, other_version: str
-) -> None:
-    it.post("/vehicles/1/pause", {})
-    task = move(it, 0.2)["id"]
-    with web(tmp_path, both[0], name="first") as first:
-        port = first.url.rpartition(":")[2]
-        with opened(chromium, first, path=f"/tasks/{task}", may_fail=True) as page:
-            says(page, "#link", "you: a local user")
-            page.wait_for_selector("#panel-task >> text=Cancel…")
-            first.process.end(signal.SIGKILL)
-            says(page, "#banner", "The connection to the web process is lost")
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setenv("PYTHONPATH", other_version)
-                token = add_key(tmp_path, "anna", "observer")
-                with web(tmp_path, both[0], "--listen", f"127.0.0.1:{port}", name="second"):
-                    log_in(page, token)
-                    says(page, "#link", "you: anna, observer")
-                    page.wait_for_selector("#panel-task >> text=Cancel…", state="hidden")
-                    page.click("#tab-queue")
-                    page.wait_for_selector(f"#panel-queue [data-task='{task}']")
-                    for button in ("Add a task…", "Cancel all…", "Resume…", "▲", "Cancel…"):
-                        assert not page.is_visible(f"button:text-is('{button}')"), button
-                    assert page.is_visible("#stop-all")
-                    says(page, "#news", "The web process has version 9.9.9 now, this page has")
-                    judge(page, "another version")
-                    page.screenshot(path=str(shots / "another version.png"))
-                    page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
-                    page.emulate_media(color_scheme="dark")
-                    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
-                    page.screenshot(path=str(shots / "another version 360.png"))
-                    page.click("#news >> text=Load again")
-                    says(page, "#link", "you: anna, observer")
-                    page.wait_for_selector("#news", state="hidden")
-
-
 def log_in(page: Any, token: str) -> None:
     """Enter a token where the page asks for one."""
     page.fill(".box [name=token]", token)
     page.click(".box [type=submit]")
-
-
-@pytest.fixture
-def other_version(tmp_path: Path) -> str:
-    """PYTHONPATH of a process that takes itself for another version of mav-tasks."""
-    folder = tmp_path / "site" / "mav_tasks-9.9.9.dist-info"
-    folder.mkdir(parents=True)
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: mav-tasks\nVersion: 9.9.9\n")
-    return os.pathsep.join((str(folder.parent), os.environ.get("PYTHONPATH", "")))
 
 
 def test_a_token_opens_the_page_and_its_revocation_closes_it(
@@ -287,19 +184,3 @@ def test_a_token_opens_the_page_and_its_revocation_closes_it(
         says(page, ".box", "This page needs a token.")  # the stream of events has ended
         page.click("#stop-all")
         says(page, "#stop-outcome", "STOP not acknowledged: a token is required")
-
-
-def test_the_api_is_tried_on_a_page_made_from_its_document(
-    chromium: Any, it: Web, shots: Path
-) -> None:
-    it.post("/vehicles/1/pause", {})
-    with opened(chromium, it, path="/api", waits=False) as page:
-        page.click("summary:has-text('POST /vehicles/{vehicle}/tasks')")
-        form = "details[open] form"
-        page.fill(f"{form} label:has-text('vehicle (path)') input", "1")
-        page.fill(f"{form} textarea", '{"goals": [{"kind": "move", "distance": 0.2}]}')
-        page.click(f"{form} >> text=Send")
-        says(page, f"{form} pre", '201 { "id":')
-        judge(page, "the API")
-        page.screenshot(path=str(shots / "api.png"))
-    assert it.get("/vehicles/1/queue")["waiting_count"] == 1

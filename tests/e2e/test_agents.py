@@ -4,7 +4,6 @@ import asyncio
 import http.client
 import json
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Iterator
@@ -23,14 +22,12 @@ from mcp_types import CallToolResult, Request, RequestParams, Result
 
 from tests.kit.agents import Agent, agent, url_of
 from tests.kit.awaited import awaited
-from tests.kit.commands import called, mav_tasks
+from tests.kit.commands import called
 from tests.kit.processes import Process, Stand, environment_with, frozen, process, stand, wait_until
 
 pytestmark = pytest.mark.slow
 
 MOVE = {"kind": "move", "distance": 0.4}
-READING = {"vehicles", "queue", "history", "task", "wait"}
-DRIVING = {"submit", "cancel", "release", "pause", "resume"}
 
 
 @pytest.fixture(scope="module")
@@ -74,21 +71,6 @@ async def test_an_agent_drives_a_task_to_its_end(running: Stand, tmp_path: Path,
         assert it.heard[-1][1].endswith("completed")
         assert (await it.call("history", limit=1))["tasks"][0]["id"] == task["id"]
         assert await it.call("task", id=task["id"]) == done
-
-
-@awaited
-async def test_several_goals_are_one_task_and_a_wait_may_end_before_it(
-    running: Stand, tmp_path: Path
-) -> None:
-    async with agent(running, tmp_path) as it:
-        goals = {"kind": "rotate", "angle": 20}, {"kind": "wait", "duration": 600}
-        task = await it.drive("several", *goals)
-        shown = await it.call("wait", id=task["id"], seconds=0.5)
-        assert not shown["is_over"]
-        await it.call("cancel", id=task["id"])
-        ended = await it.call("wait", id=task["id"])
-        assert ended["state"] == "cancelled"
-        assert "no tool" not in await it.refused("cancel", id=task["id"])
 
 
 @awaited
@@ -159,142 +141,6 @@ async def test_a_key_with_other_content_is_refused(
         assert (await it.call("submit", **first))["state"] == "cancelled"
 
 
-@awaited
-async def test_an_agent_that_may_only_read_can_stop(running: Stand, tmp_path: Path) -> None:
-    async with agent(running, tmp_path, "--read-only") as it:
-        tools = {tool.name: tool for tool in (await it.client.list_tools()).tools}
-        assert set(tools) == READING | {"stop"}
-        with pytest.raises(MCPError, match="no tool 'submit'"):
-            await it.client.call_tool("submit", {})
-        await it.call("stop")
-        queue = await it.call("queue")
-        assert queue["paused"] == "stopped"
-    assert mav_tasks("resume", server=url_of(running)).status == 0
-
-
-@awaited
-async def test_tools_say_what_they_may_change(running: Stand, tmp_path: Path) -> None:
-    async with agent(running, tmp_path) as it:
-        tools = {tool.name: tool for tool in (await it.client.list_tools()).tools}
-        assert set(tools) == READING | DRIVING | {"stop"}
-        hints = {name: tool.annotations for name, tool in tools.items()}
-        assert {name for name, hint in hints.items() if hint and hint.read_only_hint} == READING
-        moving = {name for name, hint in hints.items() if hint and hint.destructive_hint}
-        assert moving == {"submit", "cancel", "release", "stop", "resume"}
-        assert all(hint and hint.idempotent_hint for hint in hints.values())
-        assert all(tool.output_schema and tool.description for tool in tools.values())
-
-
-@pytest.mark.timeout(120)
-@awaited
-async def test_a_server_that_was_away_is_used_again_and_a_held_task_released(
-    tmp_path: Path,
-) -> None:
-    store = str(tmp_path / "tasks.sqlite3")
-    with stand(tmp_path, serve_store=store) as there:
-        async with agent(there, tmp_path) as it:
-            task = await it.drive("held", {"kind": "move", "distance": 1.5})
-            wait_until(lambda: there.speed() > 0.3, within=15, what="the rover at speed")
-            there.server.end(signal.SIGKILL)
-            assert "no answer" in await it.refused("task", id=task["id"])
-            with serve(tmp_path, there, "second") as second:
-                second.wait_for("rover 1: found")
-                held = await it.call("wait", id=task["id"], seconds=20)
-                assert (held["state"], held["is_over"]) == ("held", False)
-                assert "call release" in held["advice"]
-                again = await it.drive("held", {"kind": "move", "distance": 1.5})
-                assert again["id"] == task["id"]
-                old = {"id": task["id"], "how": "remainder", "epoch": held["halt_epoch"] - 1}
-                assert await it.refused("release", **(old | {"epoch": max(1, old["epoch"])}))
-                await it.call("release", **(old | {"epoch": held["halt_epoch"]}))
-                queue = await it.call("queue")
-                if queue["paused"]:
-                    await it.call("resume", epoch=queue["halt_epoch"])
-                assert (await it.call("wait", id=task["id"]))["state"] == "completed"
-                assert (await it.call("history"))["tasks"][0]["id"] == task["id"]
-
-
-@awaited
-async def test_a_server_that_is_not_there_yet_is_found_later(tmp_path: Path) -> None:
-    store = str(tmp_path / "tasks.sqlite3")
-    with stand(tmp_path, serve_store=store) as there:
-        there.server.end()
-        async with agent(there, tmp_path, "--timeout", "0.5") as it:
-            assert "no task server answered" in await it.refused("vehicles")
-            with serve(tmp_path, there, "second") as second:
-                second.wait_for("rover 1: found")
-                assert len((await it.call("vehicles"))["vehicles"]) == 1
-
-
-@awaited
-async def test_the_role_of_the_key_decides(tmp_path: Path) -> None:
-    ring = str(tmp_path / "keys.toml")
-    for name, role in (("watcher", "observer"), ("worker", "submitter")):
-        assert called("keys", "add", name, "--role", role, "--keys", ring).status == 0
-    with stand(tmp_path, "--keys", ring) as there:
-        async with agent(there, tmp_path, "--sign", "watcher", "--keys", ring) as it:
-            assert len((await it.call("vehicles"))["vehicles"]) == 1
-            goals = {"goals": [MOVE], "idempotency_key": "observer"}
-            assert "observer" in await it.refused("submit", **goals)
-            await it.call("stop")
-            epoch = (await it.call("queue"))["halt_epoch"]
-            assert "observer" in await it.refused("resume", epoch=epoch)
-        async with agent(there, tmp_path, "--sign", "worker", "--keys", ring) as it:
-            task = await it.call("submit", **goals)
-            assert "call resume" in task["advice"]
-            assert "submitter" in await it.refused("resume", epoch=epoch)
-
-
-AS_THE_GUIDE_SAYS = "keys add agent --role submitter --max-distance 50 --max-speed 0.5 --quota 5"
-
-
-@awaited
-async def test_the_server_keeps_the_limits_of_the_key(tmp_path: Path) -> None:
-    ring = str(tmp_path / "keys.toml")
-    limits = "--max-distance", "2", "--max-speed", "0.5", "--quota", "1", "--max-priority", "6"
-    assert (
-        called("keys", "add", "small", "--role", "submitter", *limits, "--keys", ring).status == 0
-    )
-    assert called("keys", "add", "large", "--role", "submitter", "--keys", ring).status == 0
-    assert called(*AS_THE_GUIDE_SAYS.split(), "--keys", ring).status == 0
-
-    def asking(key: str, kind: str = "move", **goal: Any) -> dict[str, Any]:
-        return {"goals": [{"kind": kind, **goal}], "idempotency_key": key, "start_in": 900}
-
-    with stand(tmp_path, "--keys", ring) as there:
-        other, own = (("--sign", name, "--keys", ring) for name in ("large", "small"))
-        async with agent(there, tmp_path, *other) as large, agent(there, tmp_path, *own) as it:
-            tools = {tool.name: tool for tool in (await it.client.list_tools()).tools}
-            told = "max_priority 6, max_speed 0.5 m/s, max_distance 2 m, quota 1"
-            assert told in (tools["submit"].description or "")
-            used = await large.call("submit", **asking("patrol-1", distance=12, speed=1.6))
-            for words, asked in {
-                "2 m at most in a task, not 12": asking("patrol-1", distance=12, speed=0.2),
-                "0.5 m/s at most, not 1.6": asking("patrol-1", distance=1, speed=1.6),
-                "2 m at most in a task, not 99": asking("a", "goto", north=99, east=0, speed=0.2),
-                "priority 6 at most, not 7": asking("a", distance=1) | {"priority": 7},
-                "speed 1e-46 is too small": asking("a", distance=1, speed=1e-46),
-            }.items():
-                assert words in await it.refused("submit", **asked)
-            task = await it.call("submit", **asking("patrol-1", distance=1))
-            assert task["id"] != used["id"]
-            assert "at most 1 waiting tasks" in await it.refused(
-                "submit", **asking("b", distance=1)
-            )
-            again = await it.call("submit", **asking("patrol-1", distance=1))
-            assert again["id"] == task["id"]
-            assert "belongs to" in await it.refused("cancel", id=used["id"])
-
-
-def test_the_limits_of_before_name_the_way_of_now(tmp_path: Path) -> None:
-    done = called("mcp", "--max-queued", "5")
-    assert done.status == 2
-    assert done.error == (
-        "mav-tasks: --max-queued: the server keeps the limits of an agent's key: mav-tasks keys"
-        " add agent --role submitter --quota 5, then mav-tasks mcp --sign agent\n"
-    )
-
-
 class GetParams(RequestParams):
     task_id: str
 
@@ -310,11 +156,6 @@ class GetTask(Request[GetParams, Literal["tasks/get"]]):
 
 class UpdateTask(Request[UpdateParams, Literal["tasks/update"]]):
     method: Literal["tasks/update"] = "tasks/update"
-    name_param = "taskId"
-
-
-class CancelTask(Request[GetParams, Literal["tasks/cancel"]]):
-    method: Literal["tasks/cancel"] = "tasks/cancel"
     name_param = "taskId"
 
 
@@ -366,32 +207,6 @@ async def shown(it: Agent, task_id: str, *, until: tuple[str, ...]) -> Shown:
             return found
         await it.call("wait", id=int(task_id.split("-")[1]), seconds=1)
     raise AssertionError(found)
-
-
-@awaited
-async def test_a_submission_is_a_task_of_the_protocol_for_who_has_the_extension(
-    running: Stand, tmp_path: Path
-) -> None:
-    tasks = Tasks()
-    async with agent(running, tmp_path, extensions=[tasks]) as it:
-        goals = {"goals": [MOVE], "idempotency_key": "durable"}
-        for _ in range(2):
-            await it.client.call_tool("submit", goals)
-        first, again = tasks.created
-        assert (first.task_id, first.ttl_ms) == (again.task_id, None)
-        done = await shown(it, first.task_id, until=("completed", "failed", "cancelled"))
-        assert done.status == "completed"
-        assert done.result is not None
-        assert done.result["structuredContent"]["state"] == "completed"
-        assert not done.result["isError"]
-        with pytest.raises(MCPError, match="no task '1-1-1'"):
-            await shown(it, "1-1-1", until=())
-
-        await it.client.call_tool("submit", goals | {"idempotency_key": "durable 2", "start_in": 9})
-        params = GetParams(task_id=tasks.created[-1].task_id)
-        await it.client.session.send_request(CancelTask(params=params), Empty)
-        await shown(it, params.task_id, until=("cancelled",))
-        await it.client.session.send_request(CancelTask(params=params), Empty)  # it is over
 
 
 async def accepted(request: Callable[[], Awaitable[None]]) -> None:

@@ -14,7 +14,6 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.store.halt_record import SIZE
 from mav_tasks.tasks.lifecycle import TaskReason
 from tests.kit.processes import (
     Process,
@@ -39,6 +38,7 @@ DELAY = 6.0  # s, until the task that waits would drive
 GOES_ON = ("--set", "rules.on_restart=continue")
 NO_FILE_AT_ALL = 1  # byte
 SOME = 40  # changes, whose entries in SQLite's log are longer than the record of halts
+RECORD = 98_368  # bytes, of the record of halts
 
 
 def limit_files(running: Stand, largest: int) -> None:
@@ -105,7 +105,7 @@ def test_a_halt_outlives_the_end_of_the_server_just_after_its_acknowledgement(
         use_log(link)
         submit(link, MOVE, 5.0, 0, 0, 11, 0, DELAY)
         if is_full:
-            limit_files(running, SIZE)
+            limit_files(running, RECORD)
         with busy(tmp_path):
             command, params, target = halt
             assert command_long(link, command, *params, target=target).result == 0
@@ -132,7 +132,7 @@ def test_a_continue_outlives_a_full_disk_too(tmp_path: Path) -> None:
         use_log(link)
         assert command_long(link, STOP).result == 0
         wait_until(lambda: is_latched(path), within=5, what="the latch on the disk")
-        limit_files(running, SIZE)
+        limit_files(running, RECORD)
         assert command_long(link, CONTINUE, 1).result == 0
         wait_until(lambda: "the disk" in running.server.text, within=5, what="the full disk")
         running.server.end(signal.SIGKILL)

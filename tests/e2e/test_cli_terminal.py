@@ -7,8 +7,7 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from mav_tasks import Move, Refused, SyncClient, TaskState, Wait
-from tests.kit.commands import called, mav_tasks
-from tests.kit.processes import Stand, frozen, stand, wait_until
+from tests.kit.processes import Stand, stand, wait_until
 from tests.kit.terminal import CTRL_C, Terminal, terminal
 
 ESCAPE = b"\x1b"
@@ -67,16 +66,6 @@ def test_a_task_that_is_waited_for_is_one_line_that_moves(there: Stand, client: 
     assert over.startswith(f"{task}: wait 2 s: completed, in 2")
     assert COLOUR.search(screen.written)
     assert screen.written.count(SHOWN_CURSOR) >= 1
-
-
-def test_no_color_is_no_colour_and_a_narrow_window_no_trouble(
-    there: Stand, client: SyncClient
-) -> None:
-    with at(there, "submit", "wait", "1s", "--wait", size=(5, 40), NO_COLOR="1") as screen:
-        screen.wait_for(lambda text: re.search(r"executing +\d+ %", text))
-        assert len(screen.lines) == 2  # the task's number, and the line
-        assert screen.end() == 0
-    assert not COLOUR.search(screen.written)
 
 
 @pytest.mark.parametrize("command", [("status", "{}", "--wait"), ("queue", "--watch")])
@@ -138,28 +127,6 @@ def test_a_watched_queue_fits_its_window_and_follows_it(there: Stand, client: Sy
     assert b"Traceback" not in screen.written
 
 
-def test_a_watched_queue_outlives_a_silence_of_the_server(there: Stand, client: SyncClient) -> None:
-    with at(there, "queue", "--watch", size=(10, 60)) as screen:
-        screen.wait_for(lambda text: "no task runs; 0 waiting" in text)
-        with frozen(there.server):
-            screen.wait_for(lambda text: re.match(r"no answer for \d s\nrover 1: no task", text))
-        screen.wait_for(lambda text: text.startswith("rover 1: no task runs"))
-        screen.type(CTRL_C)
-        assert screen.end() == 130
-
-
-def test_who_waits_is_told_of_a_silence(there: Stand, client: SyncClient) -> None:
-    client.pause()
-    task = client.submit(Wait(0.1))
-    with at(there, "status", str(task.id), "--wait") as screen:
-        screen.wait_for(lambda text: "queue paused" in text)
-        with frozen(there.server):
-            screen.wait_for(lambda text: "rover silent" in text)
-        screen.wait_for(lambda text: "queue paused" in text)
-        client.resume()
-        assert screen.end() == 0
-
-
 def test_to_call_off_everything_is_asked_about(there: Stand, client: SyncClient) -> None:
     task = client.submit(Wait(60.0))
     with at(there, "clear", "--all") as screen:
@@ -173,39 +140,3 @@ def test_to_call_off_everything_is_asked_about(there: Stand, client: SyncClient)
         screen.type(b"y\n")
         assert screen.end() == 0
     wait_until(lambda: client.status(task.id).is_over, within=10)
-
-
-def test_a_terminal_that_knows_ascii_only_is_none_the_worse(
-    there: Stand, client: SyncClient
-) -> None:
-    client.pause()
-    client.submit(Wait(1.0), delay=600.0)
-    with at(there, "queue", size=(24, 30), PYTHONIOENCODING="ascii") as screen:
-        assert screen.end() == 0
-    assert screen.lines[0].startswith("rover 1: no task runs; queue")
-    client.resume()
-    submit = ("submit", "wait", "0.5s", "--wait")
-    with at(there, *submit, PYTHONIOENCODING="ascii") as screen:
-        assert screen.end() == 0
-    assert "completed" in screen.text
-    assert screen.written.isascii()
-
-
-def test_a_stop_that_does_not_reach_the_rover_stays(there: Stand, client: SyncClient) -> None:
-    with frozen(there.rover):
-        wait_until(lambda: not client.vehicles()[0].is_heard, within=10, what="a silent rover")
-        done = called("stop", "--vehicle", "1", server=url_of(there))
-        assert done.status == 1
-        assert "STOP is in force, but a rover is silent" in done.error
-        assert len(done.error.splitlines()) == 1
-    wait_until(lambda: client.vehicles()[0].is_heard, within=10, what="the rover again")
-    assert client.queue().paused is not None
-
-
-@pytest.mark.parametrize(
-    "command", [("config", "show"), ("config", "init"), ("serve", "--help"), ("probe", "--help")]
-)
-def test_what_needs_no_server_is_ascii_too(command: tuple[str, ...]) -> None:
-    done = mav_tasks(*command, PYTHONIOENCODING="ascii")
-    assert (done.status, done.error) == (0, "")
-    assert done.output.isascii()

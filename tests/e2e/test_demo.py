@@ -4,13 +4,10 @@ import os
 import re
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
-import httpx
 import pytest
 
-from tests.kit.processes import wait_until
 from tests.kit.volume import some
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -66,58 +63,6 @@ def test_in_the_fleet_s_demo_a_gateway_is_killed_and_its_rovers_go_on() -> None:
 
 
 @pytest.mark.timeout(60)
-def test_a_recorded_demo_decides_the_same_again(tmp_path: Path) -> None:
-    done = demo("--fast", "--body", "kinematic", "--record", str(tmp_path))
-    assert done.returncode == 0, done.stdout + done.stderr
-    (record,) = tmp_path.iterdir()
-    replayed = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "replay", str(record)],
-        capture_output=True,
-        text=True,
-        timeout=50,
-        check=False,
-        env={**os.environ, "PYTHONHASHSEED": "12345"},
-    )
-    assert replayed.returncode == 0, replayed.stdout + replayed.stderr
-    assert [line for line in replayed.stdout.splitlines() if " completed; " in line]
-    assert replayed.stdout.splitlines()[-1].startswith("same: ")
-
-
-def test_the_window_cannot_be_had_in_virtual_time() -> None:
-    done = demo("--gui", "--fast")
-    assert done.returncode == 2
-    assert "--gui" in done.stdout
-
-
-@pytest.mark.timeout(60)
-def test_a_part_that_cannot_run_is_named_at_once(tmp_path: Path) -> None:
-    (tmp_path / "pybullet.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    for options in (("--body", "bullet"), ("--fast", "--body", "bullet")):
-        done = demo(*options, environment=environment)
-        assert done.returncode == 2, done.stdout + done.stderr
-        assert "pip install pybullet" in done.stdout.strip().splitlines()[-1]
-        assert "Traceback" not in done.stderr
-
-
-@pytest.mark.timeout(60)
-def test_without_matplotlib_and_pybullet_it_runs_without_a_picture_and_says_so(
-    tmp_path: Path,
-) -> None:
-    for name in ("matplotlib", "pybullet"):
-        (tmp_path / f"{name}.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    done = demo("--fast", "--output", str(tmp_path), environment=environment)
-    assert done.returncode == 0, done.stdout + done.stderr
-    lines = [line for line in done.stdout.splitlines() if line.startswith("demo: ")]
-    kinematic, no_picture, last = lines
-    assert "the rover is the kinematic one" in kinematic
-    assert no_picture.endswith("not installed (pip install matplotlib)")
-    assert last == "demo: all correct"
-    assert not list(tmp_path.glob("*.png"))
-
-
-@pytest.mark.timeout(60)
 @pytest.mark.parametrize("after", [0.3, 4.0])
 def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
     running = subprocess.Popen(
@@ -133,34 +78,3 @@ def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
     output, _ = running.communicate(timeout=20)
     assert running.returncode in (130, -signal.SIGINT)
     assert "Traceback" not in output
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(150)
-def test_the_demo_with_the_web_page_goes_on_until_ctrl_c(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "rover_sim.demo", "--web", "--body", "kinematic"]
-    log = tmp_path / "demo.log"
-    with log.open("wb") as output:
-        it = subprocess.Popen(
-            [*command, "--output", str(tmp_path)],
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            env={name: value for name, value in os.environ.items() if "DISPLAY" not in name},
-        )
-    try:
-        text = log.read_text
-        wait_until(lambda: "press Ctrl-C" in text(), within=90, what=text)
-        found = re.search(r"web page: (\S+)/", text())
-        assert found is not None
-        tasks = httpx.get(f"{found[1]}/api/v1/vehicles/1/history").json()["tasks"]
-        assert [task["state"] for task in tasks] == ["completed"] * 3
-        os.killpg(it.pid, signal.SIGINT)  # as a terminal does
-        assert it.wait(20) == 0, text()
-        assert "demo: all correct" in text()
-    finally:
-        it.kill()
-        it.wait()
-    refused = demo("--web", "--fast")
-    assert refused.returncode == 2
-    assert "--web needs real time" in refused.stdout

@@ -4,7 +4,6 @@ So are the guide's lines for systemd, below a folder of the test. Those for Dock
 the Dockerfile: there is no Docker where the tests run.
 """
 
-import json
 import os
 import re
 import shlex
@@ -15,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.kit.commands import Done, mav_tasks
 from tests.kit.processes import free_udp_ports, process
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +22,6 @@ GUIDE = (ROOT / "mav_tasks" / "GUIDE.md").read_text(encoding="utf-8")
 SERVICE = GUIDE[GUIDE.index("## Run it as a service\n") :]
 INSTALL, DOCKER = re.findall(r"^```sh\n(.*?)^```", SERVICE, flags=re.MULTILINE | re.DOTALL)
 UNIT = (DEPLOY / "mav-tasks.service").read_text(encoding="utf-8")
-DOCKERFILE = (DEPLOY / "Dockerfile").read_text(encoding="utf-8")
 PROGRAM = str(Path(sys.executable).with_name("mav-tasks"))
 
 
@@ -41,42 +38,6 @@ def test_systemd_takes_the_units(tmp_path: Path) -> None:
     command = ["systemd-analyze", "verify", "--recursive-errors=no", "--man=no", *paths]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=30)
     assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_the_health_check_of_the_container_asks_the_server_of_the_unit(tmp_path: Path) -> None:
-    (started,) = re.findall(r"^ExecStart=/opt/mav-tasks/bin/mav-tasks (.*)$", UNIT, re.MULTILINE)
-    (check,) = re.findall(r"^HEALTHCHECK .*CMD (\[.*\])$", DOCKERFILE, re.MULTILINE)
-    (entry,) = re.findall(r"^ENTRYPOINT (\[.*\])$", DOCKERFILE, re.MULTILINE)
-    (command,) = re.findall(r"^CMD (\[.*\])$", DOCKERFILE, re.MULTILINE)
-    assert json.loads(entry) == ["mav-tasks"]
-    assert json.loads(command) == shlex.split(started)[:1] == ["serve"]
-    program, *asked = json.loads(check)
-    assert program == "mav-tasks"
-
-    client, rover = free_udp_ports(2)
-    (tmp_path / "config.toml").write_text(
-        f'[links]\nclients = ["udpin:127.0.0.1:{client}"]\npush = []\n'
-        f'vehicles = ["udpout:127.0.0.1:{rover}"]\n'
-    )
-    started = started.replace("/etc/mav-tasks", str(tmp_path))
-    started = started.replace("/var/lib/mav-tasks", str(tmp_path))
-    url = f"udpout:127.0.0.1:{client}"
-    sim = ("-m", "rover_sim", "--port", str(rover), "--body", "kinematic")
-    serve = ("-m", "mav_tasks.cli", *shlex.split(started))
-    with process(*serve, folder=tmp_path, name="serve") as server:
-        with process(*sim, folder=tmp_path, name="sim"):
-            server.wait_for("rover 1: found")
-            assert mav_tasks(*asked, server=url).status == 0
-        # The rover has gone: the server is there, and says so.
-        answers: list[Done] = []
-        while not answers or answers[-1].status == 0:
-            answers.append(mav_tasks(*asked, server=url))
-            assert len(answers) < 50
-        assert answers[-1].status == 1
-        assert "does not hear rover 1 (silent for" in answers[-1].error
-        server.end()
-        assert server.popen.returncode == 0
-    assert mav_tasks(*asked, server=url).status == 3
 
 
 def command_that(does: str, path: Path) -> None:
@@ -145,11 +106,3 @@ def test_the_lines_of_the_guide_install_a_service_that_serves(tmp_path: Path) ->
         assert done.returncode == 0, done.stderr
     assert "tester" in done.stdout
     assert list(tmp_path.rglob("keys.toml"))
-
-
-def test_the_lines_for_docker_fit_the_dockerfile() -> None:
-    build, run = (shlex.split(line) for line in DOCKER.splitlines())
-    (volume,) = re.findall(r"^VOLUME (.*)$", DOCKERFILE, re.MULTILINE)
-    assert build == ["docker", "build", "-f", "tools/deploy/Dockerfile", "-t", run[-1], "."]
-    assert run[:4] == ["docker", "run", "--network", "host"]
-    assert run[4:6] == ["-v", f"mav-tasks:{volume}"]

@@ -1,14 +1,13 @@
 """Recordings of real runs as MCAP, and telemetry logs back; real processes, stock pymavlink."""
 
 import json
-import math
 import os
 import resource
 import stat
 import subprocess
 import sys
 from collections import Counter
-from contextlib import closing, nullcontext
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,13 +20,9 @@ os.environ.setdefault("MAVLINK20", "1")
 from mcap.reader import NonSeekingReader, make_reader
 from pymavlink import mavutil
 
-from mav_tasks import Move, SyncClient
-from mav_tasks.key_ring.ring_file import load
-from tests.kit.commands import called, mav_tasks
+from tests.kit.commands import called
 from tests.kit.processes import free_tcp_ports, stand, submit, wait_for
 from tests.unit.mcap_export.json_schema import check
-
-SIGNED = bytes((0xFD, 1))  # magic and incompat flags of a packet
 
 
 @dataclass(frozen=True)
@@ -106,32 +101,6 @@ def test_another_reader_finds_each_message_and_no_fault(run: Run) -> None:
 
 
 @pytest.mark.slow
-def test_fields_times_and_numbers_are_those_that_pymavlink_reads(run: Run) -> None:
-    topic = "/mavlink/1/1/LOCAL_POSITION_NED"
-    found = run.messages(topic)
-    expected = [each for each in run.packets() if each.get_type() == "LOCAL_POSITION_NED"]
-    assert len(found) == len(expected) > 20
-    for (_, message, values), packet in zip(found, expected, strict=True):
-        assert message.log_time / 1e9 == pytest.approx(packet._timestamp, abs=1e-6)
-        assert message.sequence == packet.get_seq()
-        told = packet.to_dict()
-        del told["mavpackettype"]
-        assert values == pytest.approx(told, rel=1e-8)
-
-
-@pytest.mark.slow
-def test_the_rover_is_drawn_where_it_drove(run: Run) -> None:
-    first, *_, last = run.values("/rover/1/pose")
-    position, orientation = last["pose"]["position"], last["pose"]["orientation"]
-    assert first["pose"]["position"]["y"] == pytest.approx(0.0, abs=0.05)
-    assert position["y"] == pytest.approx(0.5, abs=0.05)  # north
-    heading = 2 * math.atan2(orientation["z"], orientation["w"])  # from east, to the left
-    assert math.degrees(heading) == pytest.approx(90 - 30, abs=3)
-    place = run.values("/rover/1/location")[-1]
-    assert place["latitude"] == pytest.approx(-35.363262 + 0.5 / 111_195, abs=2e-6)
-
-
-@pytest.mark.slow
 def test_setpoints_tasks_and_texts_are_those_of_the_run(run: Run) -> None:
     sent = [each for each in run.packets() if each.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
     setpoints = run.values("/rover/1/setpoints/250/191")
@@ -144,106 +113,6 @@ def test_setpoints_tasks_and_texts_are_those_of_the_run(run: Run) -> None:
     texts = [each["message"] for each in run.values("/texts")]
     assert {"Task 1 done", "Task 2 done"} <= set(texts)
     assert "rover 1: task 1 starting" in {each["message"] for each in run.values("/tasks/log")}
-
-
-@pytest.mark.slow
-def test_a_record_alone_has_the_links(run: Run, tmp_path: Path) -> None:
-    out = tmp_path / "record.mcap"
-    assert called("export", "--mcap", str(out), str(run.record)).status == 0
-    it = Run(run.log, run.record, out)
-    commands = it.messages("/mavlink/255/0/COMMAND_LONG", "/mavlink/200/0/COMMAND_LONG")
-    assert [channel.metadata["side"] for channel, *_ in commands] == ["clients", "clients"]
-    one, other = (channel.metadata["link"] for channel, *_ in commands)
-    assert one.startswith("udpin:")
-    assert other.startswith("tcpin:")
-    (channel, *_), *_ = it.messages("/mavlink/1/1/ATTITUDE")
-    assert channel.metadata["side"] == "vehicles"
-    assert it.values("/rover/1/setpoints/250/191") == []  # a record has a digest of what was sent
-
-
-@pytest.mark.slow
-def test_a_signed_run_comes_back(tmp_path: Path) -> None:
-    ring = tmp_path / "keys.toml"
-    for name, role in (("r1", "vehicle"), ("anna", "operator")):
-        assert called("keys", "add", name, "--role", role, "--keys", str(ring)).status == 0
-    logs, back = tmp_path / "logs", tmp_path / "back"
-    with stand(
-        tmp_path,
-        *("--keys", str(ring), "--tlog", str(logs)),
-        client_options="?unsigned=refuse",
-        rover_options=("--sign", "r1", "--keys", str(ring)),
-        way=lambda port: nullcontext(f"udpout:127.0.0.1:{port}?key=r1"),
-    ) as it:
-        key = load(ring).ring.usable_key("anna")
-        with SyncClient(f"udpout:127.0.0.1:{it.client_port}", key=key) as client:
-            assert client.submit(Move(0.3)).done(timeout=30).is_over
-        it.server.end()
-    (log,) = logs.iterdir()
-    assert log.read_bytes()[8:11:2] == SIGNED
-    out = tmp_path / "run.mcap"
-    assert called("export", "--mcap", str(out), str(log)).status == 0
-    back.mkdir()
-    assert called("export", "--tlog", str(back), str(out)).status == 0
-    assert (back / log.name).read_bytes() == log.read_bytes()
-    assert Run(log, log, out).values("/rover/1/pose")
-
-
-def one_clear_line(*arguments: str | Path) -> str:
-    """Run a command that fails; return its line."""
-    done = called("export", *map(str, arguments))
-    assert (done.status, done.output) == (2, "")
-    (line,) = done.error.splitlines()
-    return line.removeprefix("mav-tasks: ")
-
-
-@pytest.mark.slow
-def test_what_is_wrong_is_one_clear_line(run: Run, tmp_path: Path) -> None:
-    out, text = tmp_path / "out", tmp_path / "text"
-    text.write_text("no recording, but a text that is a little longer\n", encoding="ascii")
-    assert one_clear_line("--mcap", out, text) == f"{text}: not a telemetry log"
-    assert one_clear_line("--mcap", out, run.mcap) == f"{run.mcap}: not a telemetry log"
-    assert one_clear_line("--mcap", out, tmp_path) == f"{tmp_path}: not a file"
-    nowhere = tmp_path / "none"
-    missing = f"{nowhere}: No such file or directory"
-    assert one_clear_line("--mcap", out, nowhere) == missing
-    assert one_clear_line("--tlog", out, nowhere) == missing
-    assert one_clear_line("--tlog", out, text) == f"{text}: not an MCAP file"
-    assert one_clear_line("--tlog", out, text, text) == "--tlog takes one MCAP file, not 2"
-    assert one_clear_line("--mcap", nowhere / "out", run.log).startswith(f"{nowhere / 'out'}: No")
-    both = "choose one of --mcap OUT and --tlog OUT"
-    assert one_clear_line(run.log) == both
-    assert one_clear_line("--mcap", out, "--tlog", out, run.log) == both
-    assert list(tmp_path.iterdir()) == [text]
-
-
-@pytest.mark.slow
-def test_nothing_is_overwritten_unless_that_is_said(run: Run, tmp_path: Path) -> None:
-    out = tmp_path / "out.mcap"
-    out.write_text("mine", encoding="ascii")
-    line = one_clear_line("--mcap", out, run.log)
-    assert line == f"{out} exists; use --force to overwrite it"
-    assert out.read_text(encoding="ascii") == "mine"
-    assert called("export", "--force", "--mcap", str(out), str(run.log)).status == 0
-    for way, source in (("--mcap", run.log), ("--tlog", run.mcap)):
-        line = one_clear_line(way, source, "--force", source)
-        assert line == f"{source} is also read: name another file"
-    assert one_clear_line("--mcap", "/dev/null", "--force", run.log) == "/dev/null: not a file"
-    assert one_clear_line("--mcap", tmp_path, "--force", run.log) == f"{tmp_path}: not a file"
-
-
-@pytest.mark.slow
-def test_several_logs_need_a_folder_and_come_back_by_name(run: Run, tmp_path: Path) -> None:
-    copy, out, back = tmp_path / "copy.tlog", tmp_path / "out.mcap", tmp_path / "back"
-    copy.write_bytes(run.log.read_bytes()[:-3])
-    assert called("export", "--mcap", str(out), str(run.log), str(copy)).status == 0
-    line = one_clear_line("--tlog", tmp_path / "one.tlog", out)
-    assert line == f"{out}: has several telemetry logs; name a folder for them: --tlog FOLDER"
-    assert not (tmp_path / "one.tlog").exists()
-    back.mkdir()
-    assert called("export", "--tlog", str(back), str(out)).status == 0
-    assert {path.name: path.read_bytes() for path in back.iterdir()} == {
-        each.name: each.read_bytes() for each in (run.log, copy)
-    }
 
 
 @pytest.mark.slow
@@ -262,16 +131,3 @@ def test_a_full_disk_leaves_nothing_behind(run: Run, tmp_path: Path, way: str) -
     assert done.returncode == 2
     assert done.stderr == f"mav-tasks: {tmp_path / 'out'}: File too large\n"
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_a_missing_package_is_named_with_what_installs_it(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "mcap.py").touch()  # has none of its modules
-    out = str(tmp_path / "out")
-    for way in ("--mcap", "--tlog"):
-        done = mav_tasks("export", way, out, str(run.log), PYTHONPATH=str(tmp_path))
-        assert done.status == 2
-        assert done.error == (
-            "mav-tasks: export needs the package mcap: run pip install '.[mcap]' in the folder of"
-            " mav-tasks\n"
-        )

@@ -77,18 +77,6 @@ def full(fleet: Fleet) -> Iterator[None]:
     server.execute("DROP FUNCTION mav_tasks.full() CASCADE", database=database)
 
 
-@contextmanager
-def read_only(server: PostgresServer) -> Iterator[None]:
-    """Let the whole server be read-only, as after a fail-over, for a block."""
-    server.execute("ALTER SYSTEM SET default_transaction_read_only = on")
-    server.execute("SELECT pg_reload_conf()")
-    try:
-        yield
-    finally:
-        server.execute("ALTER SYSTEM RESET default_transaction_read_only")
-        server.execute("SELECT pg_reload_conf()")
-
-
 def test_with_a_full_disk_the_task_goes_on_and_a_stop_at_the_other_gateway_works(
     postgres: PostgresServer, tmp_path: Path
 ) -> None:
@@ -121,24 +109,3 @@ def test_a_stop_at_the_other_gateway_while_the_database_hangs_holds_when_it_goes
             assert fleet.motions_since(began + UNTIL_ZERO) == 0
         fleet.until(S.KILLED)
         assert fleet.motions_since(began + UNTIL_ZERO) == 0
-
-
-def test_a_read_only_server_stops_the_rover_and_its_task_goes_on_when_it_can_be_written(
-    postgres: PostgresServer, tmp_path: Path
-) -> None:
-    with driving(postgres, tmp_path, 1.5) as fleet:
-        began = time.monotonic()
-        with read_only(postgres):
-            fleet.said(r"the fleet's database: it is read-only \(")
-            fleet.said("cannot renew its lease: its rovers are stopped")
-            assert fleet.zero_after(began) < UNTIL_ZERO
-            stopped = time.monotonic()
-            later = stopped + 1.0
-            wait_until(lambda: time.monotonic() > later, within=5)
-            assert fleet.motions_since(stopped) == 0
-        fleet.said("has renewed its lease: its tasks go on")
-        fleet.until(S.COMPLETED)
-        assert fleet.watcher.holder() == fleet.holder
-        truth = (tmp_path / "truth.csv").read_text(encoding="ascii").split("\n")
-        place = dict(zip(truth[0].split(","), truth[-2].split(","), strict=True))
-        assert abs(float(place["north"]) - 1.5) < 0.05

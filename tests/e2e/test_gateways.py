@@ -2,16 +2,14 @@
 
 import signal
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
-from pymavlink import mavutil
 
 from mav_tasks import Move, Refused, SyncClient, TaskReason, TaskState
 from tests.kit.commands import mav_tasks
-from tests.kit.gateways.serving import Watcher, serving, wait_for_holder, wrong_motions
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, free_udp_ports, process, wait_until
 
@@ -89,12 +87,6 @@ class Fleet:
 def fleet(postgres: PostgresServer, tmp_path: Path) -> Iterator[Fleet]:
     with ExitStack() as opened:
         yield Fleet(opened, tmp_path, postgres.new_database())
-
-
-def test_a_gateway_whose_system_id_is_another_does_not_start(fleet: Fleet) -> None:
-    fleet.start("a")
-    with pytest.raises(AssertionError, match="system_id is 249 here and 250 at gateway a: all"):
-        fleet.start("b", "--set", "identity.system_id=249")
 
 
 def test_a_gateway_takes_over_from_one_that_was_killed(fleet: Fleet) -> None:
@@ -236,60 +228,6 @@ def test_a_stop_of_all_is_acknowledged_by_each_gateway_for_its_rover(fleet: Flee
     assert [b.queue(vehicle=rover).paused for rover in (1, 2)] == [TaskReason.STOPPED] * 2
     for task in tasks:
         fleet.until_state(task.id, S.KILLED)
-
-
-def test_a_parameter_that_is_set_at_one_gateway_is_in_force_at_the_other(fleet: Fleet) -> None:
-    second = fleet.add_rover(2)
-    fleet.start("a")
-    fleet.start("b", rover=second)
-    fleet.processes["a"].wait_for("rover 1: found")
-    fleet.processes["b"].wait_for("rover 2: found")
-    with ExitStack() as ends:
-        a, b = (ends.enter_context(closing(connected_to(fleet.ports[name]))) for name in "ab")
-
-        def value_at_b() -> float:
-            """Return the value that the server of rover 2 tells, 0 as long as it does not."""
-            b.mav.param_request_read_send(2, 191, b"TSK_SPEED", -1)
-            told = b.recv_match(type="PARAM_VALUE", blocking=True, timeout=0.2)
-            is_its = told is not None and (told.get_srcSystem(), told.param_id) == (2, "TSK_SPEED")
-            return round(told.param_value, 3) if is_its else 0.0
-
-        wait_until(lambda: value_at_b() == 0.5, within=5, what="the default at the other gateway")
-        a.mav.param_set_send(1, 191, b"TSK_SPEED", 0.3, 9)
-        wait_until(lambda: value_at_b() == 0.3, within=5, what="the value at the other gateway")
-
-
-def test_a_rover_that_drives_out_of_reach_goes_on_at_the_gateway_that_hears_it(
-    postgres: PostgresServer, tmp_path: Path
-) -> None:
-    with serving(postgres, tmp_path, "ab") as it, closing(Watcher(it.url)) as watcher:
-        first = wait_for_holder(watcher)
-        (other,) = set(it.processes) - {first}
-        with it.client(first) as client:
-            ran, waits = client.submit(Move(6.0)), client.submit(Move(0.5))
-            wait_until(lambda: it.states()[ran.id] is S.EXECUTING, within=20, what=it.said)
-            it.taps[first].is_cut = True
-            assert wait_for_holder(watcher, other_than=first) == other
-            it.processes[first].wait_for(f"gateway {other}, which hears it, gets it")
-            it.taps[first].is_cut = False  # it is heard in both places: it stays
-            wait_until(lambda: it.states()[waits.id] is S.COMPLETED, within=60, what=it.said)
-            assert it.states()[ran.id] is S.COMPLETED
-            near = client.submit(Move(0.25))
-            wait_until(lambda: it.states()[near.id] is S.COMPLETED, within=30, what=it.said)
-        it.taps[other].is_cut = True  # and back
-        assert wait_for_holder(watcher, other_than=other) == first
-        with it.client(other) as client:
-            last = client.submit(Move(0.25))
-            wait_until(lambda: it.states()[last.id] is S.COMPLETED, within=30, what=it.said)
-        assert wrong_motions(it.motions, watcher.seen) == []
-
-
-def connected_to(port: int) -> Any:
-    """Return a stock connection to a gateway, which has heard it."""
-    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=255)
-    link.mav.heartbeat_send(6, 8, 0, 0, 4)
-    assert link.wait_heartbeat(timeout=10) is not None
-    return link
 
 
 def speed(truth: Path) -> float:

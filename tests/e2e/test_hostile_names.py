@@ -4,7 +4,6 @@ import json
 import os
 import re
 import socket
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -143,13 +142,3 @@ def test_no_text_from_the_wire_is_a_path(tmp_path: Path) -> None:
     stamp = r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ(\.\d+)?\.(tlog|decisions\.gz)"
     for folder in ("logs", "records"):
         assert all(re.fullmatch(stamp, path.name) for path in (tmp_path / folder).iterdir())
-
-
-def test_a_path_that_is_opened_would_be_seen(tmp_path: Path) -> None:
-    out = tmp_path / "opened.json"
-    (tmp_path / CANARY).touch()
-    arguments = [str(Path(audited.__file__)), str(out), "config", "check", str(tmp_path / CANARY)]
-    with process(*arguments, folder=tmp_path, name="check", python=sys.executable) as running:
-        running.popen.wait(20)
-    events = [(name, arguments) for name, arguments in json.loads(out.read_text())]
-    assert [name for name, _ in of_canary(events)] == ["open"], running.text

@@ -1,7 +1,5 @@
 """Every kind of link, on both sides, with a real server and stock pymavlink as the client."""
 
-import os
-import socket
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -12,12 +10,10 @@ from time import monotonic
 from typing import Any
 
 import pytest
-from pymavlink.dialects.v20 import common
 
 from rover_sim.geo import DEFAULT_ORIGIN
 from tests.kit.bridges import (
     Bridge,
-    DiallingFar,
     LineFar,
     SerialFar,
     TcpFar,
@@ -38,8 +34,6 @@ from tests.kit.processes import (
 HOST = "127.0.0.1"
 BAUD = 57_600
 ANSWER = 0.5  # s, within which each command is acknowledged
-SETPOINT_GAP = 0.5  # s; later than this the server itself would call the tick late
-ASKS_EACH = 0.1  # s; each is 2 KB of answers, and a rover that has more to say is slow by itself
 #: ATTITUDE, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, VFR_HUD, GPS_RAW_INT, SYS_STATUS
 STREAMS = (30, 32, 33, 74, 24, 1)
 MAGIC_V2 = 0xFD
@@ -224,68 +218,6 @@ def test_a_rover_is_driven_stops_when_its_link_is_cut_and_goes_on_when_it_is_bac
 
 
 # one among others
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs Linux's /proc")
-def test_one_that_reads_nothing_delays_no_answer_and_no_setpoint(tmp_path: Path) -> None:
-    (port,) = free_tcp_ports(1)
-    bridges: list[Bridge] = []
-    way = over(DiallingFar, bridges)
-    with (
-        stand(tmp_path, "--client", f"tcpin:{HOST}:{port}", way=way) as running,
-        reads_nothing(port) as deaf,
-    ):
-        link = running.heard(f"tcp:{HOST}:{port}")
-        deaf.sendall(everything_please())
-        task_id = running.drive(link, 4.0)
-        before = memory(running.server.popen.pid)
-        began, answers, asked_at = monotonic(), [], 0.0
-        while monotonic() - began < 6.0:
-            sent_at = monotonic()
-            if sent_at - asked_at > ASKS_EACH:
-                asked_at = sent_at
-                deaf.sendall(everything_please())  # it is answered, and nobody takes the answers
-            submit(link, 512, 148.0, target=(1, 1))  # AUTOPILOT_VERSION
-            answers.append(monotonic() - sent_at)
-
-        assert len(answers) > 20
-        assert max(answers) < ANSWER
-        wait_for(link, "STATUSTEXT", f"'Task {task_id} done' in STATUSTEXT.text", within=30)
-        setpoints = [at for at in bridges[0].setpoints if began < at < began + 4.0]
-        gaps = [b - a for a, b in pairwise(setpoints)]
-        assert len(gaps) > 60
-        assert max(gaps) < SETPOINT_GAP
-        assert memory(running.server.popen.pid) - before < 8 << 20
-        assert "Traceback" not in running.server.text
-
-
-@contextmanager
-def reads_nothing(port: int) -> Iterator[socket.socket]:
-    """A client that is there, and takes as little as a system allows."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as sock:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2_048)
-        sock.connect((HOST, port))
-        sock.settimeout(5.0)
-        yield sock
-
-
-def everything_please() -> bytes:
-    """A hello, and questions with long answers."""
-    mav = common.MAVLink(None, 200, 190)
-    messages = [common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)]
-    messages += [common.MAVLink_param_request_list_message(1, 1)]
-    packed = b""
-    for message in messages:
-        packed += message.pack(mav)
-        mav.seq += 1
-    return packed
-
-
-def memory(pid: int) -> int:
-    """Resident bytes of a process."""
-    pages = Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1]
-    return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
 @pytest.mark.slow

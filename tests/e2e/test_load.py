@@ -18,10 +18,9 @@ import httpx
 import pytest
 
 from mav_tasks import SyncClient
-from mav_tasks.key_ring.ring_file import load
 from tests.kit.commands import called
 from tests.kit.processes import Process, Stand, free_tcp_ports, process, stand
-from tests.kit.web import Web, has_rover, web
+from tests.kit.web import Web, has_rover, key_in, web
 
 pytestmark = pytest.mark.slow
 
@@ -70,11 +69,11 @@ def test_silent_strangers_keep_no_key_holder_from_a_tcp_link(tmp_path: Path) -> 
     signed = "--client", f"tcpin:{HOST}:{port}?unsigned=refuse", "--keys", str(ring)
     with (
         stand(tmp_path, *signed) as it,
-        SyncClient(f"tcp:{HOST}:{port}", key=load(ring).ring.usable_key("anna")) as inside,
+        SyncClient(f"tcp:{HOST}:{port}", key=key_in(ring, "anna")) as inside,
     ):
         inside.queue()
         with connections(port, 100):
-            outside = SyncClient(f"tcp:{HOST}:{port}", key=load(ring).ring.usable_key("anna"))
+            outside = SyncClient(f"tcp:{HOST}:{port}", key=key_in(ring, "anna"))
             with outside as late:
                 late.stop()
                 inside.stop()  # who was there before is still there

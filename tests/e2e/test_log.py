@@ -1,6 +1,5 @@
 """The log of a real server, and ``mav-tasks log`` beside it."""
 
-import csv
 import fcntl
 import json
 import os
@@ -10,7 +9,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +17,7 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.tasks.events import TaskModified, VehicleSeen
-from mav_tasks.tasks.task import TaskId, Terms
-from tests.kit.commands import Done, mav_tasks
+from mav_tasks.tasks.events import VehicleSeen
 from tests.kit.processes import (
     Process,
     Stand,
@@ -33,7 +29,6 @@ from tests.kit.processes import (
     wait_for,
     wait_until,
 )
-from tests.kit.terminal import terminal
 from tests.unit.store.samples import opened
 
 MOVE, STOP, CONTINUE = 54000, 54003, 193
@@ -184,17 +179,6 @@ def essence(entry: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in entry.items() if key in PLAIN}
 
 
-def test_the_table_of_a_store_that_no_server_has(full: Path) -> None:
-    rows = list(csv.DictReader(export("--store", str(full), "--csv")[1].splitlines()))
-    assert [row["number"] for row in rows] == [str(number) for number in range(1, 5_001)]
-    assert {(row["event"], row["vehicle"], row["task"]) for row in rows} == {
-        ("VehicleSeen", "1", "")
-    }
-    status, printed, told = export("--store", str(full), "--vehicle", "7")
-    assert (status, printed) == (0, "")  # nothing to print: it says where it has looked
-    assert told == f"mav-tasks: no such event in {full}\n"
-
-
 def lines_until(follower: "subprocess.Popen[bytes]", words: str) -> Iterator[str]:
     assert follower.stdout is not None
     for line in map(bytes.decode, follower.stdout):
@@ -217,92 +201,6 @@ def begun(path: Path, *options: str, **streams: Any) -> "subprocess.Popen[bytes]
     return subprocess.Popen(command, stderr=subprocess.PIPE, **streams)
 
 
-def test_only_a_terminal_gets_long_lines_wrapped_at_words(tmp_path: Path) -> None:
-    path = tmp_path / "t.sqlite3"
-    before, terms = Terms(), Terms(priority=9, label="north of the shed")
-    with opened(path) as store:
-        store.append([TaskModified(TaskId(3), 1, 2, terms, "client", 1.0, before)])
-    command = ("-m", "mav_tasks.cli", "log", "--store", str(path))
-    (line,) = export("--store", str(path))[1].splitlines()
-    words = "modified by client: priority 9 (was 5), label 'north of the shed'"
-    assert line.endswith(f"rover 1: task 3 {words}")
-    with terminal(*command, size=(24, 50)) as screen:
-        assert screen.end() == 0
-    first, *rest = screen.lines
-    assert len(rest) == 2
-    assert all(each.startswith("    ") for each in rest)
-    assert " ".join([first, *map(str.strip, rest)]) == line
-    with terminal(*command, "--json", size=(24, 50)) as screen:
-        assert screen.end() == 0
-    assert json.loads(screen.written)["before"]["priority"] == 5
-
-
-def test_one_change_of_several_properties_is_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "t.sqlite3"
-    terms = [Terms(), Terms(priority=9)]
-    terms += [replace(terms[-1], start_at=at) for at in (600.0, 601.0)]
-    terms += [replace(terms[-1], label=label) for label in ("to the n", "to the north")]
-    times = (0.0, 0.5, 1.0, 1.5, 1.6)  # and the fifth by somebody else; the sixth later
-    changes = [
-        TaskModified(TaskId(3), 1, 2, after, "client", at, before)
-        for at, before, after in zip(times, terms[:-1], terms[1:], strict=True)
-    ]
-    other = replace(terms[-1], label="x")
-    changes += [TaskModified(TaskId(3), 1, 2, other, "pilot", 1.7, terms[-1])]
-    changes += [TaskModified(TaskId(3), 1, 2, terms[-1], "pilot", 9.0, other)]
-    with opened(path) as store:
-        store.append(changes)
-    said = [
-        line.partition("modified by ")[2] for line in export("--store", str(path))[1].split("\n")
-    ]
-    assert said == [
-        "client: priority 9 (was 5), start in 599.5 s, start in 600 s, label 'to the north'",
-        "pilot: label 'x'",
-        "pilot: label 'to the north'",
-        "",
-    ]
-    assert len(export("--store", str(path), "--json")[1].splitlines()) == len(changes)
-
-
-@pytest.mark.parametrize("follow", [(), ("--follow",)])
-def test_who_has_read_enough_ends_it_quietly(full: Path, follow: tuple[str, ...]) -> None:
-    with begun(full, *follow, stdout=subprocess.PIPE) as it:
-        assert it.stdout is not None
-        assert it.stderr is not None
-        assert it.stdout.readline().endswith(b" rover 1: seen 0\n")
-        if follow:  # all of it, and then nobody waits for more
-            while b"seen 4999" not in it.stdout.readline():
-                pass
-        it.stdout.close()
-        assert it.wait(10) == 0
-        assert it.stderr.read() == b""
-
-
-def test_a_full_disk_is_told(full: Path) -> None:
-    with Path("/dev/full").open("wb") as sink, begun(full, stdout=sink) as it:
-        assert it.stderr is not None
-        assert it.stderr.read() == b"mav-tasks: standard output: No space left on device\n"
-        assert it.wait(10) == 2
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--store", "/nowhere/at.all"), "does not exist"),
-        (("--store", ":memory:"), "no journal"),
-        (("--json", "--csv"), "choose one"),
-        (("--since", "yesterday"), "--since yesterday"),
-        (("--task", "9" * 30), "not a valid id"),
-        (("--vehicle", "-" + "9" * 30), "not a valid id"),
-    ],
-)
-def test_what_cannot_be_printed_is_told_in_one_line(options: tuple[str, ...], words: str) -> None:
-    code, said, error = export(*options)
-    assert (code, said) == (2, "")
-    assert words in error
-    assert len(error.splitlines()) == 1
-
-
 @pytest.mark.parametrize("closed", [">&-", ">/dev/full 2>&-", ">/dev/full 2>/dev/full"])
 def test_a_server_serves_though_nobody_can_be_told(tmp_path: Path, closed: str) -> None:
     client_port, rover_port = free_udp_ports(2)
@@ -319,25 +217,3 @@ def test_a_server_serves_though_nobody_can_be_told(tmp_path: Path, closed: str) 
         finally:
             server.kill()
             server.wait(10)
-
-
-def log_of_nobody_in_particular(folder: Path, *options: str) -> Done:
-    """Run ``mav-tasks log`` as somebody whose files are all in a folder, and who names no store."""
-    own = str(folder)
-    return mav_tasks("log", *options, XDG_STATE_HOME=own, XDG_CONFIG_HOME=own, XDG_DATA_HOME=own)
-
-
-def test_the_log_is_that_of_the_server_that_was_started_last(tmp_path: Path) -> None:
-    nobody = log_of_nobody_in_particular(tmp_path)
-    assert (nobody.status, nobody.output) == (2, "")
-    with stand(tmp_path, serve_store=str(tmp_path / "of its own.sqlite3")) as running:
-        submit(running.connect(), MOVE, 0.2)
-        done = log_of_nobody_in_particular(tmp_path, "--task", "1")
-        assert (done.status, done.error) == (0, "")
-        assert "task 1" in done.lines[0]
-    again = log_of_nobody_in_particular(tmp_path, "--task", "1")
-    assert again.lines[0] == done.lines[0]
-    with stand(tmp_path):
-        none = log_of_nobody_in_particular(tmp_path)
-        assert none.status == 2
-        assert "keeps its tasks in memory" in none.error

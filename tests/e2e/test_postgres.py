@@ -17,7 +17,6 @@ from tests.kit.processes import (
     free_udp_ports,
     process,
     stand,
-    submit,
     wait_for,
     wait_until,
 )
@@ -99,48 +98,6 @@ def serving_again(running: Stand, folder: Path, url: str) -> Iterator[None]:
     with process(*serve, folder=folder, name="second") as server:
         server.wait_for("rover 1: found")
         yield
-
-
-def test_the_journal_and_the_history_are_read_and_no_password_is_shown(
-    tmp_path: Path, postgres: PostgresServer
-) -> None:
-    url = postgres.new_database()
-    typed = url.replace("postgres@", "postgres:top%20secret@")
-    state = {"XDG_STATE_HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path)}
-    with stand(tmp_path, serve_store=typed) as running:
-        running.server.wait_for(f"store {re.escape(url)}, 0 tasks")
-        assert submit(running.connect(), MOVE, 0.1) == 1
-        running.server.wait_for("task 1 .*completed")
-        server = f"udpout:127.0.0.1:{running.client_port}"
-        history = mav_tasks("history", server=server, folder=tmp_path)
-        assert history.lines[2].split()[:2] == ["1", "completed"], history
-        journal = mav_tasks("log", "--task", "1", "--store", typed, folder=tmp_path, **state)
-        assert (journal.status, journal.error) == (0, "")
-        assert "task 1" in journal.lines[0]
-        again = mav_tasks("log", "--task", "1", folder=tmp_path, **state)
-        assert again == journal  # the store of the latest server
-    texts = [running.server.text, journal.output, (tmp_path / "mav-tasks/latest-store").read_text()]
-    assert not any("secret" in text for text in texts)
-
-
-@pytest.mark.parametrize(
-    ("place", "words"),
-    [
-        ("postgresql://anna:top%20secret@nowhere.invalid/fleet", "check the host's name"),
-        ("postgresql://anna:top@secret@host/fleet", "write %40 for @"),
-        ("postgresql://127.0.0.1:1/fleet", "is the server running there?"),
-    ],
-)
-def test_a_database_that_cannot_be_used_is_told_in_one_line(
-    tmp_path: Path, place: str, words: str
-) -> None:
-    (port,) = free_udp_ports(1)
-    serve = ["serve", "--no-push", "--client", f"udpin:127.0.0.1:{port}", "--store", place]
-    for command in (serve, ["log", "--store", place]):
-        done = mav_tasks(*command, folder=tmp_path, XDG_STATE_HOME=str(tmp_path))
-        assert (done.status, len(done.error.splitlines())) == (2, 1), done
-        assert words in done.error
-        assert "secret" not in done.error
 
 
 def test_a_database_that_is_made_as_the_guide_says_serves(

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 import re
 import signal
 import subprocess
@@ -152,41 +151,6 @@ def test_what_cannot_be_done_is_said_in_one_line() -> None:
     assert_one_clear_line(run("probe", "pigeon:1"), "udpin:host:port")
     code, _, error = run("probe", url, "--timeout", "1")
     assert (code, error.splitlines()[-1]) == (3, "mav-tasks: no heartbeat from a rover within 1 s")
-
-
-def test_nothing_is_driven_where_nobody_could_say_yes() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "probe", "udpout:127.0.0.1:1", "--drive"],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=30,
-        env={**os.environ},
-        check=False,
-    )
-    assert_one_clear_line((done.returncode, done.stdout, done.stderr), "--yes")
-
-
-def test_a_rover_that_signs_is_probed_by_who_has_its_key(tmp_path: Path) -> None:
-    ring = tmp_path / "mav-tasks" / "keys.toml"
-    added = subprocess.run(
-        [sys.executable, "-m", "mav_tasks.cli", "keys", "add", "r1", "--role", "vehicle"],
-        env=environment_with(XDG_CONFIG_HOME=str(tmp_path)),
-        capture_output=True,
-        check=False,
-        text=True,
-    )
-    assert added.returncode == 0, added.stderr
-    with rover(tmp_path, "--sign", "r1", "--keys", str(ring)) as port:
-        with probe(tmp_path, port, "--sign", "r1", "--json") as signed:
-            out, err = signed.communicate(timeout=OVER)
-        # from elsewhere: to where it was heard signed the rover speaks for 10 s more
-        (elsewhere,) = free_udp_ports(1)
-        with probe(tmp_path, f"{port}?local={elsewhere}", "--timeout", "2") as unsigned:
-            _, nothing = unsigned.communicate(timeout=OVER)
-    assert signed.returncode == 0, err
-    assert json.loads(out)["autopilot"] == "ardupilot"
-    assert unsigned.returncode == 3, nothing
 
 
 @pytest.mark.slow

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mav_tasks import Move, Refused, SyncClient, TaskState
-from mav_tasks.client.values import TaskStatus
+from mav_tasks import Move, Refused, SyncClient, TaskStatus
 from tests.kit.commands import Done, called, mav_tasks
 from tests.kit.processes import Stand, free_udp_ports, process, stand, wait_until
 
@@ -18,7 +17,6 @@ WAY = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t0\t0\t0\t1
 1\t0\t2\t54000\t0.1\t0.5\t0\t0\t0\t0\t0\t1
 """
-CRON = "0 6 * * 1-5 Europe/Zurich"
 
 
 class Rover:
@@ -87,28 +85,6 @@ def test_a_server_killed_between_two_runs_drives_each_once(tmp_path: Path) -> No
             assert states(runs) == ["COMPLETED", "COMPLETED", "SCHEDULED"]
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(120)
-@pytest.mark.parametrize("when", ["before", "after"])
-def test_a_server_killed_as_it_stores_the_end_of_a_run_makes_the_next_one_once(
-    tmp_path: Path, when: str
-) -> None:
-    it = Rover(tmp_path)
-    with it.rover():
-        with it.server("first", "tests.kit.crashing", f"{when}:TaskChanged.COMPLETED") as client:
-            task = client.submit(Move(0.2), every=1000.0)
-        with it.server("second") as client:
-            runs = runs_of(client, task.id)
-            if when == "after":
-                assert states(runs) == ["COMPLETED", "SCHEDULED"]
-                assert runs[1].time_to_start == pytest.approx(985, abs=15)
-                return
-            assert states(runs) == ["HELD"]
-            client.release(task.id, "skip")
-            wait_until(lambda: len(runs_of(client, task.id)) == 2, within=5, what="the next run")
-            assert states(runs_of(client, task.id)) == ["CANCELLED", "SCHEDULED"]
-
-
 # commands
 
 
@@ -153,18 +129,6 @@ def test_a_series_is_submitted_looked_at_and_ended(server: str) -> None:
     assert (again.status, "does not repeat" in again.error) == (1, True)
 
 
-def test_a_mission_repeats_at_the_times_of_an_expression(server: str, tmp_path: Path) -> None:
-    plan = tmp_path / "round.waypoints"
-    plan.write_text(WAY, encoding="ascii")
-    done = called("mission", "upload", str(plan), "--every", CRON, "--json", server=server)
-    (task,) = done.objects
-    assert (task["every"], task["cron"], task["state"]) == (None, CRON, "scheduled")
-    changed = called("modify", str(task["id"]), "--every", "never", server=server)
-    assert changed.lines == [f"rover 1: task {task['id']} changed"]
-    (task,) = called("status", str(task["id"]), "--json", server=server).objects
-    assert (task["cron"], task["series"]) == (None, task["id"])
-
-
 def test_the_commands_of_the_guide_do_what_it_says(server: str, tmp_path: Path) -> None:
     (tmp_path / "round.waypoints").write_text(WAY, encoding="ascii")
 
@@ -184,31 +148,3 @@ def test_the_commands_of_the_guide_do_what_it_says(server: str, tmp_path: Path) 
     assert run("modify 12 --every never", mission).lines == [f"rover 1: task {mission} changed"]
     ended = run("cancel --series 12", patrol)
     assert ended.lines == [f"rover 1: task {patrol} cancelled, and its series"]
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--every", "5s"), "expected 10 s"),
-        (("--every", "soon"), "--every soon"),
-        (("--every", "61 * * * *"), "bad minute"),
-        (("--every", "0 6 * * * Mars/X"), "time zone"),
-        (("--every", CRON, "--at", "14:30"), "names the start times"),
-    ],
-)
-def test_what_is_no_repetition_is_a_usage_error(
-    server: str, options: tuple[str, ...], words: str
-) -> None:
-    done = called("submit", "move", "1", *options, server=server)
-    assert (done.status, done.output) == (2, "")
-    assert words in done.error
-    assert len(done.error.splitlines()) == 1
-
-
-def test_a_run_is_told_by_its_handle(server: str) -> None:
-    with SyncClient(server, component_id=98) as client:
-        task = client.submit(Move(0.2), every=60.0, delay=60.0)
-        assert task.refresh().state is TaskState.SCHEDULED
-        assert task.series == task.id
-        task.cancel(series=True)
-        assert client.queue().waiting_count == 0

@@ -7,13 +7,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from time import monotonic, time
+from time import monotonic
 from typing import Any
 
 import pytest
 
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.registry import TaskRegistry
 from tests.kit.databases import locked, tables
 from tests.kit.processes import (
     Stand,
@@ -25,8 +24,6 @@ from tests.kit.processes import (
     wait_for,
     wait_until,
 )
-from tests.unit.store.samples import finish, opened
-from tests.unit.tasks.samples import draft
 
 HOLD = 4
 MOVE, STOP, CONTINUE, MODIFY = 54000, 54003, 193, 54012
@@ -223,29 +220,3 @@ def test_a_store_in_use_is_refused_and_its_owner_named(serving: Stand, place: st
     said = refusal(place)
     assert place in said
     assert f"pid {serving.server.popen.pid}" in said
-
-
-@pytest.mark.parametrize("content", [b"not a database at all, but long enough to be one" * 40])
-def test_a_damaged_store_is_refused_in_one_line(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
-    assert str(path) in refusal(str(path))
-    assert path.read_bytes() == content
-
-
-@pytest.mark.parametrize(
-    ("option", "kept"), [(("--keep-tasks", "2"), 2), (("--keep-days", "0"), 0)]
-)
-def test_as_much_of_what_is_over_is_kept_as_the_operator_says(
-    tmp_path: Path, place: str, option: tuple[str, str], kept: int
-) -> None:
-    registry = TaskRegistry()
-    for number in range(1, 7):
-        registry.submit(draft(), now=1.0)
-        if number < 6:
-            finish(registry, number, now=1.0)
-    with opened(place, offset=time() - monotonic()) as store:
-        store.append(registry.take_events())
-    with stand(tmp_path, "--store", place, *option) as it:
-        wait_until(lambda: len(stored(place)) == kept + 1, within=10, what="the rest forgotten")
-        it.connect()
-    assert stored(place) == [*range(6 - kept, 6), 6]

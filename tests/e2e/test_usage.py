@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.kit.commands import called
 from tests.kit.processes import environment_with, free_tcp_ports, free_udp_ports, process
 
 
@@ -43,35 +44,27 @@ def test_a_port_in_use_is_named() -> None:
         )
 
 
-@pytest.mark.parametrize(
-    ("url", "word"),
-    [
-        ("carrier-pigeon:127.0.0.1:1", "udpin:host:port"),
-        ("udpin:127.0.0.1", "host:port"),
-        ("udpin:127.0.0.1:99999", "65535"),
-        ("udpin::14560", "host:port"),
-        ("tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
-        ("serial:/dev/null:57600", "not a serial device"),
-        ("udpin:no.such.host.invalid:14560", "no.such.host.invalid"),
-        ("", "udpin:host:port"),
-    ],
-)
-@pytest.mark.parametrize("option", ["--client", "--vehicle"])
-def test_a_link_that_says_nothing_is_named(option: str, url: str, word: str) -> None:
-    assert_one_clear_line(run("serve", "--no-push", option, url), word)
-
-
-@pytest.mark.parametrize(
-    "option",
-    [
-        ("--client", "udpin:0.0.0.0:14560"),
-        ("--vehicle", "udpout:192.0.2.1:14580"),
-        ("--push", "192.0.2.1:14550"),
-        ("--vehicle", "tcp:192.0.2.1:5760"),
-    ],
-)
-def test_a_link_beyond_this_machine_needs_a_key(option: tuple[str, str]) -> None:
-    assert_one_clear_line(run("serve", *option), "--insecure", "signing key")
+def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
+    """That of URLs is in tests/unit/links."""
+    ring = tmp_path / "keys.toml"
+    for command in (("add", "ben", "--role", "safety"), ("revoke", "ben"), ("add", "anna")):
+        role = ("--role", "safety") if command == ("add", "anna") else ()
+        assert called("keys", *command, *role, "--keys", str(ring)).status == 0
+    near = "udpin:127.0.0.1:1"
+    for option, url, *words in (
+        ("--client", "", "udpin:host:port"),
+        ("--vehicle", "tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
+        ("--client", "serial:/dev/null:57600", "not a serial device"),
+        ("--client", "udpin:0.0.0.0:14560", "--insecure", "signing key"),
+        ("--vehicle", "udpout:192.0.2.1:14580", "--insecure", "signing key"),
+        ("--push", "192.0.2.1:14550", "--insecure", "signing key"),
+        ("--vehicle", f"{near}?key=carl", "no key 'carl' (usable keys: anna)"),
+        ("--client", f"{near}?key=ben", "key ben was revoked on"),
+        ("--vehicle", f"{near}?key=anna", "key anna has role safety"),
+    ):
+        keys = ("--set", f"signing.keys={ring}") if "?key" in url else ()
+        push = () if option == "--push" else ("--no-push",)
+        assert_one_clear_line(run("serve", *push, option, url, *keys), *words)
 
 
 def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:
@@ -85,13 +78,6 @@ def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:
         server.wait_for(f"clients on udpin:0.0.0.0:{port}")
         server.end()
     assert server.popen.returncode == 0
-
-
-def test_a_tcp_port_in_use_is_named() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        result = run("serve", "--client", f"tcpin:127.0.0.1:{port}", "--no-push")
-        assert_one_clear_line(result, f"127.0.0.1:{port}", "in use")
 
 
 def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
@@ -121,62 +107,10 @@ def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
     )  # once for each, however often it was tried
 
 
-def test_a_store_in_use_is_named_with_its_process(tmp_path: Path) -> None:
-    path = tmp_path / "tasks.sqlite3"
-    first, second, rover = free_udp_ports(3)
-    options = ("serve", "--no-push", "--store", str(path), "--vehicle", f"udpout:127.0.0.1:{rover}")
-    with process(
-        *("-m", "mav_tasks.cli", *options, "--client", f"udpin:127.0.0.1:{first}"),
-        folder=tmp_path,
-        name="server",
-    ) as server:
-        server.wait_for(re.escape(f"store {path}, 0 tasks"))
-        result = run(*options, "--client", f"udpin:127.0.0.1:{second}")
-        assert_one_clear_line(result, str(path), "in use", str(server.popen.pid))
-        server.end()
-    assert server.popen.returncode == 0
-
-
 def test_a_store_without_a_name_is_refused() -> None:
     (port,) = free_udp_ports(1)
     client = ("--client", f"udpin:127.0.0.1:{port}")
     assert_one_clear_line(run("serve", "--no-push", *client, "--store", ""), "--store", ":memory:")
-
-
-def test_who_arms_must_be_known() -> None:
-    assert_one_clear_line(run("serve", "--arming", "anybody"), "anybody", "operator")
-
-
-def test_a_missing_pybullet_that_is_asked_for_is_named(tmp_path: Path) -> None:
-    (tmp_path / "pybullet.py").write_text("raise ImportError('not here')\n", encoding="utf-8")
-    bullet = ("--port", "0", "--body", "bullet")
-    result = run("sim", *bullet, environment={"PYTHONPATH": str(tmp_path)})
-    assert_one_clear_line(result, "pip install pybullet numpy", "--body kinematic")
-
-
-def test_help_names_the_commands() -> None:
-    code, output, _ = run("--help")
-    assert code == 0
-    assert "serve" in output
-    assert "sim" in output
-
-
-def test_the_rovers_own_help_is_shown() -> None:
-    code, output, _ = run("sim", "--help")
-    assert code == 0
-    assert "--count" in output
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("log", "--store", "~nosuchuser/x"),
-        ("web", "--records", "~nosuchuser/x"),
-        ("web", "--tiles", "~nosuchuser/x"),
-    ],
-)
-def test_the_home_of_nobody_is_named(words: tuple[str, ...]) -> None:
-    assert_one_clear_line(run(*words), "~nosuchuser/x")
 
 
 @pytest.mark.parametrize("words", [("--sign", "anna", "queue"), ("submit", "--sign", "anna")])
@@ -184,15 +118,6 @@ def test_an_option_before_the_command_is_told_where_it_goes(words: tuple[str, ..
     code, _, error = run(*words)
     assert code == 2
     assert "--sign stands before the command" in error
-
-
-@pytest.mark.parametrize("words", [("probe",), ("queue", "--server")])
-def test_a_missing_device_is_named(words: tuple[str, ...]) -> None:
-    code, _, error = run(*words, "serial:/dev/ttyUSB99:57600", "--timeout", "1")
-    assert code == 3
-    assert "/dev/ttyUSB99" in error
-    assert "No such file" in error
-    assert "--sign" not in error
 
 
 def test_the_doctor_says_what_is_wrong_and_what_helps(tmp_path: Path) -> None:

@@ -1,8 +1,6 @@
 """Who uses the page is a client of the server, with a key; test_rights.py compares the answers."""
 
 import json
-import signal
-import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -12,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from mav_tasks import Key, Refused, SyncClient, Wait
+from mav_tasks import Key, SyncClient, Wait
 from tests.kit.commands import called
-from tests.kit.processes import Stand, free_udp_ports, process, stand, wait_until
+from tests.kit.processes import Stand, process, stand, wait_until
 from tests.kit.web import Web, add_key, has_rover, ring_of, web
 
 pytestmark = pytest.mark.slow
@@ -69,19 +67,6 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
             for name, token in tokens.items()
         }
         yield Rig(folder, it, page, tokens, clients)
-
-
-def test_the_quota_of_a_role_holds_for_the_page_and_mavlink_together(rig: Rig) -> None:
-    assert [rig.submit("sam").status_code for _ in range(2)] == [201, 201]
-    with SyncClient(f"udpout:127.0.0.1:{rig.stand.client_port}", key=rig.key("sam")) as script:
-        script.submit(Wait(5), delay=LATER)
-        refused = rig.submit("sam")
-        words = "role submitter may have at most 3 waiting tasks"
-        assert (refused.status_code, refused.json()["reason"]) == (409, "quota")
-        assert refused.json()["detail"] == words
-        with pytest.raises(Refused, match=words):
-            script.submit(Wait(5), delay=LATER)
-    rig.http("sue", "POST", "/stop", {"clear": True})
 
 
 def test_the_server_knows_who_submitted_and_who_stopped(rig: Rig) -> None:
@@ -169,13 +154,6 @@ def test_a_proxy_on_this_machine_lets_nobody_in(name: str, open_page: Web) -> No
     assert open_page.client.get("/", headers=headers).status_code == 200  # where to log in
 
 
-def test_an_old_form_of_http_that_proxies_speak_lets_nobody_in(open_page: Web) -> None:
-    port = int(open_page.url.rpartition(":")[2])
-    with socket.create_connection(("127.0.0.1", port), 10) as proxy:
-        proxy.sendall(f"GET /api/v1/session HTTP/1.0\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
-        assert b" 401 " in proxy.recv(100)
-
-
 def test_the_first_key_closes_an_open_page(rig: Rig, tmp_path: Path) -> None:
     with web(tmp_path, rig.stand, name="closing") as page:
         with page.client.stream("GET", "/api/v1/events") as stream:
@@ -214,52 +192,3 @@ def test_a_page_that_needs_a_key_says_how_to_make_one(
         assert it.popen.wait(20) == 2
     assert words in it.text
     assert len(it.text.splitlines()) == 1
-
-
-def test_a_link_for_one_client_carries_no_other_user(tmp_path: Path) -> None:
-    token = add_key(tmp_path, "sam", "submitter")
-    (port,) = free_udp_ports(1)
-    command = ("-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", "")
-    link = f"udpin:127.0.0.1:{port}"
-    with process(*command, "--server", link, folder=tmp_path, name="single") as it:
-        url = it.wait_for(r"web page: (http://\S+)/\n")[1]
-        bearer = {"authorization": f"Bearer {token}"}
-        path = f"{url}/api/v1/vehicles/1/resume"
-        refused = httpx.post(path, json={"epoch": 1}, headers=bearer)
-        assert refused.status_code == 409
-        assert f"only one client can use {link}, and it signs with key none" in refused.text
-
-
-def test_tokens_of_an_older_version_are_named(tmp_path: Path) -> None:
-    old = ring_of(tmp_path).with_name("web-tokens.json")
-    old.parent.mkdir()
-    old.write_text("{}", encoding="utf-8")
-    command = ("-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", "")
-    with process(*command, folder=tmp_path, name="old") as it:
-        it.wait_for("web page: ")
-        assert f"{old} is not used any more: mav-tasks keys add NAME" in it.text
-
-
-def test_an_owner_is_known_by_the_server_and_its_store(tmp_path: Path) -> None:
-    """A server with another store has another task of the same id: it is not the submitter's."""
-    tokens = {name: add_key(tmp_path, name, ROLES[name]) for name in ("sam", "otto")}
-    with stand(tmp_path) as it, web(tmp_path, it) as page:
-        page.client.headers["authorization"] = f"Bearer {tokens['sam']}"
-        has_rover(page)
-        goals = {"goals": [{"kind": "wait", "duration": 5}], "delay": LATER}
-        own = page.post("/vehicles/1/tasks", goals)["id"]
-        it.server.end(signal.SIGKILL)
-        serve = ("-m", "mav_tasks.cli", "serve", "--no-push", "--store", str(tmp_path / "new"))
-        links = ("--client", f"udpin:127.0.0.1:{it.client_port}")
-        rover = ("--vehicle", f"udpout:127.0.0.1:{it.rover_port}")
-        with process(*serve, *links, *rover, folder=tmp_path, name="again") as again:
-            again.wait_for("rover 1: found")
-            key = Key("otto", bytes.fromhex(tokens["otto"]))
-            with SyncClient(f"udpout:127.0.0.1:{it.client_port}", key=key) as otto:
-                assert otto.submit(Wait(5), delay=LATER).id == own
-            refused = page.send("POST", f"/tasks/{own}/cancel", {})
-            assert refused.status_code == 403
-            assert "belongs to 244/190" in refused.json()["detail"]
-            assert page.task(own)["state"] == "scheduled"
-            other = page.post("/vehicles/1/tasks", goals)["id"]  # its connection goes on
-            assert page.send("POST", f"/tasks/{other}/cancel", {}).status_code == 204

@@ -33,8 +33,6 @@ pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(120)]
 
 PASSPHRASE = "rovers-drive-home"
 TASK_MOVE = 54000
-DO_SET_MODE, ARM = 176, 400
-HOLD = 4  # ArduPilot's
 HEARTBEAT, SETPOINT, COMMAND = 0, 84, 76
 RADIO_STATUS = 109
 SILENCE = 1.5  # s, in which an answer would have come
@@ -178,35 +176,8 @@ def test_another_key_is_not_answered(connect: Callable[..., Signing]) -> None:
     assert client.unsigned == 0
 
 
-def test_nor_is_who_does_not_sign(running: Stand) -> None:
-    link = mavutil.mavlink_connection(f"udpout:127.0.0.1:{running.client_port}", source_system=255)
-    link.mav.heartbeat_send(6, 8, 0, 0, 4)
-    link.mav.command_long_send(1, 191, TASK_MOVE, 0, 1.0, 0, 0, 0, 0, 0, 0)
-    assert link.recv_match(blocking=True, timeout=SILENCE) is None
-    link.close()
-
-
 def stamp(seconds_ago: float) -> int:
     return int((time.time() - seconds_ago - 1_420_070_400) * 100_000)
-
-
-@pytest.mark.parametrize(
-    ("seconds_ago", "is_taken"), [(30.0, True), (3600.0, False), (-30.0, True), (-3600.0, False)]
-)
-def test_a_clock_may_be_a_minute_behind_or_ahead(
-    connect: Callable[..., Signing],
-    secrets: dict[str, bytes],
-    seconds_ago: float,
-    *,
-    is_taken: bool,
-) -> None:
-    link_id = 100 + int(seconds_ago) % 100
-    client = connect(secrets["py"], link_id=link_id, stamp=stamp(seconds_ago))
-    if is_taken:
-        client.hello()
-        assert client.counts[1] == 0, "answered in its own time"
-    client.link.mav.heartbeat_send(6, 8, 0, 0, 4)
-    assert client.is_answered(0.1) is is_taken
 
 
 @contextmanager
@@ -267,115 +238,3 @@ def test_mavproxy_with_its_passphrase(running: Stand, folder: Path) -> None:
         it.wait_for("Detected vehicle 1:1")
         it.ask("long 54000 0.1 0 0 0 0 0 5", r"COMMAND_ACK \{command : 54000, result : 0")
         it.wait_for(r"AP: Task \d+ done", within=20)
-
-
-def test_mavproxy_with_its_file_of_passphrases(running: Stand, folder: Path) -> None:
-    own = folder / "again"
-    own.mkdir()
-    keys = own / "mavproxy" / ".mavproxy"
-
-    def give_keys() -> None:
-        keys.mkdir(parents=True)
-        entry = f"udpout:127.0.0.1:{running.client_port} {PASSPHRASE}\n"
-        (keys / "signing.keys").write_text(entry, encoding="utf-8")
-
-    with mavproxy(running.client_port, own, "--target-system", "1", prepare=give_keys) as it:
-        it.wait_for("Detected vehicle 1:1")
-        it.ask("long 54000 0.1 0 0 0 0 0 5", r"COMMAND_ACK \{command : 54000, result : 0")
-
-
-class PymavlinkRover:
-    """An ArduPilot rover of few words, signed by pymavlink. It takes its mode as it is told.
-
-    It keeps what the server sends to it, and what it did not believe of that.
-    """
-
-    def __init__(self, port: int, secret: bytes) -> None:
-        self.link = mavutil.mavlink_connection(
-            f"udpin:127.0.0.1:{port}", source_system=1, source_component=1
-        )
-        self.unsigned: list[int] = []
-
-        def refuse(_mav: Any, message_id: int) -> bool:
-            self.unsigned.append(message_id)
-            return False
-
-        self.link.setup_signing(secret, sign_outgoing=True, allow_unsigned_callback=refuse)
-        self.began = time.monotonic()
-        self.heard: list[Any] = []
-        self.mode, self.armed = HOLD, False
-
-    def live(self, seconds: float, *, until: Callable[[], object] = lambda: False) -> None:
-        """Be a rover for a while."""
-        end = time.monotonic() + seconds
-        beat = show = 0.0
-        while time.monotonic() < end and not until():
-            now = time.monotonic()
-            boot = int((now - self.began) * 1000)
-            if now >= beat:
-                beat = now + 0.5
-                flags = 1 | (128 if self.armed else 0)
-                self.link.mav.heartbeat_send(10, 3, flags, self.mode, 4 if self.armed else 3)
-            if now >= show:
-                show = now + 0.05
-                self.link.mav.local_position_ned_send(boot, 0, 0, 0, 0, 0, 0)
-                self.link.mav.attitude_send(boot, 0, 0, 0, 0, 0, 0)
-            message = self.link.recv_match(blocking=True, timeout=0.01)
-            if message is None:
-                continue
-            self.heard.append(message)
-            if message.get_type() == "COMMAND_LONG":
-                if message.command == DO_SET_MODE:
-                    self.mode, beat = int(message.param2), 0.0
-                elif message.command == ARM:
-                    self.armed, beat = message.param1 == 1.0, 0.0
-                self.link.mav.command_ack_send(
-                    message.command, 0, 0, 0, message.get_srcSystem(), message.get_srcComponent()
-                )
-
-    def setpoints(self) -> list[Any]:
-        """Return the setpoints that it believed."""
-        kinds = ("SET_POSITION_TARGET_LOCAL_NED",)
-        return [each for each in self.heard if each.get_type() in kinds]
-
-
-def test_a_pymavlink_rover_believes_every_setpoint(tmp_path: Path) -> None:
-    ring, secrets = made_ring(tmp_path)
-    port, rover_port = free_udp_ports(2)
-    rover = PymavlinkRover(rover_port, secrets["r1"])
-    serve = ["-m", "mav_tasks.cli", "serve", "--no-push", "--store", ":memory:"]
-    serve += ["--client", f"udpin:127.0.0.1:{port}", "--keys", str(ring)]
-    serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}?key=r1"]
-    with process(*serve, folder=tmp_path, name="server") as server:
-        server.wait_for("signed only, key r1, waiting for the first heartbeat")
-        rover.live(15, until=lambda: "rover 1: found" in server.text)
-        rover.live(2)
-        client = mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=255)
-        client.mav.heartbeat_send(6, 8, 0, 0, 4)
-        client.mav.command_long_send(1, 191, TASK_MOVE, 0, 2.0, 0, 0, 0, 0, 0, 5)
-        rover.live(10, until=lambda: any(abs(each.vx) > 0.1 for each in rover.setpoints()))
-        server.end()
-        rover.live(0.3)
-        client.close()
-    assert any(abs(each.vx) > 0.1 for each in rover.setpoints()), server.text
-    assert rover.setpoints()[-1].vx == 0.0, "zero at the end, signed as well"
-    assert any(each.get_type() == "HEARTBEAT" for each in rover.heard)
-    signing = rover.link.mav.signing
-    assert signing.goodsig_count >= len(rover.heard) > 20
-    assert (signing.badsig_count, rover.unsigned) == (0, [])
-    rover.link.close()
-
-
-def test_a_rover_without_the_key_is_nobody(tmp_path: Path) -> None:
-    ring, _ = made_ring(tmp_path)
-    port, rover_port = free_udp_ports(2)
-    serve = ["-m", "mav_tasks.cli", "serve", "--no-push", "--store", ":memory:"]
-    serve += ["--client", f"udpin:127.0.0.1:{port}", "--keys", str(ring)]
-    serve += ["--vehicle", f"udpout:127.0.0.1:{rover_port}?key=r1"]
-    rover = PymavlinkRover(rover_port, b"w" * 32)
-    with process(*serve, folder=tmp_path, name="server") as server:
-        server.wait_for("signed only, key r1, waiting")
-        rover.live(4)
-        assert "found" not in server.text
-        server.end()
-    rover.link.close()

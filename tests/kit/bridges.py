@@ -12,7 +12,6 @@ from time import monotonic
 from typing import Protocol
 
 from tests.kit.lines import Device
-from tests.kit.processes import free_tcp_ports
 
 LOOPBACK = "127.0.0.1"
 TICK = 0.05  # s between two checks for a changed far end
@@ -73,36 +72,6 @@ class TcpFar:
         """Listen again."""
         self._listening = socket.create_server((LOOPBACK, self._port))
         self._port = self._listening.getsockname()[1]
-
-
-class DiallingFar:
-    """Dials the server, like a rover with its own modem."""
-
-    def __init__(self) -> None:
-        (self._port,) = free_tcp_ports(1)
-        self._socket: socket.socket | None = None
-
-    @property
-    def url(self) -> str:
-        """The URL at which the server listens."""
-        return f"tcpin:{LOOPBACK}:{self._port}"
-
-    def descriptor(self) -> int | None:
-        """Return the connection, and dial if there is none."""
-        if self._socket is None:
-            with suppress(OSError):
-                self._socket = socket.create_connection((LOOPBACK, self._port), 1.0)
-                self._socket.setblocking(False)
-        return None if self._socket is None else self._socket.fileno()
-
-    def cut(self) -> None:
-        """Close the connection."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
-
-    def mend(self) -> None:
-        """Do nothing: the next ``descriptor`` dials again."""
 
 
 class SerialFar:

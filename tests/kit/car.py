@@ -1,16 +1,8 @@
-"""A body with car-like steering, and a rover with this body that follows tasks' demands."""
+"""A body with car-like steering."""
 
-from collections import deque
-from dataclasses import replace
 from math import cos, exp, sin
 
-from mav_tasks.settings import Turning
-from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, wrap
-from mav_tasks.tasks.task import Frame
-from mav_tasks.tasks.task import Pose as TaskPose
-from mav_tasks.tasks.view import Demand, DemandKind, VehicleView
 from rover_sim.body import BodyState, Pose, wrap_angle
-from tests.unit.tasks.samples import idle_vehicle, ours
 
 
 class Car:
@@ -58,10 +50,6 @@ class Car:
             self._step(seconds)
             left -= seconds
 
-    def shift(self, *, east: float) -> None:
-        """Move the body east by metres."""
-        self._pose = replace(self._pose, east=self._pose.east + east)
-
     def close(self) -> None:
         """Do nothing: the body holds no resources."""
 
@@ -84,74 +72,3 @@ class Car:
             wrap_angle(self._pose.yaw + turned),
         )
         self._time += seconds
-
-
-class CarRover:
-    """A car driven by yaw rate or, if it does not honour one, by course like PX4's."""
-
-    STANDS = 0.01  # m/s
-    YAW_GAIN = 2.0  # 1/s, yaw rate per heading error, if driven by course
-
-    def __init__(
-        self,
-        pose: TaskPose,
-        *,
-        radius: float,
-        share: float = 1.0,
-        honours_yaw_rate: bool = True,
-        frame: Frame | None = None,
-    ) -> None:
-        self.body = Car(Pose(pose.north, pose.east, pose.yaw), radius=radius, share=share)
-        self.frame = frame
-        self.is_ours = False
-        self.known_radius = radius
-        self._turning = Turning.STEERED
-        self._honours_yaw_rate = honours_yaw_rate
-        self.overspeed = 1.0  # times the demanded speed
-        #: latest measurements, oldest first; the server sees the oldest
-        self.measured: deque[Motion] = deque(maxlen=1)
-
-    @property
-    def pose(self) -> TaskPose:
-        """True pose."""
-        state = self.body.state
-        return TaskPose(state.north, state.east, state.yaw)
-
-    def turns_on_spot(self) -> None:
-        """Make the server believe that the rover turns on the spot."""
-        self._turning = Turning.ON_SPOT
-
-    def view(self, now: float) -> VehicleView:
-        """Return the server's view of the rover."""
-        made = ours if self.is_ours else idle_vehicle
-        state = self.body.state
-        self.measured.append(Motion(self.pose, state.forward_speed, 0.0, state.yaw_rate, now))
-        return replace(
-            made(at=now),
-            motion=self.measured[0],
-            still=abs(state.forward_speed) < self.STANDS,
-            frame=self.frame,
-            honours_yaw_rate=self._honours_yaw_rate,
-            turning=self._turning,
-            turning_radius=self.known_radius,
-        )
-
-    def follow(self, demand: Demand, *, seconds: float) -> None:
-        """Follow a demand for ``seconds``."""
-        if demand.kind in (DemandKind.TAKE, DemandKind.DRIVE):
-            self.is_ours = True
-        elif demand.kind in (DemandKind.HAND_BACK, DemandKind.STOP, DemandKind.HALT):
-            self.is_ours = False
-        velocity = demand.velocity if self.is_ours else ZERO
-        self.body.drive(self.overspeed * velocity.forward, self._rate_of(velocity))
-        self.body.advance(seconds)
-
-    def _rate_of(self, velocity: Velocity) -> float:
-        if self._honours_yaw_rate:
-            assert velocity.course is None
-            return velocity.yaw_rate
-        assert velocity.forward >= 0.0
-        assert velocity.yaw_rate == 0.0
-        if velocity.course is None:
-            return 0.0
-        return self.YAW_GAIN * wrap(velocity.course - self.pose.yaw)

@@ -3,12 +3,9 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from errno import EIO
 from pathlib import Path
 from typing import Any
 
-from mav_tasks.store.database import Database
-from mav_tasks.store.event_database import EventDatabase
 from tests.kit.postgres import connected
 
 
@@ -33,24 +30,6 @@ def locked(place: str) -> Iterator[Any]:
         if not is_file(place):
             connection.execute("LOCK TABLE writer IN ACCESS EXCLUSIVE MODE")
         yield connection
-
-
-def database_of(place: str) -> type[EventDatabase]:
-    """Return the class of a store's database."""
-    if is_file(place):
-        return Database
-    from mav_tasks.store.postgres.database import PostgresDatabase
-
-    return PostgresDatabase
-
-
-def disk_error(place: str) -> Exception:
-    """Return what a database raises whose disk fails."""
-    if is_file(place):
-        return OSError(EIO, "Input/output error")
-    from mav_tasks.store.postgres.failures import PostgresError
-
-    return PostgresError("could not write to file", sqlstate="58030")
 
 
 def newer(place: str) -> None:

@@ -18,7 +18,7 @@ from math import hypot, remainder, tau
 from rover_sim.body import BodyState
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
-from tests.kit.soak.words import Kind, Word
+from tests.kit.words import Kind, Word
 
 ACCEPTED, IN_PROGRESS = 0, 5  # MAV_RESULT
 STOPS_WITHIN = 2.5  # s, from 1 m/s, with repeated requests over a net that loses a fifth
@@ -91,8 +91,11 @@ class _Go:
 class Halts:
     """Judges one rover."""
 
-    def __init__(self, vehicle: Vehicle, system_id: int) -> None:
+    def __init__(
+        self, vehicle: Vehicle, system_id: int, *, stops_within: float = STOPS_WITHIN
+    ) -> None:
         self.system_id = system_id
+        self._stops_within = stops_within
         self._vehicle = vehicle
         self._halt: _Halt | None = None
         self._suspended: _Halt | None = None  # a request that may still be refused ended it
@@ -103,6 +106,7 @@ class Halts:
         self._mode_sent_at = -1e9  # when a mode request of the server reached the rover
         self._passed: dict[int, float] = {}  # when clients' commands reached the rover
         self._pauses = True  # of the last halt
+        self._wished_at = -1e9  # when the server read the latest submission
         self._is_by_itself = False  # in a mode of its own, which the server did not request
         self.halted: Counter[str] = Counter()  # by name
         self.refused: Counter[str] = Counter()  # go requests
@@ -111,6 +115,11 @@ class Halts:
 
     def __repr__(self) -> str:
         return f"Halts({self.system_id}, {self._halt})"
+
+    @property
+    def in_force(self) -> str:
+        """The name of the halt that holds the rover, "" for none."""
+        return "" if self._halt is None else self._halt.name
 
     # inputs
 
@@ -156,6 +165,7 @@ class Halts:
         elif word.kind in (Kind.GO, Kind.MOTION):
             self._read_go(word, now=now)
         elif word.kind is Kind.WISH:
+            self._wished_at = now
             self._read_wish(word)
 
     def answered(self, peer: str, command: int, result: int, *, now: float) -> None:
@@ -189,10 +199,10 @@ class Halts:
             return
         moved = hypot(truth.north - halt.pose.north, truth.east - halt.pose.east)
         turned = abs(remainder(truth.yaw - halt.pose.yaw, tau))
-        if now - halt.at <= STOPS_WITHIN:
+        if now - halt.at <= self._stops_within:
             speed = hypot(halt.pose.forward_speed, halt.pose.lateral_speed)
-            far = moved > speed * STOPS_WITHIN + SLACK
-            far |= turned > abs(halt.pose.yaw_rate) * STOPS_WITHIN + SLACK_ANGLE
+            far = moved > speed * self._stops_within + SLACK
+            far |= turned > abs(halt.pose.yaw_rate) * self._stops_within + SLACK_ANGLE
         elif not halt.has_stood:
             halt.has_stood, halt.pose, far = True, truth, False
         else:
@@ -215,6 +225,8 @@ class Halts:
         for go in self._gos:
             if go.read_at >= read_at and not self._ends(go.word, halt):
                 halt.note_older(go.word, now=now)
+        if not halt.pauses and self._wished_at >= read_at:
+            return  # it came after the HOLD of a rover without tasks, which pauses none
         if not newer:
             self._halt = halt
         elif not any(go.granted for go in newer):

@@ -121,6 +121,7 @@ class Observer:
     #: for tests that stop the server's clock
     expects_gaps: bool = False
     longest_gap: float = FRESH  # s without set-points, after which motion may go on
+    brakes_first: bool = False  # a car, which rolls on in HOLD: a STOP brakes it by setpoints first
     expects_late_modes: bool = False  # from before a halt: zeros go with the HOLD that undoes them
     #: for worlds with several inputs per step, whose order is unknown
     batches: bool = False
@@ -302,7 +303,7 @@ class Observer:
 
     @property
     def _due_at_stop(self) -> set[str]:
-        return {"zero"} if self._is_met else {"zero", "HOLD"}
+        return {"zero"} if self._is_met or self.brakes_first else {"zero", "HOLD"}
 
     # queries
 

@@ -35,9 +35,12 @@ _PARAMS = [
     pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}")
     for make, face, loss in CASES
 ]
-each_case = pytest.mark.parametrize(("persona", "face", "loss"), _PARAMS)
 #: of tests of half a minute
 some_cases = pytest.mark.parametrize(("persona", "face", "loss"), some(_PARAMS, 1, 2))
+#: where blocking calls show the same as awaited ones
+some_makes = pytest.mark.parametrize(
+    ("persona", "loss"), [("ardupilot", 0.0), ("px4", 0.0), ("generic", LOSS)]
+)
 a_net = pytest.mark.parametrize("loss", some([*NETS], -1), ids=NETS.get)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from select import POLLIN, poll
 from typing import ClassVar
 
+from mav_tasks.settings import Retention
 from mav_tasks.store import HaltsKept, Kept, MemoryStore, NotKept, Outcome
 from mav_tasks.store.halt_record import word_of
 from mav_tasks.store.sqlite import SqliteStore
@@ -18,9 +19,15 @@ class PromptSqliteStore(SqliteStore):
     #: closed after each test: many worlds would use up the process's files
     opened: ClassVar[list["PromptSqliteStore"]] = []
 
-    def __init__(self, path: Path, *, wall_offset: float | Callable[[], float]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        wall_offset: float | Callable[[], float],
+        keep: Retention | None = None,
+    ) -> None:
         offset = wall_offset if callable(wall_offset) else lambda: wall_offset
-        super().__init__(path, wall_offset=offset)
+        super().__init__(path, wall_offset=offset, retention=keep)
         self.events: list[Event] = []
         self._kept = 0
         self.opened.append(self)

@@ -1,6 +1,7 @@
 """A running web process beside a server and a rover, and a client of its API."""
 
 import json
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import Any
 
 import httpx
 
+from mav_tasks import Key
 from tests.kit.commands import called
 from tests.kit.processes import Process, Stand, process, wait_until
 
@@ -105,6 +107,12 @@ def add_key(folder: Path, name: str, role: str) -> str:
     done = called("keys", "add", name, "--role", role, "--keys", str(ring))
     assert done.status == 0, done.error
     return done.output.strip()
+
+
+def key_in(ring: Path, name: str) -> Key:
+    """Return a key of a ring."""
+    entry = tomllib.loads(ring.read_text(encoding="utf-8"))["keys"][name]
+    return Key(name, bytes.fromhex(entry["secret"]), entry["role"])
 
 
 def ring_of(folder: Path) -> Path:

@@ -464,6 +464,8 @@ class ObservedNet(MemoryNet):
         self._sent_at: dict[bytes, float] = {}  # rovers' motion reports, newest last
         #: whether rovers receive heartbeat requests; else they send heartbeats at 1 Hz only
         self.shows_on_request = True
+        #: links that a busy server does not read now, with what has arrived there
+        self.unread_links: dict[str, list[tuple[MemoryLink, str, bytes, float]]] = {}
         #: pairs of links between which nothing passes, in either direction
         self.cut: set[frozenset[str]] = set()
         #: returns whether to lose (source, target, datagram)
@@ -495,13 +497,24 @@ class ObservedNet(MemoryNet):
         if link.name in self.observers:
             self.observers[link.name].arrived(self.now, data)
             self.on_arrival(link.name, source, data)
+        elif link.name in self.unread_links:
+            self.unread_links[link.name].append((link, source, data, self.now))
+            return
         elif link.name in self.to_vehicles or link.name in self.to_clients:
             self._unread.append((link.name, source, data))
         super().arrive(link, source, data)
 
+    def read_again(self, name: str) -> None:
+        """Let the server read a link again, with the times at which its packets arrived."""
+        for link, source, data, at in self.unread_links.pop(name, []):
+            self._unread.append((name, source, data))
+            link.arrived.append((source, data))
+            link.times.append(at)
+
     def forget_unread(self) -> None:
         """Forget packets that waited at the server."""
         self._unread.clear()
+        self.unread_links.clear()
 
     def deliver(self) -> None:
         """Deliver, and show packets that the server reads; none while it is away."""

@@ -4,11 +4,11 @@ from random import Random
 
 import pytest
 
-from tests.kit.soak.battered import Battered
-from tests.kit.soak.mutants import Mutants, badly_signed
-from tests.kit.soak.signing import signed_only
-from tests.kit.soak.whole import has_whole_packet
-from tests.kit.soak.world import Violation
+from tests.kit.bounds import Violation
+from tests.kit.packets.battered import Battered
+from tests.kit.packets.mutants import Mutants, badly_signed
+from tests.kit.packets.signing import signed_only
+from tests.kit.packets.whole import has_whole_packet
 
 SEED = 20261121
 PACKETS = 50_000
@@ -54,7 +54,7 @@ def test_what_is_whole_is_known_without_the_server() -> None:
 
 
 def test_signed_ones_may_be_made_otherwise_and_may_count_as_none() -> None:
-    """The two that say what becomes of signatures, see ``tests.kit.soak.signing``."""
+    """The two that say what becomes of signatures, see ``tests.kit.packets.signing``."""
     made: list[bytes] = []
 
     def sign(packet: bytes, random: Random) -> bytes:

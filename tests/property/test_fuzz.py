@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.kit.soak import fuzz
-from tests.kit.soak.targets import TARGETS
+from tests.kit.packets import fuzz
+from tests.kit.packets.targets import TARGETS
 
-EXAMPLES = 250  # of each target; tools/soak.py --fuzz tries as many as there is time for
+EXAMPLES = 250  # of each target
 
 
 @pytest.mark.timeout(180)

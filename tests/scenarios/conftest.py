@@ -7,8 +7,6 @@ import pytest
 
 from tests.kit.cases import anew
 from tests.kit.fleet import Fleet, Layout
-from tests.kit.joint.agreement import Agreement
-from tests.kit.needs import Needs
 from tests.kit.world import World
 
 
@@ -18,23 +16,10 @@ class MakeWorld(Protocol):
     def __call__(self, **kw: Any) -> World: ...
 
 
-@pytest.fixture(autouse=True)
-def needs(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Hold the timers of every engine against what its parts need."""
-    looked = Needs()
-    looked.look_on(monkeypatch)
-    yield
-    if looked.surprises:
-        told = "\n".join(looked.surprises)
-        pytest.fail(f"the engine's timers do not know of this:\n{told}")
-
-
 @pytest.fixture
-def make_world(monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeWorld]:
+def make_world() -> Iterator[MakeWorld]:
     """Return a factory of worlds that are ready to be used."""
     worlds: list[World] = []
-    agreement = Agreement()
-    agreement.look_on(monkeypatch)
 
     def make(**kw: Any) -> World:
         world = World(**kw)
@@ -45,9 +30,6 @@ def make_world(monkeypatch: pytest.MonkeyPatch) -> Iterator[MakeWorld]:
     yield make
     for world in worlds:
         world.check()
-    if agreement.surprises:
-        told = "\n".join(agreement.surprises)
-        pytest.fail(f"the model of joint control does not know of this:\n{told}")
 
 
 @anew

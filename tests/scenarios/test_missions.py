@@ -156,6 +156,24 @@ def test_two_wishes_to_start_are_one_and_later_it_is_another_task(world: World) 
     assert currents(world.client)[-1].mission_id == 2
 
 
+def test_a_start_that_is_repeated_while_the_mission_waits_ends_nothing(world: World) -> None:
+    """A copy of it, or the button again: somebody has disarmed the rover and paused its queue."""
+    uploaded(world)
+    person = world.add_client("person")
+    world.run(1)
+    person.arm(False)
+    world.run(1.5)
+    person.pause()
+    world.run(1.5)
+    for wait in (0.5, 5.0, 0.5):
+        assert start(world) == (ACCEPTED, 1)
+        world.run(wait)
+        assert world.state(1) == (S.QUEUED, R.NONE)
+    world.client.arm(True)
+    world.client.proceed()
+    world.until_state(1, S.COMPLETED, within=60)
+
+
 @for_each("how", ["command", "message"])
 def test_hold_pauses_it_and_auto_goes_on(world: World, how: str) -> None:
     uploaded(world)

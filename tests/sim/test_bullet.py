@@ -10,15 +10,13 @@ from types import ModuleType
 import pytest
 
 from rover_sim import bullet
-from rover_sim.body import BodyState, Pose, wrap_angle
+from rover_sim.body import BodyState, Pose
 from rover_sim.bullet import PHYSICS_RATE, BulletBody
 from rover_sim.errors import MissingExtra
 
 pytestmark = pytest.mark.pybullet
 
-PERIOD = 0.05  # s, the test controller's
 ORIGIN = Pose()
-FRICTIONS = (0.5, 0.8, 1.1)
 
 
 @contextmanager
@@ -33,88 +31,6 @@ def rover(
     body = BulletBody(start=start, friction=friction, variation=variation, seed=seed)
     with closing(body):
         yield body
-
-
-def drive_straight(body: BulletBody, distance: float) -> BodyState:
-    """Drive at up to 0.5 m/s, slower towards the end; give the state at rest."""
-    start, speed = body.state, 0.0
-    for _ in range(400):
-        along, _ = offset(start, body.state)
-        left = distance - along
-        if left < 0.002:
-            break
-        speed = min(speed + 0.025, 0.5, max(0.03, 2.0 * left))
-        body.drive(speed, 1.5 * wrap_angle(start.yaw - body.state.yaw))
-        body.advance(PERIOD)
-    return at_rest(body)
-
-
-def turn_on_the_spot(body: BulletBody, angle: float) -> BodyState:
-    """Turn at up to 0.8 rad/s with an integrating yaw rate loop; give the state at rest."""
-    goal, rate, correction = body.state.yaw + angle, 0.0, 0.0
-    for _ in range(400):
-        left = wrap_angle(goal - body.state.yaw)
-        if abs(left) < 0.003:
-            break
-        rate = min(rate + 0.1, 0.8, max(0.05, 2.0 * abs(left)))
-        wanted = math.copysign(rate, left)
-        correction += 4.0 * PERIOD * (wanted - body.state.yaw_rate)
-        body.drive(0.0, wanted + correction)
-        body.advance(PERIOD)
-    return at_rest(body)
-
-
-def at_rest(body: BulletBody) -> BodyState:
-    body.drive(0.0, 0.0)
-    body.advance(PERIOD * 10)
-    return body.state
-
-
-def offset(start: BodyState, now: BodyState) -> tuple[float, float]:
-    """How far along and across the starting heading."""
-    dn, de = now.north - start.north, now.east - start.east
-    cos, sin = math.cos(start.yaw), math.sin(start.yaw)
-    return dn * cos + de * sin, de * cos - dn * sin
-
-
-def test_it_stands_still_where_it_was_put() -> None:
-    with rover(start=Pose(north=1.0, east=2.0, yaw=0.5)) as body:
-        state = body.state
-        assert (state.time, state.north, state.east) == pytest.approx((0.0, 1.0, 2.0), abs=1e-3)
-        assert (state.yaw, state.pitch, state.roll) == pytest.approx((0.5, 0.0, 0.0), abs=1e-3)
-        assert state.down == pytest.approx(0.0, abs=1e-3)
-        body.advance(5.0)
-        assert offset(state, body.state) == pytest.approx((0.0, 0.0), abs=1e-3)
-
-
-@pytest.mark.parametrize("friction", FRICTIONS)
-@pytest.mark.parametrize("yaw", [0.0, 2.0])
-def test_forward_two_metres_in_a_straight_line(friction: float, yaw: float) -> None:
-    with rover(start=Pose(yaw=yaw), friction=friction) as body:
-        start = body.state
-        along, across = offset(start, drive_straight(body, 2.0))
-        assert along == pytest.approx(2.0, abs=0.01)
-        assert across == pytest.approx(0.0, abs=0.01)
-
-
-@pytest.mark.parametrize("friction", FRICTIONS)
-@pytest.mark.parametrize("angle", [90.0, -90.0])
-def test_quarter_turn_on_the_spot(friction: float, angle: float) -> None:
-    with rover(friction=friction) as body:
-        start = body.state
-        end = turn_on_the_spot(body, math.radians(angle))
-        assert math.degrees(end.yaw - start.yaw) == pytest.approx(angle, abs=0.5)
-        assert offset(start, end) == pytest.approx((0.0, 0.0), abs=0.01)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_it_drives_as_well_on_varied_ground(seed: int) -> None:
-    with rover(variation=0.3, seed=seed) as body:
-        start = body.state
-        end = drive_straight(body, 2.0)
-        assert offset(start, end) == pytest.approx((2.0, 0.0), abs=0.02)
-        turned = turn_on_the_spot(body, math.radians(90))
-        assert math.degrees(turned.yaw - end.yaw) == pytest.approx(90.0, abs=1.0)
 
 
 def manoeuvre(seed: int, *, steps_at_once: int) -> BodyState:
@@ -136,29 +52,10 @@ def test_motors_can_stall() -> None:
         assert body.state.yaw_rate == pytest.approx(0.0, abs=0.01)
 
 
-def test_sub_steps_equal_plain_steps() -> None:
-    many, one = manoeuvre(1, steps_at_once=6), manoeuvre(1, steps_at_once=1)
-    assert many.time == pytest.approx(one.time)
-    fields = ("north", "east", "yaw", "forward_speed", "yaw_rate")
-    plain = [getattr(one, field) for field in fields]
-    assert [getattr(many, field) for field in fields] == pytest.approx(plain, abs=1e-9)
-
-
 def test_a_seed_repeats_a_run_and_another_changes_it() -> None:
     first, again, other = (manoeuvre(seed, steps_at_once=6) for seed in (1, 1, 2))
     assert first == again
     assert (first.north, first.east) != (other.north, other.east)
-
-
-def test_rovers_of_one_process_are_worlds_apart() -> None:
-    with rover() as moving, rover() as standing:
-        moving.drive(1.0, 0.0)
-        moving.advance(1.0)
-        assert moving.state.north > 0.5
-        assert standing.state.time == 0.0
-        moving.close()
-        standing.advance(1.0)
-        assert standing.state.north == pytest.approx(0.0, abs=1e-3)
 
 
 def test_missing_pybullet_is_one_line_that_says_how_to_get_it(

@@ -10,7 +10,6 @@ import pytest
 import mav_tasks
 from mav_tasks import Client, SyncClient, SyncTask, Task, errors, settings
 from mav_tasks.engine.engine import Engine
-from mav_tasks.engine.inputs import Input
 from mav_tasks.errors import MavTasksError
 
 KINDS: list[Any] = [
@@ -31,172 +30,10 @@ def test_the_engine_has_five_methods_and_six_views() -> None:
     assert public(Engine) == sorted([*methods, *views])
 
 
-@pytest.mark.patches_core
-def test_the_engine_shows_its_last_words_and_what_it_could_not_take() -> None:
-    engine = Engine(settings.Settings(), now=0.0)
-    assert public(engine) == ["emergency_stop_packets", "figures", "not_in_force", "signatures"]
-    assert (engine.emergency_stop_packets, engine.not_in_force) == ((), ())
-
-
 def test_time_comes_in_as_a_keyword() -> None:
     for name in ("handle", "handle_deadline", "snapshot", "reach"):
         now = inspect.signature(getattr(Engine, name)).parameters["now"]
         assert (now.kind, now.default) == (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.empty)
-
-
-def test_what_can_come_into_the_engine() -> None:
-    assert [kind.__name__ for kind in Input.__args__] == [
-        "Packets",
-        "AtOnce",
-        "LinkChanged",
-        "KeysChanged",
-        "PeerChanged",
-        "Congestion",
-        "Committed",
-        "HaltsKept",
-        "StoreFailed",
-        "HaltNotStored",
-        "LeaseChanged",
-        "VehiclesTaken",
-        "VehiclesGone",
-        "FleetChanged",
-        "TasksElsewhere",
-        "ParametersChanged",
-        "IdsGranted",
-        "NonceTaken",
-        "SettingsChanged",
-        "WallClock",
-        "Shutdown",
-    ]
-
-
-def test_every_setting_is_known_by_name() -> None:
-    names = {kind.__name__: [f.name for f in dataclasses.fields(kind)] for kind in KINDS}
-    assert names == {
-        "Clients": [
-            "max_clients",
-            "forget_after",
-            "push_lost",
-            "stream_interval",
-            "packet_rate",
-            "telemetry_budget",
-            "text_rate",
-            "status_rate",
-            "priorities",
-        ],
-        "Driving": [
-            "speed",
-            "max_speed",
-            "turn_rate",
-            "max_turn_rate",
-            "max_distance",
-            "max_turn",
-            "max_duration",
-            "acceleration",
-            "turn_acceleration",
-            "arrival_distance",
-            "arrival_angle",
-            "settle_distance",
-            "settle_angle",
-            "acceptance_radius",
-            "turning_radius",
-        ],
-        "Gateway": ["name", "address"],
-        "Identity": ["system_id", "component_id"],
-        "Limits": ["tasks", "max_priority", "max_speed", "max_distance", "quota", "rate"],
-        "Links": ["clients", "push", "vehicles", "insecure", "keys", "unsigned"],
-        "Log": ["format", "level"],
-        "Metrics": ["listen"],
-        "Queueing": [
-            "capacity",
-            "quota",
-            "aging",
-            "preemption_gap",
-            "preemption_rest",
-            "least_battery_percent",
-        ],
-        "Recording": ["tlog", "tlog_size", "tlog_files", "decisions", "decisions_size"],
-        "Retention": ["max_age", "max_count"],
-        "Roles": [
-            "unsigned",
-            "addresses",
-            "observer",
-            "submitter",
-            "operator",
-            "safety",
-        ],
-        "ServerSettings": [
-            "links",
-            "store",
-            "gateway",
-            "engine",
-            "profiles",
-            "recording",
-            "metrics",
-            "log",
-        ],
-        "Settings": [
-            "identity",
-            "signing",
-            "roles",
-            "driving",
-            "watch",
-            "queueing",
-            "clients",
-            "retention",
-            "arming",
-            "yaw_rate",
-            "loss_failsafe",
-            "claim",
-            "guided",
-            "operator_lost",
-            "on_failure",
-            "on_restart",
-            "on_takeover",
-            "profiles",
-        ],
-        "VehicleProfile": [
-            "system_id",
-            "uid",
-            "autopilot",
-            "firmware",
-            "probed",
-            "yaw_rate",
-            "reverse",
-            "turning",
-            "turning_radius",
-            "setpoints",
-            "loss_stop",
-            "setpoint_timeout",
-            "speed",
-            "stopping_distance",
-            "stopping_time",
-        ],
-        "Signing": ["window", "setup"],
-        "Watch": [
-            "setpoint_period",
-            "motion_fresh",
-            "position_lost",
-            "heartbeat_lost",
-            "late_tick",
-            "start_timeout",
-            "ask_vehicle",
-            "ready_timeout",
-            "lost_timeout",
-            "fresh_before_resume",
-            "stuck",
-            "operator_lost",
-            "other_controller",
-            "commit",
-            "forward_answer",
-            "shutdown",
-            "disarm_moving",
-            "stop_unconfirmed",
-            "still_speed",
-            "still_turn_rate",
-            "still_time",
-        ],
-    }
 
 
 def test_settings_are_frozen() -> None:
@@ -266,17 +103,18 @@ def test_what_a_script_may_import_is_there_and_no_more() -> None:
 INSIDE = {"rearm", "streaming", "listening", "some_vehicles", "wake", "close"}
 
 
-@pytest.mark.parametrize(("one", "other"), [(Client, SyncClient), (Task, SyncTask)])
-def test_both_faces_of_the_library_take_the_same(one: type, other: type) -> None:
-    def calls(kind: type) -> dict[str, list[str]]:
-        methods = inspect.getmembers(kind, inspect.isfunction)
-        return {
-            name: list(inspect.signature(method).parameters)
-            for name, method in methods
-            if not name.startswith("_") and name not in INSIDE
-        }
+def test_both_faces_of_the_library_take_the_same() -> None:
+    for one, other in [(Client, SyncClient), (Task, SyncTask)]:
 
-    ours, theirs = calls(one), calls(other)
-    if one is Task:
-        ours["done"].append("timeout")  # asyncio has asyncio.timeout
-    assert theirs == ours
+        def calls(kind: type) -> dict[str, list[str]]:
+            methods = inspect.getmembers(kind, inspect.isfunction)
+            return {
+                name: list(inspect.signature(method).parameters)
+                for name, method in methods
+                if not name.startswith("_") and name not in INSIDE
+            }
+
+        ours, theirs = calls(one), calls(other)
+        if one is Task:
+            ours["done"].append("timeout")  # asyncio has asyncio.timeout
+        assert theirs == ours

@@ -1,7 +1,7 @@
 """Checks that the server agrees with the model of joint control, at each event.
 
 ``graph`` explores the states of the model, which proves something about the server only if both
-agree. So each event of each scenario is compared with the model.
+agree.
 """
 
 from functools import cache
@@ -23,6 +23,7 @@ class Agreement:
 
     def __init__(self) -> None:
         self.surprises: list[str] = []
+        self.compared = 0
         self._is_within = False
 
     def look_on(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,6 +46,7 @@ class Agreement:
         monkeypatch.setattr(JointControl, "on", on)
 
     def _compare(self, event: Event, before: State, there: State) -> None:
+        self.compared += 1
         if _open(there) not in _expected(event, before):
             self.surprises.append(f"{event.name} in {before}: {there}")
 

@@ -1,7 +1,7 @@
 """The effects of the table and of time on states: joint control as a graph.
 
 It models only states, not vehicles. ``tests/kit/joint/agreement.py`` compares it with the real
-server, in each scenario.
+server.
 """
 
 from collections.abc import Callable, Iterable, Iterator

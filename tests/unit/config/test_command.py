@@ -3,16 +3,12 @@
 import json
 import re
 import signal
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from mav_tasks.cli.app import main
-from mav_tasks.store.sqlite import SqliteStore, read_parameters
-from mav_tasks.tasks.server_events import ParameterSet
 
 Result = tuple[int, str, str]
 Run = Callable[..., Result]
@@ -30,9 +26,8 @@ def run(
             variables = {"MAV_TASKS_STORE": ":memory:", "MAV_TASKS_CONFIG": ""}
             for name, value in {**variables, **(environment or {})}.items():
                 context.setenv(name, value)
-            context.setattr(sys, "argv", ["mav-tasks", *arguments])
             with pytest.raises(SystemExit) as ended:
-                main()
+                main(arguments)  # given, or it would end this process as its own
         said = capsys.readouterr()
         return int(ended.value.code or 0), said.out, said.err
 
@@ -68,16 +63,6 @@ def test_what_is_wrong_with_a_configuration_is_told_line_by_line(run: Run, tmp_p
     assert_one_clear_line(run("config", "check", str(tmp_path)), str(tmp_path), "not a file")
 
 
-def test_the_sample_is_begun_checked_and_never_written_over(run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "c.toml"
-    assert run("config", "init", str(path)) == (0, f"wrote {path}\n", "")
-    code, printed, _ = run("config", "init")
-    assert (code, printed) == (0, path.read_text(encoding="utf-8"))
-    assert run("config", "check", str(path)) == (0, "ok\n", "")
-    assert_one_clear_line(run("config", "init", str(path)), str(path), "exists")
-    assert_one_clear_line(run("config", "init", str(tmp_path / "no" / "c")), "No such file")
-
-
 def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) -> None:
     path, again = tmp_path / "c.toml", tmp_path / "again.toml"
     path.write_text("[driving]\nspeed = 0.8\n", encoding="utf-8")
@@ -103,58 +88,3 @@ def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) ->
         "where": f"{path}:2",
         "live": True,
     }
-
-
-def test_what_a_client_has_set_is_shown_from_the_store(run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "tasks.sqlite3"
-    variable = {"MAV_TASKS_STORE": str(path)}
-    command = ("config", "show", "driving.speed", "driving.max_speed")
-    assert "default" in run(*command, environment=variable)[1]
-    assert not path.exists()
-    with closing(SqliteStore(path, wall_offset=lambda: 0.0)) as store:
-        store.append([ParameterSet("TSK_SPEED", 2.5, "255/190@x:1", 1.0)])
-    faster = {**variable, "MAV_TASKS_DRIVING_MAX_SPEED": "3"}
-    with closing(SqliteStore(path, wall_offset=lambda: 0.0)):  # in use
-        code, output, error = run(*command, environment=faster)
-    assert (code, error) == (0, "")
-    is_set = r"^driving\.speed = 2\.5 +# m/s, TSK_SPEED, set by a client$"
-    assert re.search(is_set, output, re.MULTILINE)
-    code, output, error = run(*command, environment=variable)
-    assert (code, error) == (
-        0,
-        (
-            "mav-tasks: parameter of an earlier run ignored: "
-            "TSK_SPEED 2.5 is more than TSK_SPEED_MAX 2\n"
-        ),
-    )
-    assert re.search(r"^driving\.speed = 0\.5 +# m/s, default$", output, re.MULTILINE)
-    before = path.read_bytes()
-    assert read_parameters(str(path)) == {"TSK_SPEED": 2.5}
-    assert path.read_bytes() == before
-
-
-@pytest.mark.parametrize("name", ["tasks.sqlite3", "~/tasks.sqlite3"])
-def test_a_store_is_looked_at_by_whatever_name_the_server_takes(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.chdir(tmp_path)
-    with closing(SqliteStore(name, wall_offset=lambda: 0.0)) as store:
-        store.append([ParameterSet("TSK_SPEED", 1.5, "255/190@x:1", 1.0)])
-    shown = run("config", "show", "driving.speed", environment={"MAV_TASKS_STORE": name})
-    assert shown == (0, "driving.speed = 1.5  # m/s, TSK_SPEED, set by a client\n", "")
-
-
-@pytest.mark.parametrize("text", ["no database", ""])
-def test_a_store_that_cannot_be_looked_at_keeps_nothing_from_being_shown(
-    run: Run, tmp_path: Path, text: str
-) -> None:
-    path = tmp_path / "tasks.sqlite3"
-    path.write_text(text, encoding="utf-8")
-    code, output, error = run(
-        "config", "show", "driving", environment={"MAV_TASKS_STORE": str(path)}
-    )
-    assert code == 0
-    assert "driving.speed = 0.5" in output
-    assert bool(text) is (f"parameters set by clients are not shown: store {path}" in error)
-    assert path.read_text(encoding="utf-8") == text

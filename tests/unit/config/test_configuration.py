@@ -55,15 +55,6 @@ def test_each_source_comes_before_the_one_above(tmp_path: Path) -> None:
     assert got.file == path
 
 
-def test_a_bound_holds_over_all_sources(tmp_path: Path) -> None:
-    path = tmp_path / "c.toml"
-    path.write_text("driving.speed = 3\n", encoding="utf-8")
-    assert load(str(path), {"MAV_TASKS_DRIVING_MAX_SPEED": "4"}).settings.engine.driving.speed == 3
-    assert faults(str(path), {}) == [
-        f"{path}:1: driving.speed: 3 is more than driving.max_speed, 2 m/s"
-    ]
-
-
 def test_all_faults_of_all_sources_are_told(tmp_path: Path) -> None:
     path = tmp_path / "c.toml"
     path.write_text("driving.sped = 3\n", encoding="utf-8")
@@ -95,15 +86,6 @@ def test_every_key_has_a_variable_of_its_own() -> None:
     assert variable_of("store.path") == "MAV_TASKS_STORE"
 
 
-def test_lists_in_the_environment_have_commas() -> None:
-    got = load(
-        "", {"MAV_TASKS_LINKS_PUSH": "127.0.0.1:1,127.0.0.1:2", "MAV_TASKS_STORE": ":memory:"}
-    )
-    assert got.settings.links.push == ("127.0.0.1:1", "127.0.0.1:2")
-    assert got.settings.store == ":memory:"
-    assert load("", {"MAV_TASKS_LINKS_PUSH": ""}).settings.links.push == ()
-
-
 def test_which_file_is_read(home: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.toml"
     other.write_text("driving.speed = 0.7\n", encoding="utf-8")
@@ -127,8 +109,3 @@ def test_the_sample_with_every_key_taken_in_is_the_defaults() -> None:
     assert layer.faults == []
     assert layer.given.keys() == KEYS.keys()
     assert configuration.merged([layer]).settings == ServerSettings()
-
-
-def test_the_sample_as_it_is_says_nothing() -> None:
-    layer = layer_of(sample(), name="sample")
-    assert (layer.faults, layer.given) == ([], {})

@@ -2,231 +2,121 @@
 
 import asyncio
 import logging
-import threading
 from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
-from mav_tasks.config.configuration import Configuration, Sources
-from mav_tasks.config.reload import Put, Reload, changes_of, taken
-from mav_tasks.errors import ConfigError
-from mav_tasks.settings import KEYS, ServerSettings, Settings
+from mav_tasks.config.configuration import Sources
+from mav_tasks.config.reload import Reload
+from mav_tasks.settings import KEYS, Settings
+
+SPEED = "driving.speed: 0.5 -> 0.8 m/s"
+NO_SPED = "driving.sped: no such key; did you mean driving.speed?"
+NOT_APPLIED = "ERROR configuration: not applied, the old one stays in force"
+STILL = 'WARNING rules.arming: "auto" -> "server" needs a restart: still "auto"'
 
 
-class Watched(Reload):
-    """One of which it can be awaited that it has read."""
+@pytest.mark.parametrize(
+    ("texts", "parameters", "said", "speeds"),
+    [
+        (
+            ["", "driving.speed = 0.8\nrules.arming = 'server'\n", "rules.arming = 'server'\n"],
+            {},
+            [
+                *(f"INFO {SPEED}, in force", STILL),
+                *("INFO driving.speed: 0.8 -> 0.5 m/s, in force", STILL),
+            ],
+            [0.8, 0.5],
+        ),
+        (
+            ["", "driving.speed = 0.8\ndriving.sped = 1\nx = 2\n", None, ""],
+            {},
+            [
+                f"ERROR configuration: FILE:2: {NO_SPED}",
+                "ERROR configuration: FILE:3: x: no such key",
+                NOT_APPLIED,
+                "ERROR configuration: FILE: No such file or directory",
+                NOT_APPLIED,
+                "INFO configuration: reloaded, no changes",
+            ],
+            [],
+        ),
+        (
+            ["", "driving.speed = 0.8"],
+            {"TSK_SPEED": 0.7},
+            [f"WARNING {SPEED}, but parameter TSK_SPEED, set by a client, overrides it: 0.7"],
+            [0.8],
+        ),
+        (
+            ["", "log.level = 'debug'", "log.level = 'warning'\nlog.format = 'json'"],
+            {},
+            [
+                'INFO log.level: "info" -> "debug", in force',
+                'WARNING log.format: "text" -> "json" needs a restart: still "text"',
+            ],  # the last change of the level is no warning itself
+            [],
+        ),
+        (  # a period of setpoints above the time after which one is late would hold every task
+            [
+                "[watch]\nsetpoint_period = 0.2\nlate_tick = 0.5",
+                "[watch]\nsetpoint_period = 0.05\nlate_tick = 0.1\n[driving]\nspeed = 0.8",
+            ],
+            {},
+            [
+                f"INFO {SPEED}, in force",
+                "WARNING watch.setpoint_period: 0.2 -> 0.05 s needs a restart: still 0.2",
+                "WARNING watch.late_tick: 0.5 -> 0.1 s needs a restart: still 0.5",
+            ],
+            [0.8],
+        ),
+    ],
+    ids=["live", "faults", "parameter", "log", "bound"],
+)
+def test_what_can_change_is_in_force_and_the_rest_says_that_it_is_not(
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    texts: list[str | None],
+    parameters: Mapping[str, float],
+    said: list[str],
+    speeds: list[float],
+) -> None:
+    path, put = tmp_path / "c.toml", list[Settings]()
 
-    def __init__(self, sources: Sources, configuration: Configuration) -> None:
-        super().__init__(sources, configuration)
-        self.outcomes = asyncio.Queue[ServerSettings | ConfigError]()
-
-    def _has_read(self, outcome: ServerSettings | ConfigError, put: Put) -> None:
-        super()._has_read(outcome, put)
-        self.outcomes.put_nowait(outcome)
-
-    async def outcome(self) -> ServerSettings | ConfigError:
-        return await asyncio.wait_for(self.outcomes.get(), 10)
-
-
-class Server:
-    """Takes settings as the runner does."""
-
-    def __init__(self, parameters: Mapping[str, float] | None = None) -> None:
-        self.put: list[Settings] = []
-        self._parameters = parameters or {}
-
-    def take(self, settings: Settings) -> Mapping[str, float]:
-        self.put.append(settings)
-        return self._parameters
-
-
-def with_plain(values: Mapping[str, object]) -> ServerSettings:
-    settings = ServerSettings()
-    for name, plain in values.items():
-        settings = KEYS[name].put(settings, KEYS[name].shape.kept(plain))
-    return settings
-
-
-def write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
-
-
-def read_again(
-    path: Path, texts: list[str], caplog: pytest.LogCaptureFixture, server: Server
-) -> list[str]:
-    """Start with the first text, read each of the others in turn; gives what was said."""
+    def take(settings: Settings) -> Mapping[str, float]:
+        put.append(settings)
+        return parameters
 
     async def run() -> None:
         for text in texts[1:]:
-            write(path, text)
-            reload.begin(server.take)
-            await reload.outcome()
+            path.unlink()
+            if text is not None:
+                path.write_text(text, encoding="utf-8")
+            before, turns = len(caplog.records), 0
+            reload.begin(take)
+            while len(caplog.records) == before and turns < 40:
+                await asyncio.sleep(0.05)
+                turns += 1
+            path.touch()
 
-    write(path, texts[0])
+    path.write_text(texts[0] or "", encoding="utf-8")
     sources = Sources(str(path), {})
-    reload = Watched(sources, sources.load())
+    reload = Reload(sources, sources.load())
     try:
         with caplog.at_level(logging.DEBUG, "mav_tasks"):
             asyncio.run(run())
     finally:
         logging.getLogger("mav_tasks").setLevel(logging.NOTSET)
-    return [f"{record.levelname} {record.getMessage()}" for record in caplog.records]
-
-
-def test_what_can_change_is_in_force_and_the_rest_says_that_it_is_not(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    server = Server()
-    old = "[driving]\nspeed = 0.5\n[rules]\narming = 'auto'\n"
-    new = "[driving]\nspeed = 0.8\nturn_rate_deg = 30\n[rules]\narming = 'server'\n"
-    said = read_again(tmp_path / "c.toml", [old, new, new, old], caplog, server)
-    still = 'WARNING rules.arming: "auto" -> "server" needs a restart: still "auto"'
-    assert said == [
-        "INFO driving.speed: 0.5 -> 0.8 m/s, in force",
-        "INFO driving.turn_rate_deg: 40 -> 30 deg/s, in force",
-        still,
-        still,
-        "INFO driving.speed: 0.8 -> 0.5 m/s, in force",
-        "INFO driving.turn_rate_deg: 30 -> 40 deg/s, in force",
-    ]
-    assert [put.driving.speed for put in server.put] == [0.8, 0.5]
-    assert all(put.arming == "auto" for put in server.put)
-
-
-def test_a_file_with_faults_changes_nothing(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    server, path = Server(), tmp_path / "c.toml"
-    said = read_again(
-        path, ["", "driving.speed = 0.8\ndriving.sped = 1\nx = 2\n", ""], caplog, server
-    )
-    assert said == [
-        f"ERROR configuration: {path}:2: driving.sped: no such key; did you mean driving.speed?",
-        f"ERROR configuration: {path}:3: x: no such key",
-        "ERROR configuration: not applied, the old one stays in force",
-        "INFO configuration: reloaded, no changes",
-    ]
-    assert server.put == []
-
-
-def test_what_a_client_has_set_stays_and_is_said(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    server = Server({"TSK_SPEED": 0.7})
-    assert read_again(tmp_path / "c.toml", ["", "driving.speed = 0.8"], caplog, server) == [
-        (
-            "WARNING driving.speed: 0.5 -> 0.8 m/s, "
-            "but parameter TSK_SPEED, set by a client, overrides it: 0.7"
-        )
-    ]
-
-
-def test_a_file_that_is_gone_is_a_fault_and_not_the_defaults(tmp_path: Path) -> None:
-    path = tmp_path / "c.toml"
-    path.write_text("driving.speed = 0.8", encoding="utf-8")
-    sources = Sources(None, {"MAV_TASKS_CONFIG": str(path)})
-    reload = Watched(sources, sources.load())
-    path.unlink()
-
-    async def run() -> str:
-        reload.begin(Server().take)
-        return str(await reload.outcome())
-
-    assert asyncio.run(run()) == f"{path}: No such file or directory"
-
-
-def test_the_level_of_the_log_changes(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    server = Server()
-    said = read_again(
-        tmp_path / "c.toml",
-        ["", "log.level = 'debug'", "log.level = 'warning'\nlog.format = 'json'"],
-        caplog,
-        server,
-    )
-    assert said == [
-        'INFO log.level: "info" -> "debug", in force',
-        'WARNING log.format: "text" -> "json" needs a restart: still "text"',
-    ]  # the last change of the level is no warning itself
-    assert server.put == []
-
-
-def test_a_slow_disk_keeps_nobody_and_what_is_asked_meanwhile_is_done_after_it(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    """Also not the end: the loop is over while a read still hangs."""
-    disk, reads = threading.Event(), threading.Semaphore(0)
-
-    class Slow(Sources):
-        def load(self) -> Configuration:
-            reads.release()
-            disk.wait(10)
-            return super().load()
-
-    async def run() -> None:
-        reload = Watched(Slow("", {}), Sources("", {}).load())
-        for _ in range(3):
-            reload.begin(Server().take)
-        assert await asyncio.to_thread(reads.acquire, timeout=10)
-        assert not reads.acquire(blocking=False)  # one at a time
-        disk.set()
-        await reload.outcome()
-        await reload.outcome()
-        disk.clear()
-        reload.begin(Server().take)
-
-    with caplog.at_level(logging.INFO, "mav_tasks"):
-        asyncio.run(run())
-    disk.set()
-    assert [record.getMessage() for record in caplog.records].count(
-        "configuration: still reloading; it will be read once more"
-    ) == 2
-
-
-def test_an_own_mistake_is_told_and_does_not_leave_it_reading(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    class Broken(Sources):
-        def load(self) -> Configuration:
-            raise ZeroDivisionError
-
-    async def run() -> None:
-        reload = Watched(Broken("", {}), Sources("", {}).load())
-        reload.begin(Server().take)
-        await reload.outcome()
-
-    with caplog.at_level(logging.INFO, "mav_tasks"):
-        asyncio.run(run())
-    assert "configuration: not applied, the old one stays in force" in [
-        each.getMessage() for each in caplog.records
-    ]
-
-
-def test_of_a_bound_between_what_changes_and_what_does_not_both_stay() -> None:
-    """A period of setpoints above the time after which one is late would hold every task."""
-    before = with_plain({"watch.setpoint_period": 0.2, "watch.late_tick": 0.5})
-    wanted = with_plain({"watch.setpoint_period": 0.05, "watch.late_tick": 0.1, "driving.speed": 1})
-    got = taken(before, wanted)
-    assert got == with_plain(
-        {"watch.setpoint_period": 0.2, "watch.late_tick": 0.5, "driving.speed": 1}
-    )
-    told = list(map(str, changes_of(before, wanted, in_force=got)))
-    assert told == [
-        "driving.speed: 0.5 -> 1 m/s",
-        "watch.setpoint_period: 0.2 -> 0.05 s needs a restart: still 0.2",
-        "watch.late_tick: 0.5 -> 0.1 s needs a restart: still 0.5",
-    ]
+    told = [f"{record.levelname} {record.getMessage()}" for record in caplog.records]
+    assert [line.replace(str(path), "FILE") for line in told if "asyncio" not in line] == said
+    assert [each.driving.speed for each in put] == speeds
+    assert all(each.arming == "auto" for each in put)
 
 
 def test_links_store_identity_recordings_and_metrics_are_as_they_were_at_the_start() -> None:
+    tables = ("links.", "store.", "identity.", "recording.", "metrics.", "fleet.")
     assert {name for name, key in KEYS.items() if not key.is_live} == {
-        *(
-            name
-            for name in KEYS
-            if name.startswith(
-                ("links.", "store.", "identity.", "recording.", "metrics.", "fleet.")
-            )
-        ),
+        *(name for name in KEYS if name.startswith(tables)),
         *("rules.arming", "rules.yaw_rate", "watch.setpoint_period", "log.format"),
         *("signing.keys", "signing.unsigned"),
     }

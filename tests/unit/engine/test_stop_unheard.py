@@ -11,9 +11,9 @@ from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.packet import split_datagram
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
-from tests.unit.tasks.samples import draft
+from mav_tasks.tasks.task import Marks, Task, TaskId
+from tests.unit.tasks.samples import FORWARD_2, SOMEBODY, TASK_MOVE
 
 ROVER, CLIENT = ("10.0.0.1", 1), ("10.0.0.2", 2)
 
@@ -22,9 +22,9 @@ ROVER, CLIENT = ("10.0.0.1", 1), ("10.0.0.2", 2)
 def test_is_latched_answered_and_sent_first_when_it_is_heard(
     target: tuple[int, int], source: tuple[int, int]
 ) -> None:
-    registry, packer, decoder = TaskRegistry(), Packer(), Decoder()
-    registry.submit(draft(), now=0.0)
-    restored = Restored(tasks=registry.all(), next_id=2)
+    packer, decoder = Packer(), Decoder()
+    task = Task(TaskId(1), 1, TASK_MOVE, FORWARD_2, SOMEBODY, Marks(), submitted_at=0.0)
+    restored = Restored(tasks=(task,), next_id=2)
     engine = Engine(Settings(), now=0.0, restored=restored)
     engine.handle(LinkChanged("v", LinkSide.VEHICLES, up=True, is_local=True), now=0.0)
     engine.handle(LinkChanged("c", LinkSide.CLIENTS, up=True), now=0.0)

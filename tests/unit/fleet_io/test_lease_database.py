@@ -16,7 +16,7 @@ import pytest
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Evict, Free, Join, Renew, Request, Row, Take
 from mav_tasks.fleet.rivals import Eviction
-from mav_tasks.fleet_io.lease_database import NAME_LOCK, LeaseDatabase
+from mav_tasks.fleet_io.lease_database import LeaseDatabase
 from mav_tasks.store.postgres.address import parse
 from mav_tasks.store.postgres.failures import PostgresError
 from tests.kit.gateways.database import Database
@@ -25,6 +25,7 @@ from tests.kit.processes import wait_until
 
 NAMES = ("a", "b", "c")
 STEPS = 400
+NAME_LOCK = 0x4D565454  # of the locks of names
 
 
 def opened(url: str, name: str, *, system_id: int = 0) -> LeaseDatabase:
@@ -199,20 +200,6 @@ def test_a_gateway_with_another_system_id_than_one_that_runs_is_refused(
         pytest.raises(StoreError, match="system_id is 250 here and 249 at gateway b"),
     ):
         opened(url, "a", system_id=250)
-
-
-def test_a_new_session_ends_the_lost_one_of_the_same_process(postgres: PostgresServer) -> None:
-    url = postgres.new_database()
-    with closing(opened(url, "a")) as it:
-        epoch = it.execute(Join("a")).row.epoch
-        lost = it._session  # the database does not notice yet
-        it._session = None
-        it.connect()
-        assert it.execute(Renew("a", epoch)).row.epoch == epoch
-        assert lost is not None
-        with pytest.raises(PostgresError):
-            lost.execute("SELECT 1")
-        lost.close()
 
 
 def test_a_gateway_waits_for_a_hung_database_no_longer_than_its_limits(

@@ -3,15 +3,13 @@
 from types import SimpleNamespace
 from typing import cast
 
-import pytest
-
 from rover_sim.body import BodyState, Pose
 from rover_sim.faults import Faults
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
-from tests.kit.halts import STOPS_WITHIN, Halts
-from tests.kit.soak.words import Kind, Word
+from tests.kit.halts import Halts
+from tests.kit.words import Kind, Word
 
 STEP = 0.025  # s
 ACCEPTED, DENIED = 0, 2
@@ -59,159 +57,73 @@ class Watched:
             found += [broken.kind for broken in self.halts.look(self.now)]
         return found
 
-    def stand(self, seconds: float) -> list[str]:
-        """Let the rover stand."""
-        return self.drive(seconds, 0.0)
-
     @staticmethod
     def _state(north: float, speed: float) -> BodyState:
         return STANDING._replace(north=north, forward_speed=speed)
 
 
-@pytest.fixture
-def watched() -> Watched:
-    return Watched()
+SCRIPTS = {
+    # nobody halts, or it stops and stands
+    "d10": "",
+    "d1 STOP slow1 s10": "",
+    # it drives on, or again
+    "d1 pause d5": "pause, then no word",
+    "HOLD s4 d0.15": "",
+    "HOLD s4 d0.3": "HOLD, then no word",
+    # an older word is no excuse
+    "continue s1 STOP s3 late d2": "STOP, then a copy of an older continue that was late",
+    "STOP:12 continue:11 s3 d2": "STOP, then an older continue",
+    # a newer go word ends it
+    "STOP s3 continue d5": "",
+    "STOP s3 continue@tablet d5": "",
+    "STOP s3 release d1": "STOP, then no word",
+    # what is refused lets nothing go, unless it reached the rover
+    "STOP s3 continue! d1": "STOP, then no word",
+    "pause s3 passed continue! d1": "",
+    "passed s1 pause s3 continue! d1": "pause, then no word",
+    # a person at the rover halts it too
+    "person s3 d1": "HOLD at the rover, then no word",
+    # who hears nothing or drives by itself is not judged, but by a mode that was asked for
+    "deaf STOP d5": "",
+    "HOLD s3 rtl d3": "",
+    "HOLD s3 asked d3": "HOLD, then no word",
+}
 
 
-def test_nobody_halts_and_nothing_is_wrong(watched: Watched) -> None:
-    assert watched.drive(10) == []
+def told(watched: Watched, script: str) -> list[str]:
+    """Let a script happen: words, and driving (d) or standing (s) for seconds."""
+    found: list[str] = []
+    autopilot = watched.vehicle.autopilot
+    for step in script.split():
+        if step[0] in "ds" and step[1:].replace(".", "").isdigit():
+            found += watched.drive(float(step[1:]), 0.5 if step[0] == "d" else 0.0)
+        elif step == "slow1":
+            found += watched.drive(1.0, 0.25)
+        elif step == "late":
+            watched.say("continue", first=100.0, order=1, is_copy=True)
+        elif step == "passed":
+            watched.halts.passed(COMMANDS["continue"], now=watched.now)
+        elif step == "person":
+            watched.halts.person("HOLD at the rover", drives=False, now=watched.now)
+        elif step == "deaf":
+            autopilot.faults = Faults(deaf=True)
+        elif step == "rtl":
+            autopilot.mode = Mode.RTL
+        elif step == "asked":
+            watched.halts.mode_arrived(now=watched.now)
+            autopilot.mode = Mode.AUTO
+        else:
+            name, _, by = step.rstrip("!").partition("@")
+            name, _, order = name.partition(":")
+            watched.say(
+                name,
+                by=by or "station",
+                order=int(order) if order else None,
+                result=DENIED if "!" in step else ACCEPTED,
+            )
+    return found
 
 
-def test_a_rover_that_stops_and_stands_breaks_nothing(watched: Watched) -> None:
-    watched.drive(1)
-    watched.say("STOP")
-    assert watched.drive(1.0, 0.25) == []
-    assert watched.stand(10) == []
-    assert watched.halts.halted == {"STOP": 1}
-
-
-def test_one_that_drives_on_is_seen(watched: Watched) -> None:
-    watched.drive(1)
-    watched.say("pause")
-    assert watched.drive(5) == ["pause, then no word"]
-
-
-def test_one_that_stood_and_drives_again_is_seen_after_centimetres(watched: Watched) -> None:
-    watched.say("HOLD")
-    watched.stand(STOPS_WITHIN + 1)
-    assert watched.drive(0.15) == []
-    assert watched.drive(0.15) == ["HOLD, then no word"]
-
-
-def test_a_copy_of_an_older_continue_is_no_excuse(watched: Watched) -> None:
-    watched.say("continue")
-    watched.now += 1
-    watched.say("STOP")
-    watched.stand(3)
-    watched.say("continue", first=100.0, order=1, is_copy=True)
-    assert watched.drive(2) == ["STOP, then a copy of an older continue that was late"]
-
-
-def test_an_older_word_of_the_same_sender_that_comes_later_is_none_either(watched: Watched) -> None:
-    watched.say("STOP", order=12)
-    watched.say("continue", order=11)
-    watched.stand(3)
-    assert watched.drive(2) == ["STOP, then an older continue"]
-
-
-@pytest.mark.parametrize("by", ["station", "tablet"])
-def test_a_newer_go_word_ends_it(watched: Watched, by: str) -> None:
-    watched.say("STOP")
-    watched.stand(3)
-    watched.say("continue", by=by)
-    assert watched.drive(5) == []
-
-
-def test_hold_and_continue_said_together_are_a_go(watched: Watched) -> None:
-    """As somebody does who makes the rover ready: neither waits for an answer."""
-    hold = Word(Kind.HALT, "HOLD", 176, 1, 1.0, "station", 100.0, 1, is_copy=False)
-    go = Word(Kind.GO, "continue", 193, 1, 1.0, "station", 100.0, 2, is_copy=False)
-    for word in (hold, go):
-        watched.halts.read(word, running=None, now=100.02)
-    watched.halts.answered("station", 176, ACCEPTED, now=100.02)
-    watched.halts.answered("station", 193, ACCEPTED, now=100.02)
-    assert watched.drive(5) == []
-
-
-def test_what_is_refused_lets_nothing_go(watched: Watched) -> None:
-    watched.say("STOP")
-    watched.stand(3)
-    watched.say("continue", result=DENIED)
-    assert watched.drive(1) == ["STOP, then no word"]
-    assert watched.halts.refused == {"continue": 1}
-
-
-def test_what_reached_the_rover_lets_it_go_though_its_answer_is_lost(watched: Watched) -> None:
-    watched.say("pause")
-    watched.stand(3)
-    watched.halts.passed(COMMANDS["continue"], now=watched.now)
-    watched.say("continue", result=DENIED)
-    assert watched.drive(1) == []
-    assert watched.halts.refused == {}
-
-
-def test_what_reached_the_rover_before_the_halt_does_not(watched: Watched) -> None:
-    watched.halts.passed(COMMANDS["continue"], now=watched.now)
-    watched.stand(1)
-    watched.say("pause")
-    watched.stand(3)
-    watched.say("continue", result=DENIED)
-    assert watched.drive(1) == ["pause, then no word"]
-
-
-@pytest.mark.parametrize("sent", [0.0, -0.05])
-def test_what_is_submitted_after_a_hold_of_nothing_drives(watched: Watched, sent: float) -> None:
-    """Also while a word of a third is not answered yet, and if the two pass on their way."""
-    hold = Word(Kind.HALT, "HOLD", 176, 1, 1.0, "station", watched.now, 1, is_copy=False)
-    watched.halts.read(hold, running=None, now=watched.now, has_tasks=False)
-    watched.halts.answered("station", 176, ACCEPTED, now=watched.now)
-    read_at, first_sent = watched.now + 0.02, watched.now + 0.01 + sent
-    start = Word(Kind.GO, "mission start", 300, 1, 0.0, "third", first_sent, 2, is_copy=False)
-    move = Word(Kind.WISH, "submission", 54000, 1, 1.0, "other", first_sent, 3, is_copy=False)
-    watched.halts.read(start, running=None, now=read_at)
-    watched.halts.read(move, running=None, now=read_at)
-    watched.halts.answered("third", 300, DENIED, now=read_at)
-    assert watched.drive(5) == []
-
-
-def test_after_stop_only_a_continue_lets_it_go(watched: Watched) -> None:
-    watched.say("STOP")
-    watched.stand(3)
-    watched.say("release")
-    assert watched.drive(1) == ["STOP, then no word"]
-
-
-def test_two_people_whose_words_pass_each_other_are_counted_and_nobody_is_wrong(
-    watched: Watched,
-) -> None:
-    watched.say("pause")
-    watched.say("continue", by="tablet", first=watched.now - 0.05)
-    assert watched.drive(5) == []
-    assert watched.halts.in_flight == 1
-
-
-def test_a_person_at_the_rover_halts_it_too(watched: Watched) -> None:
-    watched.halts.person("HOLD at the rover", drives=False, now=watched.now)
-    watched.stand(3)
-    assert watched.drive(1) == ["HOLD at the rover, then no word"]
-
-
-def test_a_rover_that_hears_nothing_is_not_judged(watched: Watched) -> None:
-    watched.vehicle.autopilot.faults = Faults(deaf=True)
-    watched.say("STOP")
-    assert watched.drive(5) == []
-
-
-def test_a_rover_that_drives_by_itself_is_not_judged(watched: Watched) -> None:
-    watched.say("HOLD")
-    watched.stand(3)
-    watched.vehicle.autopilot.mode = Mode.RTL  # its own failsafe
-    assert watched.drive(3) == []
-
-
-def test_a_mode_that_the_server_asked_for_is_judged(watched: Watched) -> None:
-    watched.say("HOLD")
-    watched.stand(3)
-    watched.halts.mode_arrived(now=watched.now)
-    watched.vehicle.autopilot.mode = Mode.AUTO
-    assert watched.drive(3) == ["HOLD, then no word"]
+def test_a_rover_that_drives_after_a_halt_is_seen_and_no_other() -> None:
+    for script, breach in SCRIPTS.items():
+        assert told(Watched(), script) == [breach] * bool(breach), script

@@ -1,8 +1,5 @@
 """A net in memory: as bad as asked for, and the same each time."""
 
-import pytest
-
-from mav_tasks.links.base import Link
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet, Queue, Radio
 
 BAD = Conditions(delay=0.01, jitter=0.05, loss=0.2, duplication=0.2)
@@ -29,11 +26,6 @@ def traffic(seed: int, conditions: Conditions) -> list[tuple[float, bytes]]:
         net.now = number * 0.001
         a.send("b", bytes([number]))
     return arrivals(net, b)
-
-
-def test_it_is_a_link() -> None:
-    link: Link = MemoryNet().link("a", peers=("b",))
-    assert (link.name, link.peers, link.is_local) == ("a", ("b",), True)
 
 
 def test_a_datagram_arrives_after_its_delay_and_names_its_sender() -> None:
@@ -67,51 +59,6 @@ def test_a_bad_net_loses_doubles_and_reorders() -> None:
     assert came != sorted(came)
 
 
-@pytest.mark.parametrize("loss", [0.0, 1.0])
-def test_loss_is_a_probability(loss: float) -> None:
-    assert len(traffic(3, Conditions(loss=loss))) == (0 if loss else 200)
-
-
-def test_what_is_sent_to_nobody_is_lost() -> None:
-    net = MemoryNet()
-    a, _ = pair(net)
-    a.send("nobody", b"hello")
-    net.now = 1.0
-    net.deliver()
-    assert net.next_arrival() is None
-
-
-def test_a_closed_link_has_lost_what_had_arrived() -> None:
-    net = MemoryNet()
-    a, b = pair(net)
-    a.send("b", b"hello")
-    net.now = 1.0
-    net.deliver()
-    b.close()
-    assert b.receive(10) == []
-
-
-def test_each_link_has_a_number_that_says_whether_something_has_arrived() -> None:
-    net = MemoryNet()
-    a, b = pair(net)
-    a.send("b", b"x")
-    assert not net.is_readable(b.fileno())
-    net.now = 1.0
-    net.deliver()
-    assert (net.is_readable(a.fileno()), net.is_readable(b.fileno())) == (False, True)
-    b.receive(1)
-    assert not net.is_readable(b.fileno())
-
-
-def test_a_link_in_the_place_of_another_has_a_number_of_its_own() -> None:
-    net = MemoryNet()
-    before, after = net.link("a"), net.link("a")
-    net.link("b").send("a", b"x")
-    net.now = 1.0
-    net.deliver()
-    assert (net.is_readable(before.fileno()), net.is_readable(after.fileno())) == (False, True)
-
-
 def through(net: MemoryNet, sizes: list[int], *, every: float) -> list[tuple[float, int]]:
     """Send datagrams from a to b; gives when each arrived, and how long it was."""
     a, b = pair(net)
@@ -125,24 +72,6 @@ def test_a_radio_lets_through_what_its_rate_allows_and_keeps_the_rest_in_order()
     net = MemoryNet(conditions=Conditions(delay=0.1))
     net.buffers["a", "b"] = Radio(bytes_per_second=1000, buffer=16_000)
     assert through(net, [100, 50, 200], every=0.01) == [(0.2, 100), (0.25, 50), (0.45, 200)]
-
-
-def test_a_radio_that_is_idle_again_delays_no_more() -> None:
-    net = MemoryNet(conditions=Conditions(delay=0.0))
-    net.buffers["a", "b"] = Radio(bytes_per_second=1000, buffer=16_000)
-    assert through(net, [100, 100], every=1.0) == [(0.1, 100), (1.1, 100)]
-
-
-def test_what_a_radios_buffer_does_not_hold_is_dropped() -> None:
-    net = MemoryNet(conditions=Conditions(delay=0.0))
-    net.buffers["a", "b"] = Radio(bytes_per_second=1000, buffer=250)
-    assert through(net, [100, 100, 100, 40], every=0.0) == [(0.1, 100), (0.2, 100), (0.24, 40)]
-
-
-def test_a_radio_is_one_direction_only() -> None:
-    net = MemoryNet(conditions=Conditions(delay=0.0))
-    net.buffers["b", "a"] = Radio(bytes_per_second=1, buffer=16_000)
-    assert through(net, [100], every=0.0) == [(0.0, 100)]
 
 
 def test_a_delay_that_shrinks_lets_nothing_overtake() -> None:

@@ -1,19 +1,18 @@
-"""UDP links on real loopback sockets with ports that the system chooses."""
+"""UDP links on real loopback sockets."""
 
 import select
 import socket
 import time
 from collections.abc import Iterator
-from math import inf
+from contextlib import ExitStack, closing
 from typing import cast
 
 import pytest
 
 from mav_tasks.errors import LinkOpenError
-from mav_tasks.links.base import Link, Peer
-from mav_tasks.links.link_limits import TO_CLIENTS, TO_VEHICLES
-from mav_tasks.links.udp import COUNT, FIRST, UdpLink, UdpUrl, port_for
-from mav_tasks.links.url import parse_url
+from mav_tasks.links import TO_CLIENTS, TO_VEHICLES, LinkLimits, parse_url
+from mav_tasks.links.base import CountingLink, Link, Peer, StampedLink
+from tests.kit.processes import free_udp_ports, wait_until
 
 #: what a person reads, and what helps
 IN_USE = (
@@ -32,22 +31,27 @@ def other() -> Iterator[socket.socket]:
 
 
 @pytest.fixture
-def listening() -> Iterator[UdpLink]:
-    link = UdpLink(UdpUrl("udpin", HOST, 0))
-    yield link
-    link.close()
+def listening() -> Iterator[Link]:
+    with closing(opened(f"udpin:{HOST}:{free_udp_ports(1)[0]}")) as link:
+        yield link
 
 
-def address_of(link: UdpLink) -> tuple[str, int]:
+def opened(
+    url: str, *, limits: LinkLimits = TO_VEHICLES, push: tuple[tuple[str, int], ...] = ()
+) -> Link:
+    return parse_url(url).open(limits=limits, push=push)
+
+
+def address_of(link: Link) -> tuple[str, int]:
     with socket.socket(fileno=socket.dup(link.fileno())) as same:
         return cast(tuple[str, int], same.getsockname())
 
 
-def wait_for(link: UdpLink) -> None:
+def wait_for(link: Link) -> None:
     assert select.select([link.fileno()], [], [], 5.0)[0], "nothing came"
 
 
-def received(link: UdpLink, count: int) -> list[tuple[Peer, bytes]]:
+def received(link: Link, count: int) -> list[tuple[Peer, bytes]]:
     datagrams: list[tuple[Peer, bytes]] = []
     while len(datagrams) < count:
         wait_for(link)
@@ -55,200 +59,113 @@ def received(link: UdpLink, count: int) -> list[tuple[Peer, bytes]]:
     return datagrams
 
 
-def test_it_is_a_link(listening: UdpLink) -> None:
-    link: Link = listening
-    assert (link.name, link.peers, link.is_local) == (f"udpin:{HOST}:0", (), True)
-
-
-def test_a_datagram_comes_with_its_sender_and_can_be_answered(
-    listening: UdpLink, other: socket.socket
+def test_datagrams_come_in_order_with_their_sender_and_can_be_answered(
+    listening: Link, other: socket.socket
 ) -> None:
-    other.sendto(b"hello", address_of(listening))
-    ((peer, data),) = received(listening, 1)
-    assert (peer, data) == (other.getsockname(), b"hello")
-    listening.send(peer, b"answer")
-    assert other.recvfrom(100) == (b"answer", address_of(listening))
-
-
-def test_datagrams_come_in_order_and_no_more_than_asked_for(
-    listening: UdpLink, other: socket.socket
-) -> None:
+    assert listening.receive(64) == []
     for number in range(5):
         other.sendto(bytes([number]), address_of(listening))
     wait_for(listening)
     first = listening.receive(2)
     rest = received(listening, 5 - len(first))
     assert len(first) == 2
-    assert [data for _, data in first + rest] == [bytes([n]) for n in range(5)]
+    assert first + rest == [(other.getsockname(), bytes([n])) for n in range(5)]
+    listening.send(first[0][0], b"answer")
+    assert other.recvfrom(100) == (b"answer", address_of(listening))
 
 
-def test_without_datagrams_it_gives_none_at_once(listening: UdpLink) -> None:
-    assert listening.receive(64) == []
-    assert listening.lost == 0
-
-
-def test_a_dialling_link_knows_its_peer_beforehand(other: socket.socket) -> None:
-    link = UdpLink(UdpUrl("udpout", HOST, other.getsockname()[1]))
-    assert link.peers == (other.getsockname(),)
-    link.send(link.peers[0], b"first word")
-    data, sender = other.recvfrom(100)
-    assert data == b"first word"
-    other.sendto(b"answer", sender)
-    assert received(link, 1) == [(other.getsockname(), b"answer")]
-    link.close()
-
-
-def test_peers_that_are_pushed_to_are_known_beforehand(other: socket.socket) -> None:
+def test_peers_that_are_dialled_or_pushed_to_are_known_beforehand(other: socket.socket) -> None:
     port = other.getsockname()[1]
-    link = UdpLink(UdpUrl("udpin", HOST, 0), push=(("localhost", port),))
-    assert link.peers == ((HOST, port),)
-    link.close()
+    (free,) = free_udp_ports(1)
+    pushing = opened(f"udpin:{HOST}:{free}", push=(("localhost", port),))
+    dialling = opened(f"udpout:{HOST}:{port}")
+    for link in (pushing, dialling):
+        with closing(link):
+            assert (link.peers, link.is_local) == (((HOST, port),), True)
+            link.send(link.peers[0], b"first word")
+            data, sender = other.recvfrom(100)
+            other.sendto(data, sender)
+            assert received(link, 1) == [(other.getsockname(), b"first word")]
+    for far in (f"udpin:{HOST}:{free}", f"udpout:{HOST}:9"):
+        with closing(opened(far, push=(("192.0.2.1", 9),))) as link:
+            assert not link.is_local
 
 
-@pytest.mark.parametrize(
-    ("push", "local"), [((), True), (((HOST, 9),), True), ((("192.0.2.1", 9),), False)]
-)
-def test_a_link_is_local_if_all_that_it_speaks_to_are(
-    push: tuple[tuple[str, int], ...], local: bool
-) -> None:
-    link = UdpLink(UdpUrl("udpin", HOST, 0), push=push)
-    assert link.is_local is local
-    link.close()
-
-
-def test_a_port_in_use_is_one_clear_error(other: socket.socket) -> None:
+def test_what_cannot_be_opened_is_one_clear_error(other: socket.socket) -> None:
     port = other.getsockname()[1]
-    with pytest.raises(LinkOpenError) as error:
-        UdpLink(UdpUrl("udpin", HOST, port))
-    assert str(error.value) == f"link udpin:{HOST}:{port} cannot be opened: {IN_USE}"
+    for url, words in (
+        (f"udpin:{HOST}:{port}", IN_USE),
+        (f"udpout:{HOST}:9?local={port}", IN_USE),
+        ("udpin:no host:1", ""),
+    ):
+        with pytest.raises(LinkOpenError) as error:
+            opened(url)
+        assert str(error.value).startswith(f"link {url.partition('?')[0]} cannot be opened: ")
+        assert str(error.value).endswith(words)
 
 
-def test_a_host_that_is_none_is_one_clear_error() -> None:
-    with pytest.raises(LinkOpenError, match=r"^link udpin:no host:1 cannot be opened: "):
-        UdpLink(UdpUrl("udpin", "no host", 1))
-
-
-def test_a_peer_that_is_gone_costs_nothing_but_the_datagram(listening: UdpLink) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as gone:
-        gone.bind((HOST, 0))
-        nobody = gone.getsockname()
+def test_a_datagram_that_is_not_taken_costs_nothing_but_itself(listening: Link) -> None:
+    (nobody,) = free_udp_ports(1)
     for _ in range(3):
-        listening.send(nobody, b"anybody?")
+        listening.send((HOST, nobody), b"anybody?")
         listening.receive(64)
-
-
-def test_a_datagram_that_the_system_does_not_take_is_counted(listening: UdpLink) -> None:
+    assert isinstance(listening, CountingLink)
+    assert listening.lost == 0
     listening.send((HOST, 9), b"x" * 70_000)
     assert listening.lost == 1
 
 
-def test_it_says_what_it_is(listening: UdpLink) -> None:
-    assert repr(listening) == f"UdpLink(udpin:{HOST}:0)"
-
-
-@pytest.mark.parametrize("family", [socket.AF_INET, socket.AF_INET6])
-def test_a_link_that_dials_this_machine_hears_no_other(
-    family: socket.AddressFamily, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("host", [HOST, "[::1]"])
+def test_a_link_that_dials_this_machine_hears_no_other(host: str) -> None:
     """The system would bind its socket to every address, where anybody may send."""
-    made: list[socket.socket] = []
-    kind = socket.socket
-
-    def noted(*arguments: int) -> socket.socket:
-        made.append(kind(*arguments))
-        return made[-1]
-
-    monkeypatch.setattr(socket, "socket", noted)
-    host = HOST if family == socket.AF_INET else "::1"
-    link = UdpLink(UdpUrl("udpout", host, 9))
-    link.send(link.peers[0], b"hello")
-    assert made[0].getsockname()[0] == host
-    link.close()
-
-
-def test_one_that_speaks_to_others_too_hears_them() -> None:
-    link = UdpLink(UdpUrl("udpout", HOST, 9), push=(("192.0.2.1", 9),))
-    assert not link.is_local
-    link.close()
-
-
-def dialling(port: int, *, local: int | None = None) -> UdpLink:
-    option = "" if local is None else f"?local={local}"
-    link = parse_url(f"udpout:{HOST}:{port}{option}").open(limits=TO_VEHICLES)
-    assert isinstance(link, UdpLink)
-    return link
+    with closing(opened(f"udpout:{host}:9")) as link:
+        link.send(link.peers[0], b"hello")
+        assert address_of(link)[0] == host.strip("[]")
 
 
 def test_a_rover_is_dialled_from_the_same_port_each_time(other: socket.socket) -> None:
     """It answers its first sender only, as PX4's simulation does."""
+    port = other.getsockname()[1]
     answered: tuple[str, int] | None = None
     for _ in range(3):  # a probe, a server, the server again
-        link = dialling(other.getsockname()[1])
-        link.send(link.peers[0], b"hello")
-        data, sender = other.recvfrom(100)
-        answered = answered or sender
-        other.sendto(data, answered)
-        wait_for(link)
-        assert [data for _, data in link.receive(10)] == [b"hello"]
-        assert link.note == ""
-        link.close()
+        with closing(opened(f"udpout:{HOST}:{port}")) as link:
+            link.send(link.peers[0], b"hello")
+            data, sender = other.recvfrom(100)
+            answered = answered or sender
+            other.sendto(data, answered)
+            wait_for(link)
+            assert [data for _, data in link.receive(10)] == [b"hello"]
+            assert link.note == ""
+    url = f"udpout:{HOST}:{port}"
+    with closing(opened(url)) as first, closing(opened(url)) as second:  # the port is taken
+        assert address_of(second) != address_of(first) == answered
+        assert second.note.startswith(f"local port {address_of(first)[1]} is in use")
+    (free,) = free_udp_ports(1)
+    with closing(opened(f"udpout:{HOST}:{port}?local={free}")) as link:
+        assert address_of(link) == (HOST, free)
+    with ExitStack() as stack:  # clients, or rovers side by side
+        links = [opened(f"udpout:{HOST}:{port}", limits=TO_CLIENTS) for _ in range(3)]
+        links += [opened(f"udpout:{HOST}:{14_580 + number}") for number in range(20)]
+        for link in links:
+            stack.callback(link.close)
+        assert len({address_of(link) for link in links}) == 23
+        assert not any(link.note for link in links)
 
 
-def test_rovers_side_by_side_have_ports_of_their_own() -> None:
-    ports = [port_for(HOST, port) for port in range(14580, 14680)]
-    assert len(set(ports)) == 100
-    assert all(FIRST <= port < FIRST + COUNT for port in ports)
+def test_each_datagram_says_when_it_arrived(listening: Link, other: socket.socket) -> None:
+    assert isinstance(listening, StampedLink)
+    link = listening
 
+    def is_stamped() -> bool:  # the kernel begins that a moment after it was asked to
+        other.sendto(b"first", address_of(link))
+        time.sleep(0.05)
+        return link.receive_stamped(1)[1] < [time.time() - 0.04]
 
-def test_where_that_port_is_taken_it_is_said_and_another_one_is_used(other: socket.socket) -> None:
-    port = other.getsockname()[1]
-    first, second = dialling(port), dialling(port)
-    assert address_of(second) != address_of(first)
-    assert second.note.startswith(f"local port {address_of(first)[1]} is in use")
-    second.send(second.peers[0], b"hello")
-    assert other.recvfrom(100) == (b"hello", address_of(second))
-    first.close()
-    second.close()
-
-
-def test_a_port_that_the_url_names_is_the_one_or_none(other: socket.socket) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.bind((HOST, 0))
-        free = sock.getsockname()[1]
-        with pytest.raises(LinkOpenError):
-            dialling(other.getsockname()[1], local=free)
-    link = dialling(other.getsockname()[1], local=free)
-    assert address_of(link) == (HOST, free)
-    link.close()
-
-
-def test_clients_dial_from_any_port(other: socket.socket) -> None:
-    url = UdpUrl("udpout", HOST, other.getsockname()[1])
-    several = [url.open(limits=TO_CLIENTS) for _ in range(3)]
-    assert len({address_of(cast(UdpLink, link)) for link in several}) == 3
-    for link in several:
-        link.close()
-
-
-def test_each_datagram_says_when_it_arrived(listening: UdpLink, other: socket.socket) -> None:
+    wait_until(is_stamped, within=10, what="the kernel's stamps")
     began = time.time()
-    other.sendto(b"old", address_of(listening))
-    wait_for(listening)
-    sent = time.monotonic()
-    while time.monotonic() < sent + 0.2:
-        select.select([], [], [], 0.2)
-    other.sendto(b"new", address_of(listening))
-    datagrams, stamps = listening.receive_stamped(64)
+    other.sendto(b"old", address_of(link))
+    time.sleep(0.2)
+    other.sendto(b"new", address_of(link))
+    datagrams, stamps = link.receive_stamped(64)
     assert [data for _, data in datagrams] == [b"old", b"new"]
     assert began - 0.01 < stamps[0] < stamps[1] - 0.1 < time.time()
-
-
-def test_a_datagram_without_a_stamp_may_have_arrived_at_any_time(
-    monkeypatch: pytest.MonkeyPatch, other: socket.socket
-) -> None:
-    monkeypatch.setattr("mav_tasks.links.udp.ask_for_stamps", lambda sock: None)
-    link = UdpLink(UdpUrl("udpin", HOST, 0))
-    other.sendto(b"word", address_of(link))
-    wait_for(link)
-    assert link.receive_stamped(64) == ([(other.getsockname(), b"word")], [-inf])
-    link.close()

@@ -1,198 +1,112 @@
 """Link URLs; every error names what is wrong."""
 
-import re
+from pathlib import Path
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.errors import LinkUrlError
-from mav_tasks.links import serial, tcp_in, tcp_out, udp
-from mav_tasks.links.endpoint import HostUrl, is_loopback, parse_endpoint
-from mav_tasks.links.serial import SerialUrl
-from mav_tasks.links.tcp_in import TcpInUrl
-from mav_tasks.links.tcp_out import TcpOutUrl
-from mav_tasks.links.udp import UdpUrl
-from mav_tasks.links.url import KINDS, KindModule, LinkUrl, parse_url
-from tests.kit import third_link
+from mav_tasks.links import parse_url
+from tests.kit.commands import called
 
-#: mypy checks each module against the interface
-MODULES: list[KindModule] = [serial, tcp_in, tcp_out, udp, third_link]
+RATES = "expected serial:device:baud with a baud rate from 1200 to 12000000"
+PORT = "expected host:port with a port from 1 to 65535"
+NO_HOST = "no host has such a name"
+KIND = "expected udpin:host:port, udpout:host:port, tcpin:host:port, tcp:host:port or serial:"
+OPTION = "expected unsigned=allow, unsigned=refuse and key=NAME"
 
-RATES = "from 1200 to 12000000"
-EXPECTED = (
-    "expected udpin:host:port, udpout:host:port, tcpin:host:port, tcp:host:port "
-    "or serial:device:baud"
-)
-
-
-@pytest.mark.parametrize(
-    ("text", "url"),
-    [
-        ("udpin:127.0.0.1:14560", UdpUrl("udpin", "127.0.0.1", 14560)),
-        ("udpout:localhost:14580", UdpUrl("udpout", "localhost", 14580)),
-        ("udpin://0.0.0.0:14550", UdpUrl("udpin", "0.0.0.0", 14550)),
-        ("udpout:[::1]:65535", UdpUrl("udpout", "::1", 65535)),
-        ("tcpin:0.0.0.0:5760", TcpInUrl("tcpin", "0.0.0.0", 5760)),
-        ("tcp:rover.local:5760", TcpOutUrl("tcp", "rover.local", 5760)),
-        ("serial:/dev/ttyUSB0:57600", SerialUrl("/dev/ttyUSB0", 57_600)),
-        (
-            "serial:/dev/serial/by-path/pci-0:1.0:9600",
-            SerialUrl("/dev/serial/by-path/pci-0:1.0", 9_600),
-        ),
+#: text -> as it is shown, whether no other machine can dial it, what is asked of signatures
+GOOD = """\
+udpin:127.0.0.1:14560                           udpin:127.0.0.1:14560       True  None
+udpout:localhost:14580                          udpout:localhost:14580      True  None
+udpin://0.0.0.0:14550                           udpin:0.0.0.0:14550         False None
+udpout:[::1]:65535                              udpout:::1:65535            True  None
+udpout:127.9.9.9:1?unsigned=refuse              udpout:127.9.9.9:1          True  False
+tcpin:192.168.1.2:5760?unsigned=allow           tcpin:192.168.1.2:5760      False True
+tcp:rover.local:5760?key=rover-1                tcp:rover.local:5760        False None
+serial:/dev/ttyUSB0:57600?key=a&unsigned=allow  serial:/dev/ttyUSB0:57600   True  True
+serial:/dev/by-path/pci-0:1.0:9600              serial:/dev/by-path/pci-0:1.0:9600  True  None
+udpout:127.0.0.1:14580?local=14590              udpout:127.0.0.1:14580      True  None
+"""
+BAD = {
+    KIND: ("14560", "", "udp:127.0.0.1:1"),
+    NO_HOST: (f"udpout:{300 * 'a'}:1", "tcp:a..b:1", "udpin:a\0b:1"),
+    RATES: [
+        f"serial:{rest}"
+        for rest in ("", "/dev/x", "/dev/x:", ":57600", "/dev/x:0", "/dev/x:300", "/dev/x:fast")
     ],
-)
-def test_a_url_names_kind_host_and_port(text: str, url: LinkUrl) -> None:
-    assert parse_url(text) == url
-
-
-@pytest.mark.parametrize(
-    "text", ["udpin:127.0.0.1:14560", "tcp:localhost:5760", "serial:/dev/ttyACM0:115200"]
-)
-def test_a_url_reads_as_it_is_written(text: str) -> None:
-    assert str(parse_url(text)) == text
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("14560", f"link '14560': {EXPECTED}"),
-        (f"udpout:{300 * 'a'}:1", f"link 'udpout:{300 * 'a'}:1': no host has such a name"),
-        ("tcp:a..b:1", "link 'tcp:a..b:1': no host has such a name"),
-        ("udpin:a\0b:1", "link 'udpin:a\\x00b:1': no host has such a name"),
-        ("udp:127.0.0.1:1", f"link 'udp:127.0.0.1:1': {EXPECTED}"),
-        ("", f"link '': {EXPECTED}"),
-        *[
-            (
-                text,
-                f"link {text!r}: expected serial:device:baud with a baud rate {RATES}",
-            )
-            for text in (
-                "serial:",
-                "serial:/dev/ttyUSB0",
-                "serial:/dev/ttyUSB0:",
-                "serial::57600",
-                "serial:/dev/ttyUSB0:0",
-                "serial:/dev/ttyUSB0:300",
-                "serial:/dev/ttyUSB0:fast",
-                "serial:/dev/ttyUSB0:-57600",
-                "serial:/dev/ttyUSB0:99999999999999999999",
-            )
-        ],
-        *[
-            (text, f"link {text!r}: expected host:port with a port from 1 to 65535")
-            for text in (
-                "udpin:127.0.0.1",
-                "udpin:127.0.0.1:",
-                "udpin::14560",
-                "udpin:127.0.0.1:0",
-                "udpin:127.0.0.1:65536",
-                "udpin:127.0.0.1:-1",
-                "udpin:127.0.0.1:" + "1" * 5_000,
-                "udpin:[]:14560",
-                "udpin:127.0.0.1:http",
-                "udpout:",
-                "tcp:host",
-                "tcpin:",
-            )
-        ],
+    PORT: [
+        *(f"udpin:127.0.0.1{port}" for port in ("", ":", ":0", ":65536", ":-1", ":" + "1" * 5_000)),
+        *("udpin::14560", "udpin:[]:14560", "udpin:127.0.0.1:http", "tcp:host", "tcpin:"),
     ],
-)
-def test_an_error_names_what_is_wrong(text: str, words: str) -> None:
-    with pytest.raises(LinkUrlError) as error:
-        parse_url(text)
-    assert str(error.value) == words
+    f"unknown option 'keys': {OPTION}": ("tcp:127.0.0.1:1?keys=a",),
+    f"unknown option 'local': {OPTION}": ("tcp:127.0.0.1:1?local=14590",),
+    "unsigned: expected one of ": ("tcp:127.0.0.1:1?unsigned=yes", "tcp:127.0.0.1:1?unsigned"),
+    "key: expected one of ": ("tcp:127.0.0.1:1?key=",),
+    "key is given twice": ("tcp:127.0.0.1:1?key=a&key=b",),
+    "local: expected a port from 1 to 65535": ("udpout:127.0.0.1:1?local=0",),
+}
 
 
-def test_an_endpoint_error_names_what_it_is_for() -> None:
-    with pytest.raises(LinkUrlError, match=r"^--push x: expected host:port with a port"):
-        parse_endpoint("x", what="--push x")
+def test_a_url_is_shown_without_its_options_and_knows_who_can_dial_it() -> None:
+    found = [
+        (text, url := parse_url(text), url.is_nearby, url.options.unsigned)
+        for text in (line.split()[0] for line in GOOD.splitlines())
+    ]
+    assert [list(map(str, each)) for each in found] == [line.split() for line in GOOD.splitlines()]
+    assert parse_url("tcp:a:1?key=b") == parse_url("tcp:a:1"), "it is the same link"
+
+
+def test_an_error_names_what_is_wrong() -> None:
+    wrong: list[tuple[str, object]] = []
+    for words, texts in BAD.items():
+        for text in texts:
+            try:
+                wrong.append((text, parse_url(text)))
+            except LinkUrlError as error:
+                if not str(error).startswith(f"link {text!r}: {words}"):
+                    wrong.append((text, str(error)))
+    assert wrong == []
 
 
 @given(st.text(max_size=40))
 def test_any_text_is_a_url_or_a_clear_error(text: str) -> None:
-    problem = ""
+    words = repr(text)
     try:
-        url = parse_url(text)
-        assert not isinstance(url, HostUrl) or 0 < url.port < 65536
+        parse_url(text)
     except LinkUrlError as error:
-        problem = str(error)
-    assert not problem or repr(text) in problem
+        words = str(error)
+    assert repr(text) in words
 
 
-@pytest.mark.parametrize(
-    ("host", "loopback"),
-    [
-        ("127.0.0.1", True),
-        ("127.9.9.9", True),
-        ("::1", True),
-        ("localhost", True),
-        ("0.0.0.0", False),
-        ("192.168.1.2", False),
-        ("rover.local", False),
-        ("", False),
-    ],
-)
-def test_only_this_machine_is_loopback(host: str, loopback: bool) -> None:
-    assert is_loopback(host) is loopback
+NEAR, FAR, WIRE = "udpin:127.0.0.1:1", "udpin:0.0.0.0:1", "serial:/dev/ttyUSB0:57600"
+NO_KEY = "has no signing key"
+#: lines of a configuration -> what is wrong with it, "" for nothing
+CONFIGURATIONS = {
+    f'clients = ["{FAR}?unsigned=allow"]': "needs no signing key",
+    f'vehicles = ["{FAR}"]': NO_KEY,
+    'vehicles = ["tcp:192.0.2.1:5760"]': NO_KEY,
+    f'vehicles = ["{FAR}?unsigned=refuse"]': NO_KEY,
+    f'vehicles = ["{FAR}?key=r1&unsigned=allow"]': "needs no signing key",
+    'push = ["192.0.2.1:14550"]\nclients = ["udpin:127.0.0.1:1?unsigned=allow"]': "push 192.0.2.1",
+    f'vehicles = ["{NEAR}"]\n[signing]\nunsigned = "nowhere"': "but has no key: add ?key=NAME",
+    f'clients = ["{NEAR}"]\nvehicles = ["{NEAR}?key=a"]': f"link {NEAR} is given twice",
+    f'clients = ["{FAR}"]': "",  # whether there is a key is seen later
+    f'clients = ["{WIRE}"]\nvehicles = ["serial:/dev/ttyUSB1:57600"]': "",
+    f'vehicles = ["{FAR}?key=r1"]': "",
+    f'vehicles = ["{FAR}?key=r1&unsigned=allow"]\ninsecure = true': "",
+    f'clients = ["{FAR}?unsigned=allow"]\ninsecure = true': "",
+    'vehicles = ["udpout:192.0.2.1:1"]\ninsecure = true': "",
+    f'vehicles = ["{NEAR}?key=r1"]\n[signing]\nunsigned = "nowhere"': "",
+}
 
 
-@pytest.mark.parametrize(
-    ("options", "unsigned", "key"),
-    [
-        ("", None, ""),
-        ("?unsigned=allow", True, ""),
-        ("?unsigned=refuse", False, ""),
-        ("?key=rover-1", None, "rover-1"),
-        ("?key=rover-1&unsigned=allow", True, "rover-1"),
-    ],
-)
-@pytest.mark.parametrize("link", ["udpin:0.0.0.0:14560", "serial:/dev/ttyUSB0:57600"])
-def test_a_url_says_what_is_asked_of_signatures(
-    link: str, options: str, unsigned: bool | None, key: str
-) -> None:
-    url = parse_url(link + options)
-    assert (url.options.unsigned, url.options.key) == (unsigned, key)
-    assert str(url) == link
-    assert url == parse_url(link), "it is the same link, whatever is asked of it"
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (
-            "?keys=a",
-            "unknown option 'keys': expected unsigned=allow, unsigned=refuse and key=NAME",
-        ),
-        ("?unsigned=yes", "unsigned: expected one of "),
-        ("?unsigned", "unsigned: expected one of "),
-        ("?key=", "key: expected one of "),
-        ("?key=a&key=b", "key is given twice"),
-        ("?key=a&", "unknown option ''"),
-        (
-            "?local=14590",
-            "unknown option 'local': expected unsigned=allow, unsigned=refuse and key",
-        ),
-    ],
-)
-def test_an_unknown_option_is_refused_by_name(options: str, words: str) -> None:
-    with pytest.raises(LinkUrlError, match=re.escape(words)):
-        parse_url(f"tcp:127.0.0.1:1{options}")
-
-
-def test_a_url_says_from_which_port_it_dials() -> None:
-    url = parse_url("udpout:127.0.0.1:14580?local=14590")
-    assert isinstance(url, UdpUrl)
-    assert (url.options.others, str(url)) == ({"local": "14590"}, "udpout:127.0.0.1:14580")
-    with pytest.raises(LinkUrlError, match="local: expected a port from 1 to 65535"):
-        parse_url("udpout:127.0.0.1:14580?local=0")
-    with pytest.raises(LinkUrlError, match=r"unknown option 'x': expected .* and local=PORT"):
-        parse_url("udpout:127.0.0.1:14580?x=0")
-
-
-def test_a_third_kind_takes_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(KINDS, "unix", third_link.KIND)
-    url = parse_url("unix:/tmp/rover?key=anna")
-    assert (str(url), url.options.key, url.is_nearby) == ("unix:/tmp/rover", "anna", True)
-    with pytest.raises(LinkUrlError, match=r"serial:device:baud or unix:path$"):
-        parse_url("other:/tmp/rover")
+def test_links_that_others_reach_unsigned_need_a_word(tmp_path: Path) -> None:
+    wrong = []
+    for lines, words in CONFIGURATIONS.items():
+        path = tmp_path / "mav-tasks.toml"
+        path.write_text(f"[links]\n{lines}\n", encoding="utf-8")
+        done = called("config", "check", str(path))
+        if (done.status == 0) is bool(words) or words not in done.output + done.error:
+            wrong.append((lines, done))
+    assert wrong == []

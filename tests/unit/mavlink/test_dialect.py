@@ -1,54 +1,41 @@
-"""What the generated dialect must have beside what pymavlink ships."""
+"""What the generated dialect must have beside what pymavlink ships, and our names for it."""
 
-import struct
+import re
+from enum import IntEnum, IntFlag
+from inspect import getmembers, isclass
 
 import pytest
+from pymavlink.dialects.v20 import development
 
-from mav_tasks.mavlink import _dialect
+from mav_tasks.mavlink import _dialect, enums
 from mav_tasks.mavlink import messages as m
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
-STATES = 14
-
-
-def test_task_status_is_as_the_contract_draws_it() -> None:
-    assert (m.TaskStatus.id, m.TaskStatus.unpacker.size) == (54000, 200)
-    assert m.TaskStatus.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50sI24sI64s"
-    assert m.TaskStatus.ordered_fieldnames == m.TaskStatus.fieldnames
-    assert struct.calcsize("<5I4f4H10B50sI24sI64s") == 200
+QUEUE_STATUS = "time_boot_ms version running_id next_id capacity counts paused_reason flags"
 
 
-def test_task_queue_status_is_as_the_contract_draws_it() -> None:
-    assert (m.TaskQueueStatus.id, m.TaskQueueStatus.unpacker.size) == (54001, 126)
-    assert m.TaskQueueStatus.ordered_fieldnames == [
-        "time_boot_ms",
-        "version",
-        "running_id",
-        "next_id",
-        "capacity",
-        "counts",
-        "paused_reason",
-        "flags",
-        "halt_epoch",
-        "heartbeat_age",
-        "gateway",
+def test_our_messages_are_as_the_contract_draws_them() -> None:
+    status, queue, timing = m.TaskStatus, m.TaskQueueStatus, m.TaskTiming
+    assert [(kind.id, kind.unpacker.size) for kind in (status, queue, timing)] == [
+        (54000, 200),
+        (54001, 126),
+        (54002, 34),
     ]
-    assert m.TaskQueueStatus.array_lengths[5] == STATES
-
-
-def test_task_timing_is_as_the_contract_draws_it() -> None:
-    assert (m.TaskTiming.id, m.TaskTiming.unpacker.size) == (54002, 34)
-    assert m.TaskTiming.unpacker.format == "<IIIIffffBB"
-    assert m.TaskTiming.ordered_fieldnames == m.TaskTiming.fieldnames
-    assert struct.calcsize("<4I4f2B") == 34
-
-
-def test_protocol_version_has_the_public_crc_extra() -> None:
-    assert (m.ProtocolVersion.id, m.ProtocolVersion.crc_extra) == (300, 217)
+    assert status.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50sI24sI64s"
+    assert timing.unpacker.format == "<IIIIffffBB"
+    for kind in (status, timing):
+        assert kind.ordered_fieldnames == kind.fieldnames
+    assert queue.ordered_fieldnames == [
+        *QUEUE_STATUS.split(),
+        *("halt_epoch", "heartbeat_age", "gateway"),
+    ]
+    assert queue.array_lengths[5] == 14
+    assert sorted(number for number in m.ALL if 54000 <= number < 60000) == [54000, 54001, 54002]
+    commands = sorted(n for n in _dialect.enums["MAV_CMD"] if 54000 <= n < 60000)
+    assert commands[:9] == [*range(54000, 54004), *range(54010, 54015)]
 
 
 def test_what_the_base_lacks_is_as_the_set_that_has_it() -> None:
-    from pymavlink.dialects.v20 import development
-
     for number in (435, 436, 437):  # AVAILABLE_MODES, CURRENT_MODE, AVAILABLE_MODES_MONITOR
         ours, theirs = m.ALL[number], development.mavlink_map[number]
         assert ours.msgname == theirs.msgname
@@ -58,50 +45,52 @@ def test_what_the_base_lacks_is_as_the_set_that_has_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("message", "extensions"),
-    [
-        (m.MissionCount, ["mission_type", "opaque_id"]),
-        (m.MissionAck, ["mission_type", "opaque_id"]),
-        (
-            m.MissionCurrent,
-            ["total", "mission_state", "mission_mode", "mission_id", "fence_id", "rally_points_id"],
-        ),
-    ],
-)
-def test_mission_messages_carry_the_ids_of_plans(
-    message: type[m.Message], extensions: list[str]
-) -> None:
-    assert message.fieldnames[-len(extensions) :] == extensions
-    assert message.ordered_fieldnames[-len(extensions) :] == extensions  # extensions are not sorted
-
-
-@pytest.mark.parametrize(
-    ("message", "number", "crc_extra"),
+    ("message", "number", "crc_extra", "extensions"),
     [  # CRC_EXTRA as pymavlink ships it: an extension field must not change it
-        (m.MissionCount, 44, 221),
-        (m.MissionAck, 47, 153),
-        (m.MissionCurrent, 42, 28),
-        (m.CommandAck, 77, 143),
-        (m.CommandLong, 76, 152),
-        (m.Heartbeat, 0, 50),
+        (m.MissionCount, 44, 221, "mission_type opaque_id"),
+        (m.MissionAck, 47, 153, "mission_type opaque_id"),
+        (
+            *(m.MissionCurrent, 42, 28),
+            "total mission_state mission_mode mission_id fence_id rally_points_id",
+        ),
+        (m.CommandAck, 77, 143, "progress result_param2 target_system target_component"),
+        (m.ProtocolVersion, 300, 217, ""),
     ],
 )
-def test_extensions_leave_crc_extra_alone(
-    message: type[m.Message], number: int, crc_extra: int
+def test_extensions_come_last_and_leave_crc_extra_alone(
+    message: type[m.Message], number: int, crc_extra: int, extensions: str
 ) -> None:
     assert (message.id, message.crc_extra) == (number, crc_extra)
+    names = extensions.split()
+    for fields in (message.fieldnames, message.ordered_fieldnames):
+        assert fields[len(fields) - len(names) :] == names  # they are not sorted
 
 
-def test_every_readable_name_stands_for_a_message_of_the_dialect() -> None:
-    ours: list[type[m.Message]] = [
-        kind for name, kind in vars(m).items() if isinstance(kind, type) and name != "Message"
+def test_every_member_of_our_enums_has_the_number_of_its_definition() -> None:
+    prefixes = {"MavComponent": "MAV_COMP_ID", "MavMissionResult": "MAV_MISSION"}
+    ours = [
+        enum
+        for _, enum in getmembers(enums, isclass)
+        if issubclass(enum, IntEnum | IntFlag) and enum.__module__ == enums.__name__
     ]
-    assert len(ours) > 50
-    assert [kind for kind in ours if m.ALL[kind.id] is not kind] == []
+    assert len(ours) >= 12
+    for enum in ours:
+        name = re.sub(r"(?<!^)(?=[A-Z])", "_", enum.__name__).upper()  # MavModeFlag: MAV_MODE_FLAG
+        prefix = prefixes.get(enum.__name__, name)
+        for member in enum:
+            assert getattr(_dialect, f"{prefix}_{member.name}", None) == member.value, member
+    assert max(enums.MavResult) < 7, "larger ones crash MAVSDK"
 
 
-def test_our_numbers_are_in_the_range_that_is_free() -> None:
-    messages = sorted(number for number in m.ALL if 54000 <= number < 60000)
-    commands = [number for number in _dialect.enums["MAV_CMD"] if 54000 <= number < 60000]
-    assert messages == [54000, 54001, 54002]
-    assert sorted(commands)[:9] == [54000, 54001, 54002, 54003, 54010, 54011, 54012, 54013, 54014]
+def numbers_of(name: str) -> dict[str, int]:
+    """The members of an enum of the dialect, by their short names."""
+    return {
+        entry.name.removeprefix(f"{name}_"): number
+        for number, entry in _dialect.enums[name].items()
+        if not entry.name.endswith("_ENUM_END")
+    }
+
+
+def test_states_and_reasons_of_tasks_are_those_of_the_dialect() -> None:
+    assert {state.name: state.value for state in TaskState} == numbers_of("TASK_STATE")
+    assert {reason.name: reason.value for reason in TaskReason} == numbers_of("TASK_REASON")

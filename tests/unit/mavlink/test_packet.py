@@ -3,7 +3,6 @@
 from random import Random
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
@@ -45,132 +44,100 @@ def unknown(*, seq: int, message_id: int = 0xABCDEF, payload: bytes = b"\x01\x02
     return b"\xfd" + head + payload + crc.to_bytes(2, "little")
 
 
-class TestSplitting:
-    @pytest.mark.parametrize("raw", [V1, V2], ids=["v1", "v2"])
-    def test_a_packet_shows_its_header(self, raw: bytes) -> None:
-        heartbeat = common.MAVLINK_MSG_ID_HEARTBEAT
-        assert split_datagram(raw) == [Packet(raw, 7, Address(3, 1), heartbeat)]
+SIGNED = signed(HEARTBEAT, seq=7)
 
-    def test_system_and_component_are_those_of_its_source(self) -> None:
-        (packet,) = split_datagram(V2)
-        assert (packet.system_id, packet.component_id) == packet.source == (3, 1)
 
-    def test_a_v1_packet_is_known_as_such(self) -> None:
-        (v1,), (v2,) = split_datagram(V1), split_datagram(V2)
-        assert [(p.is_v2, p.is_signed) for p in (v1, v2)] == [(False, False), (True, False)]
+def test_a_packet_shows_its_header_payload_and_kind() -> None:
+    heartbeat = common.MAVLINK_MSG_ID_HEARTBEAT
+    for raw, payload, is_v2, is_signed in (
+        (V1, V1[6:-2], False, False),
+        (V2, V2[10:-2], True, False),
+        (SIGNED, V2[10:-2], True, True),
+    ):
+        (packet,) = split_datagram(raw)
+        assert packet == Packet(raw, 7, Address(3, 1), heartbeat)
+        assert (packet.system_id, packet.component_id) == packet.source
+        assert (packet.payload, packet.is_v2, packet.is_signed) == (payload, is_v2, is_signed)
+    assert len(SIGNED) == len(V2) + SIGNATURE_LENGTH
+    (packet,) = split_datagram(unknown(seq=1))
+    assert packet.message_id == 0xABCDEF
 
-    def test_the_payload_lies_between_header_and_checksum(self) -> None:
-        (v1,), (v2,) = split_datagram(V1), split_datagram(V2)
-        assert (v1.payload, v2.payload) == (V1[6:-2], V2[10:-2])
 
-    def test_a_message_id_has_three_bytes(self) -> None:
-        (packet,) = split_datagram(unknown(seq=1))
-        assert packet.message_id == 0xABCDEF
+def test_packets_come_out_in_order_and_junk_is_skipped() -> None:
+    packets = [V1, SIGNED, V2, unknown(seq=2), V1]
+    for between in (b"", JUNK):
+        data = between + between.join(packets) + between
+        assert [packet.raw for packet in split_datagram(data)] == packets
+    for flags in (0x02, 0x03, 0x80, 0xFF):  # of incompatibility, that nobody knows
+        strange = V2[:2] + bytes([flags]) + V2[3:]
+        assert [packet.raw for packet in split_datagram(strange + V2)] == [V2]
 
-    def test_a_signature_belongs_to_its_packet(self) -> None:
-        raw = signed(HEARTBEAT, seq=7)
-        (first, second) = split_datagram(raw + V2)
-        assert (first.raw, second.raw) == (raw, V2)
-        assert first.is_signed
-        assert first.payload == V2[10:-2]
-        assert len(raw) == len(V2) + SIGNATURE_LENGTH
 
-    def test_several_packets_come_out_in_order(self) -> None:
-        assert [p.raw for p in split_datagram(V1 + V2 + unknown(seq=2) + V1)] == [
-            V1,
-            V2,
-            unknown(seq=2),
-            V1,
-        ]
-
-    def test_junk_before_between_and_after_is_skipped(self) -> None:
-        assert [p.raw for p in split_datagram(JUNK + V2 + JUNK + V1 + JUNK)] == [V2, V1]
-
-    @pytest.mark.parametrize("raw", [V1, V2, signed(HEARTBEAT, seq=7)], ids=["v1", "v2", "signed"])
-    def test_a_packet_cut_at_any_length_is_no_packet(self, raw: bytes) -> None:
+def test_a_packet_cut_at_any_length_is_no_packet() -> None:
+    for raw in (V1, V2, SIGNED):
         assert [split_datagram(raw[:length]) for length in range(len(raw))] == [[]] * len(raw)
 
-    def test_a_truncated_datagram_does_not_swallow_the_next(self) -> None:
-        assert split_datagram(V2[:-1]) == []
-        assert [p.raw for p in split_datagram(V2)] == [V2]
 
-    @pytest.mark.parametrize("flags", [0x02, 0x03, 0x80, 0xFF])
-    def test_a_packet_with_an_incompat_flag_that_nobody_knows_is_skipped(self, flags: int) -> None:
-        strange = V2[:2] + bytes([flags]) + V2[3:]
-        assert [p.raw for p in split_datagram(strange + V2)] == [V2]
-
-    @given(st.binary(max_size=700))
-    def test_packets_of_any_bytes_are_pieces_of_them_in_order(self, data: bytes) -> None:
-        start = 0
-        for packet in split_datagram(data):
-            start = data.index(packet.raw, start) + len(packet.raw)
-
-    @given(st.lists(st.sampled_from([V1, V2, b"\xfd\xfe", b"\xfe", b"\xfd" * 12]), max_size=8))
-    def test_magic_bytes_in_junk_never_raise(self, parts: list[bytes]) -> None:
-        split_datagram(b"".join(parts))
+ANY = st.binary(max_size=700) | st.lists(
+    st.sampled_from([V1, V2, b"\xfd\xfe", b"\xfe", b"\xfd" * 12]), max_size=8
+).map(b"".join)
 
 
-class TestRenumbering:
-    def test_two_thousand_packets_are_as_stock_pymavlink_packs_them(self) -> None:
-        random = Random(SEED)
-        for number in range(2000):
-            v1 = number % 2 == 0
-            message = stock_message(random, v1=v1)
-            old, new = random.randrange(256), random.randrange(256)
-            source = (random.randrange(1, 256), random.randrange(256))
-            (packet,) = split_datagram(stock_packet(message, seq=old, source=source, v1=v1))
-            assert with_seq(packet, new) == stock_packet(message, seq=new, source=source, v1=v1), (
-                f"seed {SEED}, packet {number}: {message.get_type()}"
-            )
+@given(ANY)
+def test_packets_of_any_bytes_are_pieces_of_them_in_order(data: bytes) -> None:
+    start = 0
+    for packet in split_datagram(data):
+        start = data.index(packet.raw, start) + len(packet.raw)
 
-    @pytest.mark.parametrize("length", [0, 1, 2, 127, 254, 255])
-    def test_an_unknown_message_of_any_length_keeps_a_good_checksum(self, length: int) -> None:
+
+def test_two_thousand_packets_are_renumbered_as_stock_pymavlink_packs_them() -> None:
+    random = Random(SEED)
+    for number in range(2000):
+        v1 = number % 2 == 0
+        message = stock_message(random, v1=v1)
+        old, new = random.randrange(256), random.randrange(256)
+        source = (random.randrange(1, 256), random.randrange(256))
+        (packet,) = split_datagram(stock_packet(message, seq=old, source=source, v1=v1))
+        assert with_seq(packet, new) == stock_packet(message, seq=new, source=source, v1=v1), (
+            f"seed {SEED}, packet {number}: {message.get_type()}"
+        )
+
+
+def test_an_unknown_message_of_any_length_keeps_a_good_checksum() -> None:
+    for length in (0, 1, 2, 127, 254, 255):
         payload = Random(length).randbytes(length)
         (packet,) = split_datagram(unknown(seq=250, payload=payload))
         assert with_seq(packet, 3) == unknown(seq=3, payload=payload)
 
-    def test_a_corrupt_packet_stays_corrupt(self) -> None:
-        random = Random(SEED)
-        decoder = Decoder()
-        for _ in range(500):
-            raw = bytearray(stock_packet(HEARTBEAT, seq=random.randrange(256)))
-            raw[random.randrange(10, len(raw))] ^= 1 << random.randrange(8)
-            (packet,) = split_datagram(bytes(raw))
-            (passed_on,) = split_datagram(with_seq(packet, random.randrange(256)))
-            assert decoder.decode(passed_on) is None
-        assert decoder.counts.corrupt == 500
 
-    def test_the_same_number_leaves_a_packet_as_it_is(self) -> None:
-        (packet,) = split_datagram(V2)
-        assert with_seq(packet, 7) is packet.raw
+def test_a_corrupt_packet_stays_corrupt() -> None:
+    random = Random(SEED)
+    for _ in range(500):
+        raw = bytearray(stock_packet(HEARTBEAT, seq=random.randrange(256)))
+        raw[random.randrange(10, len(raw))] ^= 1 << random.randrange(8)
+        (packet,) = split_datagram(bytes(raw))
+        (passed_on,) = split_datagram(with_seq(packet, random.randrange(256)))
+        assert Decoder().decode(passed_on) is None
+        assert Decoder().decode(with_payload(packet, 0, b"\x01\x02")) is None
 
-    @pytest.mark.parametrize("seq", [7, 8])
-    def test_a_signature_is_taken_off_and_its_flag_with_it(self, seq: int) -> None:
-        (packet,) = split_datagram(signed(HEARTBEAT, seq=7))
+
+def test_a_new_number_takes_a_signature_off_and_the_same_one_leaves_a_packet_alone() -> None:
+    (packet,), (plain,) = split_datagram(SIGNED), split_datagram(V2)
+    for seq in (7, 8):
         assert with_seq(packet, seq) == stock_packet(HEARTBEAT, seq=seq, source=(3, 1))
+    assert with_seq(plain, 7) is plain.raw
 
 
-class TestAnotherPayload:
-    @pytest.mark.parametrize("raw", [V1, V2, signed(HEARTBEAT, seq=7)], ids=["v1", "v2", "signed"])
-    def test_decodes_as_the_message_with_the_other_field(self, raw: bytes) -> None:
+def test_with_another_payload_it_is_the_message_with_the_other_field() -> None:
+    for raw in (V1, V2, SIGNED):
         (packet,) = split_datagram(raw)
         other = with_payload(packet, 0, (0x04040000).to_bytes(4, "little"))
         assert not other.is_signed
-        message = Decoder().decode(other)
-        assert message is not None
-        before = Decoder().decode(packet)
+        after, before = Decoder().decode(other), Decoder().decode(packet)
+        assert after is not None
         assert before is not None
-        assert message.to_dict() == {**before.to_dict(), "custom_mode": 0x04040000}
-
-    def test_beyond_what_was_sent_is_left_out(self) -> None:
-        (packet,) = split_datagram(V2)
-        length = len(packet.payload)
-        assert with_payload(packet, length - 1, b"\x07\x08\x09").payload[-1] == 7
-        assert with_payload(packet, length, b"\x07") == packet._replace(
-            raw=with_seq(packet, packet.seq)
-        )
-
-    def test_corrupt_stays_corrupt(self) -> None:
-        broken = V2[:-1] + bytes([V2[-1] ^ 1])
-        (packet,) = split_datagram(broken)
-        assert Decoder().decode(with_payload(packet, 0, b"\x01\x02")) is None
+        assert after.to_dict() == {**before.to_dict(), "custom_mode": 0x04040000}
+    (packet,) = split_datagram(V2)
+    length = len(packet.payload)  # beyond what was sent is left out
+    assert with_payload(packet, length - 1, b"\x07\x08\x09").payload[-1] == 7
+    assert with_payload(packet, length, b"\x07").raw == with_seq(packet, packet.seq)

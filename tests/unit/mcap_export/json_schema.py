@@ -28,5 +28,14 @@ def check(value: Any, schema: Mapping[str, Any], path: str = "") -> None:
 
 
 def check_schema(schema: Mapping[str, Any]) -> None:
-    """Fail if a schema is none."""
+    """Fail if a schema is none, or has what viewers cannot read: lists of types, other types."""
     _Validator.check_schema(schema)
+    assert schema["type"] == "object"
+    assert _types(schema) <= {"object", "array", "string", "number", "integer"}
+
+
+def _types(schema: Mapping[str, Any]) -> set[str]:
+    if "oneOf" in schema:
+        return set()
+    parts = [*schema.get("properties", {}).values(), *filter(None, [schema.get("items")])]
+    return {schema["type"]}.union(*map(_types, parts))

@@ -1,18 +1,52 @@
+"""What viewers draw of a recording: poses, places, set-points, texts and tasks."""
+
+import json
+from dataclasses import replace
 from math import nan, pi, sqrt
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+pytest.importorskip("mcap", reason="the extra mcap is not installed")
+
+from mcap.reader import make_reader
+
+from mav_tasks.engine.inputs import WallClock
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.enums import MavSeverity
+from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Message
-from mav_tasks.mcap_export.views import SECOND, Seen, Views
-from mav_tasks.services.statustext import chunks
-from tests.unit.mcap_export.json_schema import check
+from mav_tasks.mcap_export.exporting import export
+from mav_tasks.recording import observers
+from mav_tasks.settings import Recording, Settings
+from mav_tasks.tasks.events import (
+    Event,
+    QueuePaused,
+    TaskAssigned,
+    TaskChanged,
+    TaskModified,
+    TaskProgressed,
+    TaskSubmitted,
+)
+from mav_tasks.tasks.goal import Move
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Marks, Progress, Submitter, Task, TaskId, Terms
+from tests.unit.mcap_export.test_round_trip import check_messages, json_of, stamped
 
 ROVER, SERVER = Address(1, 1), Address(250, 191)
-START = 1_763_726_400 * SECOND
+START = 1_763_726_400_000_000  # us
+SECOND = 1_000_000
+Sent = Message | tuple[int, Message]  # some us after START
+
+#: as Foxglove's documentation has them: the fields that a message must have
+FOXGLOVE = {
+    "foxglove.PoseInFrame": "timestamp frame_id pose",
+    "foxglove.LocationFix": "timestamp frame_id latitude longitude altitude position_covariance"
+    " position_covariance_type",
+    "foxglove.Log": "timestamp level message name file line",
+}
 
 
 def attitude(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Message:
@@ -23,14 +57,21 @@ def position(north: float, east: float, down: float) -> Message:
     return m.LocalPositionNed(0, north, east, down, 0.0, 0.0, 0.0)
 
 
-def seen(*messages: Message, source: Address = ROVER, views: Views | None = None) -> list[Seen]:
-    views = views or Views()
-    found: list[Seen] = []
-    for number, message in enumerate(messages):
-        found += views.of(message, source, time=START + number)
-    for each in found:
-        check(each.values, each.schema.body, each.topic)
-    return found
+def seen(folder: Path, *sent: Sent, source: Address = ROVER) -> list[tuple[str, Any]]:
+    """Export a log of messages; return what viewers find beside the messages themselves."""
+    timed = [each if isinstance(each, tuple) else (n, each) for n, each in enumerate(sent)]
+    encoder, log, out = Encoder(source), folder / "log.tlog", folder / "out.mcap"
+    log.write_bytes(b"".join(stamped(encoder.encode(each), START + at) for at, each in timed))
+    with out.open("wb") as file:
+        export([log], file)
+    check_messages(out)
+    with out.open("rb") as file:
+        for schema, _, _ in make_reader(file).iter_messages():
+            if schema and schema.name in FOXGLOVE:
+                fields = json.loads(schema.data)["properties"]
+                assert set(fields) == set(FOXGLOVE[schema.name].split())
+    own = {topic: found for topic, found in json_of(out).items() if topic[:9] != "/mavlink/"}
+    return [(topic, values) for topic, found in own.items() for values in found]
 
 
 def turned(q: dict[str, float], vector: tuple[float, float, float]) -> list[float]:
@@ -44,97 +85,142 @@ def turned(q: dict[str, float], vector: tuple[float, float, float]) -> list[floa
     return [round(sum(a * b for a, b in zip(row, vector, strict=True)), 6) + 0.0 for row in rows]
 
 
-FORWARD, LEFT, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-EAST, NORTH, SKY = [1, 0, 0], [0, 1, 0], [0, 0, 1]
-HALF = round(sqrt(0.5), 6)
+def test_a_pose_is_drawn_as_the_rover_stands(tmp_path: Path) -> None:
+    forward, left, up = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    half = round(sqrt(0.5), 6)
+    for angles, axis, points in (
+        ({"yaw": 0.0}, forward, [0, 1, 0]),  # east, north, up
+        ({"yaw": pi / 2}, forward, [1, 0, 0]),
+        ({"yaw": pi / 2}, left, [0, 1, 0]),
+        ({"yaw": 1.0}, up, [0, 0, 1]),
+        ({"pitch": pi / 4}, forward, [0, half, half]),  # nose up
+        ({"roll": pi / 4}, left, [-half, 0, half]),  # the right side down
+        ({"roll": pi / 4, "yaw": pi / 2}, left, [0, half, half]),
+    ):
+        ((topic, pose),) = seen(tmp_path, attitude(**angles), position(3.0, -2.0, 0.5))
+        assert (topic, pose["frame_id"]) == ("/rover/1/pose", "rover/1/local")
+        assert pose["timestamp"] == {"sec": 1_763_726_400, "nsec": 1000}
+        assert pose["pose"]["position"] == {"x": -2.0, "y": 3.0, "z": -0.5}
+        drawn = turned(pose["pose"]["orientation"], axis)
+        assert drawn == pytest.approx(points, abs=1e-6), angles
 
 
-@pytest.mark.parametrize(
-    ("angles", "axis", "points"),
-    [
-        ({"yaw": 0.0}, FORWARD, NORTH),
-        ({"yaw": pi / 2}, FORWARD, EAST),
-        ({"yaw": pi / 2}, LEFT, NORTH),
-        ({"yaw": 1.0}, UP, SKY),
-        ({"pitch": pi / 4}, FORWARD, [0, HALF, HALF]),  # nose up
-        ({"roll": pi / 4}, LEFT, [-HALF, 0, HALF]),  # the right side down
-        ({"roll": pi / 4, "yaw": pi / 2}, LEFT, [0, HALF, HALF]),
-    ],
-)
-def test_a_pose_is_drawn_as_the_rover_stands(
-    angles: dict[str, float], axis: tuple[float, float, float], points: list[float]
-) -> None:
-    (pose,) = seen(attitude(**angles), position(3.0, -2.0, 0.5))
-    assert (pose.topic, pose.schema.name) == ("/rover/1/pose", "foxglove.PoseInFrame")
-    assert pose.values["frame_id"] == "rover/1/local"
-    assert pose.values["timestamp"] == {"sec": 1_763_726_400, "nsec": 1}
-    assert pose.values["pose"]["position"] == {"x": -2.0, "y": 3.0, "z": -0.5}
-    assert turned(pose.values["pose"]["orientation"], axis) == pytest.approx(points, abs=1e-6)
+def test_what_is_not_known_is_not_drawn(tmp_path: Path) -> None:
+    assert len(seen(tmp_path, attitude(), (SECOND, position(1, 2, 3)))) == 1
+    for source, sent in (
+        (ROVER, [position(1, 2, 3)]),
+        (ROVER, [attitude(), (SECOND + 1, position(1, 2, 3))]),
+        (ROVER, [attitude(roll=nan), position(1, 2, 3)]),
+        (Address(1, 191), [attitude(), position(1, 2, 3)]),  # no autopilot
+        (ROVER, [m.GlobalPositionInt(0, 0, 0, 0, 0, 0, 0, 0, 0)]),
+        (ROVER, [m.GpsRawInt(0, 1, 10, 20, 30, 0, 0, 0, 0, 9)]),
+    ):
+        assert seen(tmp_path, *sent, source=source) == [], sent
 
 
-def test_there_is_no_pose_without_a_recent_attitude() -> None:
-    views = Views()
-    assert seen(position(1, 2, 3), views=views) == []
-    seen(attitude(), views=views)
-    assert list(views.of(position(1, 2, 3), ROVER, time=START + SECOND)) != []
-    assert list(views.of(position(1, 2, 3), ROVER, time=START + SECOND + 1)) == []
-    assert list(views.of(position(1, 2, 3), Address(2, 1), time=START)) == []
-    assert seen(attitude(roll=nan), position(1, 2, 3)) == []
-
-
-def test_only_the_autopilot_is_drawn() -> None:
-    assert seen(attitude(), position(1, 2, 3), source=Address(1, 191)) == []
-
-
-def test_places_of_estimate_and_receiver() -> None:
+def test_places_of_estimate_and_receiver(tmp_path: Path) -> None:
     place = m.GlobalPositionInt(0, -353_632_620, 1_491_652_370, 584_120, 0, 0, 0, 0, 0)
     raw = m.GpsRawInt(0, 3, 10, 20, 30, 0, 0, 0, 0, 9, 0, 1500, 2000)
-    where, receiver = seen(place, raw)
-    assert (where.topic, receiver.topic) == ("/rover/1/location", "/rover/1/gps")
-    assert {where.schema.name, receiver.schema.name} == {"foxglove.LocationFix"}
-    assert [where.values[n] for n in ("latitude", "longitude", "altitude", "frame_id")] == [
-        -35.363262,
-        149.165237,
-        584.12,
-        "rover/1",
-    ]
-    assert where.values["position_covariance_type"] == 0
-    assert receiver.values["position_covariance"] == [2.25, 0, 0, 0, 2.25, 0, 0, 0, 4.0]
-    assert receiver.values["position_covariance_type"] == 1
+    (where, found), (receiver, fix) = seen(tmp_path, place, raw)
+    assert (where, receiver) == ("/rover/1/location", "/rover/1/gps")
+    del found["timestamp"]
+    assert found.pop("position_covariance") == [0] * 9
+    assert found == {
+        "frame_id": "rover/1",
+        "latitude": -35.363262,
+        "longitude": 149.165237,
+        "altitude": 584.12,
+        "position_covariance_type": 0,
+    }
+    assert fix["position_covariance"] == [2.25, 0, 0, 0, 2.25, 0, 0, 0, 4.0]
+    assert fix["position_covariance_type"] == 1
 
 
-def test_a_place_that_is_not_known_is_left_out() -> None:
-    assert seen(m.GlobalPositionInt(0, 0, 0, 0, 0, 0, 0, 0, 0)) == []
-    assert seen(m.GpsRawInt(0, 1, 10, 20, 30, 0, 0, 0, 0, 9)) == []
-
-
-def test_a_setpoint_has_what_its_mask_says() -> None:
+def test_a_setpoint_has_what_its_mask_says(tmp_path: Path) -> None:
     target: dict[str, Any] = dict.fromkeys(("x", "y", "z", "afx", "afy", "afz"), 9.0)
     target |= {"vx": 0.5, "vy": 0.0, "vz": 0.0, "yaw": 9.0, "yaw_rate": -0.25}
     message = m.SetPositionTargetLocalNed(0, 2, 1, 8, 0b0101_1100_0111, **target)
-    (setpoint,) = seen(message, source=SERVER)
-    assert setpoint.topic == "/rover/2/setpoints/250/191"
-    assert setpoint.values["frame"] == "BODY_NED"
-    told = {name: value for name, value in setpoint.values.items() if value is not None}
-    assert set(told) == {"timestamp", "frame", "vx", "vy", "vz", "yaw_rate"}
-    assert (told["vx"], told["yaw_rate"]) == (0.5, -0.25)
+    ((topic, values),) = seen(tmp_path, message, source=SERVER)
+    assert topic == "/rover/2/setpoints/250/191"
+    told = {name: value for name, value in values.items() if value is not None}
+    del told["timestamp"]
+    assert told == {"frame": "BODY_NED", "vx": 0.5, "vy": 0.0, "vz": 0.0, "yaw_rate": -0.25}
 
 
-def test_long_texts_are_joined_and_levels_are_foxgloves() -> None:
-    words = "A text that is longer than one message has room for, and so comes in two"
-    (text,) = seen(*chunks(MavSeverity.WARNING, words, text_id=7))
-    assert (text.topic, text.schema.name) == ("/texts", "foxglove.Log")
-    assert [text.values[name] for name in ("message", "level", "name")] == [words, 3, "1/1"]
-    levels = [seen(m.Statustext(severity, b"x"))[0].values["level"] for severity in range(8)]
-    assert levels == [5, 5, 5, 4, 3, 2, 2, 1]
+def test_long_texts_are_joined_and_levels_are_foxgloves(tmp_path: Path) -> None:
+    first, second = b"x" * 50, b"the rest"
+    texts = [m.Statustext(4, first, 7, 0), m.Statustext(4, second, 7, 1)]
+    ((topic, text),) = seen(tmp_path, *texts)
+    words = (first + second).decode()
+    assert (topic, text["message"], text["level"], text["name"]) == ("/texts", words, 3, "1/1")
+    levels = seen(tmp_path, *(m.Statustext(severity, b"x") for severity in range(8)))
+    assert [text["level"] for _, text in levels] == [5, 5, 5, 4, 3, 2, 2, 1]
+    for sent in ([texts[0]], [texts[0], (3 * SECOND, m.Heartbeat(6, 8, 0, 0, 4, 3))]):
+        ((_, late),) = seen(tmp_path, *sent)  # that never becomes whole
+        assert late["message"] == "x" * 50 + "[…]"
 
 
-def test_a_text_that_never_becomes_whole_is_told_at_last() -> None:
-    first, _ = chunks(MavSeverity.INFO, "x" * 60, text_id=7)
-    views = Views()
-    assert list(views.of(first, ROVER, time=START)) == []
-    (late,) = views.of(attitude(), ROVER, time=START + 3 * SECOND)
-    assert late.values["message"] == "x" * 50 + "[…]"
-    assert list(views.of(first, ROVER, time=START)) == []
-    (last,) = views.rest(time=START + 1)
-    assert last.time == START + 1
+SENDER = Submitter("clients", "127.0.0.1:5", 255, 190)
+TERMS = Terms(priority=7, label="patrol")
+TASK = Task(TaskId(3), 1, 54000, Move(2.0), SENDER, Marks(), 0.0, terms=TERMS)
+HOME = replace(TERMS, label="home", priority=2)
+
+
+def changed(old: TaskState, new: TaskState, reason: TaskReason, version: int) -> TaskChanged:
+    return TaskChanged(TaskId(3), 1, version, old, new, reason, "server", 1.0, Progress())
+
+
+def test_each_change_of_a_task_has_all_that_is_known_of_it(tmp_path: Path) -> None:
+    held = replace(TASK, id=TaskId(2), state=TaskState.HELD, reason=TaskReason.RESTARTED, version=9)
+    over = replace(TASK, id=TaskId(1), state=TaskState.COMPLETED)
+    restored = Restored(tasks=(over, held))
+    (record,) = observers(Recording(decisions=str(tmp_path)), Settings(), restored, now=0.0)
+    record.on_input(WallClock(START / 1e6), now=0.0)
+    fails = changed(TaskState.STARTING, TaskState.FAILED, TaskReason.STUCK, 5)
+    paused = QueuePaused(1, TaskReason.TAKEOVER, "server", 1.0)
+    events: list[Event] = [
+        TaskSubmitted(TASK, 0.0),
+        TaskModified(TaskId(3), 1, 2, HOME, "255/190", 1.0, TERMS),
+        TaskAssigned(TaskId(3), 2, 3, 1, "rover 1: silent; free", 1.0),
+        changed(TaskState.QUEUED, TaskState.STARTING, TaskReason.NONE, 4),
+        TaskProgressed(TaskId(3), 1, 4, Progress(), 1.0),
+        fails,
+        paused,
+    ]
+    record.on_output([], events, now=5.0)
+    record.close()
+    (path,) = tmp_path.iterdir()
+    with (tmp_path / "out.mcap").open("wb") as file:
+        assert export([path], file).events == len(events)
+    check_messages(tmp_path / "out.mcap")
+    found = json_of(tmp_path / "out.mcap")
+    before, submitted, *later, failed = found["/tasks/changes"]
+    names = ("event", "task", "rover", "version", "state", "reason", "label", "priority")
+    assert [before[name] for name in names] == [
+        *("restored", 2, 1, 9, "held", "restarted", "patrol", 7)
+    ]
+    assert submitted == {
+        "timestamp": {"sec": 1_763_726_405, "nsec": 0},
+        "event": "submitted",
+        "rover": 1,
+        "task": 3,
+        "version": 1,
+        "state": "queued",
+        "old": "unknown",
+        "reason": "none",
+        "label": "patrol",
+        "priority": 7,
+        "actor": str(SENDER),
+        "words": str(events[0]),
+    }
+    assert [[each[name] for name in names] for each in later] == [
+        ["modified", 3, 1, 2, "queued", "none", "home", 2],
+        ["assigned", 3, 2, 3, "queued", "none", "home", 2],
+        ["changed", 3, 2, 4, "starting", "none", "home", 2],
+    ]
+    assert [failed[name] for name in (*names, "old", "actor")] == [
+        *("changed", 3, 2, 5, "failed", "stuck", "home", 2, "starting", "server")
+    ]
+    log = [(each["level"], each["message"]) for each in found["/tasks/log"]]
+    assert log[-1] == (3, str(paused))
+    assert len(log) == len(events) - 1  # progress is no text

@@ -9,18 +9,7 @@ from mav_tasks.metrics.families import FAMILIES
 from mav_tasks.metrics.pages import dashboard
 
 #: labels with a bounded number of values each, whatever clients send
-LABELS = {
-    "vehicle": "255 system ids",
-    "state": "enum",
-    "reason": "enum",
-    "outcome": "enum",
-    "link": "in the configuration",
-    "direction": "2",
-    "side": "2",
-    "code": "statuses of HTTP that the server sends",
-    "version": "1",
-    "python": "1",
-}
+LABELS = "vehicle state reason outcome link direction side code version python"
 UNITS = ("seconds", "bytes")
 NO_UNITS = ("milliseconds", "_ms", "minutes", "kilobytes", "percent")
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -46,7 +35,7 @@ def test_each_name_is_used_once_and_follows_the_conventions() -> None:
 
 
 def test_labels_have_few_values() -> None:
-    assert {label for family in FAMILIES for label in family.labels} == set(LABELS)
+    assert {label for family in FAMILIES for label in family.labels} == set(LABELS.split())
 
 
 def expressions(node: Any) -> list[str]:
@@ -76,12 +65,3 @@ def test_every_query_of_the_dashboard_uses_metrics_that_exist() -> None:
             assert set(labels.split(", ")) - {"le"} <= known, expression
         if "histogram_quantile" in expression:
             assert "_bucket{" in expression
-
-
-def test_every_metric_of_ours_is_on_the_dashboard() -> None:
-    told = " ".join(expressions(json.loads(dashboard())))
-    silent = {f.name for f in FAMILIES if not any(name in told for name in f.series)}
-    others = {"process_start_time_seconds", "process_virtual_memory_bytes"}
-    others |= {"process_open_fds", "process_max_fds"}
-    others |= {f"{PREFIX}{name}" for name in ("engine_inputs_total", "metrics_requests_total")}
-    assert silent == others

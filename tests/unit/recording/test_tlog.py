@@ -1,9 +1,9 @@
 """What stands in a telemetry log, read back by pymavlink."""
 
-import errno
 import os
+import shutil
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +22,15 @@ from mav_tasks.engine.inputs import (
     PeerChanged,
     WallClock,
 )
+from mav_tasks.errors import RecordError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Message
-from mav_tasks.recording import tlog as tlog_module
-from mav_tasks.recording.new_files import write_all
+from mav_tasks.observer import EngineObserver
+from mav_tasks.recording import observers
 from mav_tasks.recording.tlog import Tlog
+from mav_tasks.settings import Recording, Settings
 from tests.kit.processes import wait_until
 
 ROVER, SERVER, GCS, OUR_OWN = Address(1, 1), Address(1, 191), Address(255, 190), Address(250, 191)
@@ -60,9 +62,9 @@ def to_client(data: bytes, peer: str = "gcs") -> Outgoing:
     return Outgoing("clients", peer, data)
 
 
-def started(folder: Path, **options: Any) -> Tlog:
-    options = {"size": 10**6, "count": 10, "component_id": 191, **options}
-    tlog = Tlog(folder, **options)
+def started(folder: Path, **options: Any) -> EngineObserver:
+    recording = Recording(tlog=str(folder), **options)
+    (tlog,) = observers(recording, Settings(), None, now=0.0)
     for item in LINKS:
         tlog.on_input(item, now=0.0)
     return tlog
@@ -128,34 +130,23 @@ def test_an_answer_that_says_the_same_to_two_is_no_copy(tmp_path: Path) -> None:
     assert len(told(tmp_path)) == 2
 
 
-@pytest.mark.parametrize("cut", [1, 5, 17, 300])
-def test_a_stream_may_be_cut_anywhere(tmp_path: Path, cut: int) -> None:
-    tlog = started(tmp_path)
-    tlog.on_input(LinkChanged("tcp", LinkSide.VEHICLES, up=True, is_stream=True), now=0.0)
-    tlog.on_input(PeerChanged("tcp", "rover", up=True), now=0.0)
+def test_a_stream_may_be_cut_anywhere(tmp_path: Path) -> None:
     stream = b"".join(packet(attitude(number), ROVER, number) for number in range(1, 11))
-    tlog.on_input(Packets("tcp", [("rover", stream[:3])]), now=0.5)
-    tlog.on_input(PeerChanged("tcp", "rover", up=False), now=0.5)  # the torn packet is no more
-    for number, start in enumerate(range(0, len(stream), cut)):
-        piece = Packets("tcp", [("rover", stream[start : start + cut])])
-        tlog.on_input(piece, now=1.0 + number / 1000)
-    tlog.close()
-    assert [(kind, seq) for _, kind, _, seq in told(tmp_path)] == [
-        ("ATTITUDE", number) for number in range(1, 11)
-    ]
-
-
-def test_noise_is_not_logged(tmp_path: Path) -> None:
-    tlog = started(tmp_path)
-    good = packet(heartbeat(), ROVER, 7)
-    bad = good[:-1] + bytes([good[-1] ^ 1])
-    tlog.on_input(Packets("rovers", [("x", b"\xfd\x01"), ("x", bad), ("x", b"?" + good)]), now=1.0)
-    tlog.close()
-    assert told(tmp_path) == [(1.0, "HEARTBEAT", ROVER, 7)]
+    for cut in (1, 5, 17, 300):
+        tlog = started(tmp_path / str(cut))
+        tlog.on_input(LinkChanged("tcp", LinkSide.VEHICLES, up=True, is_stream=True), now=0.0)
+        tlog.on_input(PeerChanged("tcp", "rover", up=True), now=0.0)
+        tlog.on_input(Packets("tcp", [("rover", stream[:3])]), now=0.5)
+        tlog.on_input(PeerChanged("tcp", "rover", up=False), now=0.5)  # the torn packet is gone
+        for start in range(0, len(stream), cut):
+            piece = Packets("tcp", [("rover", stream[start : start + cut])])
+            tlog.on_input(piece, now=1.0)
+        tlog.close()
+        assert [seq for *_, seq in told(tmp_path / str(cut))] == [*range(1, 11)]
 
 
 def test_the_log_goes_on_in_the_next_file(tmp_path: Path) -> None:
-    tlog = started(tmp_path, size=2_000, count=3)
+    tlog = started(tmp_path, tlog_size=2_000, tlog_files=3)
     for number in range(400):
         data = packet(attitude(number), ROVER, number % 256)
         tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0 + number)
@@ -167,92 +158,84 @@ def test_the_log_goes_on_in_the_next_file(tmp_path: Path) -> None:
     assert (len(sizes), max(sizes) <= 2_000) == (3, True)
 
 
-class Disk:
-    """A disk that can be full, or stuck."""
-
-    def __init__(self) -> None:
-        self.is_full = False
-        self.goes_on = threading.Event()
-        self.goes_on.set()
-        self.tries = 0
-
-    def write(self, fd: int, data: bytes) -> None:
-        self.tries += 1
-        self.goes_on.wait()
-        if self.is_full:
-            write_all(fd, data[:10])
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        write_all(fd, data)
-
-
-def wait_for_another_try(disk: Disk, before: int) -> None:
-    until(lambda: disk.tries > before)
-
-
-def until(condition: Callable[[], object]) -> None:
-    wait_until(condition, within=10)
-
-
-def test_a_full_disk_loses_packets_and_is_told_of_twice(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tlog_module, "RETRY", 0.0)
-    disk = Disk()
-    tlog = started(tmp_path, write=disk.write)
-    disk.is_full = True
-    for number in range(3):
-        before = disk.tries
+def test_only_the_oldest_of_ours_are_removed_and_nothing_is_written_over(tmp_path: Path) -> None:
+    others = ["notes.tlog", "2025-11-21T12-00-00Z.tlog.old", "2024-01-01T00-00-00Z.raw"]
+    old = [f"2024-01-01T00-00-00Z.{n}tlog" for n in ("", "9.", "10.")]
+    for name in [*others, *old]:
+        (tmp_path / name).write_bytes(b"x")
+    (tmp_path / "2023-01-01T00-00-00Z.tlog").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "2025-11-21T12-00-01Z.tlog").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "2023-01-02T00-00-00Z.tlog").mkdir()
+    others += [
+        "2023-01-01T00-00-00Z.tlog",
+        "2023-01-02T00-00-00Z.tlog",
+        "2025-11-21T12-00-01Z.tlog",
+    ]
+    tlog = started(tmp_path, tlog_size=2_000, tlog_files=3)
+    for number in range(150):
         data = packet(attitude(number), ROVER, number)
         tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0)
-        wait_for_another_try(disk, before)
-    until(lambda: caplog.messages)
-    disk.is_full = False
-    tlog.on_input(Packets("rovers", [("rover", packet(attitude(3), ROVER, 3))]), now=2.0)
     tlog.close()
-    name = f"telemetry log in {tmp_path}"
-    assert caplog.messages == [
-        f"{name}: packets are being lost: No space left on device",
-        f"{name}: writing again; 3 packets lost",
-    ]
-    assert [seq for *_, seq in told(tmp_path)] == [3]
+    made = ["2025-11-21T12-00-01Z.1.tlog", "2025-11-21T12-00-01Z.2.tlog"]
+    assert {path.name for path in tmp_path.iterdir()} == {*others, old[2], *made}
+    assert (tmp_path / made[0]).stat().st_mode & 0o777 == 0o600
+
+
+def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) -> None:
+    folder = tmp_path / "logs"
+    tlog = started(folder)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    for number in range(2):
+        data = packet(attitude(number), ROVER, number)
+        tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0)
+        wait_until(lambda: any(folder.glob("*")), within=10)
+        if not number:
+            shutil.rmtree(folder)
+    tlog.close()
+    assert [seq for *_, seq in told(folder)] == [1]
+
+
+def test_a_folder_that_cannot_be_used_is_told_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for folder, words in (
+        (f"{tmp_path}/file/folder", "cannot write records to .*/file/folder: Not a dir"),
+        (f"{tmp_path}/file", "not a folder"),
+        ("~nobody.there/logs", r"cannot write records to ~nobody\.there/logs: "),
+    ):
+        with pytest.raises(RecordError, match=words):
+            started(Path(folder))
+    started(Path("~/logs")).close()  # in a file or a variable no shell makes it the home
+    assert (tmp_path / "logs").is_dir()
 
 
 def test_a_disk_that_does_not_answer_keeps_nobody_waiting(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("mav_tasks.recording.writing.END_LIMIT", 0.2)
-    disk = Disk()
-    tlog = started(tmp_path, write=disk.write, most_waiting=10_000)
-    disk.goes_on.clear()
+    goes_on, tries = threading.Event(), []
+
+    def write(fd: int, data: bytes) -> None:
+        tries.append(len(data))
+        goes_on.wait()
+        os.write(fd, data)
+
+    options = {"size": 10**6, "count": 10, "component_id": 191, "most_waiting": 10_000}
+    tlog = Tlog(tmp_path, write=write, **options)
+    for item in LINKS:
+        tlog.on_input(item, now=0.0)
     one = Packets("rovers", [("rover", packet(heartbeat(), ROVER))])
     tlog.on_input(one, now=1.0)
-    until(lambda: disk.tries)
+    wait_until(lambda: tries, within=10)
     for number in range(100):
         tlog.on_input(one, now=2.0 + number)
-    tlog.close()  # in bounded time
-    disk.goes_on.set()
-    until(lambda: "recorder" not in {thread.name for thread in threading.enumerate()})
+    goes_on.set()
+    tlog.close()
     name = f"telemetry log in {tmp_path}"
     there = len(told(tmp_path))
     assert 10 < there < 90
     assert caplog.messages == [
         f"{name}: packets are being lost: the disk is too slow",
-        f"{name}: incomplete: the disk is too slow",
         f"{name}: writing again; {101 - there} packets lost",
     ]
-
-
-def test_what_fails_in_the_thread_is_told_and_nothing_else_happens(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    def write(fd: int, data: bytes) -> None:
-        raise ZeroDivisionError
-
-    tlog = started(tmp_path, write=write, most_waiting=5_000)
-    one = Packets("rovers", [("rover", packet(heartbeat(), ROVER))])
-    tlog.on_input(one, now=1.0)
-    until(lambda: caplog.messages)
-    for _ in range(100):
-        tlog.on_input(one, now=2.0)
-    tlog.close()
-    assert "internal error" in caplog.messages[0]

@@ -1,10 +1,15 @@
-"""A simulated rover in virtual time with clients on its link; no socket, no sleep."""
+"""The driver of simulated rovers in virtual time: MAVLink bytes in, bytes and true pose out.
 
-import math
-from collections.abc import Callable, Hashable
-from dataclasses import replace
-from math import nan
-from typing import TypeVar
+``Rig`` is a rover with a client on its link, ``record`` drives it as the recordings of real
+autopilots were driven, and ``VirtualWire`` is a link for check_vehicle on which things go wrong.
+"""
+
+from collections import deque
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import cos, degrees, hypot, nan, sin
+from typing import Any, TypeVar
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -12,28 +17,36 @@ from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import split_datagram
-from rover_sim.body import BodyState, Pose
+from rover_sim.body import BodyState, Pose, wrap_angle
+from rover_sim.check_vehicle.context import Options
+from rover_sim.check_vehicle.contract import GROUPS, check_vehicle
+from rover_sim.check_vehicle.report import Line, Report
+from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import ARDUPILOT, PX4, Persona
 from rover_sim.realism import NO_BOOT, Realism
 from rover_sim.vehicle import make_vehicle
 
-PROMPT = ARDUPILOT
 CLIENT = Address(250, 191)
 ROVER = Address(1, 1)
 ORIGIN = Pose()
 PEER = "client"
+START = 1000.0  # s
 VELOCITY = 0x0DC7  # type masks: velocity only
 VELOCITY_AND_RATE = 0x05C7
-VELOCITY_AND_YAW = 0x09C7
 POSITION = 0x0DF8
-LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED = 1, 7, 8, 9
+LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED = 1, 7, 8
 MANUAL, HOLD, AUTO, RTL, GUIDED, INITIALISING = 0, 4, 10, 11, 15, 16
-PX4_MANUAL, PX4_POSCTL, PX4_OFFBOARD = 1 << 16, 3 << 16, 6 << 16
 PX4_HOLD, PX4_MISSION, PX4_RTL = 0x03040000, 0x04040000, 0x05040000
+PX4_OFFBOARD = 6 << 16
+ARMED = 128
 READY = 1.0  # s after which a rover has started and can be armed
 
 M = TypeVar("M", bound=Message)
+
+
+def command_long(command: int, *params: float) -> m.CommandLong:
+    return m.CommandLong(1, 1, command, 0, *params, *(0.0,) * (7 - len(params)))
 
 
 def calm(persona: Persona) -> Realism:
@@ -47,23 +60,20 @@ class Rig:
 
     def __init__(
         self,
+        persona: Persona = ARDUPILOT,
         *,
         start: Pose = ORIGIN,
         slip: float = 0.3,
         wait: float = READY,
-        persona: Persona = PROMPT,
-        realism: Realism | None = None,
+        realism_of: Callable[[Persona], Realism] = calm,
         seed: int = 0,
     ) -> None:
-        self.now = 1000.0
+        self.now = START
+        self.speaks_px4 = persona.name != "ardupilot"
         body = kinematic_body(persona.frame, start=start, slip=slip, seed=None)
+        realism = realism_of(persona)
         self.vehicle = make_vehicle(
-            body,
-            system_id=1,
-            persona=persona,
-            now=self.now,
-            realism=realism or calm(persona),
-            seed=seed,
+            body, system_id=1, persona=persona, now=self.now, realism=realism, seed=seed
         )
         self.autopilot = self.vehicle.autopilot
         self.heard: list[Message] = []
@@ -117,34 +127,35 @@ class Rig:
 
     def command(self, command: int, *params: float) -> MavResult:
         """Send a COMMAND_LONG and give the result of its one and only answer."""
-        padded = (*params, *(0.0,) * (7 - len(params)))
-        return self._answer_to(m.CommandLong(1, 1, command, 0, *padded))
+        return self._answer_to(command_long(command, *params))
 
-    def command_int(
-        self,
-        command: int,
-        *,
-        frame: int,
-        x: int,
-        y: int,
-        param2: float,
-        param4: float = nan,
-        z: float = 0.0,
-    ) -> MavResult:
+    def command_int(self, command: int, *, frame: int, x: int, y: int, param2: float) -> MavResult:
         return self._answer_to(
-            m.CommandInt(1, 1, frame, command, 0, 0, -1.0, param2, 0.0, param4, x, y, z)
+            m.CommandInt(1, 1, frame, command, 0, 0, -1.0, param2, 0.0, nan, x, y, 0.0)
         )
 
     def set_mode(self, custom_mode: int) -> MavResult:
-        return self.command(MavCmd.DO_SET_MODE, 1, custom_mode)
+        main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
+        params = (main, sub, nan) if self.speaks_px4 else (custom_mode,)
+        return self.command(MavCmd.DO_SET_MODE, 1, *params)
 
     def arm(self) -> MavResult:
         return self.command(MavCmd.COMPONENT_ARM_DISARM, 1)
 
+    def mode(self) -> int:
+        """The mode as HEARTBEAT has it, without waiting for the next one."""
+        self.command(MavCmd.REQUEST_MESSAGE, m.Heartbeat.id)
+        return int(self.last(m.Heartbeat).custom_mode)
+
     def ready_to_drive(self) -> None:
-        """GUIDED and armed."""
-        assert self.set_mode(GUIDED) == MavResult.ACCEPTED
-        assert self.arm() == MavResult.ACCEPTED
+        """GUIDED and armed, or armed in HOLD and then OFFBOARD on a stream of zeros."""
+        if self.speaks_px4:
+            assert self.arm() == MavResult.ACCEPTED
+            self.run(1.0, velocity(0.0))
+            assert self.set_mode(PX4_OFFBOARD) == MavResult.ACCEPTED
+        else:
+            assert self.set_mode(GUIDED) == MavResult.ACCEPTED
+            assert self.arm() == MavResult.ACCEPTED
 
     def take(self, kind: type[M]) -> list[M]:
         """Return what was heard of a kind, and forget everything heard."""
@@ -178,35 +189,10 @@ class Rig:
                 self.heard.append(message)
 
 
-class Px4Rig(Rig):
-    """One rover that speaks as PX4 does."""
-
-    def __init__(
-        self,
-        *,
-        start: Pose = ORIGIN,
-        wait: float = READY,
-        persona: Persona = PX4,
-        realism: Realism | None = None,
-        slip: float = 0.3,
-    ) -> None:
-        super().__init__(start=start, wait=wait, persona=persona, realism=realism, slip=slip)
-
-    def set_mode(self, custom_mode: int) -> MavResult:
-        return self.command(
-            MavCmd.DO_SET_MODE, 1, custom_mode >> 16 & 0xFF, custom_mode >> 24, math.nan
-        )
-
-    def mode(self) -> int:
-        """The mode as HEARTBEAT has it, without waiting for the next one."""
-        self.command(MavCmd.REQUEST_MESSAGE, m.Heartbeat.id)
-        return int(self.last(m.Heartbeat).custom_mode)
-
-    def ready_to_drive(self) -> None:
-        """Armed in HOLD, then OFFBOARD on a stream of zeros."""
-        assert self.arm() == MavResult.ACCEPTED
-        self.run(1.0, velocity(0.0))
-        assert self.set_mode(PX4_OFFBOARD) == MavResult.ACCEPTED
+#: one that speaks as PX4 does
+Px4Rig = partial(Rig, PX4)
+#: one as unkind as its make
+RealRig = partial(Rig, realism_of=lambda persona: persona.realism, seed=1, wait=0.0)
 
 
 def heartbeat() -> m.Heartbeat:
@@ -219,12 +205,11 @@ def local_target(
     frame: int = LOCAL_NED,
     position: tuple[float, float] = (0.0, 0.0),
     velocity: tuple[float, float] = (0.0, 0.0),
-    yaw: float = 0.0,
     yaw_rate: float = 0.0,
     target: Address = ROVER,
 ) -> m.SetPositionTargetLocalNed:
     return m.SetPositionTargetLocalNed(
-        0, *target, frame, mask, *position, 0.0, *velocity, 0.0, 0.0, 0.0, 0.0, yaw, yaw_rate
+        0, *target, frame, mask, *position, 0.0, *velocity, 0.0, 0.0, 0.0, 0.0, 0.0, yaw_rate
     )
 
 
@@ -236,3 +221,165 @@ def body_velocity(forward: float, yaw_rate: float = 0.0) -> m.SetPositionTargetL
     return local_target(
         VELOCITY_AND_RATE, frame=BODY_NED, velocity=(forward, 0.0), yaw_rate=yaw_rate
     )
+
+
+# the manoeuvres of the recordings
+
+LOOK = 0.02  # s between two looks at the truth
+
+
+def driver(persona: Persona, frame: Frame) -> Rig:
+    """Return a rover that points north, armed and ready for set-points."""
+    rig = Rig(persona.on(frame))
+    rig.ready_to_drive()
+    return rig
+
+
+ardupilot = partial(driver, ARDUPILOT)
+px4 = partial(driver, PX4)
+
+
+def ahead(rig: Rig, speed: float) -> Message:
+    """Return the setpoint of the recordings: the speed along its heading."""
+    if rig.speaks_px4:
+        yaw = rig.truth.yaw
+        return velocity(speed * cos(yaw), speed * sin(yaw))
+    return body_velocity(speed)
+
+
+@dataclass
+class Run:
+    """What the truth was from the beginning of a manoeuvre, every 0.02 s."""
+
+    times: list[float]
+    states: list[BodyState]
+
+    @property
+    def speeds(self) -> list[float]:
+        return [state.forward_speed for state in self.states]
+
+    @property
+    def peak(self) -> float:
+        return max(self.speeds, key=abs)
+
+    def steady(self, part: float = 0.4) -> float:
+        """Return the mean speed of the last part of the run."""
+        last = self.speeds[-int(part * len(self.speeds)) :]
+        return sum(last) / len(last)
+
+    @property
+    def way(self) -> float:
+        """Return how many metres it drove."""
+        pairs = zip(self.states, self.states[1:], strict=False)
+        return sum(hypot(b.north - a.north, b.east - a.east) for a, b in pairs)
+
+    @property
+    def turned(self) -> float:
+        """Return by how many degrees it turned, clockwise, whole turns counted."""
+        pairs = zip(self.states, self.states[1:], strict=False)
+        return degrees(sum(wrap_angle(b.yaw - a.yaw) for a, b in pairs))
+
+    @property
+    def peak_rate(self) -> float:
+        """Return its fastest turn, deg/s."""
+        return degrees(max((state.yaw_rate for state in self.states), key=abs))
+
+
+def record(rig: Rig, seconds: float, stream: Message | None = None) -> Run:
+    """Let time pass and look at the truth all the while."""
+    run = Run([0.0], [rig.truth])
+    next_send = next_heartbeat = 0.0
+    while run.times[-1] < seconds:
+        if run.times[-1] >= next_heartbeat:
+            rig.send(heartbeat())
+            next_heartbeat += 1.0
+        if stream is not None and run.times[-1] >= next_send - 1e-9:
+            rig.send(stream)
+            next_send += 0.05
+        rig.run(LOOK)
+        run.times.append(run.times[-1] + LOOK)
+        run.states.append(rig.truth)
+    return run
+
+
+# a wire for check_vehicle
+
+Says = Callable[[Message], Iterable[Message]]
+Hears = Callable[[Message], Message | None]
+Packets = Callable[[bytes], Iterable[bytes]]
+
+
+class VirtualWire:
+    """Implements check_vehicle's ``Wire``. A rover says, hears and sends what the hooks make of it.
+
+    ``unsafe`` collects each setpoint that could have moved a rover that did not say it was armed.
+    """
+
+    def __init__(
+        self,
+        persona: Persona,
+        *,
+        says: Says = lambda message: [message],
+        hears: Hears = lambda message: message,
+        packets: Packets = lambda data: [data],
+        at: Callable[["VirtualWire"], None] = lambda _: None,
+    ) -> None:
+        body = kinematic_body(persona.frame, start=Pose(yaw=1.0), slip=0.3, seed=None)
+        self.vehicle = make_vehicle(body, system_id=1, persona=persona, now=START)
+        self.setpoints: list[m.SetPositionTargetLocalNed] = []
+        self.unsafe: list[m.SetPositionTargetLocalNed] = []
+        self.asked: list[Message] = []
+        self._shown_armed = False
+        self._now = START
+        self._says, self._hears, self._packets, self._at = says, hears, packets, at
+        self._inbox: deque[bytes] = deque()
+        self._decoder, self._encoder = Decoder(), Encoder(ROVER)
+
+    def now(self) -> float:
+        return self._now
+
+    def send(self, data: bytes) -> None:
+        for packet in split_datagram(data):
+            message = self._decoder.decode(packet)
+            assert message is not None
+            self.asked.append(message)
+            if isinstance(message, m.SetPositionTargetLocalNed):
+                self._watch(message)
+            heard = self._hears(message)
+            if heard is not None:
+                again = Encoder(packet.source, first_seq=packet.seq).encode(heard)
+                self.vehicle.receive(again, "checker", now=self._now)
+        self._listen()
+
+    def receive(self, within: float) -> bytes:
+        self._at(self)
+        end = self._now + within
+        while not self._inbox and self._now < end:
+            self._now = min(end, max(self._now, self.vehicle.next_deadline()))
+            self.vehicle.handle_deadline(now=self._now)
+            self._listen()
+        return self._inbox.popleft() if self._inbox else b""
+
+    def _listen(self) -> None:
+        for _, data in self.vehicle.take_packets():
+            message: Any = self._decoder.decode(split_datagram(data)[0])
+            for said in self._says(message):
+                if isinstance(said, m.Heartbeat):
+                    self._shown_armed = bool(said.base_mode & ARMED)
+                self._inbox.extend(self._packets(self._encoder.encode(said)))
+
+    def _watch(self, message: m.SetPositionTargetLocalNed) -> None:
+        self.setpoints.append(message)
+        moves = (message.vx, message.vy, message.yaw_rate) != (0.0, 0.0, 0.0)
+        moves = moves or not message.type_mask & 0x0007  # position ignored
+        if moves and not self._shown_armed:
+            self.unsafe.append(message)
+
+
+def run(wire: VirtualWire, options: Options, groups: tuple[str, ...] = GROUPS) -> Report:
+    """Run the contract over a wire."""
+    lines: list[Line] = []
+    report = check_vehicle(wire, options, system_id=None, show=lines.append, groups=groups)
+    assert lines == report.lines
+    assert wire.unsafe == []
+    return report

@@ -8,7 +8,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavMissionResult
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.unit.rover_sim.rig import AUTO, CLIENT, RTL, Px4Rig, Rig, velocity
+from tests.unit.rover_sim.rig import AUTO, CLIENT, Px4Rig, Rig
 
 OTHER_CLIENT = Address(255, 190)
 
@@ -34,14 +34,6 @@ def upload(rig: Rig, items: list[m.MissionItemInt]) -> MavMissionResult:
 SQUARE = [waypoint(0, 9.0, 9.0), waypoint(1, 3.0, 0.0), waypoint(2, 3.0, 3.0)]
 
 
-def test_a_rover_begins_with_no_mission() -> None:
-    rig = Rig()
-    for mission_type in (0, 1, 2):
-        rig.send(m.MissionRequestList(1, 1, mission_type))
-        (count,) = rig.take(m.MissionCount)
-        assert (count.count, count.mission_type) == (0, mission_type)
-
-
 def test_upload_and_download_with_home_as_item_0() -> None:
     rig = Rig()
     assert upload(rig, SQUARE) == MavMissionResult.ACCEPTED
@@ -52,13 +44,6 @@ def test_upload_and_download_with_home_as_item_0() -> None:
     assert (home.x, home.y) == DEFAULT_ORIGIN.to_global(0.0, 0.0)
     assert (first.seq, first.frame, first.command) == (1, 3, 16)  # frame 6 comes back as 3
     assert (second.x, second.y) == DEFAULT_ORIGIN.to_global(3.0, 3.0)
-
-
-def test_mission_current_counts_without_home() -> None:
-    rig = Rig()
-    upload(rig, SQUARE)
-    rig.run(1.1)
-    assert rig.last(m.MissionCurrent).total == 2
 
 
 def test_auto_drives_the_stored_mission_to_its_end() -> None:
@@ -84,21 +69,6 @@ def test_items_that_cannot_be_stored_end_the_upload() -> None:
     assert upload(rig, [unknown]) == MavMissionResult.UNSUPPORTED
 
 
-def test_too_many_items_are_refused_with_a_text() -> None:
-    rig = Rig()
-    rig.send(m.MissionCount(1, 1, 3000))
-    assert rig.texts()[-1] == "Only 655 items are supported"
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.NO_SPACE
-
-
-def test_a_wrong_sequence_number_is_told_and_the_upload_goes_on() -> None:
-    rig = Rig()
-    rig.send(m.MissionCount(1, 1, 2), waypoint(1, 0, 0))
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.INVALID_SEQUENCE
-    rig.send(waypoint(0, 0, 0), waypoint(1, 0, 0))
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.ACCEPTED
-
-
 def test_a_second_client_is_denied_and_the_first_undisturbed() -> None:
     rig = Rig()
     rig.send(m.MissionCount(1, 1, 1))
@@ -108,54 +78,6 @@ def test_a_second_client_is_denied_and_the_first_undisturbed() -> None:
     assert (denied.type, denied.target_system) == (MavMissionResult.DENIED, 255)
     rig.send(waypoint(0, 0, 0))
     assert rig.take(m.MissionAck)[0].type == MavMissionResult.ACCEPTED
-
-
-def test_a_silent_sender_is_asked_each_second_and_given_up_after_eight() -> None:
-    rig = Rig()
-    rig.send(m.MissionCount(1, 1, 2))
-    rig.take(m.MissionRequest)
-    rig.run(7.5)
-    assert [request.seq for request in rig.take(m.MissionRequest)] == [0] * 7
-    rig.run(1.0)
-    assert "Mission upload timeout" in rig.texts()
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.OPERATION_CANCELLED
-
-
-def test_clearing_and_empty_uploads_are_accepted() -> None:
-    rig = Rig()
-    upload(rig, SQUARE)
-    rig.send(m.MissionClearAll(1, 1, 255))
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.ACCEPTED
-    rig.send(m.MissionRequestList(1, 1))
-    assert rig.take(m.MissionCount)[0].count == 0
-    rig.send(m.MissionCount(1, 1, 0))
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.ACCEPTED
-
-
-@pytest.mark.parametrize("seq", [0, 7, 65535])
-def test_asking_for_an_item_that_is_not_there_is_an_error(seq: int) -> None:
-    rig = Rig()
-    rig.send(m.MissionRequestInt(1, 1, seq))
-    assert rig.take(m.MissionAck)[0].type == MavMissionResult.ERROR
-
-
-def test_set_current_is_answered_with_mission_current() -> None:
-    rig = Rig()
-    upload(rig, SQUARE)
-    rig.set_mode(AUTO)
-    rig.send(m.MissionSetCurrent(1, 1, 2))
-    assert rig.take(m.MissionCurrent)[-1].seq == 2
-
-
-def test_set_current_on_the_way_home_leaves_it_on_its_way() -> None:
-    rig = Rig()
-    upload(rig, SQUARE)
-    rig.ready_to_drive()
-    rig.run(5.0, velocity(1.0))
-    rig.set_mode(RTL)
-    rig.send(m.MissionSetCurrent(1, 1, 2))
-    rig.run(10.0)
-    assert math.hypot(rig.truth.north, rig.truth.east) < 0.4
 
 
 def guided_item(north: float, east: float) -> m.MissionItem:

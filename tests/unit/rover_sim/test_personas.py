@@ -3,14 +3,12 @@
 import math
 from typing import Any
 
-import pytest
-
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
 from mav_tasks.mavlink.messages import Message
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.personas import PERSONAS
-from tests.unit.rover_sim.rig import PX4_OFFBOARD, PX4_RTL, Px4Rig, Rig
+from tests.unit.rover_sim.rig import Rig
 
 A, P, G = "ardupilot", "px4", "generic"
 NAN = math.nan
@@ -39,30 +37,22 @@ ACCEPTED, FAILED, DENIED = MavResult.ACCEPTED, MavResult.FAILED, MavResult.DENIE
 REJECTED, UNSUPPORTED = MavResult.TEMPORARILY_REJECTED, MavResult.UNSUPPORTED
 MODE, ARM, GO = MavCmd.DO_SET_MODE, MavCmd.COMPONENT_ARM_DISARM, MavCmd.DO_REPOSITION
 SILENCE: list[dict[str, Any]] = []
+BEAT = {"mavpackettype": "HEARTBEAT"}
 
 TABLE: list[tuple[str, Message, list[dict[str, Any]]]] = [
     # modes: ArduPilot's number in param2; PX4's main mode in param2, sub mode in param3
     (A, long(MODE, 1, 4), ack(MODE, ACCEPTED)),
     (P, long(MODE, 1, 4, 3), ack(MODE, ACCEPTED)),
-    (P, long(MODE, 1 | 128, 4, 5), ack(MODE, ACCEPTED)),
-    (P, long(MODE, 1, 1, NAN), ack(MODE, ACCEPTED)),
-    (P, long(MODE, 1, 3), ack(MODE, ACCEPTED)),
     (P, long(MODE, 1, 4, 4), ack(MODE, ACCEPTED)),  # any mode, while it is disarmed
-    (P, long(MODE, 1, 6), ack(MODE, ACCEPTED)),
-    (P, long(MODE, 1, 4, 9), ack(MODE, REJECTED)),
     (P, long(MODE, 1, 99), ack(MODE, REJECTED)),
     (P, long(MODE, 0, 4, 3), ack(MODE, DENIED)),
     (P, long(MODE, NAN, NAN, NAN), ack(MODE, DENIED)),
     (P, long(262, 5), ack(262, ACCEPTED)),  # DO_SET_STANDARD_MODE: safe recovery
     (P, long(262, 6), ack(262, ACCEPTED)),  # mission
-    (P, long(262, 1), ack(262, FAILED)),  # position hold: not for a rover
-    (P, long(262, NAN), ack(262, FAILED)),
-    (A, long(262, 5), ack(262, UNSUPPORTED)),
     (A, long(MODE, 1, 99), ack(MODE, FAILED)),
     # the old message: the whole number for all; PX4 answers as to the command
     (A, m.SetMode(1, 1, 4), ack(11, ACCEPTED)),
     (P, m.SetMode(1, 1, 0x03040000), ack(MODE, ACCEPTED)),
-    (P, m.SetMode(1, 1, 0x00060000), ack(MODE, ACCEPTED)),
     # arming
     (P, long(ARM, 1), ack(ARM, ACCEPTED)),
     (P, long(ARM, 0), ack(ARM, ACCEPTED)),
@@ -75,18 +65,14 @@ TABLE: list[tuple[str, Message, list[dict[str, Any]]]] = [
     (P, reposition(x=0x7FF80000, y=0x7FF80000), ack(GO, DENIED)),
     (P, reposition(0.0), ack(GO, UNSUPPORTED)),  # only with the mode change
     (P, long(GO, -1, 1, 0, NAN, X * 1e-7, Y * 1e-7, NAN), ack(GO, ACCEPTED)),
-    (P, long(GO, -1, 1, 0, NAN, NAN, NAN, NAN), ack(GO, ACCEPTED)),
     (P, long(GO, -1, 1, 0, NAN, 91.0, 0.0, 0.0), ack(GO, DENIED)),
-    (P, long(GO, -1, 1, 0, NAN, math.inf, 0.0, 0.0), ack(GO, DENIED)),
     (P, long(MavCmd.NAV_RETURN_TO_LAUNCH), ack(MavCmd.NAV_RETURN_TO_LAUNCH, ACCEPTED)),
     (P, long(MavCmd.NAV_TAKEOFF), ack(MavCmd.NAV_TAKEOFF, REJECTED)),
-    (P, long(MavCmd.NAV_LAND), ack(MavCmd.NAV_LAND, REJECTED)),
     (A, long(MavCmd.NAV_TAKEOFF), ack(MavCmd.NAV_TAKEOFF, UNSUPPORTED)),
     (P, long(MavCmd.DO_CHANGE_SPEED, 1, 2.0), ack(MavCmd.DO_CHANGE_SPEED, ACCEPTED)),
     (P, long(MavCmd.DO_CHANGE_SPEED, 1, NAN), ack(MavCmd.DO_CHANGE_SPEED, DENIED)),
     (A, long(MavCmd.MISSION_START), ack(MavCmd.MISSION_START, ACCEPTED)),  # its own square
     (P, long(MavCmd.MISSION_START), ack(MavCmd.MISSION_START, DENIED)),
-    (P, long(224, 3), ack(224, DENIED)),  # no such mission item
     # whatever else
     (A, long(31010), ack(31010, UNSUPPORTED)),
     (P, long(31010), ack(31010, UNSUPPORTED)),
@@ -94,61 +80,48 @@ TABLE: list[tuple[str, Message, list[dict[str, Any]]]] = [
     (A, long(512, 397), ack(512, FAILED)),
     (P, long(512, 397), ack(512, DENIED)),
     (P, long(512, 435, 7), ack(512, DENIED)),  # there are six modes
-    (P, long(512, 435, NAN), ack(512, DENIED)),
-    (P, long(512, 437), ack(512, DENIED)),  # only streamed, and only after a change
     (A, long(512, 435, 1), ack(512, FAILED)),
-    (A, long(512, 436), ack(512, FAILED)),
     (P, long(512, 436), [{"custom_mode": 0x03040000, "standard_mode": 0}, *ack(512, ACCEPTED)]),
     (P, long(512, 244, 0), [{"message_id": 0, "interval_us": 1_000_000}, *ack(512, ACCEPTED)]),
-    (A, long(512, 0), [{"mavpackettype": "HEARTBEAT"}, *ack(512, ACCEPTED)]),
-    (P, long(512, 0), [{"mavpackettype": "HEARTBEAT"}, *ack(512, ACCEPTED)]),
-    (A, long(512, 395), ack(512, FAILED)),
-    (P, long(512, 395), ack(512, DENIED)),
-    (A, long(512, 280), ack(512, ACCEPTED)),  # and is not sent
-    (P, long(512, 280), ack(512, DENIED)),
+    (A, long(512, 0), [BEAT, *ack(512, ACCEPTED)]),
+    (P, long(512, 0), [BEAT, *ack(512, ACCEPTED)]),
     (P, long(511, 12_000, 1e5), ack(511, FAILED)),
     (P, long(511, 30, 50_000), ack(511, ACCEPTED)),
     (P, long(246, 0), ack(246, ACCEPTED)),
-    (P, long(246, 1), ack(246, ACCEPTED)),
     (P, long(246, 2), ack(246, DENIED)),
     (A, long(31010, component=50), ack(31010, UNSUPPORTED)),
-    (P, long(31010, component=0), ack(31010, UNSUPPORTED)),
     (P, long(31010, component=50), SILENCE),
     # plans
     (A, m.MissionCount(1, 1, 1), [{"mavpackettype": "MISSION_REQUEST", "seq": 0}]),
     (P, m.MissionCount(1, 1, 1), [{"mavpackettype": "MISSION_REQUEST_INT", "seq": 0}]),
-    (P, m.MissionCount(1, 1, 0), mission_ack(MavMissionResult.ACCEPTED)),
     (P, m.MissionCount(1, 1, 3000), mission_ack(MavMissionResult.NO_SPACE)),
     (P, m.MissionCount(1, 1, 1, 7), mission_ack(MavMissionResult.INVALID)),
-    (P, m.MissionClearAll(1, 1, 255), mission_ack(MavMissionResult.ACCEPTED)),
     (P, m.MissionRequestList(1, 1), [{"mavpackettype": "MISSION_COUNT", "opaque_id": 0}]),
     # parameters
     (P, m.ParamRequestRead(1, 1, b"NO_SUCH", -1), SILENCE),
-    (P, m.ParamSet(1, 1, b"NO_SUCH", 1.0, 9), SILENCE),
     (P, m.ParamSet(1, 1, b"COM_OF_LOSS_T", 1.0, 6), SILENCE),  # of another type
-    (A, m.ParamRequestRead(1, 1, b"_HASH_CHECK", -1), SILENCE),
 ]
 #: a generic one speaks as PX4 does
 TABLE += [(G, message, answer) for name, message, answer in TABLE if name == P]
 
 
-@pytest.mark.parametrize(("name", "message", "answer"), TABLE)
-def test_what_it_answers(name: str, message: Message, answer: list[dict[str, Any]]) -> None:
-    rig = Rig(persona=PERSONAS[name])
-    rig.heard.clear()
-    rig.send(message)
-    unasked: tuple[type[Message], ...] = (m.Statustext, m.Heartbeat)  # of a change of its mode
-    if {"mavpackettype": "HEARTBEAT"} in answer:
-        unasked = (m.Statustext,)
-    heard = [each.to_dict() for each in rig.heard if not isinstance(each, unasked)]
-    wanted = [{key: found[key] for key in each} for each, found in zip(answer, heard, strict=True)]
-    assert wanted == answer
+def test_what_it_answers() -> None:
+    for name, message, answer in TABLE:
+        rig = Rig(PERSONAS[name])
+        rig.heard.clear()
+        rig.send(message)
+        unasked = [m.Statustext] if BEAT in answer else [m.Statustext, m.Heartbeat]  # new mode
+        heard = [each.to_dict() for each in rig.heard if type(each) not in unasked]
+        wanted = [
+            {key: found[key] for key in each} for each, found in zip(answer, heard, strict=True)
+        ]
+        assert wanted == answer
 
 
 def test_each_persona_shows_itself() -> None:
     shown = {}
     for name, persona in PERSONAS.items():
-        rig = Rig(persona=persona)
+        rig = Rig(persona)
         beat = rig.last(m.Heartbeat)
         shown[name] = (beat.autopilot, beat.type, hex(beat.custom_mode), beat.base_mode & 129)
     assert shown == {
@@ -158,44 +131,11 @@ def test_each_persona_shows_itself() -> None:
     }
 
 
-@pytest.mark.parametrize("name", [P, G])
-def test_its_modes_can_be_enumerated(name: str) -> None:
-    rig = Rig(persona=PERSONAS[name])
-    rig.take(m.AvailableModes)
-    rig.send(long(512, 435, 0))
-    every = rig.take(m.AvailableModes)
-    rig.send(*[long(512, 435, index) for index in range(1, 7)])
-    one_by_one = rig.take(m.AvailableModes)
-    assert [each.to_dict() for each in one_by_one] == [each.to_dict() for each in every]
-    assert {each.number_modes for each in every} == {6}
-    assert [
-        (each.mode_index, hex(each.custom_mode), each.standard_mode, each.mode_name.rstrip("\0"))
-        for each in every
-    ] == [
-        (1, "0x10000", 0, "Manual"),
-        (2, "0x30000", 0, "Position"),
-        (3, "0x4040000", 6, ""),
-        (4, "0x3040000", 0, "Hold"),
-        (5, "0x5040000", 5, ""),
-        (6, "0x60000", 0, "Offboard"),
-    ]
-
-
-def test_current_mode_tells_what_was_wanted_from_what_a_failsafe_did() -> None:
-    rig = Px4Rig()
-    rig.ready_to_drive()
-    rig.run(2.5)  # no setpoints: the failsafe drives it home
-    rig.heard.clear()
-    rig.command(MavCmd.REQUEST_MESSAGE, m.CurrentMode.id)
-    current = rig.last(m.CurrentMode)
-    assert (current.custom_mode, current.intended_custom_mode) == (PX4_RTL, PX4_OFFBOARD)
-
-
-@pytest.mark.parametrize("name", PERSONAS)
-@pytest.mark.parametrize("value", [NAN, math.inf, -math.inf, -1e30, 1e30])
-def test_unusable_numbers_in_commands_arm_nothing(name: str, value: float) -> None:
-    rig = Rig(persona=PERSONAS[name])
-    for command in (*MavCmd, 224):
-        if (name, command) != (A, MavCmd.DO_CHANGE_SPEED):  # which makes ArduPilot abort
-            rig.send(long(command, *[value] * 7))
-    assert not rig.autopilot.armed
+def test_unusable_numbers_in_commands_arm_nothing() -> None:
+    for name in PERSONAS:
+        for value in [NAN, math.inf, -math.inf, -1e30, 1e30]:
+            rig = Rig(PERSONAS[name])
+            for command in (*MavCmd, 224):
+                if (name, command) != (A, MavCmd.DO_CHANGE_SPEED):  # which makes ArduPilot abort
+                    rig.send(long(command, *[value] * 7))
+            assert not rig.autopilot.armed

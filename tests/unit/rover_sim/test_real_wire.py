@@ -1,24 +1,10 @@
 """What the real ones say that a tidy simulator would not."""
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.mavlink.enums import MavCmd, MavLandedState, MavResult
-from rover_sim.body import Pose
-from rover_sim.kinematic import KinematicBody
-from rover_sim.personas import ARDUPILOT, PX4
-from rover_sim.vehicle import Peers, Vehicle, make_vehicle
-from tests.unit.rover_sim.real_rig import RealRig
-from tests.unit.rover_sim.rig import CLIENT, heartbeat
+from rover_sim.personas import ARDUPILOT
+from tests.unit.rover_sim.rig import RealRig
 
 UNNUMBERED = 65535
-
-
-def test_ardupilot_never_says_whether_it_is_on_the_ground() -> None:
-    rig = RealRig(ARDUPILOT)
-    rig.get_ready()
-    rig.run(3.0)
-    states = {e.landed_state for _, e in rig.arrivals if isinstance(e, m.ExtendedSysState)}
-    assert states == {MavLandedState.UNDEFINED}
 
 
 def test_ardupilot_sends_a_parameter_unasked_that_has_no_number() -> None:
@@ -33,53 +19,3 @@ def test_ardupilot_sends_a_parameter_unasked_that_has_no_number() -> None:
     listed = rig.take(m.ParamValue)
     assert [v.param_index for v in listed] == list(range(listed[0].param_count))
     assert listed[-1].param_id == "STAT_RUNTIME"
-
-
-def test_px4_sends_its_digest_before_its_parameters() -> None:
-    rig = RealRig(PX4, wait=1.0)
-    rig.send(m.ParamRequestList(1, 1))
-    first, *others = rig.take(m.ParamValue)
-    assert (first.param_id, first.param_index) == ("_HASH_CHECK", UNNUMBERED)
-    assert [v.param_index for v in others] == list(range(first.param_count))
-
-
-def test_ardupilot_accepts_to_tell_of_its_gimbal_and_has_none() -> None:
-    rig = RealRig(ARDUPILOT, wait=3.0)
-    assert rig.ask(MavCmd.REQUEST_MESSAGE, 280).result == MavResult.ACCEPTED
-    assert [e.get_msgId() for e in rig.heard if e.get_msgId() == 280] == []
-    assert rig.ask(MavCmd.REQUEST_MESSAGE, 12_000).result == MavResult.FAILED
-
-
-def met(peers: Peers) -> Vehicle:
-    body = KinematicBody(start=Pose(), slip=0.0, seed=None)
-    vehicle = make_vehicle(body, system_id=1, now=0.0, persona=PX4, peers=peers)
-    beat = Encoder(CLIENT).encode(heartbeat())
-    for peer in ("first", "second"):
-        vehicle.receive(beat, peer, now=0.0)
-    return vehicle
-
-
-def talked_to(vehicle: Vehicle, until: float) -> set[object]:
-    while vehicle.next_deadline() < until:
-        vehicle.handle_deadline(now=vehicle.next_deadline())
-    return {peer for peer, _ in vehicle.take_packets()}
-
-
-def test_a_rover_that_answers_its_first_peer_only_keeps_to_it_for_good() -> None:
-    vehicle = met(Peers.FIRST)
-    assert talked_to(vehicle, 1.0) == {"first"}
-    assert talked_to(vehicle, 30.0) == {"first"}  # though it has fallen silent
-    vehicle.receive(Encoder(CLIENT).encode(heartbeat()), "second", now=30.0)
-    assert talked_to(vehicle, 31.0) == {"first"}
-
-
-def test_any_other_rover_answers_everybody() -> None:
-    assert talked_to(met(Peers.ALL), 1.0) == {"first", "second"}
-
-
-def test_a_rover_that_answers_its_first_peer_only_hears_the_others_all_the_same() -> None:
-    vehicle = met(Peers.FIRST)
-    request = Encoder(CLIENT).encode(m.ParamRequestRead(1, 1, b"MAV_SYS_ID", -1))
-    vehicle.receive(request, "second", now=0.5)
-    answers = [peer for peer, _ in vehicle.take_packets()]
-    assert answers == ["first"]

@@ -1,19 +1,12 @@
 """What the rover tells about itself, and how often."""
 
-import math
 from collections import Counter
-from itertools import pairwise
 
 import pytest
 
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavCmd, MavResult
-from rover_sim.body import Pose
 from rover_sim.faults import Faults
-from rover_sim.geo import DEFAULT_ORIGIN
 from tests.unit.rover_sim.rig import GUIDED, Rig, body_velocity
-
-GEOFENCE = 0x100000  # MAV_SYS_STATUS_SENSOR
 
 STREAMED = {
     m.Heartbeat,
@@ -37,91 +30,6 @@ def test_everything_streams_at_1_hz_unasked() -> None:
     rig.heard.clear()
     rig.run(5.0)
     assert Counter(type(message) for message in rig.heard) == dict.fromkeys(STREAMED, 5)
-
-
-def test_message_intervals_are_kept_one_by_one() -> None:
-    rig = Rig()
-    for message_id in (m.Attitude.id, m.LocalPositionNed.id):
-        assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, message_id, 50_000) == MavResult.ACCEPTED
-    rig.run(0.5)
-    rig.heard.clear()
-    rig.run(3.0)
-    times = [message.time_boot_ms for message in rig.heard if isinstance(message, m.Attitude)]
-    assert {late - early for early, late in pairwise(times)} == {50}
-    assert len(rig.take(m.LocalPositionNed)) == 60
-
-
-def test_an_interval_can_be_switched_off_and_back_to_the_default() -> None:
-    rig = Rig()
-    rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.VfrHud.id, -1)
-    rig.heard.clear()
-    rig.run(3.0)
-    assert rig.take(m.VfrHud) == []
-    rig.command(MavCmd.GET_MESSAGE_INTERVAL, m.VfrHud.id)
-    assert rig.last(m.MessageInterval).interval_us == -1
-    rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.VfrHud.id, 0)
-    rig.command(MavCmd.GET_MESSAGE_INTERVAL, m.VfrHud.id)
-    assert rig.last(m.MessageInterval).interval_us == 1_000_000
-    rig.run(3.0)
-    assert len(rig.take(m.VfrHud)) == 3
-
-
-def test_intervals_that_cannot_be_are_denied() -> None:
-    rig = Rig()
-    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, 12_000, 100_000) == MavResult.DENIED
-    assert rig.texts()[-1] == "No ap_message for mavlink id (12000)"
-    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, m.Attitude.id, 1_000) == MavResult.DENIED
-
-
-def test_request_data_stream_sets_its_group() -> None:
-    rig = Rig()
-    rig.send(m.RequestDataStream(1, 1, 10, 10, 1))
-    rig.run(0.5)
-    rig.heard.clear()
-    rig.run(2.0)
-    counts = Counter(type(message) for message in rig.heard)
-    assert (counts[m.Attitude], counts[m.VfrHud]) == (20, 2)
-    rig.send(m.RequestDataStream(1, 1, 10, 0, 0))
-    rig.heard.clear()
-    rig.run(2.0)
-    assert rig.take(m.Attitude) == []
-
-
-def test_position_and_motion_agree_with_the_truth() -> None:
-    rig = Rig(start=Pose(north=3.0, east=-2.0, yaw=math.radians(120)))
-    rig.ready_to_drive()
-    rig.run(4.0, body_velocity(1.0))
-    for message_id in (m.LocalPositionNed.id, m.GlobalPositionInt.id, m.Attitude.id, m.VfrHud.id):
-        rig.command(MavCmd.REQUEST_MESSAGE, message_id)
-    truth, local = rig.truth, rig.last(m.LocalPositionNed)
-    assert math.dist((local.x, local.y), (truth.north, truth.east)) < 0.03  # one step old
-    assert math.atan2(local.vy, local.vx) == pytest.approx(math.radians(120), abs=1e-3)
-    assert rig.last(m.Attitude).yaw == pytest.approx(math.radians(120), abs=1e-3)
-    world = rig.last(m.GlobalPositionInt)
-    there = DEFAULT_ORIGIN.to_local(world.lat, world.lon)
-    assert there == pytest.approx((local.x, local.y), abs=0.02)
-    assert (world.hdg, rig.last(m.VfrHud).heading) == (12000, 120)
-    home = rig.last(m.HomePosition)
-    assert (home.x, home.y) == (3.0, -2.0)
-
-
-def test_timesync_is_answered_with_boot_time_and_the_question_echoed() -> None:
-    rig = Rig(wait=2.0)
-    rig.send(m.Timesync(0, 123_456_789))
-    (answer,) = rig.take(m.Timesync)
-    assert answer.tc1 == pytest.approx(2_000_000_000, abs=1000)
-    assert answer.ts1 == 123_456_789
-    rig.send(m.Timesync(5, 6))  # somebody else's answer
-    assert rig.take(m.Timesync) == []
-
-
-def test_file_transfer_is_refused_at_once() -> None:
-    rig = Rig()
-    payload = [7, 0, 3, 4, 9] + [0] * 246  # seq 7, session 3, OpenFileRO
-    rig.send(m.FileTransferProtocol(0, 1, 1, payload))
-    (answer,) = rig.take(m.FileTransferProtocol)
-    assert (answer.payload[0], answer.payload[2]) == (8, 3)
-    assert (answer.payload[3], answer.payload[5], answer.payload[12]) == (129, 4, 10)
 
 
 def test_faults_of_the_estimate_show_in_position_only() -> None:
@@ -156,18 +64,3 @@ def test_telemetry_can_be_withheld_or_silenced_altogether() -> None:
     rig.autopilot.set_faults(Faults())
     rig.run(1.1)
     assert rig.last(m.Heartbeat).custom_mode == GUIDED  # it had heard, and obeyed
-
-
-def test_a_deaf_rover_talks_but_does_not_obey() -> None:
-    rig = Rig()
-    rig.autopilot.set_faults(Faults(deaf=True))
-    rig.send(m.CommandLong(1, 1, 176, 0, 1, GUIDED, 0, 0, 0, 0, 0))
-    rig.run(1.1)
-    assert rig.last(m.Heartbeat).custom_mode != GUIDED
-
-
-def test_a_fence_that_is_not_there_is_healthy() -> None:
-    """As ArduPilot says it; MAVProxy announces "fence breach" of any other rover."""
-    status = Rig().last(m.SysStatus)
-    assert not status.onboard_control_sensors_present & GEOFENCE
-    assert status.onboard_control_sensors_health & GEOFENCE

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mav_tasks.errors import SettingError
-from mav_tasks.setting_keys.key import Key, check_bounds
+from mav_tasks.setting_keys.key import check_bounds
 from mav_tasks.setting_keys.literals import in_digits, literal
 from mav_tasks.setting_keys.shapes import (
     ByClient,
@@ -22,7 +22,6 @@ from mav_tasks.setting_keys.shapes import (
 from mav_tasks.settings import BOUNDED, KEYS, ServerSettings
 from mav_tasks.tasks.task import Submitter
 
-EACH = pytest.mark.parametrize("key", KEYS.values(), ids=lambda key: key.name)
 DEFAULTS = ServerSettings()
 
 
@@ -44,34 +43,40 @@ def test_every_setting_has_exactly_one_key() -> None:
 PRIORITIES = ByClient(Number(0, 10, is_whole=True), example=7)
 
 
-@EACH
-def test_the_default_comes_back_from_how_people_write_it(key: Key) -> None:
-    plain = key.plain_of(DEFAULTS)
-    kept = key.shape.kept(plain)
-    assert (type(kept), kept) == (type(key.of(DEFAULTS)), key.of(DEFAULTS))
-    assert tomllib.loads(f"x = {literal(plain)}") == {"x": plain}
-    assert key.put(DEFAULTS, key.shape.kept(plain)) == DEFAULTS
+NO_VALUES: tuple[object, ...] = (nan, inf, -inf, -1, 10**400, None, object(), [1], {"a": []}, b"")
+NO_TEXTS = ("nan", "inf", "1e999", "ten", "=", "9" * 5000, "²")
 
 
-@EACH
-def test_a_key_says_what_it_means_in_one_line(key: Key) -> None:
-    assert key.meaning
-    assert key.shape.valid
-    assert (key.meaning + key.shape.valid).isprintable()
-    table, _, last = key.name.partition(".")
-    assert (table + last).replace("_", "").replace(".", "").isalpha()
+def test_the_default_of_each_key_comes_back_from_how_people_write_it() -> None:
+    for key in KEYS.values():
+        plain = key.plain_of(DEFAULTS)
+        kept = key.shape.kept(plain)
+        assert (type(kept), kept) == (type(key.of(DEFAULTS)), key.of(DEFAULTS)), key.name
+        assert tomllib.loads(f"x = {literal(plain)}") == {"x": plain}, key.name
+        assert key.put(DEFAULTS, kept) == DEFAULTS, key.name
 
 
-@EACH
-def test_what_is_no_value_is_refused_and_never_breaks(key: Key) -> None:
-    for plain in (nan, inf, -inf, -1, 10**400, None, object(), [1], {"a": []}, b""):
-        with pytest.raises(SettingError):
-            key.shape.kept(plain)
+def test_each_key_says_what_it_means_in_one_line() -> None:
+    for key in KEYS.values():
+        assert key.meaning, key.name
+        assert key.shape.valid, key.name
+        assert (key.meaning + key.shape.valid).isprintable(), key.name
+        assert key.name.replace("_", "").replace(".", "").isalpha(), key.name
 
 
-@pytest.mark.parametrize(
-    ("shape", "plain", "says"),
-    [
+def test_what_is_no_value_of_a_key_is_refused_and_never_breaks() -> None:
+    for key in KEYS.values():
+        for plain in NO_VALUES:
+            with pytest.raises(SettingError):
+                key.shape.kept(plain)
+        if isinstance(key.shape, Number | Choice | Flag | ByClient):
+            for text in NO_TEXTS:
+                with pytest.raises(SettingError):
+                    key.shape.kept(key.shape.read(text))
+
+
+def test_what_is_wrong_is_said() -> None:
+    for shape, plain, says in (
         (Number(0.05, 10, "m/s"), 50, "not in 0.05..10 m/s"),
         (Number(0.05, 10, "m/s"), "1", "not a number: 0.05..10 m/s"),
         (Number(0.05, 10, "m/s"), True, "not a number: 0.05..10 m/s"),
@@ -87,17 +92,14 @@ def test_what_is_no_value_is_refused_and_never_breaks(key: Key) -> None:
         (PRIORITIES, {"0/190": 1}, "'0/190': no client"),
         (PRIORITIES, {"256/1": 1}, "'256/1': no client"),
         (PRIORITIES, {"qgc": 1}, "'qgc': no client"),
-    ],
-)
-def test_what_is_wrong_is_said(shape: Any, plain: object, says: str) -> None:
-    with pytest.raises(SettingError) as raised:
-        shape.kept(plain)
-    assert str(raised.value).startswith(says)
+    ):
+        with pytest.raises(SettingError) as raised:
+            shape.kept(plain)
+        assert str(raised.value).startswith(says)
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "kept"),
-    [
+def test_a_text_is_read() -> None:
+    for name, text, kept in (
         ("driving.speed", "0.8", 0.8),
         ("driving.turn_rate_deg", "90", radians(90)),
         ("queueing.quota", "7", 7),
@@ -109,19 +111,9 @@ def test_what_is_wrong_is_said(shape: Any, plain: object, says: str) -> None:
         ("links.clients", "udpin:127.0.0.1:1, tcp:a:2", ("udpin:127.0.0.1:1", "tcp:a:2")),
         ("clients.priorities", "255/190=7,1/2@h:3=0", {"255/190": 7, "1/2@h:3": 0}),
         ("clients.priorities", "", {}),
-    ],
-)
-def test_a_text_is_read(name: str, text: str, kept: object) -> None:
-    shape = KEYS[name].shape
-    assert shape.kept(shape.read(text)) == kept
-
-
-@EACH
-def test_a_text_that_means_nothing_is_refused(key: Key) -> None:
-    if isinstance(key.shape, Number | Choice | Flag | ByClient):
-        for text in ("nan", "inf", "1e999", "ten", "=", "9" * 5000, "²"):
-            with pytest.raises(SettingError):
-                key.shape.kept(key.shape.read(text))
+    ):
+        shape = KEYS[name].shape
+        assert shape.kept(shape.read(text)) == kept
 
 
 def test_a_client_is_written_as_the_server_writes_it() -> None:
@@ -147,9 +139,8 @@ def test_defaults_keep_their_bounds_and_a_broken_one_is_named() -> None:
         check_bounds(faster, KEYS["driving.speed"], KEYS["driving.max_speed"])
 
 
-@pytest.mark.parametrize(
-    ("plain", "toml"),
-    [
+def test_a_value_is_written_as_toml() -> None:
+    for plain, toml in (
         (True, "true"),
         (5, "5"),
         (1e6, "1000000"),
@@ -158,11 +149,9 @@ def test_defaults_keep_their_bounds_and_a_broken_one_is_named() -> None:
         (["a", "b"], '["a", "b"]'),
         ({}, "{}"),
         ({"255/190": 7}, '{ "255/190" = 7 }'),
-    ],
-)
-def test_a_value_is_written_as_toml(plain: object, toml: str) -> None:
-    assert literal(plain) == toml
-    assert tomllib.loads(f"x = {toml}")["x"] == plain
+    ):
+        assert literal(plain) == toml
+        assert tomllib.loads(f"x = {toml}")["x"] == plain
 
 
 def test_numbers_are_written_in_digits() -> None:

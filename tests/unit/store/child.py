@@ -11,8 +11,7 @@ import signal
 import sys
 import time
 
-from mav_tasks.store import HaltNotKept, Kept, NotKept
-from mav_tasks.store.opening import open_store
+from mav_tasks.store import HaltNotKept, Kept, NotKept, open_store
 from tests.unit.store.samples import submitted
 
 UNDER_WAY = 50  # events appended and not yet kept

@@ -11,11 +11,10 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from mav_tasks.store import NotKept
-from mav_tasks.store.sqlite import SqliteStore
+from mav_tasks.store import HaltsKept, NotKept, open_store
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason
-from tests.unit.store.samples import opened, submitted, wait_for_failure
+from tests.unit.store.samples import loaded, next_outcomes, opened, submitted, wait_for_failure
 
 NO_NAMESPACE = 77
 ROOM = "size=2m"
@@ -33,19 +32,21 @@ def main() -> None:
         os.wait()
         (path.parent / "filler").unlink()
         with opened(path) as store:
-            print(store.load().paused[1].name)
+            restored = loaded(store)
+            print(restored.paused[1].name)
         subprocess.run(["umount", place], check=True)
 
 
 def stop_on_full_disk(path: Path) -> None:
     """Stop a rover when nothing can be written, and die when the record has had time for it."""
-    store = SqliteStore(path, wall_offset=lambda: 0.0)
+    store = open_store(str(path))
     fill(path.parent / "filler")
     store.append([submitted(number) for number in range(1, 1000)])  # more than the log has room for
     failure: NotKept = wait_for_failure(store)
     print("not kept" if "full" in failure.text else failure.text, flush=True)
     store.append([QueuePaused(1, TaskReason.STOPPED, "client", 100.0)])
-    store._keeper.close(within=5.0)
+    while not any(isinstance(outcome, HaltsKept) for outcome in next_outcomes(store)):
+        pass
     os._exit(0)
 
 

@@ -4,29 +4,29 @@ import select
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from mav_tasks.settings import Retention
-from mav_tasks.store import Kept, NotKept, Outcome, Store
-from mav_tasks.store.durable import DurableStore
-from mav_tasks.store.opening import kind_of
-from mav_tasks.tasks.events import TaskSubmitted
+from mav_tasks.store import Kept, NotKept, Outcome, Store, kind_of
+from mav_tasks.tasks.events import Event, TaskChanged, TaskSubmitted
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Marks, Task, TaskId, Terms
-from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE
+from mav_tasks.tasks.restored import Restored
+from mav_tasks.tasks.task import Marks, Progress, Submitter, Task, TaskId, Terms
 
 OFFSET = 1_800_000_000.0  # s, UTC minus monotonic; a whole number loses nothing of the samples
 FOR_EVER = Retention(max_age=None, max_count=None)
 PATIENCE = 20.0  # s
+SOMEBODY = Submitter("udpin:127.0.0.1:14560", "127.0.0.1:50000", 255, 190)
+TASK_MOVE = 54000
 
 
-def submitted(number: int, *, at: float = 100.0) -> TaskSubmitted:
+def submitted(number: int, *, at: float = 100.0, vehicle: int = 1) -> TaskSubmitted:
     """Return the event of a submission; times are exact in binary."""
     task = Task(
         id=TaskId(number),
-        vehicle=1,
+        vehicle=vehicle,
         command=TASK_MOVE,
         goal=Move(number / 4),
         submitter=SOMEBODY,
@@ -37,24 +37,61 @@ def submitted(number: int, *, at: float = 100.0) -> TaskSubmitted:
     return TaskSubmitted(task, at)
 
 
-def finish(registry: TaskRegistry, number: int, *, now: float) -> None:
-    """Let a waiting task be cancelled."""
-    registry.change(
-        TaskId(number), TaskState.CANCELLED, reason=TaskReason.CANCELLED, actor="client", now=now
+def changed(
+    task: Task, new: TaskState, *, at: float, progress: Progress | None = None
+) -> tuple[Task, TaskChanged]:
+    """Return a task in its next state, and the event of that."""
+    after = replace(
+        task,
+        state=new,
+        reason=TaskReason.OPERATOR,
+        version=task.version + 1,
+        progress=progress or task.progress,
+        changed_at=at,
     )
+    event = TaskChanged(
+        task.id,
+        task.vehicle,
+        after.version,
+        task.state,
+        new,
+        after.reason,
+        "client",
+        at,
+        after.progress,
+    )
+    return after, event
+
+
+def cancelled(number: int, *, at: float, vehicle: int = 1) -> list[Event]:
+    """Return the events of a task that is submitted, and cancelled half a second later."""
+    first = submitted(number, at=at, vehicle=vehicle)
+    return [first, changed(first.task, TaskState.CANCELLED, at=at + 0.5)[1]]
 
 
 @contextmanager
 def opened(
     place: str | Path, *, offset: float = OFFSET, retention: Retention = FOR_EVER
-) -> Iterator[DurableStore]:
+) -> Iterator[Store]:
     """Return the store at a place, of any durable kind; it is closed after the block."""
     store = kind_of(str(place)).open_store(str(place), lambda: offset, retention)
-    assert isinstance(store, DurableStore)
     try:
         yield store
     finally:
         store.close()
+
+
+def loaded(store: Store) -> Restored:
+    """Return the state that a durable store has kept."""
+    found = store.load()
+    assert found is not None
+    return found
+
+
+def keep(store: Store, *events: Event) -> list[Outcome]:
+    """Append the first events of a store's life; return all outcomes until they are kept."""
+    store.append(events)
+    return wait_for(store, len(events))
 
 
 def wait_for(store: Store, through: int) -> list[Outcome]:

@@ -10,18 +10,14 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.errors import StoreError
-from mav_tasks.store import schema
-from mav_tasks.store import sqlite_reader as module
-from mav_tasks.store.base import JournalReader, Which
-from mav_tasks.store.durable import DurableStore
-from mav_tasks.store.journal import PAGE
-from mav_tasks.store.opening import kind_of
+from mav_tasks.store import Store, Which, kind_of
+from mav_tasks.store.base import JournalReader
 from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
-from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 from tests.kit.databases import foreign, newer, tables
-from tests.unit.store.samples import OFFSET, finish, opened, submitted, wait_for
-from tests.unit.tasks.samples import draft
+from tests.unit.store.samples import OFFSET, cancelled, keep, loaded, opened, submitted, wait_for
+
+PAGE = 500  # entries that are read at once
 
 
 @pytest.fixture
@@ -30,24 +26,16 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def store(place: str) -> Iterator[DurableStore]:
+def store(place: str) -> Iterator[Store]:
     with opened(place) as it:
         yield it
 
 
-def history(count: int, *, vehicle: int = 1, at: float = 10.0) -> list[Event]:
+def history(count: int) -> list[Event]:
     """Tasks submitted and cancelled, one after the other."""
-    registry = TaskRegistry()
-    for number in range(1, count + 1):
-        registry.submit(draft(vehicle=vehicle), now=at + number)
-        finish(registry, number, now=at + number + 0.5)
-    return list(registry.take_events())
-
-
-def keep(store: DurableStore, events: list[Event], *, through: int | None = None) -> list[Event]:
-    store.append(events)
-    wait_for(store, through or len(events))
-    return events
+    return [
+        event for number in range(1, count + 1) for event in cancelled(number, at=10.0 + number)
+    ]
 
 
 def journal_of(place: str | Path, which: Which | None = None) -> JournalReader:
@@ -60,46 +48,37 @@ def read(place: str | Path, which: Which | None = None) -> list[tuple[int, Event
 
 
 @pytest.mark.parametrize("count", [0, 1, PAGE // 2, PAGE // 2 + 1, 2 * PAGE + 7])
-def test_every_event_is_given_once_in_its_order(
-    store: DurableStore, place: str, count: int
-) -> None:
+def test_every_event_is_given_once_in_its_order(store: Store, place: str, count: int) -> None:
     events: list[Event] = [VehicleSeen(1, "found", 1.0), *history(count)]
     assert read(place) == []
-    keep(store, events)
+    keep(store, *events)
     assert read(place) == list(enumerate(events, 1))
 
 
-def test_many_submissions_in_one_piece_and_then_their_ends(store: DurableStore, place: str) -> None:
-    tasks: list[Event] = [submitted(number) for number in range(1, 2 * PAGE + 4)]
-    notes: list[Event] = [VehicleSeen(1, str(number), 1.0) for number in range(3 * PAGE)]
-    events = keep(store, tasks + notes)
-    assert read(place) == list(enumerate(events, 1))
-
-
-def test_what_comes_later_is_given_to_who_goes_on_reading(store: DurableStore, place: str) -> None:
+def test_what_comes_later_is_given_to_who_goes_on_reading(store: Store, place: str) -> None:
     first = history(3)
     then: list[Event] = [VehicleSeen(1, "found", 99.0), submitted(4)]
-    keep(store, first)
+    keep(store, *first)
     with closing(journal_of(place)) as it:
         seen = it.version()
         assert [event for _, event in it.take(offset=OFFSET)] == first
         assert it.version() == seen
-        keep(store, then, through=len(first) + 2)
+        store.append(then)
+        wait_for(store, len(first) + 2)
         assert it.version() != seen
         assert list(it.take(offset=OFFSET)) == list(enumerate(then, len(first) + 1))
         assert list(it.take(offset=OFFSET)) == []
 
 
-def test_a_submission_that_was_withdrawn_stays_in_the_journal(
-    store: DurableStore, place: str
-) -> None:
-    events = keep(store, [submitted(1), submitted(2), TaskWithdrawn(TaskId(1), 1, 100.5)])
+def test_a_submission_that_was_withdrawn_stays_in_the_journal(store: Store, place: str) -> None:
+    events: list[Event] = [submitted(1), submitted(2), TaskWithdrawn(TaskId(1), 1, 100.5)]
+    keep(store, *events)
     assert read(place) == list(enumerate(events, 1))
 
 
-def test_some_of_it(store: DurableStore, place: str) -> None:
+def test_some_of_it(store: Store, place: str) -> None:
     ours, theirs = history(4), VehicleSeen(2, "found", 50.0)
-    keep(store, [*ours, theirs])
+    keep(store, *ours, theirs)
     assert [event for _, event in read(place, Which(task=3))] == ours[4:6]
     assert [event for _, event in read(place, Which(vehicle=2))] == [theirs]
     assert [event for _, event in read(place, Which(vehicle=1))] == ours
@@ -119,47 +98,32 @@ def test_a_reader_that_stays_keeps_nothing_from_the_writer(path: Path) -> None:
         _stay(store, path)
 
 
-def _stay(store: DurableStore, path: Path) -> None:
-    keep(store, history(PAGE))
+def _stay(store: Store, path: Path) -> None:
+    keep(store, *history(PAGE))
     with closing(journal_of(path)) as it, closing(sqlite3.connect(path)) as other:
         events = it.take(offset=OFFSET)
         assert len(list(islice(events, 10))) == 10  # the pager has no room for more
-        keep(store, [VehicleSeen(1, "found", 99.0)], through=2 * PAGE + 1)
+        store.append([VehicleSeen(1, "found", 99.0)])
+        wait_for(store, 2 * PAGE + 1)
         busy, pages, done = other.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
         assert (busy, pages) == (0, done)
         assert len(list(events)) == 2 * PAGE + 1 - 10
 
 
-def test_reading_needs_no_lock_and_no_server(store: DurableStore, place: str) -> None:
-    keep(store, history(3))
+def test_reading_needs_no_lock_and_no_server(store: Store, place: str) -> None:
+    keep(store, *history(3))
     assert len(read(place)) == 6
     store.close()
     assert len(read(place)) == 6
     with opened(place) as again:
-        assert again.load().ended_well
-
-
-def test_reading_a_file_changes_nothing(path: Path) -> None:
-    with opened(path) as store:
-        keep(store, history(3))
-        before = path.read_bytes()
-        assert len(read(path)) == 6
-        assert path.read_bytes() == before
-
-
-def test_no_more_is_read_than_a_page_ahead(store: DurableStore, place: str) -> None:
-    keep(store, history(3 * PAGE))
-    with closing(journal_of(place)) as it:
-        for number, _ in it.take(offset=OFFSET):
-            ahead = int(repr(it).removesuffix(")").rpartition(" ")[2])
-            assert number <= ahead < number + 2 * PAGE
-        assert number == 6 * PAGE
+        restored = loaded(again)
+        assert restored.ended_well
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_store_is_read_where_nobody_may_write(path: Path) -> None:
     with opened(path) as store:
-        keep(store, history(3))
+        keep(store, *history(3))
     path.parent.chmod(0o500)
     try:
         assert len(read(path)) == 6
@@ -167,47 +131,8 @@ def test_a_store_is_read_where_nobody_may_write(path: Path) -> None:
         path.parent.chmod(0o700)
 
 
-def test_where_sqlite_may_not_write_its_index_the_file_is_read_as_it_stands(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with opened(path) as store:
-        keep(store, history(3))
-    checked, asked = module._checked, list[str]()
-
-    def refuse(path: Path, how: str) -> sqlite3.Connection:
-        asked.append(how)
-        if how == "mode=ro":
-            raise sqlite3.OperationalError("unable to open database file")
-        return checked(path, how)
-
-    monkeypatch.setattr(module, "_checked", refuse)
-    assert len(read(path)) == 6
-    assert asked == ["mode=ro", "immutable=1"]
-
-
 def damaged(path: Path) -> None:
     path.write_bytes(b"not a database at all, but long enough to be one" * 40)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "words"),
-    [
-        (lambda path: None, "does not exist"),
-        (lambda path: path.mkdir(), "does not exist"),
-        (lambda path: path.touch(), "it is empty"),
-        (damaged, "damaged"),
-    ],
-)
-def test_what_is_no_file_of_a_store_is_told_in_one_line(
-    path: Path, spoil: object, words: str
-) -> None:
-    assert callable(spoil)
-    spoil(path)
-    before = {each.name for each in path.parent.iterdir()}
-    assert words in refusal(str(path))
-    assert before >= {
-        each.name for each in path.parent.iterdir() if not each.name.endswith(("-wal", "-shm"))
-    }
 
 
 def refusal(place: str) -> str:
@@ -226,14 +151,14 @@ def outdated(place: str) -> None:
 
 def unknown_event(place: str) -> None:
     with opened(place) as store:
-        keep(store, [VehicleSeen(1, "found", 1.0)])
+        keep(store, VehicleSeen(1, "found", 1.0))
     with tables(place) as connection:
         connection.execute("UPDATE journal SET kind = 'Later'")
 
 
 def no_json(place: str) -> None:
     with opened(place) as store:
-        keep(store, [submitted(1)])
+        keep(store, submitted(1))
     with tables(place) as connection:
         connection.execute("UPDATE tasks SET submitted = '[1, what'")
 
@@ -252,11 +177,3 @@ def test_what_this_version_cannot_read_is_told_in_one_line(
 ) -> None:
     spoil(place)
     assert words in refusal(place)
-
-
-def test_a_file_of_the_first_schema_is_read_without_being_changed(path: Path) -> None:
-    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        schema.migrate(connection, migrations=schema.MIGRATIONS[:1])
-    assert read(path) == []
-    with closing(sqlite3.connect(path)) as connection:
-        assert connection.execute("PRAGMA user_version").fetchone() == (1,)

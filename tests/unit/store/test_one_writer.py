@@ -12,14 +12,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path, PurePath
+from pathlib import Path
 
 import pytest
 
 from mav_tasks.errors import StoreError
-from mav_tasks.store import Kept
-from mav_tasks.store.network_folder import network_type
-from tests.unit.store.samples import PATIENCE, opened, submitted, wait_for, wait_for_failure
+from tests.unit.store.samples import PATIENCE, loaded, opened, submitted, wait_for, wait_for_failure
 from tests.unit.store.test_failures import ROOT, child, kept, line
 
 SOME = 30  # tasks
@@ -96,7 +94,7 @@ def second(place: Path) -> str:
 
 def found(place: Path) -> list[int]:
     with opened(place) as store:
-        return [task.id for task in store.load().tasks]
+        return [task.id for task in loaded(store).tasks]
 
 
 def end(process: "subprocess.Popen[str]") -> list[str]:
@@ -184,20 +182,6 @@ def test_what_was_copied_over_it_is_left_as_it_is(path: Path) -> None:
     assert len(found(path)) == 99
 
 
-@pytest.mark.parametrize("is_running", [True, False])
-def test_a_copy_is_a_store_of_its_own_that_starts(path: Path, is_running: bool) -> None:
-    copy = path.with_name("copy.sqlite3")
-    with child(path) as process:
-        kept(process, at_least=SOME)
-        if not is_running:
-            end(process)
-        for name in ("", "-wal", ".halts"):
-            shutil.copyfile(f"{path}{name}", f"{copy}{name}")
-        with opened(copy) as store:
-            store.append([submitted(99_999)])
-            assert wait_for(store, 1)[-1] == Kept(1)
-
-
 def test_a_record_of_halts_is_not_taken_for_another_stores(path: Path) -> None:
     other = path.with_name("other.sqlite3")
     for each in (path, other):
@@ -208,29 +192,3 @@ def test_a_record_of_halts_is_not_taken_for_another_stores(path: Path) -> None:
         opened(path).__enter__()
     path.with_name(f"{path.name}.halts").unlink()
     assert found(path) == [1]
-
-
-MOUNTS = """\
-22 1 254:0 / / rw,relatime - ext4 /dev/vda rw
-30 22 0:30 / /home rw - nfs4 server:/export/home rw
-31 30 0:31 / /home/rover/local rw - xfs /dev/vdb rw
-32 22 0:32 / /mnt/my\\040share rw shared:1 - cifs //server/share rw
-33 22 0:33 / /mnt/far rw - fuse.sshfs rover@far: rw
-34 22 0:34 / /mnt/crypt rw - fuse.gocryptfs /data rw
-"""
-
-
-@pytest.mark.parametrize(
-    ("folder", "kind"),
-    [
-        ("/var/lib/mav-tasks", ""),
-        ("/home/rover/.local/share", "nfs4"),
-        ("/home/rover/local/share", ""),
-        ("/mnt/my share/rover", "cifs"),
-        ("/mnt/my", ""),
-        ("/mnt/far", "sshfs"),
-        ("/mnt/crypt", ""),
-    ],
-)
-def test_a_folder_of_another_machine_is_known_by_its_mount(folder: str, kind: str) -> None:
-    assert network_type(PurePath(folder), MOUNTS) == kind

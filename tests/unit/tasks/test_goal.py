@@ -1,7 +1,5 @@
 """Goals in words, as people at a terminal or a ground station read them."""
 
-import pytest
-
 from mav_tasks.tasks.goal import (
     Face,
     Goal,
@@ -19,9 +17,8 @@ from mav_tasks.tasks.goal import (
 PLACE = GoTo(LocalPlace(1.0, -2.0))
 
 
-@pytest.mark.parametrize(
-    ("goal", "words"),
-    [
+def test_goals_in_words() -> None:
+    words: tuple[tuple[Goal, str], ...] = (
         (Move(2.0), "move 2 m"),
         (Face(-1.5707963267948966), "face 270 deg"),
         (PLACE, "go to 1.00 m N, -2.00 m E"),
@@ -33,7 +30,6 @@ PLACE = GoTo(LocalPlace(1.0, -2.0))
         (Plan((Nothing(),), has_home=True), "plan of 0 items"),
         (Plan((Nothing(), PLACE), has_home=True), "plan of 1 item"),
         (Plan((Wait(1.0), Jump(0, 3))), "plan of 2 items"),
-    ],
-)
-def test_a_goal_in_words(goal: Goal, words: str) -> None:
-    assert describe(goal) == words
+    )
+    for goal, said in words:
+        assert describe(goal) == said

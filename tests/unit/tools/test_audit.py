@@ -1,8 +1,6 @@
 """The gate's question for known vulnerabilities, with a pip-audit that says what a test wants."""
 
 import json
-import os
-import re
 import shutil
 import subprocess
 import sys
@@ -95,110 +93,42 @@ def test_all_that_is_locked_is_asked_about_also_for_other_pythons(auditor: Audit
     assert done.asked == {"numpy==2.4.6", "numpy==2.5.5", "rich==15.0.0", "mavproxy==1.8.75"}
 
 
-@pytest.mark.parametrize("pin", ["rich==15.0.0", "numpy==2.5.5"])
 def test_a_vulnerability_fails_with_its_name_and_the_version_that_mends_it(
-    auditor: Auditor, pin: str
+    auditor: Auditor,
 ) -> None:
-    done = auditor.run({pin: [BAD]})
-    name, _, version = pin.partition("==")
-    line = f"vulnerable: {name} {version}: PYSEC-2026-7, CVE-2026-1, fixed in 15.0.1\n"
-    assert (done.status, done.text) == (FAILED, line)
+    for pin in ["rich==15.0.0", "numpy==2.5.5"]:
+        done = auditor.run({pin: [BAD]})
+        name, _, version = pin.partition("==")
+        line = f"vulnerable: {name} {version}: PYSEC-2026-7, CVE-2026-1, fixed in 15.0.1\n"
+        assert (done.status, done.text) == (FAILED, line)
 
 
-def test_one_that_no_release_mends_fails_too(auditor: Auditor) -> None:
-    done = auditor.run({"rich==15.0.0": [BAD | {"fix_versions": []}]})
-    assert done.status == FAILED
-    assert "fixed in no version yet" in done.text
+def test_one_that_is_lived_with_passes_and_is_said(auditor: Auditor) -> None:
+    for number in ["PYSEC-2026-7", "CVE-2026-1"]:
+        auditor.accept(f'[[accepted]]\nid = "{number}"\nreason = "we never draw that"\n')
+        done = auditor.run({"rich==15.0.0": [BAD]})
+        assert done.status == PASSED
+        assert done.text.startswith("accepted: rich 15.0.0: PYSEC-2026-7")
+        assert "we never draw that" in done.text
+        others = auditor.run({"rich==15.0.0": [BAD, BAD | {"id": "PYSEC-2026-8", "aliases": []}]})
+        assert others.status == FAILED
 
 
-@pytest.mark.parametrize("number", ["PYSEC-2026-7", "CVE-2026-1"])
-def test_one_that_is_lived_with_passes_and_is_said(auditor: Auditor, number: str) -> None:
-    auditor.accept(f'[[accepted]]\nid = "{number}"\nreason = "we never draw that"\n')
-    done = auditor.run({"rich==15.0.0": [BAD]})
-    assert done.status == PASSED
-    assert done.text.startswith("accepted: rich 15.0.0: PYSEC-2026-7")
-    assert "we never draw that" in done.text
-    others = auditor.run({"rich==15.0.0": [BAD, BAD | {"id": "PYSEC-2026-8", "aliases": []}]})
-    assert others.status == FAILED
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        '[[accepted]]\nid = "PYSEC-2026-7"\n',
-        '[[accepted]]\nid = "PYSEC-2026-7"\nreason = ""\n',
-        '[[accepted]]\nid = "PYSEC-2026-7"\nreason = "fine"\n',
-        '[[accepted]]\nid = ""\nreason = "all of them are fine"\n',
-        "accepted = 7\n",
-        "[[accepted",
-    ],
-)
-def test_nothing_is_lived_with_without_a_reason(auditor: Auditor, text: str) -> None:
-    auditor.accept(text)
-    done = auditor.run({"rich==15.0.0": [BAD]})
-    assert done.status == FAILED
-    assert done.text.startswith("accepted.toml: ")
-    assert len(done.text.splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    "said",
-    [
+def test_without_a_network_it_is_skipped_and_says_so(auditor: Auditor) -> None:
+    for said in [
         "ERROR:pip_audit._cli:Could not connect to PyPI's vulnerability feed",
         "requests.exceptions.ConnectionError: Max retries exceeded: Name or service not known",
         "requests.exceptions.ReadTimeout: timed out",
         "requests.exceptions.HTTPError: 503 Server Error",
-    ],
-)
-def test_without_a_network_it_is_skipped_and_says_so(auditor: Auditor, said: str) -> None:
-    done = auditor.run(SAYS=said)
-    assert done.status == SKIPPED
-    assert done.text == f"no network ({said}): the lock was not asked about\n"
-
-
-def test_a_mirror_that_knows_nothing_is_no_answer(auditor: Auditor) -> None:
-    pins = ("rich==15.0.0", "numpy==2.4.6", "mavproxy==1.8.75")
-    assert auditor.run(dict.fromkeys(pins, "unknown")).status == SKIPPED
+    ]:
+        done = auditor.run(SAYS=said)
+        assert done.status == SKIPPED
+        assert done.text == f"no network ({said}): the lock was not asked about\n"
 
 
 def test_one_pin_that_nobody_knows_fails(auditor: Auditor) -> None:
     done = auditor.run({"mavproxy==1.8.75": "unknown"})
     assert (done.status, done.text) == (FAILED, "not audited: mavproxy not found\n")
-
-
-@pytest.mark.parametrize("said", ["ERROR: package x has duplicate requirements", "Traceback"])
-def test_another_mishap_is_no_lack_of_network(auditor: Auditor, said: str) -> None:
-    done = auditor.run(SAYS=said)
-    assert done.status == FAILED
-    assert said in done.text
-
-
-def test_what_is_not_installed_is_no_lack_of_network(auditor: Auditor) -> None:
-    (auditor.bin / "pip-audit").unlink()
-    assert auditor.run().status == FAILED
-
-
-def test_a_network_that_hangs_is_given_up(auditor: Auditor, tmp_path: Path) -> None:
-    source = (ROOT / "tools" / "audit.py").read_text("utf-8")
-    assert "LIMIT = 60.0 " in source
-    hurried = tmp_path / "audit.py"
-    hurried.write_text(source.replace("LIMIT = 60.0 ", "LIMIT = 1.0 "), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, str(hurried), str(auditor.lock)],
-        capture_output=True,
-        text=True,
-        timeout=20,
-        check=False,
-        env={"PATH": str(auditor.bin), "ASKED": os.devnull, "HANGS": "60"},
-    )
-    line = "no network (no answer within 1 s): the lock was not asked about\n"
-    assert (done.returncode, done.stdout) == (SKIPPED, line)
-
-
-def test_an_empty_lock_does_not_pass(auditor: Auditor) -> None:
-    for file in ("requirements.txt", "without_dependencies.txt"):
-        (auditor.lock / file).write_text("# nothing\n", encoding="utf-8")
-    assert auditor.run().status == FAILED
 
 
 def test_what_is_accepted_in_this_tree_can_be_read(auditor: Auditor) -> None:
@@ -207,43 +137,6 @@ def test_what_is_accepted_in_this_tree_can_be_read(auditor: Auditor) -> None:
 
 
 # in the gate
-
-STUB = "#!/bin/sh\n[ \"$1\" = tools/audit.py ] || exit 0\necho '{line}'\necho more\nexit {status}\n"
-
-
-@pytest.mark.parametrize(
-    ("status", "end", "last"),
-    [
-        (PASSED, 0, ["check: all passed"]),
-        (
-            SKIPPED,
-            0,
-            [
-                "check: SKIPPED pip-audit: no network (x)",
-                "check: all that was asked has passed; 1 not asked",
-            ],
-        ),
-        (FAILED, 1, ["check: 1 failed: pip-audit"]),
-    ],
-)
-def test_the_gate_repeats_at_its_end_what_it_skipped(
-    tmp_path: Path, status: int, end: int, last: list[str]
-) -> None:
-    stubs, tools = tmp_path / ".venv" / "bin", tmp_path / "tools"
-    for folder in (stubs, tools):
-        folder.mkdir(parents=True)
-    shutil.copy(ROOT / "tools" / "check", tools)
-    stub = STUB.format(line="no network (x)", status=status)
-    for name in (stubs / "python", stubs / "ruff", stubs / "mypy", tools / "setup"):
-        name.write_text(stub, encoding="utf-8")
-        name.chmod(0o755)
-    done = subprocess.run(
-        [tools / "check"], capture_output=True, text=True, timeout=20, check=False
-    )
-    assert done.returncode == end
-    lines = done.stdout.splitlines()
-    assert lines[-len(last) :] == last
-    assert ("SKIPPED pip-audit: no network (x)" in lines) is (status == SKIPPED)
 
 
 # what is installed
@@ -262,17 +155,3 @@ def test_every_pin_has_a_hash_and_the_set_up_asks_for_it() -> None:
     assert len(installs) == 3
     for line in installs:
         assert '"--require-hashes"' in line or '"--no-build-isolation"' in line
-
-
-def pins_of(name: str) -> set[str]:
-    """Return the pins of a lock, each as name==version."""
-    text = (ROOT / "tools" / "lock" / name).read_text("utf-8")
-    return set(re.findall(r"^[^ #]+==[^ ]+", text, flags=re.MULTILINE))
-
-
-def test_the_demo_installs_a_part_of_what_the_tests_install_at_the_same_versions() -> None:
-    demo, everything = pins_of("demo.txt"), pins_of("requirements.txt")
-    assert demo < everything
-    names = {pin.partition("==")[0] for pin in demo}
-    assert {"pymavlink", "matplotlib", "hatchling"} <= names
-    assert not names & {"pytest", "mypy", "ruff", "mavsdk", "pip-audit", "hypothesis"}

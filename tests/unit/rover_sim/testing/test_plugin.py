@@ -1,6 +1,5 @@
 """The pytest plugin as a stranger has it: test files of their own, run by a pytest of their own."""
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -73,25 +72,6 @@ print(sorted(set(sys.modules) - before))
     assert done.stdout == "['rover_sim', 'rover_sim.testing', 'rover_sim.testing.plugin']\n"
 
 
-def test_what_tests_may_name_is_there() -> None:
-    names = ["Faults", "LossyLink", "NotInVirtualTime", "RoverWorld", "SimulatedRover", "Stalled"]
-    assert list(rover_sim.testing.__all__) == [*names, "TaskServer"]
-    for name in rover_sim.testing.__all__:
-        assert getattr(rover_sim.testing, name).__name__ == name
-    with pytest.raises(AttributeError, match="has no attribute 'Robot'"):
-        _ = rover_sim.testing.Robot
-
-
-def test_help_tells_of_fixtures_and_marker(pytester: pytest.Pytester) -> None:
-    assert "--rover-seed" in pytester.runpytest_inprocess(*PLUGIN, "--help").stdout.str()
-    shown = pytester.runpytest_inprocess(*PLUGIN, "--markers").outlines
-    assert any(line.startswith("@pytest.mark.simulated_rover(persona=") for line in shown)
-    shown = pytester.runpytest_inprocess(*PLUGIN, "--fixtures").outlines
-    names = ("rover", "rovers", "rover_world", "task_server", "task_client", "lossy_link")
-    for name in (*names, "task_server_settings"):
-        assert any(line.startswith(f"{name} ") for line in shown), name
-
-
 def test_the_marker_says_what_is_simulated(pytester: pytest.Pytester) -> None:
     result = run(
         pytester,
@@ -113,9 +93,8 @@ def test_the_marker_says_what_is_simulated(pytester: pytest.Pytester) -> None:
     result.assert_outcomes(passed=2)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
+def test_what_there_is_not_is_said_in_one_line(pytester: pytest.Pytester) -> None:
+    for arguments, said in [
         ('persona="arduplane"', "persona must be one of ardupilot, px4, generic, not 'arduplane'"),
         ('body="lego"', "body must be one of kinematic, bullet, not 'lego'"),
         ("count=0", "count must be 1 to 250, not 0"),
@@ -130,145 +109,20 @@ def test_the_marker_says_what_is_simulated(pytester: pytest.Pytester) -> None:
             "rovers=2",
             TAKES,
         ),
-    ],
-)
-def test_what_there_is_not_is_said_in_one_line(
-    pytester: pytest.Pytester, arguments: str, said: str
-) -> None:
-    result = run(
-        pytester,
-        f"""
-        import pytest
+    ]:
+        result = run(
+            pytester,
+            f"""
+            import pytest
 
-        @pytest.mark.simulated_rover({arguments})
-        def test_it(rover):
-            pass
-        """,
-    )
-    result.assert_outcomes(errors=1)
-    assert f"@pytest.mark.simulated_rover: {said}" in result.outlines
-    assert "Traceback" not in result.stdout.str()
-
-
-SHOWS_SEED = """
-    import pytest
-
-    def test_by_name(rover_world):
-        print("seed of the first", rover_world.seed)
-
-    def test_by_another_name(rover_world):
-        print("seed of the second", rover_world.seed)
-
-    @pytest.mark.simulated_rover(seed=7)
-    def test_by_marker(rover_world):
-        print("seed of the third", rover_world.seed)
-"""
-
-
-def seeds(result: pytest.RunResult) -> list[int]:
-    """Return the seeds that SHOWS_SEED shows."""
-    found = re.findall(r"^seed of the \w+ (\d+)$", result.stdout.str(), flags=re.MULTILINE)
-    return [int(seed) for seed in found]
-
-
-def test_each_test_has_a_seed_by_its_name(pytester: pytest.Pytester) -> None:
-    first, second, third = seeds(run(pytester, SHOWS_SEED, "-rP"))
-    assert (first != second, third) == (True, 7)
-    assert seeds(run(pytester, SHOWS_SEED, "-rP")) == [first, second, 7]
-    folder = pytester.mkdir("elsewhere")
-    (pytester.path / "test_patrol.py").rename(folder / "test_patrol.py")
-    assert seeds(pytester.runpytest_inprocess(*PLUGIN, "-rP")) == [first, second, 7]
-
-
-def test_the_command_line_gives_another_seed(pytester: pytest.Pytester) -> None:
-    assert seeds(run(pytester, SHOWS_SEED, "-rP", "--rover-seed", "12")) == [12, 12, 7]
-    result = run(pytester, SHOWS_SEED, "--rover-seed", "twelve")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-
-
-def test_a_failing_test_shows_its_world(pytester: pytest.Pytester) -> None:
-    result = run(
-        pytester,
-        """
-        import pytest
-
-        @pytest.mark.simulated_rover(seed=11)
-        def test_it(rover, rover_world):
-            rover.place(north=4.0, east=-1.0)
-            rover_world.sleep(2.5)
-            assert rover.north == 5.0
-
-        def test_that_passes(rover):
-            pass
-        """,
-    )
-    result.assert_outcomes(passed=1, failed=1)
-    result.stdout.fnmatch_lines(
-        [
-            "*- simulated rover -*",
-            "seed 11 (the same again: --rover-seed 11)",
-            "ardupilot, kinematic body, 2.50 s of virtual time",
-            "rover 1 at 4.000 m north, -1.000 m east, heading 0.0 deg, 0.00 m/s, disarmed, *",
-        ]
-    )
-    assert result.stdout.str().count("simulated rover -") == 1
-
-
-def test_a_missing_pybullet_is_said(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    result = run(
-        pytester,
-        """
-        import pytest
-
-        @pytest.mark.simulated_rover(body="bullet")
-        def test_it(rover):
-            pass
-        """,
-    )
-    result.assert_outcomes(errors=1)
-    result.stdout.fnmatch_lines(["@pytest.mark.simulated_rover: *pybullet*"])
-
-
-def test_fixtures_of_the_same_name_are_the_strangers(pytester: pytest.Pytester) -> None:
-    result = run(
-        pytester,
-        """
-        import pytest
-
-        @pytest.fixture
-        def rover():
-            return "Spirit"
-
-        def test_it(rover):
-            assert rover == "Spirit"
-        """,
-    )
-    result.assert_outcomes(passed=1)
-
-
-def test_pytest_does_not_rewrite_the_dialect(pytester: pytest.Pytester) -> None:
-    """As it would, with all that is installed with a plugin; that takes two seconds each time."""
-    pytester.makepyfile(
-        installs="""
-        import pytest
-        pytest.register_assert_rewrite("mav_tasks", "theirs")
-        """,
-        theirs="",
-        test_it="""
-        import theirs
-        import mav_tasks.mavlink.messages
-
-        def test_it():
-            assert "Rewriting" in repr(theirs.__loader__)
-            assert "Rewriting" not in repr(mav_tasks.mavlink.messages.__loader__)
-        """,
-    )
-    pytester.syspathinsert()
-    result = pytester.runpytest_subprocess("-p", "installs", *PLUGIN)
-    result.assert_outcomes(passed=1)
+            @pytest.mark.simulated_rover({arguments})
+            def test_it(rover):
+                pass
+            """,
+        )
+        result.assert_outcomes(errors=1)
+        assert f"@pytest.mark.simulated_rover: {said}" in result.outlines
+        assert "Traceback" not in result.stdout.str()
 
 
 def test_a_test_without_a_rover_pays_nothing(pytester: pytest.Pytester) -> None:

@@ -1,23 +1,17 @@
 """Clients in a test's world: they drive the rover in no time, and what goes wrong is seen."""
 
 import asyncio
-import gc
 from datetime import UTC, datetime, timedelta
-from math import pi, radians
+from math import radians
 
 import pytest
 
 from mav_tasks import (
-    Client,
     Move,
-    NoAnswer,
     Rotate,
     SyncClient,
-    TaskFailed,
-    TaskReason,
     TaskState,
 )
-from mav_tasks.settings import Driving, Settings
 from rover_sim.errors import NotInVirtualTime, Stalled
 from rover_sim.faults import Faults
 from rover_sim.testing.rover_world import RoverWorld
@@ -53,111 +47,6 @@ def test_a_script_drives_the_rover(served: RoverWorld) -> None:
     assert 8 < served.now < 30
 
 
-def test_time_stands_while_nobody_waits(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        tasks.submit(Move(2.0))
-        before = served.now
-        assert served.rovers[0].stands
-        assert served.now == before
-        served.sleep(4.0)
-        assert served.now == pytest.approx(before + 4.0)
-        assert served.rovers[0].speed > 0.3
-
-
-def test_asyncio_code_runs_in_its_time(served: RoverWorld) -> None:
-    async def patrol(client: Client) -> list[TaskState]:
-        async with client as tasks:
-            task = await tasks.submit(Move(1.0))
-            seen = [status.state async for status in task.updates()]
-            await asyncio.sleep(5.0)
-            return seen
-
-    seen = served.run(patrol(served.client()))
-    assert (seen[-1], TaskState.EXECUTING in seen) == (TaskState.COMPLETED, True)
-    assert served.rovers[0].north == pytest.approx(1.0, abs=0.05)
-
-
-def test_clients_of_both_kinds_work_side_by_side(served: RoverWorld) -> None:
-    async def turn() -> None:
-        async with served.client() as tasks:
-            await (await tasks.submit(Rotate(pi / 2))).done()
-
-    with served.sync_client() as one, served.sync_client() as other:
-        ids = [one.submit(Move(0.5)).id, other.submit(Move(0.5)).id]
-        served.run(turn())
-        other.task(ids[1]).done()
-    assert states(served) == [TaskState.COMPLETED] * 3
-    assert len({str(task.submitter) for task in served.server.tasks}) == 3
-
-
-def test_a_blocked_rover_is_stuck_and_the_script_is_told(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(2.0))
-        served.until(lambda: served.rovers[0].speed > 0.1)
-        served.rovers[0].block_wheels()
-        with pytest.raises(TaskFailed, match="stuck") as told:
-            task.done()
-    assert told.value.reason is TaskReason.STUCK
-    assert served.rovers[0].north < 1.0
-
-
-def test_a_rover_disarmed_by_hand_stops_its_task(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(2.0))
-        served.until(lambda: served.rovers[0].speed > 0.3)
-        served.rovers[0].disarm()
-        served.sleep(2.0)  # it says so once a second
-        assert served.rovers[0].stands
-        assert task.refresh().state is TaskState.PAUSED
-        tasks.resume()
-        task.done()
-    assert served.rovers[0].north == pytest.approx(2.0, abs=0.05)
-
-
-def test_a_rover_that_falls_silent_is_told_of(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(2.0))
-        served.until(lambda: served.rovers[0].speed > 0.3)
-        served.rovers[0].set_faults(Faults(silent=True, deaf=True))
-        with pytest.raises(TaskFailed, match="link timeout"):
-            task.done()
-
-
-def test_pushed_off_its_line_it_is_held(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(5.0))
-        served.until(lambda: served.rovers[0].speed > 0.3)
-        served.rovers[0].push(right=3.0)
-        served.sleep(3.0)
-        assert task.refresh().state is TaskState.HELD
-
-
-def test_settings_are_those_of_the_test(make_world: MakeWorld) -> None:
-    world = start(make_world(settings=Settings(driving=Driving(speed=1.0))))
-    with world.sync_client() as tasks:
-        tasks.submit(Move(9.0))
-        world.sleep(6.0)
-        assert world.rovers[0].speed == pytest.approx(1.0, abs=0.05)
-
-
-@pytest.mark.parametrize("persona", ["ardupilot", "px4", "generic"])
-def test_each_persona_drives(make_world: MakeWorld, persona: str) -> None:
-    world = start(make_world(persona=persona))
-    with world.sync_client() as tasks:
-        tasks.submit(Move(2.0)).done()
-    assert world.rovers[0].north == pytest.approx(2.0, abs=0.1)
-
-
-def test_several_rovers_have_one_server(make_world: MakeWorld) -> None:
-    world = start(make_world(count=3))
-    with world.sync_client() as tasks:
-        assert [vehicle.id for vehicle in tasks.vehicles()] == [1, 2, 3]
-        under_way = [tasks.submit(Move(float(n)), vehicle=n) for n in (1, 2, 3)]
-        for task in under_way:
-            task.done()
-    assert [rover.north for rover in world.rovers] == pytest.approx([1, 2, 3], abs=0.05)
-
-
 def pose_after(world: RoverWorld) -> tuple[float, float, float, float]:
     """Drive over a bad link; gives where and when that ended, exactly."""
     start(world)
@@ -174,35 +63,6 @@ def test_the_same_seed_gives_the_same_to_the_bit(make_world: MakeWorld) -> None:
     first, again, other = (pose_after(make_world(seed=seed)) for seed in (5, 5, 6))
     assert first == again
     assert first != other
-
-
-def test_each_submission_is_one_task_though_a_third_is_lost(served: RoverWorld) -> None:
-    goals = [Move(0.1 + number / 100) for number in range(12)]
-    served.lossy_link(loss=0.3, duplication=0.2, jitter=0.2, leg="client")
-    with served.sync_client() as tasks:
-        handles = [tasks.submit(goal) for goal in goals]
-        for handle in handles:
-            assert handle.done().state is TaskState.COMPLETED
-    assert [task.id for task in served.server.tasks] == [handle.id for handle in handles]
-    driven = sum(goal.distance for goal in goals)
-    assert served.rovers[0].north == pytest.approx(driven, abs=0.2)
-
-
-def test_a_link_that_comes_back_lets_the_task_go_on(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(2.0))
-        served.until(lambda: served.rovers[0].speed > 0.3)
-        with served.lossy_link(loss=1.0, leg="rover"):
-            served.sleep(6.0)
-            assert served.server.task(task.id).state is TaskState.PAUSED
-        task.done()
-    assert served.rovers[0].north == pytest.approx(2.0, abs=0.05)
-
-
-def test_nobody_answers_where_no_server_runs(world: RoverWorld) -> None:
-    with pytest.raises(NoAnswer, match="no task server answered"), world.sync_client():
-        pass
-    assert world.now >= 5.0
 
 
 def test_killed_and_started_again_the_server_has_its_tasks(served: RoverWorld) -> None:
@@ -227,21 +87,6 @@ def test_killed_and_started_again_the_server_has_its_tasks(served: RoverWorld) -
     assert sum(word.startswith("rover 1: task 1 submitted: move 2 m") for word in words) == 1
 
 
-def test_stopped_in_order_it_leaves_the_rover_standing(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        tasks.submit(Move(5.0))
-        served.until(lambda: served.rovers[0].speed > 0.3)
-        served.server.stop()
-        served.until(lambda: not served.server.is_running, within=1.5)
-        served.sleep(1.0)
-        assert (served.rovers[0].stands, served.rovers[0].mode) == (True, "hold")
-        with pytest.raises(RuntimeError, match="not running"):
-            served.server.kill()
-        served.server.start()
-        with pytest.raises(RuntimeError, match="running already"):
-            served.server.start()
-
-
 def test_what_never_comes_is_told_with_who_waits_for_it(make_world: MakeWorld) -> None:
     world = start(make_world(limit=20.0))
     with world.sync_client() as tasks:
@@ -259,32 +104,6 @@ def test_what_never_comes_is_told_with_who_waits_for_it(make_world: MakeWorld) -
         assert task.refresh().id == task.id
 
 
-def test_what_stalls_is_cancelled_and_may_clean_up(make_world: MakeWorld) -> None:
-    world = make_world(limit=50.0)
-    ended: list[float] = []
-
-    async def waits() -> None:
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await asyncio.sleep(1.0)
-            ended.append(world.now)
-
-    with pytest.raises(Stalled):
-        world.run(waits())
-    assert ended == [pytest.approx(51.0, abs=0.1)]
-
-
-def test_a_link_of_the_real_world_is_refused_and_closed(served: RoverWorld) -> None:
-    async def go() -> None:
-        async with Client("udpout:127.0.0.1:14560"):
-            pass
-
-    with pytest.raises(NotInVirtualTime, match="a link of the world's net"):
-        served.run(go())
-    gc.collect()  # an open socket would be told of here, as an error
-
-
 def test_it_has_a_time_of_day(served: RoverWorld) -> None:
     assert abs(served.utc - datetime.now(UTC)) < timedelta(seconds=30)
     with served.sync_client() as tasks:
@@ -297,20 +116,6 @@ def test_it_has_a_time_of_day(served: RoverWorld) -> None:
         served.until(lambda: served.server.task(task.id).state is TaskState.STARTING)
         assert abs(served.utc - start_at) < timedelta(seconds=1)
         task.done()
-
-
-def test_what_is_waited_for_may_ask_a_client(served: RoverWorld) -> None:
-    with served.sync_client() as tasks:
-        task = tasks.submit(Move(1.0))
-        served.until(lambda: served.rovers[0].north > 0.9 and tasks.queue().running is None)
-        seen = [status.state for status in task.updates()]
-    assert seen == [TaskState.COMPLETED]
-
-
-def test_what_does_not_hold_in_time_is_an_assertion(world: RoverWorld) -> None:
-    with pytest.raises(AssertionError, match="not within 3 s of virtual time"):
-        world.until(lambda: world.rovers[0].armed, within=3)
-    assert world.now == pytest.approx(3.0, abs=0.05)
 
 
 def test_a_sync_client_inside_of_a_coroutine_is_refused(served: RoverWorld) -> None:

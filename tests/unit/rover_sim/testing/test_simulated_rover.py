@@ -1,10 +1,9 @@
 """The rover in a test's hands: it shows the truth, and what is done to it really happens."""
 
-from math import pi, radians
+from math import pi
 
 import pytest
 
-from rover_sim.faults import Faults
 from rover_sim.testing.rover_world import RoverWorld
 from rover_sim.testing.simulated_rover import SimulatedRover
 from tests.unit.rover_sim.testing.conftest import MakeWorld
@@ -21,24 +20,6 @@ def drive_by_hand(world: RoverWorld, *, forward: float = 1.0, yaw_rate: float = 
 
 def pose(rover: SimulatedRover) -> tuple[float, ...]:
     return rover.north, rover.east, rover.heading
-
-
-def test_it_shows_where_it_is_and_what_it_does(world: RoverWorld) -> None:
-    (rover,) = world.rovers
-    assert (rover.system_id, rover.persona) == (1, "ardupilot")
-    assert (rover.armed, rover.stands) == (False, True)
-    drive_by_hand(world, forward=0.5)
-    world.sleep(4)
-    assert (rover.mode, rover.armed, rover.stands) == ("manual", True, False)
-    assert rover.speed == pytest.approx(0.5, abs=0.1)
-    assert pose(rover) == pytest.approx((1.85, 0.0, 0.0), abs=0.1)
-    rover.hold_sticks(yaw_rate=radians(20))
-    world.sleep(3)
-    assert rover.yaw_rate == pytest.approx(radians(20), abs=0.05)
-    assert rover.yaw == pytest.approx(radians(rover.heading))
-    rover.disarm()
-    world.sleep(1)
-    assert (rover.armed, rover.stands) == (False, True)
 
 
 @pytest.mark.parametrize("body", ["kinematic", pytest.param("bullet", marks=pytest.mark.pybullet)])
@@ -58,64 +39,3 @@ def test_carried_elsewhere_it_drives_on_from_there(make_world: MakeWorld, body: 
     rover.place(north=0.0)
     assert pose(rover)[0] == pytest.approx(0.0)
     assert rover.east - before[1] == pytest.approx(2.0, abs=0.1)
-
-
-def test_pushed_it_is_moved_as_it_sees_it(world: RoverWorld) -> None:
-    (rover,) = world.rovers
-    rover.place(yaw=pi / 2)
-    rover.push(forward=2.0, right=0.5, turn=pi / 2)
-    assert pose(rover) == pytest.approx((-0.5, 2.0, 180.0))
-    world.sleep(1)
-    assert pose(rover) == pytest.approx((-0.5, 2.0, 180.0))
-
-
-def test_blocked_wheels_stand_whatever_is_asked(world: RoverWorld) -> None:
-    (rover,) = world.rovers
-    drive_by_hand(world)
-    world.sleep(2)
-    rover.block_wheels()
-    world.sleep(1)
-    before = pose(rover)
-    world.sleep(2)
-    assert (rover.stands, pose(rover)) == (True, before)
-    rover.free_wheels()
-    world.sleep(2)
-    assert rover.north - before[0] > 1.0
-
-
-def test_a_mode_that_it_does_not_have_is_refused(make_world: MakeWorld) -> None:
-    with pytest.raises(ValueError, match=r"mode must be one of .*hold.*, not 'position'"):
-        make_world().rovers[0].set_mode("position")
-    rover = make_world(persona="px4").rovers[0]
-    rover.set_mode("position")
-    assert rover.mode == "position"
-
-
-def test_restarted_it_begins_anew(world: RoverWorld) -> None:
-    drive_by_hand(world)
-    world.sleep(1)
-    world.rovers[0].reboot()
-    world.sleep(0.5)
-    assert not world.rovers[0].armed
-
-
-def test_of_several_each_has_a_place_and_a_body_of_its_own(make_world: MakeWorld) -> None:
-    world = make_world(count=3)
-    assert [pose(rover) for rover in world.rovers] == [(0, 0, 0), (0, 3, 0), (0, 6, 0)]
-    assert [rover.system_id for rover in world.rovers] == [1, 2, 3]
-    for rover in world.rovers:
-        world.until(lambda rover=rover: rover.mode != "initialising")  # type: ignore[misc]
-        rover.set_mode("manual")
-        rover.arm()
-        rover.hold_sticks(yaw_rate=0.5)
-    world.sleep(3)
-    assert len({rover.yaw for rover in world.rovers}) == 3
-
-
-def test_what_is_broken_is_broken_until_it_is_mended(world: RoverWorld) -> None:
-    world.server.start()
-    world.until(lambda: world.server.is_ready)
-    world.rovers[0].set_faults(Faults(silent=True))
-    world.until(lambda: not world.server.is_ready, within=10)
-    world.rovers[0].set_faults(Faults())
-    world.until(lambda: world.server.is_ready, within=10)

@@ -4,7 +4,6 @@ import select
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any, TypeVar
 
 from mav_tasks.fleet.member import Evict, Join, Renew
@@ -132,8 +131,7 @@ def away(postgres: PostgresServer, *gateways: Gateway) -> Iterator[None]:
 
 
 def of_vehicle(number: int, vehicle: int) -> TaskSubmitted:
-    event = submitted(number)
-    return TaskSubmitted(replace(event.task, vehicle=vehicle), event.at)
+    return submitted(number, vehicle=vehicle)
 
 
 def ids_in(url: str) -> list[int]:

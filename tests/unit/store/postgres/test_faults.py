@@ -11,19 +11,21 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.store import Kept, NotKept
-from mav_tasks.store.durable import DurableStore
-from mav_tasks.store.postgres.ownership import LOCK
-from mav_tasks.tasks.events import QueuePaused, TaskSubmitted
-from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.store import Kept, NotKept, Store
+from mav_tasks.tasks.events import TaskSubmitted
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import wait_until
 from tests.kit.tcp_proxy import TcpProxy
 from tests.unit.store.full_disk import fill
-from tests.unit.store.samples import next_outcomes, opened, submitted, wait_for, wait_for_failure
+from tests.unit.store.postgres.gateways import hanging
+from tests.unit.store.samples import (
+    loaded,
+    opened,
+    submitted,
+    wait_for,
+    wait_for_failure,
+)
 from tests.unit.store.test_failures import child, kept, line
-
-STOP = QueuePaused(1, TaskReason.STOPPED, "client", 100.0)
 
 
 @pytest.fixture
@@ -62,7 +64,7 @@ def ids_in(url: str) -> list[int]:
 def check_whole(url: str, *, at_least: int) -> None:
     """Check that each event is there once, in its order, up to one that was reported at least."""
     with opened(url) as store:
-        ids = [task.id for task in store.load().tasks]
+        ids = [task.id for task in loaded(store).tasks]
         assert ids == list(range(1, len(ids) + 1))
         assert len(ids) >= at_least
         journal = list(store.journal())
@@ -70,7 +72,7 @@ def check_whole(url: str, *, at_least: int) -> None:
         assert [e.task.id for _, e in journal if isinstance(e, TaskSubmitted)] == ids
 
 
-def write_through(store: DurableStore, numbers: Sequence[int], *, through: int) -> list[str]:
+def write_through(store: Store, numbers: Sequence[int], *, through: int) -> list[str]:
     """Append submissions, wait until they are kept; return the texts of failures until then."""
     store.append([submitted(number) for number in numbers])
     return [each.text for each in wait_for(store, through) if isinstance(each, NotKept)]
@@ -109,26 +111,12 @@ def test_a_database_that_hangs_in_mid_write_is_noticed_and_goes_on(
     check_whole(url, at_least=through)
 
 
-def test_a_net_that_is_cut_is_noticed_and_the_session_that_the_database_still_has_is_ended(
-    postgres: PostgresServer, url: str, proxy: TcpProxy
-) -> None:
-    with opened(by_way_of(proxy, url)) as store:
-        write_through(store, [1], through=1)
-        (before,) = holders(postgres, url)
-        proxy.fall_silent()
-        (told,) = write_through(store, [2, 3], through=3)
-        assert "no answer from the database within 3 s" in told
-        (after,) = holders(postgres, url)
-        assert after != before
-    check_whole(url, at_least=3)
-
-
 def holders(postgres: PostgresServer, url: str) -> list[int]:
     """Return the processes of the database that have the fleet's lock."""
     found = postgres.execute(
         "SELECT pid FROM pg_locks WHERE locktype = 'advisory' AND granted AND classid = %s"
         " AND database = (SELECT oid FROM pg_database WHERE datname = %s)",
-        (LOCK >> 32, name_of(url)),
+        (0x4D565453, name_of(url)),
     )
     return [row[0] for row in found]
 
@@ -156,39 +144,15 @@ def test_a_session_that_was_lost_while_nothing_was_written_delays_no_submission(
         assert len(holders(postgres, url)) == 1
 
 
-def test_a_database_that_goes_while_nothing_is_written_is_reported_and_so_is_its_return(
-    postgres: PostgresServer, url: str
-) -> None:
-    with opened(url) as store:
-        write_through(store, [1], through=1)
-        postgres.stop()
-        assert wait_for_failure(store).text.startswith(f"store {url}: ")
-        postgres.start()
-        outcomes = next_outcomes(store)
-        while Kept(1) not in outcomes:
-            outcomes += next_outcomes(store)
-        assert write_through(store, [2], through=2) == []
-
-
-def test_an_answer_that_is_lost_after_the_commit_is_found_out(
-    postgres: PostgresServer, url: str, proxy: TcpProxy, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_answer_that_is_lost_after_the_commit_is_found_out(url: str, proxy: TcpProxy) -> None:
     with opened(by_way_of(proxy, url)) as store:
         write_through(store, [1], through=1)
-        database: Any = store._database
-        write = database.write
-
-        def lose_the_answer(*arguments: Any, **keywords: Any) -> None:
-            write(*arguments, **keywords)
-            database.last_number -= 1  # as before an answer
-            monkeypatch.setattr(database, "write", write)
-            with proxy.refusing():
-                database._session.execute("SELECT 1")
-
-        monkeypatch.setattr(database, "write", lose_the_answer)
-        (told,) = write_through(store, [2], through=2)
-        assert "server closed the connection" in told
-        assert write_through(store, [3], through=3) == []
+        with hanging(url) as hang:
+            store.append([submitted(2)])
+            wait_until(hang.is_waited_for, within=10, what="a write under way")
+            proxy.fall_silent()
+        (told,) = write_through(store, [3], through=3)
+        assert "no answer from the database within 3 s" in told
     check_whole(url, at_least=3)
 
 
@@ -359,7 +323,7 @@ def test_a_server_that_was_suspended_and_wakes_up_stores_nothing_any_more(
         process.send_signal(signal.SIGSTOP)
         end_sessions(postgres, url)  # as its time limits do
         with elsewhere(tmp_path / "b"), opened(url) as store:
-            number = max(task.id for task in store.load().tasks)
+            number = max(task.id for task in loaded(store).tasks)
             write_through(store, [number + 1], through=1)
             journal = list(store.journal())
             process.send_signal(signal.SIGCONT)
@@ -370,75 +334,9 @@ def test_a_server_that_was_suspended_and_wakes_up_stores_nothing_any_more(
     assert ids_in(url) == list(range(1, number + 3))
 
 
-def test_the_same_machine_has_one_server_even_if_the_first_is_suspended(
-    postgres: PostgresServer, url: str
-) -> None:
-    with child(url) as process:
-        process.send_signal(signal.SIGSTOP)
-        end_sessions(postgres, url)
-        with pytest.raises(Exception, match=f"in use by another process, pid {process.pid}"):
-            opened(url).__enter__()
-        process.send_signal(signal.SIGCONT)
-        kept(process, at_least=1)  # it was not replaced by the one that was refused
-
-
-def test_each_row_has_the_epoch_of_the_server_that_wrote_it(url: str) -> None:
-    for number in (1, 2):
-        with opened(url) as store:
-            write_through(store, [number], through=1)
-    with connected(url) as other:
-        assert other.execute("SELECT epoch FROM tasks ORDER BY id").fetchall() == [(1,), (2,)]
-        with pytest.raises(Exception, match=r"mav_tasks\.epoch"):
-            other.execute("INSERT INTO journal VALUES (9, 0, 'x', NULL, NULL, '')")
-
-
-def test_a_stop_is_kept_without_the_database(
-    postgres: PostgresServer, url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("mav_tasks.store.durable.CLOSE_LIMIT", 0.1)
-    with opened(url) as store:
-        write_through(store, [1], through=1)
-        postgres.stop()
-        store.append([STOP])
-    postgres.start()
-    with opened(url) as store:
-        found = store.load()
-        assert (found.paused, found.ended_well) == ({1: TaskReason.STOPPED}, False)
-
-
-def test_a_long_failure_leaves_no_statements_behind(url: str) -> None:
-    with opened(url) as store, connected(url) as other:
-        session: Any = store._database
-        other.execute("ALTER TABLE tasks RENAME TO hidden")
-        store.append([submitted(1)])
-        reopened = store._database.reopen
-        tries: list[int] = []
-
-        def counted() -> None:
-            found = session._session.execute("SELECT count(*) FROM pg_prepared_statements")
-            tries.append(found.fetchone()[0])
-            reopened()
-
-        session.reopen = counted
-        wait_until(lambda: len(tries) > 3, within=20, what="attempts")
-        assert len(set(tries[1:])) == 1
-        other.execute("ALTER TABLE hidden RENAME TO tasks")
-        wait_for(store, 1)
-
-
-def test_a_dead_server_frees_the_database_at_once(url: str) -> None:
-    for _ in range(3):
-        with child(url) as process:
-            kept(process, at_least=10)
-            process.send_signal(signal.SIGKILL)
-            process.wait(10)
-        with opened(url) as store:
-            assert not store.load().ended_well
-
-
 def test_a_store_is_no_reason_to_import_psycopg() -> None:
     code = (
-        "import sys; import mav_tasks.serve; from mav_tasks.store.opening import open_store;"
+        "import sys; import mav_tasks.serve; from mav_tasks.store import open_store;"
         " open_store(':memory:'); print('psycopg' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

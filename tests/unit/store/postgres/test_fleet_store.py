@@ -7,20 +7,14 @@ from contextlib import closing
 
 import pytest
 
-from mav_tasks.clock import boot_time
 from mav_tasks.errors import StoreError
 from mav_tasks.fleet.member import Renew, Take
-from mav_tasks.store import Evicted, IdsGranted, NotKept, VehiclesLoaded, Which
-from mav_tasks.store.opening import kind_of
-from mav_tasks.store.postgres import address, fleet_database
+from mav_tasks.store import Evicted, IdsGranted, VehiclesLoaded, Which, kind_of
 from mav_tasks.store.postgres.failures import PostgresError
-from mav_tasks.store.postgres.fleet_database import FleetDatabase
-from mav_tasks.store.retention import Trimmer
 from mav_tasks.tasks.events import Event, QueuePaused, VehicleHalted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import MAX_TASK_ID, TaskId
+from mav_tasks.tasks.task import MAX_TASK_ID
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import wait_until
 from tests.kit.tcp_proxy import TcpProxy
@@ -33,8 +27,7 @@ from tests.unit.store.postgres.gateways import (
     ids_in,
     of_vehicle,
 )
-from tests.unit.store.samples import FOR_EVER, OFFSET, opened, submitted
-from tests.unit.tasks.samples import draft
+from tests.unit.store.samples import OFFSET, changed, loaded, opened, submitted
 
 
 @pytest.fixture
@@ -44,7 +37,7 @@ def url(postgres: PostgresServer) -> str:
 
 def test_a_gateway_begins_with_nothing_but_ids(url: str) -> None:
     with gateways(url, "a", "b") as (a, b):
-        assert (a.store.load().tasks, a.store.load().gateway) == ((), "a")
+        assert (loaded(a.store).tasks, loaded(a.store).gateway) == ((), "a")
         assert a.next(IdsGranted) == IdsGranted(1, 1000)
         assert b.next(IdsGranted) == IdsGranted(1001, 1000)
         a.store.append([submitted(number) for number in range(1, 502)])
@@ -62,63 +55,22 @@ def test_ids_go_on_at_1_after_the_last(url: str) -> None:
 
 
 def test_another_gateway_loads_what_one_has_stored_about_a_vehicle(url: str) -> None:
-    registry = TaskRegistry()
-    for vehicle in (1, 2, 1):
-        registry.submit(draft(vehicle=vehicle), now=8.0)
-    registry.change(TaskId(1), S.STARTING, reason=R.NONE, actor="server", now=9.0)
-    registry.change(TaskId(3), S.CANCELLED, reason=R.CANCELLED, actor="client", now=9.0)
-    pauses = [QueuePaused(number, R.OPERATOR, "client", 10.0) for number in (1, 2)]
-    halts = [VehicleHalted(number, 6 + number, R.OPERATOR, "client", 10.0) for number in (1, 2)]
-    events = [*registry.take_events(), *pauses, *halts]
+    firsts = [of_vehicle(number, vehicle) for number, vehicle in ((1, 1), (2, 2), (3, 1))]
+    starting, began = changed(firsts[0].task, S.STARTING, at=101.0)
+    over, end = changed(firsts[2].task, S.CANCELLED, at=102.0)
+    pauses = [QueuePaused(number, R.OPERATOR, "client", 110.0) for number in (1, 2)]
+    halts = [VehicleHalted(number, 6 + number, R.OPERATOR, "client", 110.0) for number in (1, 2)]
+    events: list[Event] = [*firsts, began, end, *pauses, *halts]
     with gateways(url, "a", "b") as (a, b):
         a.store.append(events)
         a.kept(len(events))
         b.store.load_vehicles(frozenset({1}))
-        loaded = b.next(VehiclesLoaded)
-        assert loaded.vehicles == (1,)
-        assert loaded.restored.tasks == tuple(t for t in registry.all() if t.vehicle == 1)
-        assert loaded.restored.paused == {1: R.OPERATOR}
-        assert loaded.restored.halt_epochs == {1: 7}
-        assert not loaded.restored.ended_well
-
-
-def test_of_finished_tasks_only_the_latest_are_loaded(
-    url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("mav_tasks.store.reading.MOST_OVER", 3)
-    registry = TaskRegistry()
-    for number in range(1, 11):
-        registry.submit(draft(), now=8.0)
-        if number != 2:
-            reason, state = R.CANCELLED, S.CANCELLED
-            registry.change(TaskId(number), state, reason=reason, actor="c", now=8.0 + number)
-    events = registry.take_events()
-    with gateways(url, "a") as (a,):
-        a.store.append(events)
-        a.kept(len(events))
-        a.store.load_vehicles(frozenset({1, 7}))
-        tasks = a.next(VehiclesLoaded).restored.tasks
-        assert [task.id for task in tasks] == [2, 8, 9, 10]
-
-
-def test_a_busy_vehicle_leaves_the_finished_tasks_of_another_loaded(
-    url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A repeat of a submission is recognised by its finished task."""
-    monkeypatch.setattr("mav_tasks.store.reading.MOST_OVER", 3)
-    registry = TaskRegistry()
-    for number, vehicle in enumerate((2, *[1] * 9), 1):
-        registry.submit(draft(vehicle=vehicle), now=8.0)
-        registry.change(
-            TaskId(number), S.CANCELLED, reason=R.CANCELLED, actor="c", now=8.0 + number
-        )
-    events = registry.take_events()
-    with gateways(url, "a") as (a,):
-        a.store.append(events)
-        a.kept(len(events))
-        a.store.load_vehicles(frozenset({1, 2}))
-        tasks = a.next(VehiclesLoaded).restored.tasks
-        assert [task.id for task in tasks] == [1, 8, 9, 10]
+        found = b.next(VehiclesLoaded)
+        assert found.vehicles == (1,)
+        assert found.restored.tasks == (starting, over)
+        assert found.restored.paused == {1: R.OPERATOR}
+        assert found.restored.halt_epochs == {1: 7}
+        assert not found.restored.ended_well
 
 
 def test_after_an_eviction_nothing_is_written_and_it_is_told_once(url: str) -> None:
@@ -202,23 +154,6 @@ def test_a_reader_follows_several_writers_without_a_gap(url: str) -> None:
         assert seen == list(range(1, 3 * count + 1))
 
 
-def test_a_restart_of_the_database_loses_and_doubles_nothing(
-    postgres: PostgresServer, url: str
-) -> None:
-    with gateways(url, "a", "b") as (a, b):
-        for it, first in ((a, 1), (b, 1001)):
-            it.store.append([submitted(first + number) for number in range(100)])
-        postgres.kill()
-        for it, first in ((a, 101), (b, 1101)):
-            it.store.append([submitted(first + number) for number in range(100)])
-            it.next(NotKept)
-        postgres.start()
-        a.kept(200)
-        b.kept(200)
-        wanted = [*range(1, 201), *range(1001, 1201)]
-        assert sorted(ids_in(url)) == wanted
-
-
 def test_a_commit_whose_answer_was_lost_is_not_made_twice(
     postgres: PostgresServer, url: str
 ) -> None:
@@ -236,27 +171,6 @@ def test_a_commit_whose_answer_was_lost_is_not_made_twice(
         a.store.append([submitted(3)])
         a.kept(3)
         assert ids_in(url) == [1, 2, 3]
-
-
-def test_a_fleet_that_has_nothing_to_store_is_seen_to_be_at_work(
-    url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Else the next gateway would pause the queues, as after hours without anybody."""
-    hours_ago = time.time() - 7_200.0  # by the clock of the database
-    with gateways(url, "a") as (a,), connected(url) as connection:
-        connection.execute("UPDATE meta SET last_write = %s", (hours_ago,))
-        a.store.load_vehicles(frozenset({1}))
-        assert a.next(VehiclesLoaded).restored.idle > 7_000
-        database = FleetDatabase(address.parse(url), "a", a.epoch)
-        database.begin()
-        began = boot_time()
-        for seconds, is_noted in ((0.0, False), (10.0, False), (60.0, True)):
-            later = began + seconds
-            monkeypatch.setattr(fleet_database, "boot_time", lambda later=later: later)
-            database.trim(Trimmer(FOR_EVER), utc=boot_time() + OFFSET)
-            (last,) = connection.execute("SELECT last_write FROM meta").fetchone()
-            assert (last > hours_ago) is is_noted
-        database.close(utc=None)
 
 
 def test_one_server_and_gateways_exclude_each_other(url: str) -> None:

@@ -4,18 +4,15 @@ import socket
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
 from mav_tasks.errors import StoreError
-from mav_tasks.fleet_io.lease_database import LeaseDatabase
-from mav_tasks.store.base import Which
-from mav_tasks.store.opening import kind_of
-from mav_tasks.store.postgres.address import parse
+from mav_tasks.store import Which, kind_of
 from tests.kit.postgres import PostgresServer
 from tests.kit.processes import free_tcp_ports
-from tests.unit.store.samples import opened, submitted, wait_for
+from tests.unit.store.postgres.gateways import Gateway
+from tests.unit.store.samples import loaded, opened, submitted, wait_for
 
 
 def refusal(url: str) -> str:
@@ -48,12 +45,6 @@ def test_an_unknown_host() -> None:
     assert text.endswith("check the host's name in the URL")
 
 
-def test_what_is_no_host_no_service_and_no_option() -> None:
-    assert "the host's name is not valid" in refusal("postgresql://a..b/fleet")
-    assert 'definition of service "none" not found' in refusal("postgresql:///?service=none")
-    assert "connect_timeout" in refusal("postgresql://127.0.0.1/fleet?connect_timeout=x")
-
-
 def test_nobody_listens() -> None:
     (port,) = free_tcp_ports(1)
     assert "is the server running there?" in refusal(f"postgresql://127.0.0.1:{port}/fleet")
@@ -82,50 +73,13 @@ def test_a_wrong_password_and_none(
             assert "secret" not in repr(store)
         monkeypatch.setenv("PGPASSWORD", "right secret")
         with opened(without) as store:
-            assert store.load().ended_well
-
-
-def test_a_password_file_is_used(
-    postgres: PostgresServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    url = postgres.new_database()
-    with role(postgres, "guarded", "PASSWORD 'right secret'") as name:
-        postgres.execute(f"GRANT CREATE ON DATABASE {name_of(url)} TO {name}")
-        (tmp_path / "pgpass").write_text(f"*:*:*:{name}:right secret\n", encoding="ascii")
-        (tmp_path / "pgpass").chmod(0o600)
-        monkeypatch.setenv("PGPASSFILE", str(tmp_path / "pgpass"))
-        with opened(url.replace("postgres@", f"{name}@")) as store:
-            assert store.load().ended_well
-
-
-def test_a_role_that_may_not_create_the_schema(postgres: PostgresServer) -> None:
-    url = postgres.new_database()
-    with role(postgres, "plain") as name:
-        theirs = url.replace("postgres@", f"{name}@")
-        assert "permission denied for database" in refusal(theirs)
-        assert "GRANT CREATE ON DATABASE" in refusal(theirs)
-        postgres.execute(f"CREATE SCHEMA mav_tasks AUTHORIZATION {name}", database=name_of(url))
-        with opened(theirs) as store:
-            store.append([submitted(1)])
-            wait_for(store, 1)
-
-
-def test_another_roles_schema(postgres: PostgresServer) -> None:
-    url = postgres.new_database()
-    with opened(url) as store:
-        store.append([submitted(1)])
-    with role(postgres, "plain") as name:
-        text = refusal(url.replace("postgres@", f"{name}@"))
-        assert text.endswith(
-            "the role plain lacks USAGE on the schema: GRANT USAGE ON SCHEMA mav_tasks TO plain,"
-            " or use the role that owns the schema mav_tasks"
-        )
+            assert loaded(store).ended_well
 
 
 def of_gateway(url: str) -> str:
     """Return the refusal of a gateway's lease."""
     with pytest.raises(StoreError) as told:
-        LeaseDatabase(parse(url), "a", host="127.0.0.1", port=1)
+        Gateway(url, "a")
     return str(told.value)
 
 
@@ -157,27 +111,10 @@ def test_each_right_that_a_role_lacks_is_named(postgres: PostgresServer) -> None
         lacks = "lacks USAGE on gateway_epochs: GRANT USAGE ON ALL SEQUENCES IN SCHEMA mav_tasks TO"
         assert lacks in of_gateway(theirs)
         sql("GRANT USAGE ON ALL SEQUENCES IN SCHEMA mav_tasks TO")
-        LeaseDatabase(parse(theirs), "a", host="127.0.0.1", port=1).close()
+        Gateway(theirs, "a").close()
         with opened(theirs) as store:
             store.append([submitted(1)])
             wait_for(store, 1)
-
-
-def test_tables_that_only_their_owner_can_convert(postgres: PostgresServer) -> None:
-    url = postgres.new_database()
-    with opened(url):
-        pass
-    with role(postgres, "plain") as name:
-        for each in (
-            "GRANT ALL ON SCHEMA mav_tasks TO plain",
-            "GRANT ALL ON ALL TABLES IN SCHEMA mav_tasks TO plain",
-            "GRANT ALL ON ALL SEQUENCES IN SCHEMA mav_tasks TO plain",
-            "DELETE FROM mav_tasks.versions WHERE version >= 4",
-            "ALTER TABLE mav_tasks.gateways DROP COLUMN hears",
-        ):
-            postgres.execute(each, database=name_of(url))
-        text = of_gateway(url.replace("postgres@", f"{name}@"))
-    assert "must be converted by the role that owns its tables: start a server of this" in text
 
 
 def test_a_database_of_a_newer_version(postgres: PostgresServer) -> None:
@@ -258,13 +195,7 @@ def test_a_replica_is_refused_and_read(postgres: PostgresServer) -> None:
         assert [number for number, _ in journal.take(offset=0.0)] == [1]
         journal.close()
     with opened(url) as store:
-        assert len(store.load().tasks) == 1
-
-
-def test_an_old_server(postgres: PostgresServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mav_tasks.store.postgres.session.OLDEST", 990_000)
-    text = refusal(postgres.new_database())
-    assert text.endswith("is too old: use version 99 or a newer one")
+        assert len(loaded(store).tasks) == 1
 
 
 def test_too_many_connections(postgres: PostgresServer) -> None:
@@ -273,27 +204,3 @@ def test_too_many_connections(postgres: PostgresServer) -> None:
     with role(postgres, "plain") as name:
         text = refusal(url.replace("postgres@", f"{name}@"))
     assert text.endswith("too many connections: end some, or raise max_connections of the server")
-
-
-def test_a_server_that_says_nothing(postgres: PostgresServer) -> None:
-    url = postgres.new_database()
-    with postgres.frozen():
-        assert "timeout expired: check host and port in the URL" in refusal(url)
-
-
-def test_a_journal_of_a_database_without_a_store(postgres: PostgresServer) -> None:
-    url = postgres.new_database()
-    assert kind_of(url).read_parameters(url) == {}
-    with pytest.raises(StoreError, match="there is no store in it yet"):
-        kind_of(url).open_journal(url, Which())
-
-
-def test_a_folder_for_the_record_of_halts_that_cannot_be_made(
-    postgres: PostgresServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    url = postgres.new_database()
-    with monkeypatch.context() as elsewhere:
-        elsewhere.setenv("XDG_DATA_HOME", "/proc/nowhere")
-        assert "/proc/nowhere/mav-tasks cannot be created" in refusal(url)
-    with opened(url) as store:  # nothing of the refused store holds on to the lock
-        assert store.load().ended_well

@@ -1,6 +1,5 @@
 """The order of a plan's steps."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -43,39 +42,22 @@ def order(plan: Plan, *, limit: int = 100) -> list[int]:
     return steps
 
 
-def test_steps_are_driven_one_after_the_other_and_others_are_passed_over() -> None:
-    assert order(Plan((Nothing(), A, Perform(), Nothing(), B, Wait(1.0), SetSpeed(1.0)))) == [
-        1,
-        4,
-        5,
-    ]
-
-
-def test_it_begins_with_the_step_that_is_asked_for() -> None:
-    assert order(Plan((A, B, C), first=1)) == [1, 2]
-
-
-def test_an_empty_plan_is_over_at_once() -> None:
-    progress = started(Plan(()), Progress())
-    assert is_over(Plan(()), progress)
-    assert present_goal(Plan(()), progress) is END
-
-
-@pytest.mark.parametrize(
-    ("times", "driven"),
-    [(0, [0, 1, 3]), (1, [0, 1, 0, 1, 3]), (2, [0, 1, 0, 1, 0, 1, 3]), (-1, [0, 1] * 50)],
-)
-def test_a_jump_is_made_so_often(times: int, driven: list[int]) -> None:
-    assert order(Plan((A, B, Jump(0, times), C))) == driven
-
-
-def test_a_jump_may_lead_forward_and_past_the_end() -> None:
-    assert order(Plan((A, Jump(3, 1), B, C))) == [0, 3]
-    assert order(Plan((A, Jump(3, -1), B))) == [0]
-
-
-def test_a_loop_within_a_loop_counts_over_the_whole_plan_as_autopilots_do() -> None:
-    assert order(Plan((A, Jump(0, 1), B, Jump(0, 1)))) == [0, 0, 2, 0, 2]
+def test_steps_are_driven_in_order_and_jumps_as_often_as_they_say() -> None:
+    for plan, driven in (
+        (Plan((Nothing(), A, Perform(), Nothing(), B, Wait(1.0), SetSpeed(1.0))), [1, 4, 5]),
+        (Plan((A, B, C), first=1), [1, 2]),
+        (Plan((A, B, Jump(0, 0), C)), [0, 1, 3]),
+        (Plan((A, B, Jump(0, 1), C)), [0, 1, 0, 1, 3]),
+        (Plan((A, B, Jump(0, 2), C)), [0, 1, 0, 1, 0, 1, 3]),
+        (Plan((A, B, Jump(0, -1), C)), [0, 1] * 50),
+        (Plan((A, Jump(3, 1), B, C)), [0, 3]),
+        (Plan((A, Jump(3, -1), B)), [0]),  # past the end
+        # a loop within a loop counts over the whole plan, as autopilots do
+        (Plan((A, Jump(0, 1), B, Jump(0, 1))), [0, 0, 2, 0, 2]),
+        (Plan(()), []),
+    ):
+        assert order(plan) == driven, plan
+    assert present_goal(Plan(()), started(Plan(()), Progress())) is END
 
 
 def test_what_lies_between_belongs_to_the_way_to_the_next() -> None:
@@ -101,29 +83,21 @@ def test_what_is_still_pending_when_a_loop_comes_round_is_pending_once() -> None
     assert (progress.step, progress.pending) == (0, (1, 2))
 
 
-def test_another_step_can_be_gone_on_with() -> None:
+def test_another_step_can_be_gone_on_with_and_whether_a_place_follows_is_known() -> None:
     plan = Plan((A, Nothing(), B, C))
     assert skipped_to(plan, started(plan, Progress()), 1).step == 2
     assert is_over(plan, skipped_to(plan, Progress(), 9))
-
-
-def test_whether_a_place_follows() -> None:
     plan = Plan((A, SetSpeed(1.0), B, Wait(1.0), C))
     first = started(plan, Progress())
-    assert goes_on_to_a_place(plan, first) == B
     second = following(plan, first)
     assert second is not None
-    assert goes_on_to_a_place(plan, second) is None
+    assert [goes_on_to_a_place(plan, each) for each in (first, second)] == [B, None]
+    # before the beginning the present goal is the first
+    assert [present_goal(each, Progress()) for each in (Plan((Nothing(), B)), A)] == [B, A]
 
 
-def test_before_the_beginning_the_present_goal_is_the_first() -> None:
-    assert present_goal(Plan((Nothing(), B)), Progress()) == B
-    assert present_goal(A, Progress()) == A
-
-
-@pytest.mark.parametrize(
-    ("steps", "found"),
-    [
+def test_a_loop_in_which_nothing_is_driven_is_found() -> None:
+    cases: tuple[tuple[tuple[Step, ...], int | None], ...] = (
         ((A, B, Jump(0, 3)), None),
         ((A, Jump(1, 1)), 1),
         ((A, Perform(), Jump(1, 2), B), 2),
@@ -132,12 +106,9 @@ def test_before_the_beginning_the_present_goal_is_the_first() -> None:
         ((A, Jump(0, 1), Jump(0, 1)), None),
         ((A, Wait(0.0), Jump(1, -1)), 2),
         ((A, Wait(1.0), Jump(1, -1)), None),
-    ],
-)
-def test_a_loop_in_which_nothing_is_driven_is_found(
-    steps: tuple[Step, ...], found: int | None
-) -> None:
-    assert loops_in_vain(Plan(steps)) == found
+    )
+    for steps, found in cases:
+        assert loops_in_vain(Plan(steps)) == found, steps
 
 
 steps_of_any_kind = st.lists(

@@ -69,56 +69,44 @@ def test_a_way_to_a_pose_ends_with_its_heading(pose: Pose, goal: Pose, reverses:
     assert len(runs_of(way)) == 1
 
 
-def test_what_lies_ahead_is_driven_to_straight() -> None:
-    way = way_to(HERE, LocalPlace(5.0, 0.0), CAR)
-    assert way is not None
-    assert [bend.curvature for bend in way] == [0.0]
-    assert path_length(way) == pytest.approx(5.0)
+def way(place: LocalPlace, steering: Steering) -> Path:
+    found = way_to(HERE, place, steering)
+    assert found is not None
+    return found
 
 
-def test_what_lies_far_behind_is_turned_to_on_an_arc() -> None:
-    way = way_to(HERE, LocalPlace(-10.0, 4.0), CAR)
-    assert way is not None
-    assert [bend.curvature > 0 for bend in way] == [True, False]
-
-
-def test_a_place_beside_it_is_reached_by_reversing_or_by_a_loop() -> None:
-    beside_it = LocalPlace(0.0, 1.0)
-    backing, loop = way_to(HERE, beside_it, CAR), way_to(HERE, beside_it, FORWARD_ONLY)
-    assert backing is not None
-    assert loop is not None
-    assert [run[0].length < 0 for run in runs_of(backing)] == [True, False]
-    assert path_length(loop) > pi * RADIUS
+def test_what_lies_ahead_is_driven_to_straight_and_what_lies_behind_on_an_arc() -> None:
+    ahead = way(LocalPlace(5.0, 0.0), CAR)
+    assert [bend.curvature for bend in ahead] == [0.0]
+    assert path_length(ahead) == pytest.approx(5.0)
+    assert [bend.curvature > 0 for bend in way(LocalPlace(-10.0, 4.0), CAR)] == [True, False]
+    beside_it = LocalPlace(0.0, 1.0)  # by reversing, or by a loop
+    assert [run[0].length < 0 for run in runs_of(way(beside_it, CAR))] == [True, False]
+    assert path_length(way(beside_it, FORWARD_ONLY)) > pi * RADIUS
 
 
 def test_a_loop_that_leaves_the_fence_becomes_a_turn_with_reversing() -> None:
     alley, behind = box(-8.0, -1.6, 8.0, 1.6), LocalPlace(-6.0, 0.0)
     assert way_to(HERE, behind, Steering(RADIUS, reverses=False, fence=alley)) is None
-    way = way_to(HERE, behind, Steering(RADIUS, reverses=True, fence=alley))
-    assert way is not None
-    assert len(runs_of(way)) > 1
-    assert is_allowed(HERE, way, alley)
+    found = way(behind, Steering(RADIUS, reverses=True, fence=alley))
+    assert len(runs_of(found)) > 1
+    assert is_allowed(HERE, found, alley)
 
 
 def test_a_bend_keeps_clear_of_the_fence_where_it_can() -> None:
     zone = Circle(to_global(LocalPlace(2.0, 1.725), EARTH), 0.1, is_inclusion=False)
     fence = LocalFence(Fence((zone,)), EARTH)
     place = LocalPlace(0.0, 5.0)
-    bold, careful = (
-        way_to(HERE, place, FORWARD_ONLY),
-        way_to(HERE, place, Steering(RADIUS, reverses=False, fence=fence)),
-    )
-    assert bold is not None
-    assert careful is not None
+    bold = way(place, FORWARD_ONLY)
+    careful = way(place, Steering(RADIUS, reverses=False, fence=fence))
     assert is_allowed(HERE, careful, fence, clear=0.3)
     assert not is_allowed(HERE, bold, fence, clear=0.3)
 
 
 def test_from_outside_the_fence_a_way_leads_in_and_stays() -> None:
     fence = box(2.0, -10.0, 20.0, 10.0)
-    way = way_to(HERE, LocalPlace(6.0, 3.0), Steering(RADIUS, reverses=True, fence=fence))
-    assert way is not None
-    assert is_allowed(HERE, way, fence)
+    found = way(LocalPlace(6.0, 3.0), Steering(RADIUS, reverses=True, fence=fence))
+    assert is_allowed(HERE, found, fence)
     assert way_to(HERE, LocalPlace(-6.0, 0.0), Steering(RADIUS, True, fence)) is None
 
 

@@ -1,0 +1,95 @@
+"""Faults that there were, to be put in again: does the simulation find them?
+
+Each is a line of the product and what stood there, or might as well have. ``tools/simulate --fault
+NAME --seeds 24`` plays stories until one finds it.
+"""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+COMMANDS, VEHICLES = "engine/commands", "engine/vehicles"
+#: name: file, line, what takes its place
+FAULTS: dict[str, tuple[str, str, str]] = {
+    "C1 order by reading": ("engine/reception.py", "arrived=arrived", "arrived=now"),
+    "C4 moved times are kept": (
+        "tasks/times.py",
+        "if len(self._heap) > 2",
+        "if len(self._heap) > 999",
+    ),
+    "C5 a disarmed rover's tasks go": (
+        "tasks/lineup.py",
+        "return at >= task.submitted_at or (bool",
+        "return (bool",
+    ),
+    "C6 halts are answered at once": (
+        f"{COMMANDS}/submissions.py",
+        "self.gate.hold(accept, give_up, now=now, is_halt=not ends_tasks)",
+        "accept(now=now)",
+    ),
+    "D1 an older go is obeyed": (
+        f"{COMMANDS}/ordering.py",
+        "if words := why_older(asked, now=now):",
+        "if (words := why_older(asked, now=now)) and False:",
+    ),
+    "D2 overtaken go is obeyed": (
+        f"{COMMANDS}/ordering.py",
+        "epoch = halts.epoch if halts.at < sent_after else halts.epoch - 1",
+        "epoch = halts.epoch",
+    ),
+    "D3 late ticks are not noticed": (
+        f"{VEHICLES}/joint_control.py",
+        "if self._pilot.is_late(now=now):",
+        "if False:",
+    ),
+    "D4 a backlog is new": (
+        "engine/clients/gcs_client.py",
+        "return self.waited > OLD",
+        "return False",
+    ),
+    "D10 parking counts for nothing": (
+        f"{VEHICLES}/takeovers.py",
+        "                self._look_for_parking(was_mode, mode, now=now)",
+        "                pass",
+    ),
+    "a late mode undoes a halt": (
+        f"{VEHICLES}/control.py",
+        "_row(_E.LATE_MODE, _F.TELL, _F.LET_GO)",
+        "_row(_E.LATE_MODE, _F.TELL)",
+    ),
+    "a late arming undoes a disarming": (
+        f"{VEHICLES}/control.py",
+        "_row(_E.LATE_ARMING, _F.TELL, _F.DISARM, work=Work.NONE)",
+        "_row(_E.LATE_ARMING, _F.TELL, work=Work.NONE)",
+    ),
+    "STOP lets set-points pass": (
+        f"{COMMANDS}/motion_gate.py",
+        "    if parts.tasks.is_stopped:\n        return STOP",
+        "    if False:\n        return STOP",
+    ),
+    "nonces are not looked at": ("tasks/deduplicator.py", "if draft.marks.nonce:", "if False:"),
+    "an end is told too early": (
+        "engine/clients/publisher.py",
+        "self._ended |= ended",
+        "pass",
+    ),
+}
+
+
+@contextmanager
+def with_fault(name: str, root: Path) -> Iterator[Path]:
+    """Yield a folder with a copy of the product that has a fault."""
+    place, right, wrong = FAULTS[name]
+    with TemporaryDirectory(prefix="fault-") as folder:
+        tree = Path(folder)
+        shutil.copytree(
+            root / "mav_tasks", tree / "mav_tasks", ignore=shutil.ignore_patterns("*.pyc")
+        )
+        file = tree / "mav_tasks" / place
+        text = file.read_text()
+        if text.count(right) != 1:
+            raise SystemExit(f"{name}: {text.count(right)} times in {place}: {right}")
+        file.write_text(text.replace(right, wrong))
+        yield tree

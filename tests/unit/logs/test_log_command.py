@@ -1,0 +1,175 @@
+"""Every kind of event becomes words, a JSON object and a row of a table: ``mav-tasks log``."""
+
+import csv
+import json
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from mav_tasks.cli.app import app
+from mav_tasks.errors import UsageError
+from mav_tasks.settings import Retention
+from mav_tasks.store.opening import kind_of
+from mav_tasks.tasks import events as e
+from mav_tasks.tasks.goal import Drive, GlobalPlace, Goal, GoTo, Move, Plan, Wait
+from mav_tasks.tasks.lifecycle import TaskReason, TaskState
+from mav_tasks.tasks.server_events import ParameterSet, SignatureRefused, SignaturesSeen
+from mav_tasks.tasks.task import Frame, Marks, Pose, Progress, Submitter, Task, TaskId, Terms
+from mav_tasks.tasks.timing import Timing
+
+SOMEBODY = Submitter("udpin:127.0.0.1:14560", "127.0.0.1:50000", 255, 190)
+AT, TIME = 100.25, "2026-11-21T10:00:00.250Z"
+OFFSET = 1_795_255_200.25 - AT
+ID = TaskId(17)
+PROGRESS = Progress(Pose(1.0, 2.0, 0.5), frame=Frame(470_000_000, None, AT - 50))
+WAY = GoTo(GlobalPlace(470_000_000, 80_000_000), speed=0.5)
+EXECUTING, PAUSED = TaskState.EXECUTING, TaskState.PAUSED
+
+
+def submitted(goal: Goal, number: int, label: str = "") -> e.TaskSubmitted:
+    terms = Terms(deadline=AT + 60, label=label)
+    task = Task(TaskId(number), 1, 54000, goal, SOMEBODY, Marks(number), AT, terms)
+    return e.TaskSubmitted(task, AT)
+
+
+def changed(new: TaskState, reason: TaskReason, actor: str = "server") -> e.TaskChanged:
+    return e.TaskChanged(ID, 1, 3, EXECUTING, new, reason, actor, AT, PROGRESS)
+
+
+TIMING = Timing(0.05, 136, 0.05, 0.0512, 0.15, 1, (500, 135, 1500, 1))
+FIGURES = {"count": 136, "p50": 0.05, "p99": 0.0512, "longest": 0.15, "late": 1}
+FULL = "STOP in force: press Continue first"
+REFUSED = e.SubmissionRefused(1, 54000, TaskReason.QUEUE_FULL, FULL, "255/190@a", AT)
+HOME = Frame(None, None, AT - 50)
+#: events of each kind, and what an object says besides event, time, level, message and vehicle
+SAMPLES: list[tuple[e.Event, dict[str, object]]] = [
+    (submitted(Move(3.0), 17), {"task": 17, "actor": str(SOMEBODY), "state": "queued"}),
+    (submitted(Drive(0.5, 0.25, 2.0), 18), {"task": 18}),
+    (submitted(Plan((Wait(1.0), WAY), "source"), 19, "patrol"), {"task": 19}),
+    (
+        changed(PAUSED, TaskReason.LINK_LOST),
+        {"task": 17, "old": "executing", "new": "paused", "reason": "link_lost"},
+    ),
+    (
+        replace(changed(PAUSED, TaskReason.LINK_LOST), timing=TIMING),
+        {"task": 17, "timing": {**FIGURES, "period": 0.05}},
+    ),
+    (changed(TaskState.CANCELLED, TaskReason.CANCELLED, "255/190@a"), {"level": "info"}),
+    (changed(TaskState.CANCELLED, TaskReason.CLEARED, "255/190@a"), {"actor": "255/190@a"}),
+    (changed(PAUSED, TaskReason.OPERATOR, "255/190@a"), {"level": "info"}),
+    (changed(TaskState.FAILED, TaskReason.STUCK), {"level": "warning"}),
+    (changed(TaskState.HELD, TaskReason.STUCK), {"level": "warning"}),
+    (changed(TaskState.EXPIRED, TaskReason.STUCK), {"level": "warning"}),
+    (e.TaskAdvanced(ID, 1, 4, PROGRESS, AT), {"task": 17, "version": 4}),
+    (
+        e.StepReached(ID, 1, 2, True, AT, 3),
+        {"task": 17, "step": 2, "performs": True, "item": 3},
+    ),
+    (e.PlanStored(1, 0, 5, "source", "a", AT), {"kind": 0, "plan_id": 5, "actor": "a"}),
+    (e.TaskModified(ID, 1, 2, Terms(priority=9), "a", AT), {"actor": "a", "version": 2}),
+    (
+        e.TaskAssigned(ID, 2, 3, 1, "rover 1: silent; free", AT),
+        {"task": 17, "before": 1, "choice": "rover 1: silent; free", "version": 3},
+    ),
+    (e.TaskWaits(ID, 1, TaskReason.DISARMED, AT), {"task": 17, "reason": "disarmed"}),
+    (e.TaskWithdrawn(ID, 1, AT), {"task": 17}),
+    (REFUSED, {"command": 54000, "reason": "queue_full", "text": FULL, "level": "warning"}),
+    (
+        e.QueuePaused(1, TaskReason.STOPPED, "a", AT),
+        {"reason": "stopped", "actor": "a", "level": "warning"},
+    ),
+    (e.QueuePaused(1, TaskReason.OPERATOR, "a", AT), {"level": "info"}),
+    (e.QueueContinued(1, "a", AT), {"actor": "a"}),
+    (e.VehicleIdentified(1, "uid", AT), {"uid": "uid"}),
+    (e.VehicleArmingSet(1, False, AT), {"may_arm": False}),
+    (e.VehicleSpeedSet(1, 0.5, "a", AT), {"speed": 0.5, "actor": "a"}),
+    (
+        e.VehicleHomeSet(1, 473_977_418, 85_455_938, HOME, "a", AT),
+        {"latitude_degE7": 473_977_418, "longitude_degE7": 85_455_938, "actor": "a"},
+    ),
+    (ParameterSet("SPEED", 0.5, "a", AT), {"name": "SPEED", "value": 0.5, "actor": "a"}),
+    (e.VehicleHalted(1, 7, TaskReason.OPERATOR, "a", AT), {"epoch": 7, "level": "debug"}),
+    (SignatureRefused("a signed anna", 90.0, AT), {"actor": "a signed anna", "seconds": 90.0}),
+    (e.VehicleSeen(1, "found", AT), {"text": "found"}),
+    (e.VehicleNoted(1, "a\x1b[31mb\r\nc\x07\u202ed\x9b é", AT), {"level": "warning"}),
+    (e.ServerStopped((1, 2), AT), {"unconfirmed": [1, 2]}),
+]
+EVENTS = [event for event, _ in SAMPLES]
+#: the first that differ from what their event says of itself
+WORDS = {
+    0: f"rover 1: task 17 submitted: move 3 m, priority 5, by {SOMEBODY}",
+    2: f"rover 1: task 19 submitted: plan of 2 items 'patrol', priority 5, by {SOMEBODY}",
+    4: "rover 1: task 17 paused: rover silent; "
+    "136 setpoints at 20 Hz: p50 50.0, p99 51.2, max 150.0 ms, 1 late",
+    5: "rover 1: task 17 cancelled by 255/190@a",
+    6: "rover 1: task 17 cancelled: cleared, by 255/190@a",
+    7: "rover 1: task 17 paused by 255/190@a",
+    18: "rover 1: command 54000 by 255/190@a refused: STOP in force: run 'mav-tasks resume' first",
+    30: "rover 1: a[31mb  cd é",
+}
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., list[str]]:
+    path = str(tmp_path_factory.mktemp("log") / "tasks.sqlite3")
+    with closing(kind_of(path).open_store(path, lambda: OFFSET, Retention())) as store:
+        store.append(EVENTS)
+
+    def lines(*options: str) -> list[str]:
+        command = ["log", "--store", path, *options]
+        result = CliRunner().invoke(app, command, catch_exceptions=False)
+        assert result.exit_code == 0
+        return [line for line in result.stdout.split("\n") if line]
+
+    return lines
+
+
+def strictly(line: str) -> dict[str, Any]:
+    """Read one JSON object as a strict reader does, to which NaN is none."""
+    return json.loads(line, parse_constant=pytest.fail)  # type: ignore[no-any-return]
+
+
+def test_every_kind_is_an_object_with_its_values_and_words(log: Callable[..., list[str]]) -> None:
+    not_in_journal = {e.TaskProgressed, SignaturesSeen}
+    assert {type(event) for event in EVENTS} == set(e.Event.__args__) - not_in_journal
+    found = [strictly(line) for line in log("--json")]
+    for number, ((event, values), told) in enumerate(zip(SAMPLES, found, strict=True)):
+        assert told.items() >= values.items()
+        assert (told["event"], told["time"]) == (type(event).__name__, TIME)
+        assert told["message"] == WORDS.get(number, str(event))
+        of_none = ParameterSet | e.ServerStopped | SignatureRefused
+        assert "vehicle" in told or isinstance(event, of_none)
+    assert found[0]["terms"]["deadline"] == "2026-11-21T10:01:00.250Z"
+    assert found[1]["goal"] == {"kind": "Drive", "forward": 0.5, "yaw_rate": 0.25, "duration": 2.0}
+    assert (found[2]["goal"]["kind"], found[2]["goal"]["steps"]) == ("Plan", 2)
+
+
+def test_the_table_has_a_row_of_each(log: Callable[..., list[str]]) -> None:
+    rows = list(csv.DictReader(log("--csv")))
+    for number, ((event, values), row) in enumerate(zip(SAMPLES, rows, strict=True)):
+        assert (row["number"], row["time"]) == (str(number + 1), TIME)
+        assert row["words"] == WORDS.get(number, str(event))
+        for name in {"task", "old", "new", "reason", "actor"} & values.keys():
+            assert row[name] == str(values[name])
+    assert {name: float(rows[4][name]) for name in FIGURES} == FIGURES
+    assert {rows[3][name] for name in FIGURES} == {""}
+
+
+def test_a_line_has_the_time_and_names_and_gives_no_orders(log: Callable[..., list[str]]) -> None:
+    lines = log()
+    assert f"{TIME} rover 1: a[31mb  cd é" in lines
+    assert f"{TIME} rover 1: task 17 cancelled by a ground station at a" in lines
+    assert all(line.startswith(TIME) and line.isprintable() for line in lines)
+
+
+def test_since_and_until_when(log: Callable[..., list[str]]) -> None:
+    for since in ("2026-11-21", "2026-11-21T10:00", "2026-11-21T11:00+01:00", "9999d"):
+        assert len(log("--since", since)) == len(log())
+    assert log("--since", "2026-11-21T10:01") == log("--until", "2026-11-21T10:00") == []
+    for text in ("", "2", "2x", "-2h", "yesterday", "2026-13-01"):
+        with pytest.raises(UsageError, match="--since"):
+            log(f"--since={text}")
