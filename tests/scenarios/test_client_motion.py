@@ -25,7 +25,7 @@ def takes_control(world: World) -> None:
     world.run(0.5)
 
 
-@for_each("gap", [0.05, 0.3, 1.2])
+@for_each("gap", [0.0, 0.05, 0.3, 1.2])
 def test_our_mode_asked_for_right_after_hold_is_not_undone(
     make_world: MakeWorld, gap: float
 ) -> None:
