@@ -20,14 +20,17 @@ def item(
     return m.MissionItemInt(1, 1, seq, 6, command, seq == 0, 1, 0, 0, 0, 0.0, x, y, 2.0, kind)
 
 
+def requests(rig: Rig) -> list[m.MissionRequestInt] | list[m.MissionRequest]:
+    """Return what it asks for as its make does, and forget it."""
+    return rig.take(m.MissionRequestInt) if rig.speaks_px4 else rig.take(m.MissionRequest)
+
+
 def upload(rig: Rig, items: list[m.MissionItemInt], kind: int = MISSION) -> m.MissionAck:
     """Upload a plan; every item is asked for once, in order, as its make asks."""
-    request = m.MissionRequestInt if rig.speaks_px4 else m.MissionRequest
-    rig.take(request)
+    requests(rig)
     rig.send(m.MissionCount(1, 1, len(items), kind))
     for each in items:
-        asked = rig.take(request)
-        assert [(one.seq, one.mission_type) for one in asked] == [(each.seq, kind)]
+        assert [(one.seq, one.mission_type) for one in requests(rig)] == [(each.seq, kind)]
         rig.send(each)
     (ack,) = rig.take(m.MissionAck)
     assert Address(ack.target_system, ack.target_component) == CLIENT

@@ -68,7 +68,6 @@ TABLE: list[tuple[str, Message, list[dict[str, Any]]]] = [
     (P, long(512, 436), [{"custom_mode": 0x03040000, "standard_mode": 0}, *ack(512, ACCEPTED)]),
     (A, long(512, 0), [BEAT, *ack(512, ACCEPTED)]),
     (P, long(512, 0), [BEAT, *ack(512, ACCEPTED)]),
-    (A, long(31010, component=50), ack(31010, UNSUPPORTED)),
     (P, long(31010, component=50), SILENCE),
     # plans
     (A, m.MissionCount(1, 1, 1), [{"mavpackettype": "MISSION_REQUEST", "seq": 0}]),
