@@ -43,6 +43,8 @@ class LinkDriver:
         self._signatures = signatures
         self._loop = asyncio.get_running_loop()
         self._peers: dict[Peer, None] = dict.fromkeys(link.peers)
+        #: who alone is heard on a link that dials; empty: everybody, who is then answered
+        self._dialled = frozenset(() if link.is_stream else link.peers)
         self._streams = PeerStreams(is_stream=link.is_stream)
         self._timer: asyncio.TimerHandle | None = None
         self._tending: asyncio.TimerHandle | None = None
@@ -113,11 +115,22 @@ class LinkDriver:
     def _read(self) -> None:
         self._take_changes()
         for peer, data in self.link.receive(DRAIN):
+            if self._dialled and not self._is_dialled(peer):
+                continue
             packets = self._streams.feed(peer, data, now=self.now)
             for packet in filter(self._believes, packets):
                 self._peers.setdefault(peer)
                 self._talk.receive(packet, now=self.now)
         self._take_changes()
+
+    def _is_dialled(self, peer: Peer) -> bool:
+        """Return whether a datagram is of whom we dialled.
+
+        Another server may still send to the port, which a client of its own had before us. If it
+        were answered, it would get our commands as well.
+        """
+        # an IPv6 socket adds flow and scope to host and port
+        return (peer[:2] if isinstance(peer, tuple) else peer) in self._dialled
 
     def _believes(self, packet: Packet) -> bool:
         return self._signatures is None or self._signatures.believes(packet, utc=time.time())

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from math import radians
 from pathlib import Path
+from socket import AF_INET, SOCK_DGRAM, socket
 
 import pytest
 
@@ -25,6 +26,9 @@ from mav_tasks import (
     Text,
     Wait,
 )
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Encoder
+from mav_tasks.mavlink.messages import Heartbeat
 from tests.kit.awaited import awaited
 from tests.kit.processes import Process, Stand, free_udp_ports, process, stand
 
@@ -157,6 +161,29 @@ async def test_nobody_there_is_said_in_time() -> None:
     ):
         async with Client(f"udpout:127.0.0.1:{port}", timeout=0.3):
             pass
+
+
+@awaited
+async def test_another_server_that_sends_to_its_port_is_neither_heard_nor_sent_anything() -> None:
+    """An earlier client had the port, and its server goes on sending: that got our commands."""
+    beat = Encoder(Address(1, 1)).encode(Heartbeat(0, 10, 3, 128, 4, 3))
+    (port,) = free_udp_ports(1)
+    with socket(AF_INET, SOCK_DGRAM) as ours, socket(AF_INET, SOCK_DGRAM) as other:
+        ours.bind(("127.0.0.1", port))
+        other.setblocking(False)
+
+        async def other_speaks() -> None:
+            _, client = await asyncio.to_thread(ours.recvfrom, 1000)
+            while True:
+                other.sendto(beat, client)
+                await asyncio.sleep(0.1)
+
+        speaks = asyncio.create_task(other_speaks())
+        with pytest.raises(NoAnswer, match="no task server answered"):
+            await Client(f"udpout:127.0.0.1:{port}", timeout=2.5).__aenter__()
+        speaks.cancel()
+        with pytest.raises(BlockingIOError):
+            other.recvfrom(1000)
 
 
 @awaited

@@ -163,6 +163,7 @@ class Mavlink:
             allow_unsigned_callback=lambda *_: True,
             link_id=number,
         )
+        self._link.port.connect(("127.0.0.1", it.client_port))  # no other server is heard
         self._link.mav.heartbeat_send(6, 8, 0, 0, 4)
         assert self._link.wait_heartbeat(timeout=10) is not None, "no heartbeat"
         self._texts, self._told = Texts(), 0
@@ -180,6 +181,7 @@ class Mavlink:
         is_any: bool = False,
     ) -> str:
         if is_any:
+            self._catch_up()
             terms = (float("nan"), 0, 0, priority)  # no nonce: it shows that it knows the dialect
             self._link.mav.command_long_send(*SERVER, MOVE, 0, distance, speed, 0, *terms)
             return self._answer(MOVE)[1]
@@ -216,6 +218,7 @@ class Mavlink:
 
     def _command(self, number: int, *params: float) -> tuple[int, str]:
         filled = (*params, *(0.0,) * (7 - len(params)))
+        self._catch_up()
         self._link.mav.command_long_send(1, 191, number, 0, *filled)
         return self._answer(number)
 
@@ -235,8 +238,14 @@ class Mavlink:
                 self._link.mav.mission_item_int_send(*item)
             return bool(message.get_type() == "MISSION_ACK")
 
+        self._catch_up()
         self._link.mav.mission_count_send(1, 1, len(items), mission_type)
         return "" if self._until(is_ack).type == 0 else self._words()
+
+    def _catch_up(self) -> None:
+        """Read what has come: a buffer full of telemetry would have no room for an answer."""
+        while (message := self._link.recv_match()) is not None:
+            self._note(message)
 
     def _until(self, is_it: Callable[[Any], bool], *, within: float = 5.0) -> Any:
         """Return the first message of a kind, None if none comes; note texts on the way."""
@@ -245,11 +254,14 @@ class Mavlink:
             message = self._link.recv_match(blocking=True, timeout=0.1)
             if message is None:
                 continue
-            if message.get_type() == "STATUSTEXT":
-                self._texts.take(message)
+            self._note(message)
             if is_it(message):
                 return message
         return None
+
+    def _note(self, message: Any) -> None:
+        if message.get_type() == "STATUSTEXT":
+            self._texts.take(message)
 
     def _words(self) -> str:
         """Return the text of a refusal, which follows it. The same text is not sent twice."""

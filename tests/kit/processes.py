@@ -144,6 +144,8 @@ class Stand:
         """Return a stock pymavlink connection that has sent a heartbeat and heard the rover."""
         link = mavutil.mavlink_connection(url, source_system=source_system, **options)
         self._links.append(link)
+        # nothing else: another test's server may still send to a port whose client has left
+        link.port.connect(link.destination_addr)
         link.mav.heartbeat_send(6, 8, 0, 0, 4)
         assert link.wait_heartbeat(timeout=10) is not None, "no heartbeat"
         wait_for(link, "LOCAL_POSITION_NED")
@@ -226,6 +228,8 @@ def command_long(
 ) -> Any:
     """Send a COMMAND_LONG and return its COMMAND_ACK."""
     filled = (*params, *(0.0,) * (7 - len(params)))
+    while link.recv_match() is not None:
+        pass  # a buffer that is full of telemetry would have no room for the ack
     link.mav.command_long_send(*target, command, 0, *filled)
     ack = link.recv_match(
         type="COMMAND_ACK", condition=f"COMMAND_ACK.command=={command}", blocking=True, timeout=5

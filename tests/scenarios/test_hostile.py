@@ -38,7 +38,7 @@ from tests.scenarios.test_roles import (
     upload,
 )
 from tests.scenarios.test_roles import with_roles as with_roles
-from tests.scenarios.test_signing import ALICE, BOB, put, signing
+from tests.scenarios.test_signing import ALICE, BOB, UTC, put, signing
 
 
 def radio_status() -> object:
@@ -250,6 +250,23 @@ def test_who_signs_has_a_place_however_many_are_there_who_do_not(world: World) -
     world.run(0.3)
     assert sent.result == ACCEPTED
     assert client.heard("LOCAL_POSITION_NED")
+
+
+def test_commands_that_have_ended_keep_nobody_away_for_long(world: World) -> None:
+    """Each run of the command line is a client; a script of them took all places for a minute."""
+    put(world, ALICE, takes_unsigned=True)
+    crowd = Settings(clients=Clients(max_clients=4), roles=Roles(unsigned="observer"))
+    world.server.pump.handle(SettingsChanged(crowd), now=world.now)
+    commands = [world.add_client(f"command {number}") for number in range(4)]
+    for number, each in enumerate(commands):
+        each.sign(ALICE.secret, utc=UTC + world.now, link_id=number)
+    world.run(1.5)
+    for each in commands:
+        world.leave(each)
+    world.run(10.0)
+    newcomer = world.add_client("newcomer", system_id=20)
+    world.run(3.0)
+    assert newcomer.heard("LOCAL_POSITION_NED")
 
 
 def test_what_the_server_has_signed_itself_makes_nobody_a_client(world: World) -> None:

@@ -27,7 +27,7 @@ from mav_tasks.settings import Settings
 MAX_LINK_NUMBER = 255  # limit of its field in TASK_STATUS
 NEWCOMERS = 2.0  # new unsigned clients a second, on average; the burst is ``max_clients``
 CROWDED = 2  # beyond ``max_clients`` / CROWDED, clients heard only once are forgotten after SILENT
-GONE = 60.0  # s of silence, after which a client of any standing may replace this one
+GONE = 10.0  # s of silence, after which a client of any standing may replace this one
 SILENT = 3.0  # s, after which a new client may replace this one; heartbeats come each second
 
 
