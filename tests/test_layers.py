@@ -551,10 +551,8 @@ BELOW = {
     # the table of joint control: a walk over all its states, and the server beside it
     "kit/joint/agreement.py": "the table",
     "kit/joint/graph.py": "the table",
-    "kit/joint/judge.py": "the table",
     "kit/joint/model.py": "the table",
     "unit/engine/vehicles/test_control.py": "the table",
-    "scenarios/test_joint_control.py": "shows that the search in every state can fail",
     "unit/engine/test_policy.py": "the table of rights, row by row",
     "kit/packets/targets.py": "random bytes at each parser, also at those within",
     "kit/asleep.py": "a process whose machine sleeps: its clock",
