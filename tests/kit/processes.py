@@ -144,8 +144,9 @@ class Stand:
         """Return a stock pymavlink connection that has sent a heartbeat and heard the rover."""
         link = mavutil.mavlink_connection(url, source_system=source_system, **options)
         self._links.append(link)
-        # nothing else: another test's server may still send to a port whose client has left
-        link.port.connect(link.destination_addr)
+        if url.startswith("udpout:"):
+            # nothing else: another test's server may still send to a port whose client has left
+            link.port.connect(link.destination_addr)
         link.mav.heartbeat_send(6, 8, 0, 0, 4)
         assert link.wait_heartbeat(timeout=10) is not None, "no heartbeat"
         wait_for(link, "LOCAL_POSITION_NED")
