@@ -65,3 +65,19 @@ def test_a_slow_database_still_gives_vehicles() -> None:
             member.answered(request, database.execute("a", request), sent=sent, now=now)
             assert now < member.lease.trusted_until
     assert member.lease.may_move(1, now)
+
+
+def test_trust_and_term_count_from_the_moment_at_which_a_renewal_was_sent() -> None:
+    member, database, terms = Member("a", Terms(), {1}), Database(), Terms()
+    database.connect("a")
+    sent = 0.0
+    for number in range(4):  # joins, takes the vehicle, renews twice
+        sent, late = 0.3 * number, 0.3 * number + 0.25
+        request = member.request(sent)
+        assert request is not None
+        member.answered(request, database.execute("a", request), sent=sent, now=late)
+    trusted, end = sent + terms.term - terms.margin, sent + terms.term
+    assert member.lease.may_move(1, trusted - 0.01)
+    assert not member.lease.may_move(1, trusted)
+    assert member.lease.may_stop(1, end - 0.01)
+    assert not member.lease.may_stop(1, end)
