@@ -558,7 +558,6 @@ BELOW = {
     "kit/asleep.py": "a process whose machine sleeps: its clock",
     "kit/suspended.py": "a process that is stopped between a setpoint and its departure",
     "unit/links/test_tcp.py": "when connections are tried again, and who gives way",
-    "unit/test_runner.py": "nobody knows how to make a real engine fail",
 }
 
 

@@ -7,7 +7,6 @@ import pytest
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
     Committed,
-    Congestion,
     LinkChanged,
     LinkSide,
     Outgoing,
@@ -103,14 +102,6 @@ def test_a_packet_may_come_in_pieces(link: str) -> None:
         assert len(rig.engine.snapshot(now=0.0).vehicles) == 1, cut
 
 
-def test_half_a_packet_in_a_datagram_delays_no_whole_one(rig: Rig) -> None:
-    """It would wait for as many bytes as the first one promises."""
-    attitude = rig.packer.pack(ATTITUDE, Address(1, 1), seq=0)
-    rig.says("u", OLD, attitude[:11])
-    rig.rover(OLD, link="u", seq=1)
-    assert len(rig.engine.snapshot(now=0.0).vehicles) == 1
-
-
 def test_what_two_senders_cut_is_not_mixed(rig: Rig) -> None:
     packets = [rig.packer.pack(ROVER, Address(number, 1), seq=0) for number in (1, 2)]
     for begin in range(0, 21, 5):
@@ -135,20 +126,6 @@ def test_a_client_that_is_gone_is_forgotten_at_once(rig: Rig) -> None:
     assert rig.engine.snapshot(now=0.0).clients == ()
     rig.rover(OLD)
     assert ids(rig.engine.take_packets(), "c", CLIENT) == []
-
-
-def test_a_client_on_a_stream_is_told_of_its_task_however_long_it_was_silent(rig: Rig) -> None:
-    """It said hello once, as a script does; on a datagram link pushed to it would be unheard."""
-    rig.peer("c", CLIENT, up=True)
-    rig.client()
-    rig.rover(OLD)
-    for second in range(50):
-        rig.passes(1.0)
-        rig.rover(OLD, seq=second)
-    attitude = rig.packer.pack(m.Attitude(0, 0, 0, 0, 0, 0, 0), Address(1, 1), seq=60)
-    rig.engine.take_packets()
-    rig.says("v", OLD, attitude)
-    assert ids(rig.engine.take_packets(), "c", CLIENT) == [m.Attitude.id]
 
 
 def test_one_that_said_nothing_for_a_minute_gets_heartbeats_only_and_stays(rig: Rig) -> None:
@@ -255,20 +232,6 @@ def test_what_is_at_another_place_is_armed_only_if_we_may_arm_there(
     assert (task.state is S.STARTING, task.state is S.QUEUED) == (begins, not begins)
 
 
-def test_as_long_as_it_is_there_another_of_its_id_is_ignored(rig: Rig) -> None:
-    rig.peer("v", OLD, up=True)
-    rig.peer("v", NEW, up=True)
-    rig.rover(OLD)
-    for step in range(12):  # it is asked meanwhile which one it is, and does not answer
-        rig.passes(1.0)
-        rig.rover(OLD, seq=step)
-        rig.rover(NEW, seq=step)
-    assert "shares its id with a rover" in " ".join(map(str, rig.engine.take_events()))
-    rig.peer("v", OLD, up=False)
-    rig.rover(NEW, seq=9)
-    assert "is now at" not in " ".join(map(str, rig.engine.take_events()))
-
-
 def test_a_vehicle_comes_back_however_often_its_connection_breaks(rig: Rig) -> None:
     for port in range(MANY):
         rig.peer("v", ("10.0.0.1", port), up=True)
@@ -294,28 +257,3 @@ def test_numbers_towards_a_line_that_comes_back_go_on(rig: Rig) -> None:
     numbers = before + after
     assert len(after) > 1
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
-
-
-def test_a_congested_client_is_spared_telemetry_and_sees_no_loss(rig: Rig) -> None:
-    rig.peer("c", CLIENT, up=True)
-    rig.client()
-    rig.rover(OLD)
-    rig.engine.take_packets()
-    sent: list[Outgoing] = []
-    for seq in range(1, 60):
-        if seq in (10, 40):
-            rig.engine.handle(Congestion("c", CLIENT, seq == 10), now=rig.now)
-        rig.now += 0.1
-        message = ROVER if seq % 10 == 5 else m.Attitude(0, 0, 0, 0, 0, 0, 0)
-        rig.says("v", OLD, rig.packer.pack(message, Address(1, 1), seq=seq))
-        came = [o for o in rig.engine.take_packets() if o.link == "c"]
-        if 10 <= seq < 40:
-            assert [o.data[7] for o in came] == [0] * (seq % 10 == 5)
-        sent += came
-    assert sum(o.data[7] == m.Attitude.id for o in sent[-20:]) > 5
-    assert [o.data[4] for o in sent] == list(range(1, len(sent) + 1))
-
-
-def test_congestion_of_who_is_not_there_means_nothing(rig: Rig) -> None:
-    rig.engine.handle(Congestion("c", CLIENT, True), now=0.0)
-    rig.engine.handle(Congestion("v", OLD, True), now=0.0)
