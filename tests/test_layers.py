@@ -557,7 +557,6 @@ BELOW = {
     "scenarios/test_joint_control.py": "shows that the search in every state can fail",
     "kit/asleep.py": "a process whose machine sleeps: its clock",
     "kit/suspended.py": "a process that is stopped between a setpoint and its departure",
-    "unit/links/test_tcp.py": "when connections are tried again, and who gives way",
 }
 
 

@@ -100,7 +100,7 @@ def test_a_server_that_has_not_heard_its_rover_yet_tells_of_its_tasks_and_takes_
     world.sleep(3)
     with world.sync_client() as tasks:
         assert (tasks.vehicles()[0].is_heard, tasks.submit(Move(1.0)).id) == (True, 2)
-        assert (tasks.queue().paused, tasks.vehicles()[0].mode) == (TaskReason.STOPPED, "hold")
+        assert (tasks.queue().paused, tasks.vehicles()[0].mode) == (TaskReason.STOPPED, "HOLD")
         world.sleep(3)
         assert world.rovers[0].speed == 0.0
 
