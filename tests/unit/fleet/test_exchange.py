@@ -2,8 +2,6 @@
 
 from math import inf
 
-import pytest
-
 from mav_tasks.fleet.exchange import BEAT, SILENCE, Arrived, Exchange
 from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
 from mav_tasks.fleet.outbox import LIMIT, Outbox, Waiting
@@ -165,14 +163,6 @@ def test_too_many_that_wait_are_dropped_the_oldest_first_but_no_stop() -> None:
     assert (len(taken), box.dropped) == (LIMIT + 1, 10)
 
 
-def test_a_datagram_leaves_in_time_or_not_at_all() -> None:
-    box = Outbox()
-    box.put("b", Waiting(b"old", 0.0, 0.5))
-    box.put("b", Waiting(b"new", 0.4, 0.9))
-    assert [each.payload for each in box.take("b", 1000, each=6, now=0.6)] == [b"new"]
-    assert box.expired == 1
-
-
 def test_a_stop_for_all_reaches_one_that_is_met_a_moment_later() -> None:
     box = Outbox()
     box.meet(frozenset({"b"}), now=0.0)
@@ -182,11 +172,3 @@ def test_a_stop_for_all_reaches_one_that_is_met_a_moment_later() -> None:
         assert [each.payload for each in box.take(name, 1000, each=6, now=0.5)] == [b"stop"]
     box.meet(frozenset({"b", "c", "d"}), now=1.5)
     assert box.take("d", 1000, each=6, now=1.5) == []
-
-
-@pytest.mark.parametrize("size", [0, 1, 400])
-def test_a_packet_comes_back_as_it_was(size: int) -> None:
-    one = Datagram(b"x" * size, age=0.25, left=1.5, first=True)
-    packet = Packet(Kind.MAIL, "north-1", session(7), 3, 4, 5, 6, 7, [one, Datagram(b"", 0.0, inf)])
-    assert SEAL.packet(SEAL.text(packet, session(9)), session(9)) == packet
-    assert SEAL.packet(SEAL.text(packet, session(9)), session(8)) is None

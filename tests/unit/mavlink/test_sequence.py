@@ -43,13 +43,6 @@ def test_a_source_of_our_own_counts_from_zero() -> None:
     assert [keeper.injected(SERVER) for _ in range(300)] == [n % 256 for n in range(300)]
 
 
-def test_sources_are_numbered_apart() -> None:
-    keeper = SequenceKeeper()
-    keeper.injected(SERVER)
-    keeper.withheld(SERVER)
-    assert [keeper.forwarded(ROVER, 9), keeper.injected(SERVER)] == [9, 1]
-
-
 def test_sources_that_somebody_makes_up_are_not_all_remembered() -> None:
     keeper = SequenceKeeper()
     ours, made_up = Address(250, 191), [Address(s, c) for s in range(1, 200) for c in range(256)]

@@ -8,7 +8,6 @@ from math import nan
 
 import pytest
 
-from mav_tasks.links.memory import Conditions
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
@@ -198,17 +197,6 @@ def test_a_car_is_driven_in_a_larger_area_and_not_asked_to_turn_on_the_spot() ->
     assert [profile.turning, profile.yaw_rate, profile.reverse] == ["steered", "honoured", "yes"]
     assert world.farthest < 4.0
     assert not [each for _, each in world.setpoints() if each.vx == 0.0 and each.yaw_rate]
-
-
-def test_a_bad_radio_spoils_the_figures_and_not_the_end() -> None:
-    for persona in (ARDUPILOT, PX4):
-        world = ProbeWorld(drive=True, persona=persona)
-        world.net.conditions = Conditions(delay=0.05, jitter=0.05, loss=0.08, duplication=0.05)
-        world.finish()
-        world.run(2.0)
-        assert (world.driven.ended, world.driven.loss_stop) == ("", "yes")
-        assert (world.rests(), world.farthest < BOX) == (True, True)
-        assert world.probe.findings.rates_given_back == "as before"
 
 
 def test_what_cannot_be_driven_safely_is_not_driven() -> None:

@@ -1,7 +1,6 @@
 """What stands in a telemetry log, read back by pymavlink."""
 
 import os
-import shutil
 import threading
 from collections.abc import Iterable
 from pathlib import Path
@@ -122,14 +121,6 @@ def test_each_packet_stands_there_once_at_its_time(tmp_path: Path) -> None:
     ]
 
 
-def test_an_answer_that_says_the_same_to_two_is_no_copy(tmp_path: Path) -> None:
-    tlog = started(tmp_path)
-    own = [to_client(packet(ack(54000), SERVER), peer) for peer in ("one", "other")]
-    tlog.on_output(own, [], now=1.0)
-    tlog.close()
-    assert len(told(tmp_path)) == 2
-
-
 def test_a_stream_may_be_cut_anywhere(tmp_path: Path) -> None:
     stream = b"".join(packet(attitude(number), ROVER, number) for number in range(1, 11))
     for cut in (1, 5, 17, 300):
@@ -179,20 +170,6 @@ def test_only_the_oldest_of_ours_are_removed_and_nothing_is_written_over(tmp_pat
     made = ["2025-11-21T12-00-01Z.1.tlog", "2025-11-21T12-00-01Z.2.tlog"]
     assert {path.name for path in tmp_path.iterdir()} == {*others, old[2], *made}
     assert (tmp_path / made[0]).stat().st_mode & 0o777 == 0o600
-
-
-def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) -> None:
-    folder = tmp_path / "logs"
-    tlog = started(folder)
-    assert folder.stat().st_mode & 0o777 == 0o700
-    for number in range(2):
-        data = packet(attitude(number), ROVER, number)
-        tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0)
-        wait_until(lambda: any(folder.glob("*")), within=10)
-        if not number:
-            shutil.rmtree(folder)
-    tlog.close()
-    assert [seq for *_, seq in told(folder)] == [1]
 
 
 def test_a_folder_that_cannot_be_used_is_told_in_one_line(

@@ -10,7 +10,7 @@ import pytest
 
 from mav_tasks.errors import SettingError
 from mav_tasks.setting_keys.key import check_bounds
-from mav_tasks.setting_keys.literals import in_digits, literal
+from mav_tasks.setting_keys.literals import literal
 from mav_tasks.setting_keys.shapes import (
     ByClient,
     Choice,
@@ -20,7 +20,6 @@ from mav_tasks.setting_keys.shapes import (
     Texts,
 )
 from mav_tasks.settings import BOUNDED, KEYS, ServerSettings
-from mav_tasks.tasks.task import Submitter
 
 DEFAULTS = ServerSettings()
 
@@ -116,12 +115,6 @@ def test_a_text_is_read() -> None:
         assert shape.kept(shape.read(text)) == kept
 
 
-def test_a_client_is_written_as_the_server_writes_it() -> None:
-    someone = Submitter("udpin:127.0.0.1:14560", "[::1]:14550", 255, 190)
-    priorities = {someone.address: 3, someone.place: 9}
-    assert PRIORITIES.kept(priorities) == priorities
-
-
 def test_angles_are_degrees_and_days_are_days() -> None:
     assert KEYS["driving.turn_rate_deg"].plain_of(DEFAULTS) == 40
     assert degrees(DEFAULTS.engine.driving.turn_rate) == pytest.approx(40)
@@ -152,12 +145,3 @@ def test_a_value_is_written_as_toml() -> None:
     ):
         assert literal(plain) == toml
         assert tomllib.loads(f"x = {toml}")["x"] == plain
-
-
-def test_numbers_are_written_in_digits() -> None:
-    assert [in_digits(n) for n in (0.05, 10.0, 1e9, 1e10)] == [
-        "0.05",
-        "10",
-        "1000000000",
-        "1" + "0" * 10,
-    ]

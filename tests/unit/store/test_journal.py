@@ -12,8 +12,7 @@ import pytest
 from mav_tasks.errors import StoreError
 from mav_tasks.store import Store, Which, kind_of
 from mav_tasks.store.base import JournalReader
-from mav_tasks.tasks.events import Event, TaskWithdrawn, VehicleSeen
-from mav_tasks.tasks.task import TaskId
+from mav_tasks.tasks.events import Event, VehicleSeen
 from tests.kit.databases import foreign, newer, tables
 from tests.unit.store.samples import OFFSET, cancelled, keep, loaded, opened, submitted, wait_for
 
@@ -68,12 +67,6 @@ def test_what_comes_later_is_given_to_who_goes_on_reading(store: Store, place: s
         assert it.version() != seen
         assert list(it.take(offset=OFFSET)) == list(enumerate(then, len(first) + 1))
         assert list(it.take(offset=OFFSET)) == []
-
-
-def test_a_submission_that_was_withdrawn_stays_in_the_journal(store: Store, place: str) -> None:
-    events: list[Event] = [submitted(1), submitted(2), TaskWithdrawn(TaskId(1), 1, 100.5)]
-    keep(store, *events)
-    assert read(place) == list(enumerate(events, 1))
 
 
 def test_some_of_it(store: Store, place: str) -> None:

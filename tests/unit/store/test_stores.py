@@ -33,7 +33,6 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
 from mav_tasks.tasks.task import MAX_TASK_ID, Pose, Progress, TaskId, Terms
 from tests.kit.databases import locked, tables
@@ -56,20 +55,6 @@ st.register_type_strategy(int, st.integers(0, 2**20))
 st.register_type_strategy(str, st.text(st.characters(min_codepoint=32, max_codepoint=0x2FFF)))
 #: the others only change what the next life knows
 JOURNALLED = [each for each in get_args(Event) if each not in (TaskProgressed, SignaturesSeen)]
-
-
-def test_a_new_store_holds_nothing(place: str) -> None:
-    with opened(place) as store:
-        assert store.load() == Restored(wall_offset=OFFSET)
-        assert store.take_outcomes() == []
-
-
-def test_events_are_kept_and_the_descriptor_says_so(place: str) -> None:
-    with opened(place) as store:
-        store.append([submitted(1), submitted(2)])
-        store.append([VehicleSeen(1, "found", 1.0)])
-        assert wait_for(store, 3)[-1] == Kept(3)
-        assert store.take_outcomes() == []
 
 
 def test_every_event_comes_back_as_it_was(place: str) -> None:
@@ -271,13 +256,6 @@ def test_a_stuck_disk_is_given_up_in_the_end(place: str) -> None:
     with opened(place) as store:
         found = loaded(store)
         assert (found.tasks, found.ended_well) == ((), False)
-
-
-def test_our_own_mistake_is_raised_where_outcomes_are_taken(place: str) -> None:
-    with opened(place) as store:
-        store.append([VehicleSpeedSet(1, float("nan"), "client", 1.0)])
-        with pytest.raises(ValueError, match="JSON"):
-            wait_for(store, 1)
 
 
 #: of the first version: what its files and databases had
