@@ -140,19 +140,6 @@ def test_what_is_first_is_sent_again_after_a_lost_connection_and_the_rest_is_not
     assert [each for _ in range(4) for each in net.exchange()] == []
 
 
-def test_one_that_is_silent_cannot_be_reached_any_more() -> None:
-    net = Net()
-    net.is_cut = True
-    net.now += SILENCE + 0.1
-    net.exchange()
-    assert net.gateways["a"].peers == frozenset()
-    net.is_cut = False
-    for _ in range(4):
-        net.now += 1.0
-        net.exchange()
-    assert net.gateways["a"].peers == {"b"}
-
-
 def test_too_many_that_wait_are_dropped_the_oldest_first_but_no_stop() -> None:
     box = Outbox()
     for number in range(LIMIT + 10):
@@ -161,14 +148,3 @@ def test_too_many_that_wait_are_dropped_the_oldest_first_but_no_stop() -> None:
     taken = box.take("b", 10**6, each=6, now=0.0)
     assert [each.payload for each in taken[:2]] == [b"stop", b"10"]
     assert (len(taken), box.dropped) == (LIMIT + 1, 10)
-
-
-def test_a_stop_for_all_reaches_one_that_is_met_a_moment_later() -> None:
-    box = Outbox()
-    box.meet(frozenset({"b"}), now=0.0)
-    box.put("", Waiting(b"stop", 0.0, 1.0, first=True))
-    box.meet(frozenset({"b", "c"}), now=0.5)
-    for name in "bc":
-        assert [each.payload for each in box.take(name, 1000, each=6, now=0.5)] == [b"stop"]
-    box.meet(frozenset({"b", "c", "d"}), now=1.5)
-    assert box.take("d", 1000, each=6, now=1.5) == []

@@ -318,20 +318,6 @@ def test_a_rover_that_would_not_stand_by_itself_is_not_left_alone_while_it_drive
         assert max(later - earlier for earlier, later in pairwise(times)) < 0.2
 
 
-def test_one_that_drives_on_in_spite_of_what_it_says_is_stopped_and_found_out() -> None:
-    """Here a bridge repeats the last set-point, whether the probe still sends or not."""
-    world = ProbeWorld(drive=True)
-    bridge = world.net.link("bridge", peers=("rover1",))
-    while not world.probe.is_over:
-        world.run(0.1)
-        for _, setpoint in world.setpoints()[-1:]:
-            bridge.send("rover1", Encoder(Address(250, 191)).encode(setpoint))
-    assert world.driven.loss_stop == "no"
-    assert world.driven.ended
-    assert (world.rests(), world.farthest < BOX) == (True, True)
-    assert profile_of(world.probe.findings, probed="2026-11-21").loss_stop == "no"
-
-
 @EACH
 def test_whenever_it_is_ended_the_rover_comes_to_rest(persona: Persona) -> None:
     for after in (1.0, 7.0, 12.0, 15.0, 17.5, 20.0, 22.5, 25.0, None):
