@@ -1,4 +1,4 @@
-"""Who is on a stream comes and goes, as the link tells; what it says is cut anywhere."""
+"""Where peers are: who comes and goes on a stream, and a rover that is heard at another place."""
 
 import pytest
 
@@ -228,3 +228,43 @@ def test_numbers_towards_a_line_that_comes_back_go_on(rig: Rig) -> None:
     numbers = before + after
     assert len(after) > 1
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def reached(rig: Rig) -> set[object]:
+    """Return to where what a client has for the rover goes."""
+    rig.passes(0.4)
+    rig.says("c", CLIENT, rig.packer.pack(m.SetMode(1, 0, 0), Address(255, 190), seq=1))
+    return {o.peer for o in rig.engine.take_packets() if o.data[7] == m.SetMode.id}
+
+
+@pytest.mark.parametrize("overlap", [False, True])
+def test_who_is_heard_elsewhere_is_followed_once_the_old_place_is_silent(
+    rig: Rig, *, overlap: bool
+) -> None:
+    rig.peer("c", CLIENT, up=True)
+    for at in range(3):
+        rig.rover(OLD, seq=at, link="u")
+        rig.passes(0.7 if at == 2 else 1.0)
+    rig.rover(NEW, seq=3, link="u")
+    rig.passes(0.9)
+    if overlap:
+        rig.rover(OLD, seq=4, link="u")  # late on the net
+    rig.passes(0.1)
+    for seq in range(5, 8):
+        rig.passes(1.0)
+        rig.rover(NEW, seq=seq, link="u")
+    assert reached(rig) == ({OLD} if overlap else {NEW})
+    for seq in range(8, 14):
+        rig.passes(0.9)
+        rig.rover(NEW, seq=seq, link="u")
+    assert reached(rig) == {NEW}
+
+
+def test_however_many_have_called_a_vehicle_can_come_back_elsewhere(rig: Rig) -> None:
+    rig.peer("c", CLIENT, up=True)
+    rig.rover(OLD, link="u")
+    for port in range(1_000):
+        rig.rover(("10.9.9.9", port), link="u")
+    rig.passes(Settings().watch.heartbeat_lost + 1.0)
+    rig.rover(NEW, seq=1, link="u")
+    assert reached(rig) == {NEW}

@@ -1,6 +1,7 @@
 """What stands in a telemetry log, read back by pymavlink."""
 
 import os
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from mav_tasks.mavlink.messages import Message
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
 from mav_tasks.settings import Recording, Settings
+from tests.kit.processes import wait_until
 
 ROVER, SERVER, GCS, OUR_OWN = Address(1, 1), Address(1, 191), Address(255, 190), Address(250, 191)
 OFFSET = 1_763_726_400.0  # UTC - monotonic
@@ -167,3 +169,17 @@ def test_a_folder_that_cannot_be_used_is_told_in_one_line(
             started(Path(folder))
     started(Path("~/logs")).close()  # in a file or a variable no shell makes it the home
     assert (tmp_path / "logs").is_dir()
+
+
+def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) -> None:
+    folder = tmp_path / "logs"
+    tlog = started(folder)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    for number in range(2):
+        data = packet(attitude(number), ROVER, number)
+        tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0)
+        wait_until(lambda: any(folder.glob("*")), within=10)
+        if not number:
+            shutil.rmtree(folder)
+    tlog.close()
+    assert [seq for *_, seq in told(folder)] == [1]

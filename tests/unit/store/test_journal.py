@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from mav_tasks.errors import StoreError
 from mav_tasks.store import Store, Which, kind_of
 from mav_tasks.store.base import JournalReader
 from mav_tasks.tasks.events import Event, VehicleSeen
+from tests.kit.databases import tables
 from tests.unit.store.samples import OFFSET, cancelled, keep, loaded, opened, submitted, wait_for
 
 PAGE = 500  # entries that are read at once
@@ -120,3 +122,11 @@ def test_a_store_is_read_where_nobody_may_write(path: Path) -> None:
         assert len(read(path)) == 6
     finally:
         path.parent.chmod(0o700)
+
+
+def test_an_event_that_this_version_does_not_know_is_named(store: Store, place: str) -> None:
+    keep(store, VehicleSeen(1, "found", 1.0))
+    with tables(place) as connection:
+        connection.execute("UPDATE journal SET kind = 'Later'")
+    with pytest.raises(StoreError, match="this version does not know Later"):
+        read(place)

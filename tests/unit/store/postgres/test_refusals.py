@@ -196,3 +196,11 @@ def test_a_replica_is_refused_and_read(postgres: PostgresServer) -> None:
         journal.close()
     with opened(url) as store:
         assert len(loaded(store).tasks) == 1
+
+
+def test_too_many_connections(postgres: PostgresServer) -> None:
+    url = postgres.new_database()
+    postgres.execute(f"ALTER DATABASE {name_of(url)} CONNECTION LIMIT 0")
+    with role(postgres, "plain") as name:
+        text = refusal(url.replace("postgres@", f"{name}@"))
+    assert text.endswith("too many connections: end some, or raise max_connections of the server")
