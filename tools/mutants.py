@@ -34,7 +34,7 @@ CORE = ("engine", "services", "tasks")
 #: tests that only compute: tools/test runs the others beside them
 LEFT_OUT = (
     *("browser", "e2e", "interop", "test_documents.py", "sim", "unit/fleet_io", "unit/key_ring"),
-    *("unit/links", "unit/recording", "unit/store", "unit/kit", "unit/rover_sim", "unit/tools"),
+    *("unit/links", "unit/recording", "unit/store", "unit/rover_sim", "unit/tools"),
     "test_forbidden.py",
 )
 BUDGET = 300.0  # s of processor time, after which a mutant counts as one that survived

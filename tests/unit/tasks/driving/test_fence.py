@@ -61,9 +61,7 @@ ROUND_YARD, ROUND_POND = Circle(ORIGIN, 5.0, True), Circle(ORIGIN, 5.0, False)
 N, E = spot(10, 10)  # of the box's corner
 STAR = [(10 * cos(2 * i * tau / 5), 10 * sin(2 * i * tau / 5)) for i in range(5)]
 RIGHT = box(0, 6, 10, 16)  # overlaps the box between 6 and 10 east
-BOTH = polygon(*BOX, group=3), polygon(*RIGHT, group=3)
 EITHER = polygon(*BOX, group=1), polygon(*RIGHT, group=2)
-DIAMOND = polygon((0, -10), (10, 0), (0, 10), (-10, 0))
 MM = 0.001  # m: the boundary is that wide, on either side
 
 PLACES: tuple[tuple[tuple[Zone, ...], dict[Point, bool]], ...] = (
@@ -75,9 +73,6 @@ PLACES: tuple[tuple[tuple[Zone, ...], dict[Point, bool]], ...] = (
     ((ROUND_POND,), {(5 + 0.9 * MM, 0): False, (5, 0): False, (5 + 1.1 * MM, 0): True}),
     ((polygon(*(p for p in U for _ in "ab")),), {(1, 5): True, (5, 5): False}),  # each twice
     ((polygon(*STAR),), {(7, 0): True, (0, 0): False}),  # where it covers twice is a hole
-    ((DIAMOND,), {(spot(0, 10)[0], 0): True, (spot(0, 10)[0], -20): False, (N, -5): False}),
-    (BOTH, {(5, 3): False, (5, 8): True, (5, 13): False}),
-    (EITHER, {(5, 3): True, (5, 8): True, (5, 13): True, (5, 17): False}),
 )
 
 
@@ -88,7 +83,6 @@ def test_places_are_allowed_or_not() -> None:
 
 
 WAYS: tuple[tuple[tuple[Zone, ...], Point, Point, bool], ...] = (
-    ((), (1e6, -1e6), (-1e6, 1e6), True),
     ((POND,), (5, -5), (5, 15), False),  # through it, though both ends are allowed
     ((POND,), (N + 4, E - 4), (N - 4, E + 4), False),  # touching a corner
     ((POND,), (N + 4 + 2 * MM, E - 4), (N - 4 + 2 * MM, E + 4), True),
@@ -96,18 +90,13 @@ WAYS: tuple[tuple[tuple[Zone, ...], Point, Point, bool], ...] = (
     ((POND,), (N, -5), (N, 15), False),
     ((POND,), (N, 11), (N, 15), True),
     ((POND,), (N + 0.9 * MM, 11), (N, -5), False),
-    ((POND,), (N + 0.5 * MM, -50), (N + 0.5 * MM, 15), False),  # beside it
     ((POND,), (N + 1.5 * MM, -50), (N + 1.5 * MM, 15), True),
     ((ROUND_POND,), (5, -9), (5, 9), False),  # a tangent
     ((ROUND_POND,), (5 + 0.9 * MM, -9), (5 + 0.9 * MM, 9), False),
     ((ROUND_POND,), (5 + 1.1 * MM, -9), (5 + 1.1 * MM, 9), True),
-    ((ROUND_YARD,), (0, -4.99), (0, 4.99), True),
-    ((ROUND_YARD,), (0, -4.99), (0, 5.01), False),
-    ((YARD,), (5, -1), (5, 5), False),  # it begins outside
     ((YARD,), (5, 5), (5, 5), True),  # of no length
     ((YARD,), (N, 5), (N, 5), False),
     (EITHER, (5, 1), (5, 15), True),  # from one group to another
-    (BOTH, (5, 1), (5, 15), False),
     ((EITHER[0], polygon(*box(0, 10, 10, 16), group=2)), (5, 1), (5, 15), False),  # a shared edge
 )
 
@@ -118,34 +107,14 @@ def test_ways_are_allowed_or_not_in_both_directions() -> None:
         assert (there, back) == (is_allowed, is_allowed), (zones, start, end)
 
 
-def test_a_way_back_in_leads_over_the_boundary_once_and_ends_where_it_may_be() -> None:
-    ponds = POND, polygon(*box(0, 8, 10, 20), inclusion=False)
-    cases: tuple[tuple[tuple[Zone, ...], Point, Point, bool], ...] = (
-        ((YARD,), (5, -3), (5, 5), True),
-        ((POND,), (5, 5), (5, -3), True),
-        ((YARD,), (5, 5), (5, 6), False),  # from where it may be
-        ((YARD,), (5, 5), (5, -3), False),
-        ((polygon(*U),), (8, -2), (8, 9), False),  # it leads out again
-        (ponds, (5, 5), (5, 25), True),
-        ((YARD,), (N, 5), (N, 5), False),
-    )
-    for zones, start, end, escapes in cases:
-        found = fence(*zones).escapes(LocalPlace(*start), LocalPlace(*end))
-        assert found is escapes, (zones, start, end)
-
-
 def test_the_room_ends_a_millimetre_before_the_boundary() -> None:
-    spike = polygon((0, 0), (100, 10), (100, -10), inclusion=False)
     hole = Circle(ORIGIN, 10.0, True), Circle(corner(3, 4), 1.0, False)
     ahead = Pose(0.0, 0.0, atan2(4, 3))
     cases: tuple[tuple[tuple[Zone, ...], Pose, bool, float], ...] = (
         ((YARD,), Pose(5, 2, EAST), True, E - 2 - MM),
         ((YARD,), Pose(5, E - 8, EAST), False, E - 8 - spot(0, 0)[1] - MM),
-        ((YARD,), Pose(N - 4, 5, 0), True, 4 - MM),
         ((ROUND_POND,), Pose(-9, 0, pi), False, 4 - MM),
-        ((spike,), Pose(-5, 0, 0), True, 5 - MM),
         ((polygon(*(p for p in U for _ in "ab")),), Pose(1, 5, 0), True, spot(2, 3)[0] - 1 - MM),
-        (EITHER, Pose(5, 1, EAST), True, spot(10, 16)[1] - 1 - MM),
         ((POND,), Pose(5, 5, 0), True, 0.0),  # where it may not be
     )
     for zones, pose, forward, wanted in cases:

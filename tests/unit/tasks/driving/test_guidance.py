@@ -65,25 +65,6 @@ def test_on_its_line_it_moves_straight_and_off_it_steers_back() -> None:
     assert -DRIVING.speed < steered(Move(2.0), Pose(2.2, 0.0, 0.0)).forward < 0
 
 
-@given(st.sampled_from([4.0, -4.0]), st.floats(-0.4, 0.4))
-def test_a_point_that_follows_it_ends_on_the_line_and_at_its_end(
-    distance: float, east: float
-) -> None:
-    goal, north, yaw, tick = Move(distance), 0.0, 0.0, 0.02
-    for _ in range(3000):
-        pose = Pose(north, east, yaw)
-        remaining = abs(distance) - done_so_far(goal, HERE, pose, before=0.0)
-        if has_arrived(goal, remaining, within=1.0, driving=DRIVING):
-            break
-        wish = steer(goal, HERE, pose, remaining=remaining, driving=DRIVING)
-        north += wish.forward * tick * (1 - yaw * yaw / 2)
-        east += wish.forward * tick * yaw
-        yaw = wrap(yaw + wish.yaw_rate * tick)
-    assert north == pytest.approx(distance, abs=0.02)
-    assert abs(east) < 0.05
-    assert abs(yaw) < 0.1
-
-
 @given(st.floats(1e-3, 20.0), st.sampled_from([1.0, -1.0]), st.floats(0.05, 2.0))
 def test_the_approach_is_never_faster_than_can_be_braked(
     remaining: float, sign: float, speed: float
