@@ -1,6 +1,5 @@
 """What every durable store does, on each kind of database."""
 
-import stat
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -290,16 +289,6 @@ def test_a_file_of_the_first_version_is_read_and_brought_up_to_date(tmp_path: Pa
         with opened(place) as store:
             found = loaded(store)
     assert ([task.id for task in found.tasks], found.paused) == ([1], {1: R.STOPPED})
-
-
-def test_files_are_their_users_alone(tmp_path: Path) -> None:
-    path = tmp_path / "folder" / "tasks.sqlite3"
-    with opened(path) as store:
-        keep(store, submitted(1))
-        modes = {entry.name: stat.S_IMODE(entry.stat().st_mode) for entry in path.parent.iterdir()}
-    assert set(modes.values()) == {0o600}
-    assert set(modes) >= {"tasks.sqlite3", "tasks.sqlite3.halts", "tasks.sqlite3-wal"}
-    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
 
 
 def test_a_place_of_an_unknown_kind_is_no_path_and_its_password_is_not_told(

@@ -60,12 +60,6 @@ def test_who_moves_otherwise_than_it_points_is_found_in_half_a_metre() -> None:
             assert found == pytest.approx(WRONG_WAY, abs=0.06), (goal, yaw)
 
 
-def test_who_goes_where_it_points_or_reverses_is_not() -> None:
-    for asked, north in ((AHEAD, 0.5), (BACK, -0.5)):
-        assert Rig(Move(10.0), asked).drives(9.0, north) is None
-        assert Rig(Move(10.0), asked).drives(9.0, -north) is not None
-
-
 def test_a_reported_speed_that_its_position_contradicts_is_no_motion() -> None:
     """A PX4 with metre-class GPS reports up to 0.6 m/s sideways while it crawls ahead."""
     rig = Rig(Move(10.0))
@@ -73,15 +67,6 @@ def test_a_reported_speed_that_its_position_contradicts_is_no_motion() -> None:
         pose = Pose(0.02 * TICK * step, 0.1 * sin(step / 40), 0.0)
         motion = Motion(pose, 0.05, 0.3, 0.0, rig.now + TICK * step)
         assert not rig.watch.is_astray(rig.course, motion), step
-
-
-def test_what_rolls_on_before_it_reverses_is_not_counted_until_it_has_stood() -> None:
-    rig = Rig(Move(10.0))
-    assert rig.drives(1.0, north=2.0) is None
-    rig.watch.commanded(BACK)
-    assert rig.drives(2.0, north=2.0) is None
-    assert rig.drives(0.01, north=0.01) is None
-    assert rig.drives(2.0, north=2.0) is not None
 
 
 def test_who_leaves_its_line_is_found_at_a_metre_more_than_it_began_with() -> None:
