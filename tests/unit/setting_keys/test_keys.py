@@ -76,20 +76,13 @@ def test_what_is_no_value_of_a_key_is_refused_and_never_breaks() -> None:
 
 def test_what_is_wrong_is_said() -> None:
     for shape, plain, says in (
-        (Number(0.05, 10, "m/s"), 50, "not in 0.05..10 m/s"),
-        (Number(0.05, 10, "m/s"), "1", "not a number: 0.05..10 m/s"),
-        (Number(0.05, 10, "m/s"), True, "not a number: 0.05..10 m/s"),
-        (Number(1, 1e5, is_whole=True), 1.5, "not a whole number: 1..100000, whole"),
         (Number(0, 1, "days", none="forever"), 2, 'not in 0..1 days, or "forever"'),
-        (Choice(("a", "b")), "c", "expected one of a, b"),
         (Flag(), 1, "expected true or false"),
         (Text("a path"), "a\0b", "not a text: a path"),
         (Texts("a list of x"), "x", "not a list of texts: a list of x"),
         (Texts("a list of x", words=("x",)), ["y"], "'y': expected a list of x"),
         (PRIORITIES, {"255/190": 11}, "255/190: not in 0..10, whole"),
-        (PRIORITIES, {"255/190": True}, "255/190: not a number: 0..10, whole"),
         (PRIORITIES, {"0/190": 1}, "'0/190': no client"),
-        (PRIORITIES, {"256/1": 1}, "'256/1': no client"),
         (PRIORITIES, {"qgc": 1}, "'qgc': no client"),
     ):
         with pytest.raises(SettingError) as raised:
