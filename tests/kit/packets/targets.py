@@ -118,8 +118,7 @@ def link_url(data: bytes) -> None:
 
 
 TARGETS: Mapping[str, Target] = {
-    target.__name__: target
-    for target in (datagram, stream, decoder, config, plan, link_url)
+    target.__name__: target for target in (datagram, stream, decoder, config, plan, link_url)
 }
 
 

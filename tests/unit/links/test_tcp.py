@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -67,7 +68,7 @@ def stack() -> Iterator[ExitStack]:
         yield it
 
 
-def listening(stack: ExitStack, **limits: float) -> TcpInLink:
+def listening(stack: ExitStack, **limits: Any) -> TcpInLink:
     link = TcpInLink(TcpInUrl("tcpin", HOST, 0), limits=replace(TO_CLIENTS, **limits))
     return stack.enter_context(closing(link))
 
