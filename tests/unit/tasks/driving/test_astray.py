@@ -5,7 +5,7 @@ from math import cos, hypot, pi, radians, sin
 import pytest
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import Motion, Velocity
+from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
 from mav_tasks.tasks.driving.jump import JumpWatch
 from mav_tasks.tasks.driving.path_divergence import WRONG_WAY, AstrayWatch
 from mav_tasks.tasks.driving.path_follower import PathFollower
@@ -60,6 +60,12 @@ def test_who_moves_otherwise_than_it_points_is_found_in_half_a_metre() -> None:
             assert found == pytest.approx(WRONG_WAY, abs=0.06), (goal, yaw)
 
 
+def test_who_goes_where_it_points_or_reverses_is_not() -> None:
+    for asked, north in ((AHEAD, 0.5), (BACK, -0.5)):
+        assert Rig(Move(10.0), asked).drives(9.0, north) is None
+        assert Rig(Move(10.0), asked).drives(9.0, -north) is not None
+
+
 def test_a_reported_speed_that_its_position_contradicts_is_no_motion() -> None:
     """A PX4 with metre-class GPS reports up to 0.6 m/s sideways while it crawls ahead."""
     rig = Rig(Move(10.0))
@@ -67,6 +73,27 @@ def test_a_reported_speed_that_its_position_contradicts_is_no_motion() -> None:
         pose = Pose(0.02 * TICK * step, 0.1 * sin(step / 40), 0.0)
         motion = Motion(pose, 0.05, 0.3, 0.0, rig.now + TICK * step)
         assert not rig.watch.is_astray(rig.course, motion), step
+
+
+def test_a_little_right_in_between_begins_anew_and_zeros_forget_nothing() -> None:
+    rig = Rig(DRIVE)
+    assert not any(rig.drives(*way) for way in 5 * ((0.4, -0.5), (0.1, 0.5)))
+    rig = Rig(DRIVE)
+    for _ in range(2):
+        rig.watch.commanded(ZERO)
+        rig.watch.begin_leg()
+        rig.watch.commanded(AHEAD)
+        found = rig.drives(0.3, north=-0.5)
+    assert found is not None
+
+
+def test_what_rolls_on_before_it_reverses_is_not_counted_until_it_has_stood() -> None:
+    rig = Rig(Move(10.0))
+    assert rig.drives(1.0, north=2.0) is None
+    rig.watch.commanded(BACK)
+    assert rig.drives(2.0, north=2.0) is None
+    assert rig.drives(0.01, north=0.01) is None
+    assert rig.drives(2.0, north=2.0) is not None
 
 
 def test_who_leaves_its_line_is_found_at_a_metre_more_than_it_began_with() -> None:

@@ -14,6 +14,7 @@ from mav_tasks.tasks.driving.recovery_path import (
     PAST_END,
     is_off_line,
     recovery_path,
+    resumed,
 )
 from mav_tasks.tasks.goal import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.task import Marks, Pose, Progress, Task, TaskId
@@ -116,3 +117,22 @@ def test_off_its_line_is_further_than_a_metre_or_past_the_end() -> None:
     ):
         task = Task(TaskId(1), 1, TASK_MOVE, goal, SOMEBODY, Marks(), 0.0, progress=progress)
         assert is_off_line(task, pose) is is_off, (goal, pose)
+
+
+def test_a_way_goes_on_near_its_line_or_place_and_is_else_begun_again_from_here() -> None:
+    for goal, leg, anchor, pose, goes_on in (
+        (WAY, 1, NORTHWARDS, Pose(2.0, 0.9, 1.0), True),
+        (WAY, 1, NORTHWARDS, Pose(2.0, 1.1, 0.0), False),
+        (WAY, 1, NORTHWARDS, Pose(-0.1, 0.0, 0.0), False),
+        (WAY, 1, NORTHWARDS, Pose(5.1, 0.0, 0.0), False),
+        (WAY, 3, Pose(5.0, 0.0, 1.0), Pose(5.03, 0.0, 1.0), True),  # the wait at the place
+        (WAY, 3, Pose(5.0, 0.0, 1.0), Pose(5.1, 0.0, 1.0), False),
+        (GoTo(TARGET, radius=0.5, wait=3.0), 2, Pose(4.6, 0, 0), Pose(4.6, 0.0, 1.0), True),
+    ):
+        progress = Progress(anchor=anchor, leg=leg, done=2.0, target=TARGET)
+        again = resumed(goal, progress, motion(pose, at=0.0), turns_first=True)
+        if goes_on:
+            assert again == progress, (leg, pose)
+        else:
+            found = again.leg, again.done, again.anchor, again.target
+            assert found == (0, 0.0, pose, TARGET), (leg, pose)
