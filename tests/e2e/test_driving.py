@@ -9,6 +9,7 @@ from time import monotonic
 import pytest
 from pymavlink.dialects.v20.common import MAVLink, MAVLink_heartbeat_message
 
+from tests.kit.databases import tables
 from tests.kit.processes import Stand, stand, submit, wait_for, wait_until
 
 HOLD, GUIDED = 4, 15
@@ -62,6 +63,26 @@ def test_an_orderly_end_stops_the_rover_at_once(running: Stand) -> None:
     heartbeat = wait_for(running.connect_to_rover(), "HEARTBEAT", "HEARTBEAT.type==10")
     assert heartbeat.custom_mode == HOLD
     assert "Traceback" not in running.server.text
+
+
+def test_a_server_that_fails_within_stops_its_rover_first_and_ends_with_70(tmp_path: Path) -> None:
+    """Its database refuses a row as none of its own would, which it can only take for a mistake."""
+    store = str(tmp_path / "tasks.sqlite3")
+    with stand(tmp_path, serve_store=store) as running:
+        link = running.connect()
+        running.drive(link, 50.0)
+        with tables(store) as other:
+            other.execute(
+                "CREATE TRIGGER no BEFORE INSERT ON tasks BEGIN SELECT RAISE(ABORT, 'x'); END"
+            )
+        link.mav.command_long_send(1, 191, 54001, 0, 90.0, 0, 0, 0, 0, 0, 0)
+        assert running.server.popen.wait(10) == 70
+        failed_at = running.truth()[-1]["time"]
+        wait_until(lambda: running.speed() < 0.01, within=10, what="the rover to stand")
+        assert running.truth()[-1]["time"] - failed_at < BRAKING  # not by the time-out
+        heartbeat = wait_for(running.connect_to_rover(), "HEARTBEAT", "HEARTBEAT.type==10")
+        assert heartbeat.custom_mode == HOLD
+        assert "internal error: stopping every vehicle and ending" in running.server.text
 
 
 def test_a_client_that_only_listens_hears_the_autopilot_first(running: Stand) -> None:
