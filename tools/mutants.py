@@ -34,8 +34,8 @@ CORE = ("engine", "services", "tasks")
 #: tests that only compute: tools/test runs the others beside them
 LEFT_OUT = (
     *("browser", "e2e", "interop", "test_documents.py", "sim", "unit/fleet_io", "unit/key_ring"),
-    *("unit/links", "unit/recording", "unit/store", "unit/test_runner.py", "unit/kit"),
-    *("unit/test_runner_standstill.py", "unit/rover_sim", "unit/tools", "test_forbidden.py"),
+    *("unit/links", "unit/recording", "unit/store", "unit/rover_sim", "unit/tools"),
+    "test_forbidden.py",
 )
 BUDGET = 300.0  # s of processor time, after which a mutant counts as one that survived
 PROBE = "_reached_mutant"

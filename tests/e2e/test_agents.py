@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,10 +20,11 @@ from mcp.client.extension import ClaimContext, ClientExtension, ResultClaim
 from mcp.shared.exceptions import MCPError
 from mcp_types import CallToolResult, Request, RequestParams, Result
 
+from mav_tasks import SyncClient
 from tests.kit.agents import Agent, agent, url_of
 from tests.kit.awaited import awaited
 from tests.kit.commands import called
-from tests.kit.processes import Process, Stand, environment_with, frozen, process, stand, wait_until
+from tests.kit.processes import Stand, environment_with, frozen, process, stand, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -35,18 +36,6 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
     """One server and rover for most of them; each leaves the queue empty and not paused."""
     with stand(tmp_path_factory.mktemp("agents")) as it:
         yield it
-
-
-def serve(folder: Path, it: Stand, name: str) -> AbstractContextManager[Process]:
-    """The next server on the store of a stand, at the same ports."""
-    return process(
-        *("-m", "mav_tasks.cli", "serve", "--no-push"),
-        *("--client", f"udpin:127.0.0.1:{it.client_port}"),
-        *("--vehicle", f"udpout:127.0.0.1:{it.rover_port}"),
-        *("--store", str(folder / "tasks.sqlite3")),
-        folder=folder,
-        name=name,
-    )
 
 
 @pytest.mark.parametrize("mode", ["auto", "legacy"])
@@ -139,6 +128,52 @@ async def test_a_key_with_other_content_is_refused(
         assert (await it.call("submit", **first))["id"] == task["id"]
         await it.call("cancel", id=task["id"])
         assert (await it.call("submit", **first))["state"] == "cancelled"
+
+
+@contextmanager
+def asking(running: Stand, folder: Path, line: str) -> Iterator[subprocess.Popen[str]]:
+    """An agent's process that is sent a line, for a ``with`` block."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "mav_tasks.cli", "mcp", "--server", url_of(running)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment_with(XDG_CONFIG_HOME=str(folder)),
+    ) as it:
+        assert it.stdin is not None
+        it.stdin.write(line + "\n")
+        it.stdin.flush()
+        yield it
+        it.kill()
+
+
+def test_one_that_is_killed_before_its_answer_and_asks_again_has_one_task(
+    running: Stand, tmp_path: Path
+) -> None:
+    order = {"goals": [MOVE], "start_in": 900, "idempotency_key": "killed"}
+    call = {"name": "submit", "arguments": order, "_meta": meta("2026-07-28")}
+    line = json.dumps({"jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": call})
+    with SyncClient(url_of(running)) as client:
+        with asking(running, tmp_path, line):
+            wait_until(lambda: client.queue().waiting_count, within=40, what="its task")
+        with asking(running, tmp_path, line) as again:
+            assert again.stdout is not None
+            answer = json.loads(again.stdout.readline())
+        (task,) = client.queue().waiting
+        assert answer["result"]["structuredContent"]["id"] == task.id
+        client.cancel(task.id)
+
+
+INFO = {"name": "a", "version": "1"}
+
+
+def meta(version: str) -> dict[str, Any]:
+    """Return what each request of an agent has without a session."""
+    return {
+        "io.modelcontextprotocol/protocolVersion": version,
+        "io.modelcontextprotocol/clientInfo": INFO,
+        "io.modelcontextprotocol/clientCapabilities": {},
+    }
 
 
 class GetParams(RequestParams):
@@ -293,16 +328,10 @@ def test_a_page_from_elsewhere_cannot_use_it(
     found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/mcp", over_http)
     assert found is not None
     port = int(found[1])
-    info = {"name": "a", "version": "1"}
-    legacy = {"protocolVersion": version, "capabilities": {}, "clientInfo": info}
-    meta = {
-        "io.modelcontextprotocol/protocolVersion": version,
-        "io.modelcontextprotocol/clientInfo": info,
-        "io.modelcontextprotocol/clientCapabilities": {},
-    }
+    legacy = {"protocolVersion": version, "capabilities": {}, "clientInfo": INFO}
     is_legacy = version.startswith("2025")
     method = "initialize" if is_legacy else "tools/list"
-    params = legacy if is_legacy else {"_meta": meta}
+    params = legacy if is_legacy else {"_meta": meta(version)}
     body = json.dumps({"jsonrpc": "2.0", "id": 1, "method": method, "params": params})
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
     connection.request(
@@ -350,8 +379,7 @@ def test_only_the_protocol_is_on_standard_output(running: Stand, tmp_path: Path)
         f"main(['mcp', '--server', '{url_of(running)}'])\n"
     )
     call = {"name": "vehicles", "arguments": {}}
-    info = {"name": "a", "version": "1"}
-    begin = {"protocolVersion": "2025-11-25", "capabilities": {}, "clientInfo": info}
+    begin = {"protocolVersion": "2025-11-25", "capabilities": {}, "clientInfo": INFO}
     lines = [
         json.dumps({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": begin}),
         json.dumps({"jsonrpc": "2.0", "method": "notifications/initialized"}),

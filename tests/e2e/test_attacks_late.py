@@ -22,26 +22,19 @@ STOPPED = 5.0  # s
 TIMEOUT = 3.0  # s, the rover's own, of setpoints
 
 
-def test_a_rover_is_not_driven_on_by_a_machine_that_was_asleep(tmp_path: Path) -> None:
+def test_time_in_which_the_machine_was_asleep_counts(tmp_path: Path) -> None:
+    """What drives is held, and the deadline of what waits has passed."""
     module = ("tests.kit.asleep", str(ASLEEP))
     with stand(tmp_path, module=module) as running:
         link = running.connect()
         running.drive(link, 50.0)
+        waiting = submit(link, MOVE, 1.0)
+        assert command_long(link, 54012, waiting, 3, 0.5 * ASLEEP).result == 0
         os.kill(running.server.popen.pid, signal.SIGUSR1)
         wait_for(link, "STATUSTEXT", "'held: server was late' in STATUSTEXT.text", within=2)
+        running.server.wait_for(f"task {waiting} expired", within=3)
         wait_until(lambda: running.speed() < 0.01, within=5, what="the rover to stand")
         assert "Traceback" not in running.server.text
-
-
-def test_time_in_which_the_machine_was_asleep_counts_for_a_deadline(tmp_path: Path) -> None:
-    module = ("tests.kit.asleep", str(ASLEEP))
-    with stand(tmp_path, module=module) as running:
-        link = running.connect()
-        submit(link, CONTINUE, 0)
-        ack = command_long(link, 54012, submit(link, MOVE, 1.0), 3, 0.5 * ASLEEP)
-        assert ack.result == 0, ack
-        os.kill(running.server.popen.pid, signal.SIGUSR1)
-        running.server.wait_for("task 1 expired", within=3)
 
 
 def test_what_waited_on_all_links_comes_as_a_whole_with_its_age(tmp_path: Path) -> None:

@@ -6,12 +6,12 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
-from mav_tasks import Move, Refused, SyncClient, TaskState, Wait, read_plan
+from mav_tasks import Move, Refused, SyncClient, Wait, read_plan
 from mav_tasks.plan_files import PlanFile, parse_plan
 from tests.kit.commands import Done, called, mav_tasks, surroundings
 from tests.kit.processes import Stand, stand, wait_until
@@ -204,26 +204,6 @@ def test_finished_tasks_are_listed_newest_first(server: str, client: SyncClient)
     assert any(re.match(r"ended         \d\d:\d\d:\d\d .*ago$", line) for line in shown.lines)
 
 
-def test_a_queue_says_when_each_task_runs_and_why_it_waits(server: str, client: SyncClient) -> None:
-    running = client.submit(Wait(60.0))
-    wait_until(lambda: client.queue().running == running.id, within=10, what="a task that runs")
-    behind = client.submit(Wait(30.0))
-    after = client.submit(Wait(1.0), after=behind)
-    (queue,) = called("queue", "--json", server=server).objects
-    first, second = queue["waiting"]
-    assert (first["id"], first["why"]) == (behind.id, f"behind task {running.id}")
-    assert (second["id"], second["why"]) == (after.id, f"after task {behind.id}")
-    assert 55 < first["time_to_start"] < 62
-    assert 28 < first["time_to_finish"] - first["time_to_start"] < 35
-    assert second["time_to_start"] == pytest.approx(first["time_to_finish"], abs=0.1)
-    narrow = mav_tasks("queue", server=server, COLUMNS="40")
-    assert f"behind task {running.id}" in narrow.output
-    client.pause()
-    (queue,) = called("queue", "--json", server=server).objects
-    assert queue["waiting"][0]["time_to_start"] is None
-    assert "unknown" in called("status", str(behind.id), server=server).output
-
-
 def test_each_goal_becomes_what_it_says(server: str, client: SyncClient) -> None:
     client.pause()
     goals = {
@@ -369,23 +349,6 @@ def test_a_mission_goes_up_waits_is_driven_and_comes_back(server: str, tmp_path:
     assert f"task {driven[-1]['id']}" in staged.output
     refused = called("mission", "upload", str(way), "--stage", "--after", "3", server=server)
     assert_one_line(refused, 2, "--stage")
-
-
-def test_a_mission_is_a_task_with_terms(server: str, client: SyncClient, tmp_path: Path) -> None:
-    way = tmp_path / "way.waypoints"
-    way.write_text(WAY, encoding="utf-8")
-    upload = ("mission", "upload", str(way), "--priority", "7", "--json")
-    in_an_hour = datetime.now(UTC) + timedelta(hours=1)
-    for start in (("--in", "1h"), ("--at", in_an_hour.isoformat())):
-        (task,) = called(*upload, *start, server=server).objects
-        assert (task["state"], task["priority"], task["items"]) == ("scheduled", 7, 2)
-        assert 3590 < task["time_to_start"] <= 3630  # the second one is behind the first
-        assert client.status(task["id"]).state is TaskState.SCHEDULED
-    moment = in_an_hour.astimezone().replace(tzinfo=None).isoformat(timespec="minutes")
-    late = ("submit", "rotate", "-90", "--at", moment, "--deadline", "2h", "--after")
-    (later,) = called(*late, str(task["id"]), "--json", server=server).objects
-    assert (later["what"], later["after"]) == ("rotate -90 deg", task["id"])
-    assert 3500 < later["time_to_start"] <= 3630
 
 
 def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(

@@ -1,11 +1,8 @@
 """The client library against a real server and rover: what a script author relies on."""
 
 import asyncio
-import signal
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 from math import radians
-from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, socket
 
 import pytest
@@ -20,7 +17,6 @@ from mav_tasks import (
     Rotate,
     SyncClient,
     TaskFailed,
-    TaskReason,
     TaskState,
     TaskStatus,
     Text,
@@ -30,13 +26,12 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Heartbeat
 from tests.kit.awaited import awaited
-from tests.kit.processes import Process, Stand, free_udp_ports, process, stand
+from tests.kit.processes import Stand, free_udp_ports, stand
 
-S, R = TaskState, TaskReason
+S = TaskState
+CLIENTS = 50
 
 pytestmark = pytest.mark.slow
-
-CLIENTS = 50
 
 
 @pytest.fixture(scope="module")
@@ -48,19 +43,6 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stand]:
 
 def url(it: Stand) -> str:
     return f"udpout:127.0.0.1:{it.client_port}"
-
-
-def serve(
-    folder: Path, client_port: int, rover_port: int, name: str
-) -> AbstractContextManager[Process]:
-    return process(
-        *("-m", "mav_tasks.cli", "serve", "--no-push"),
-        *("--client", f"udpin:127.0.0.1:{client_port}"),
-        *("--vehicle", f"udpout:127.0.0.1:{rover_port}"),
-        *("--store", str(folder / "tasks.sqlite3")),
-        folder=folder,
-        name=name,
-    )
 
 
 @awaited
@@ -154,16 +136,6 @@ def test_the_same_without_asyncio(running: Stand) -> None:
 
 
 @awaited
-async def test_nobody_there_is_said_in_time() -> None:
-    (port,) = free_udp_ports(1)
-    with pytest.raises(
-        NoAnswer, match=f"no task server answered on udpout:127.0.0.1:{port} within 0.3 s"
-    ):
-        async with Client(f"udpout:127.0.0.1:{port}", timeout=0.3):
-            pass
-
-
-@awaited
 async def test_another_server_that_sends_to_its_port_is_neither_heard_nor_sent_anything() -> None:
     """An earlier client had the port, and its server goes on sending: that got our commands."""
     beat = Encoder(Address(1, 1)).encode(Heartbeat(0, 10, 3, 128, 4, 3))
@@ -191,47 +163,3 @@ async def test_a_rover_without_a_task_server_is_told_apart(running: Stand) -> No
     with pytest.raises(NoAnswer, match=r"rover 1 is heard on .*, but no task server answered"):
         async with Client(f"udpout:127.0.0.1:{running.rover_port}", timeout=2.5):
             pass
-
-
-@pytest.mark.parametrize(
-    ("number", "state", "end"),
-    [(signal.SIGKILL, S.HELD, S.CANCELLED), (signal.SIGTERM, S.PAUSED, S.COMPLETED)],
-)
-@awaited
-async def test_handles_outlive_the_server(
-    tmp_path: Path, number: int, state: TaskState, end: TaskState
-) -> None:
-    client_port, rover_port = free_udp_ports(2)
-    ready = ("--boot", "none")
-    rover = ("-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic", *ready)
-    with process(*rover, folder=tmp_path, name="rover"):
-        with serve(tmp_path, client_port, rover_port, "first") as server:
-            server.wait_for("rover 1: found")
-            tasks = Client(f"udpout:127.0.0.1:{client_port}")
-            tasks.open()
-            await tasks.found()
-            driving = await tasks.submit(Move(1.0))
-            waiting = await tasks.submit(Rotate(0.3))
-            cancelled = await tasks.submit(Move(1.0), delay=600.0)
-            ends = [asyncio.ensure_future(t.done()) for t in (driving, waiting, cancelled)]
-            async for status in driving.updates(interval=0.1):
-                if status.progress:
-                    break
-            server.end(number)
-        with serve(tmp_path, client_port, rover_port, "second") as server:
-            server.wait_for("rover 1: found")
-            async for status in driving.updates():
-                if status.state is state:
-                    break
-            if state is S.HELD:
-                assert status.reason is R.OUTCOME_UNKNOWN
-                await driving.release("skip")
-            await cancelled.cancel()
-            await tasks.resume()
-            done = await asyncio.gather(*ends, return_exceptions=True)
-            await tasks.close()
-    assert [_state(each) for each in done] == [end, S.COMPLETED, S.CANCELLED]
-
-
-def _state(end: TaskStatus | BaseException) -> int:
-    return end.state if isinstance(end, TaskStatus | TaskFailed) else -1

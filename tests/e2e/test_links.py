@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -12,19 +12,11 @@ from typing import Any
 import pytest
 
 from rover_sim.geo import DEFAULT_ORIGIN
-from tests.kit.bridges import (
-    Bridge,
-    LineFar,
-    SerialFar,
-    TcpFar,
-    UdpEnd,
-    bridge,
-)
+from tests.kit.bridges import Bridge, SerialFar, TcpFar, bridge
 from tests.kit.lines import slow_line
 from tests.kit.processes import (
     Stand,
     free_tcp_ports,
-    free_udp_ports,
     stand,
     submit,
     wait_for,
@@ -41,11 +33,6 @@ PLACES = [DEFAULT_ORIGIN.to_global(2.0 * n, -n) for n in range(5)]
 
 
 # the clients' side
-
-
-@contextmanager
-def over_udp(folder: Path) -> Iterator[tuple[tuple[str, ...], Callable[[Stand], Any]]]:
-    yield (), lambda running: running.connect()
 
 
 @contextmanager
@@ -78,7 +65,7 @@ def over_a_slow_line(folder: Path) -> Iterator[tuple[tuple[str, ...], Callable[[
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", [over_udp, over_tcp, over_tcp_dialled, over_a_slow_line])
+@pytest.mark.parametrize("way", [over_tcp, over_tcp_dialled, over_a_slow_line])
 def test_the_same_script_works_over_every_kind_of_link(
     tmp_path: Path,
     way: Callable[[Path], AbstractContextManager[tuple[tuple[str, ...], Callable[[Stand], Any]]]],
@@ -152,22 +139,6 @@ def download(link: Any) -> list[tuple[int, int]]:
     return places
 
 
-def test_a_client_comes_back_at_once_after_its_connection_broke(tmp_path: Path) -> None:
-    (port,) = free_tcp_ports(1)
-    url = f"tcpin:{HOST}:{port}"
-    with stand(tmp_path, "--client", url) as running:
-        first = running.heard(f"tcp:{HOST}:{port}")
-        task_id = submit(first, 54002, 0.0, 20.0, 3.0)  # turns for three seconds
-        first.close()
-        running.server.wait_for(rf"link {url} {HOST}:\d+ disconnected: ")
-
-        again = running.heard(f"tcp:{HOST}:{port}")
-
-        waiting = submit(again, 54001, 10.0)
-        assert waiting == task_id + 1
-        wait_for(again, "STATUSTEXT", f"'Task {task_id} done' in STATUSTEXT.text", within=20)
-
-
 # the vehicles' side
 
 
@@ -215,35 +186,3 @@ def test_a_rover_is_driven_stops_when_its_link_is_cut_and_goes_on_when_it_is_bac
         end = running.truth()[-1]
         assert end["north"] - start["north"] == pytest.approx(3.0, abs=0.1)
         assert ": server was late" not in running.server.text  # as a task that is held for it says
-
-
-# one among others
-
-
-@pytest.mark.slow
-def test_two_radios_behind_bridges_that_cut_packets_and_one_dies(tmp_path: Path) -> None:
-    """Each is a line of 57,600 baud between pseudo-terminals, and 13 bytes make a datagram."""
-    ports = free_udp_ports(2)
-    ends: list[UdpEnd] = []
-
-    @contextmanager
-    def radios(rover_port: int) -> Iterator[str]:
-        with ExitStack() as stack:
-            for port in ports:
-                folder = tmp_path / str(port)
-                folder.mkdir()
-                one, other = stack.enter_context(slow_line(folder, baud=BAUD))
-                ends.append(UdpEnd(other, port, piece=13))
-                stack.callback(ends[-1].close)
-                far = LineFar(one, f"udpout:{HOST}:{port}")
-                stack.enter_context(bridge(rover_port, far))
-            yield f"udpout:{HOST}:{ports[0]}"
-
-    with stand(tmp_path, "--vehicle", f"udpout:{HOST}:{ports[1]}", way=radios) as running:
-        link = running.connect()
-        running.server.wait_for("rover 1: is also heard at")
-        task_id = running.drive(link, 2.5)
-        # either may be in use: the first one that was heard
-        ends[0].close()
-        wait_for(link, "STATUSTEXT", f"'Task {task_id} done' in STATUSTEXT.text", within=30)
-        assert "paused" not in running.server.text

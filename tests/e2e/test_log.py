@@ -14,10 +14,6 @@ from typing import Any
 
 import pytest
 
-from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import Address
-from mav_tasks.mavlink.codec import Encoder
-from mav_tasks.tasks.events import VehicleSeen
 from tests.kit.processes import (
     Process,
     Stand,
@@ -29,11 +25,9 @@ from tests.kit.processes import (
     wait_for,
     wait_until,
 )
-from tests.unit.store.samples import opened
 
 MOVE, STOP, CONTINUE = 54000, 54003, 193
 PLAIN = ("event", "level", "message", "task", "vehicle", "old", "new", "reason", "actor", "text")
-TALKER = 42  # system id of a vehicle that only talks
 
 
 @contextmanager
@@ -99,31 +93,6 @@ def test_a_server_whose_log_nobody_reads_goes_on_driving_and_ends(tmp_path: Path
         assert running.truth()[-1]["time"] - asked_at < 2.5  # not by its own time-out
 
 
-def test_what_a_rover_says_is_in_the_log_and_gives_no_orders_to_the_terminal(
-    tmp_path: Path,
-) -> None:
-    with socket.socket(type=socket.SOCK_DGRAM) as talker:
-        talker.bind(("127.0.0.1", 0))
-        port = talker.getsockname()[1]
-        with stand(tmp_path, "--vehicle", f"udpout:127.0.0.1:{port}", "-v") as running:
-            talker.settimeout(10)
-            server = talker.recvfrom(300)[1]  # its heartbeat
-            rover = Encoder(Address(TALKER, 1))
-            text = rover.encode(m.Statustext(4, b"PreArm: \x1b[31mred\nERROR forged"))
-            for _ in range(40):
-                talker.sendto(text, server)
-            talker.sendto(rover.encode(m.Statustext(7, b"that is all")), server)
-            running.server.wait_for("DEBUG rover 42 says: that is all")
-            running.server.end()
-            lines = [line for line in running.server.text.splitlines() if "rover 42" in line]
-    assert [line.split(" ", 1)[1] for line in lines] == [
-        "WARNING rover 42 says: PreArm: [31mred ERROR forged",
-        "DEBUG rover 42 says: that is all",
-    ] + [line.split(" ", 1)[1] for line in lines[2:]]
-    assert "\x1b" not in running.server.text
-    assert any("(repeated" in line for line in lines[2:])
-
-
 def export(*options: str) -> tuple[int, str, str]:
     """Run ``mav-tasks log``; gives exit code, standard output and error."""
     done = subprocess.run(
@@ -185,15 +154,6 @@ def lines_until(follower: "subprocess.Popen[bytes]", words: str) -> Iterator[str
         yield line
         if words in line:
             return
-
-
-@pytest.fixture
-def full(tmp_path: Path) -> Path:
-    """A store with more in it than a pipe holds."""
-    path = tmp_path / "full.sqlite3"
-    with opened(path) as store:
-        store.append([VehicleSeen(1, f"seen {number}", 1.0) for number in range(5_000)])
-    return path
 
 
 def begun(path: Path, *options: str, **streams: Any) -> "subprocess.Popen[bytes]":

@@ -29,7 +29,7 @@ def test_texts_are_told_by_their_severity_whole_once_and_not_without_end(tmp_pat
         said += [m.Statustext(3, b"a" * 50, 5, 0), m.Statustext(3, b"b" * 30, 5, 1)]
         for message in said:
             talker.send(rover.encode(message))
-        talker.send(gimbal.encode(m.Statustext(4, b"hot")))
+        talker.send(gimbal.encode(m.Statustext(4, b"\x1b[31mhot\nERROR forged")))
 
         def told() -> bool:
             stranger.send(b"\xfd\x80$GPGGA" * 10)
@@ -46,7 +46,7 @@ def test_texts_are_told_by_their_severity_whole_once_and_not_without_end(tmp_pat
     assert lines[:10] == [
         *(f"{level} rover 42 says: of {number}" for number, level in enumerate(LEVELS)),
         f"ERROR rover 42 says: {'a' * 50}{'b' * 30}",
-        "WARNING rover 42, component 154, says: hot",
+        "WARNING rover 42, component 154, says: [31mhot ERROR forged",  # no order to a terminal
     ]
     assert len([line for line in lines if "says: number" in line]) < 100
     assert re.search(rf"bytes came from 127.0.0.1:{name} in \d+ s, and not one whole", text)

@@ -2,8 +2,8 @@
 
 import re
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -37,17 +37,14 @@ def away(server: PostgresServer) -> Iterator[None]:
         server.start()
 
 
-@pytest.mark.parametrize("gone", [PostgresServer.frozen, away])
 def test_without_its_database_the_server_refuses_new_tasks_and_nothing_else(
-    tmp_path: Path,
-    postgres: PostgresServer,
-    gone: Callable[[PostgresServer], AbstractContextManager[None]],
+    tmp_path: Path, postgres: PostgresServer
 ) -> None:
     url = postgres.new_database()
     with stand(tmp_path, serve_store=url) as running:
         link = running.connect()
         running.drive(link, 2.0)
-        with gone(postgres):
+        with away(postgres):
             for nonce in (11, 12):
                 refused = command_long(link, MOVE, 1.0, 0, 0, nonce)
                 assert (refused.result, refused.result_param2) == REFUSED

@@ -43,34 +43,6 @@ def drive(running: Stand, distance: float) -> None:
     wait_for(link, "STATUSTEXT", f"'Task {task} done' in STATUSTEXT.text", within=20)
 
 
-@pytest.mark.slow
-def test_a_telemetry_log_shows_the_run(tmp_path: Path) -> None:
-    with stand(tmp_path, "--tlog", str(tmp_path / "logs")) as running:
-        assert f"telemetry log in {tmp_path / 'logs'}" in running.server.text
-        drive(running, 0.5)
-        running.server.end()
-    packets = packets_of(tmp_path / "logs")
-    times = [packet._timestamp for packet in packets]
-    assert times == sorted(times)
-    started = running.server.output.stat().st_mtime
-    assert started - 60 < times[0] < times[-1] <= started + 1
-    kinds = [(packet.get_type(), packet.get_srcComponent()) for packet in packets]
-    assert kinds.count(("COMMAND_ACK", 191)) == 1
-    command = kinds.index(("COMMAND_LONG", 0))
-    ack = kinds.index(("COMMAND_ACK", 191))
-    moving = [
-        number
-        for number, packet in enumerate(packets)
-        if packet.get_type() == "SET_POSITION_TARGET_LOCAL_NED" and packet.vx > 0
-    ]
-    assert command < ack < moving[0]
-    assert len(moving) > 10
-    positions = [packet for packet in packets if packet.get_type() == "LOCAL_POSITION_NED"]
-    assert positions[-1].x == pytest.approx(0.5, abs=0.1)
-    assert len({packet.time_boot_ms for packet in positions}) == len(positions)  # each once
-    assert "BAD_DATA" not in {kind for kind, _ in kinds}
-
-
 def over_tcp(made: list[Bridge]) -> Callable[[int], AbstractContextManager[str]]:
     """A way on which what comes may be cut anywhere; gives the bridge, too."""
 

@@ -96,34 +96,6 @@ def test_a_full_disk_refuses_new_tasks_and_nothing_else(running: Stand, path: Pa
     assert "Traceback" not in running.server.text
 
 
-def test_a_store_that_is_removed_under_the_server_refuses_new_tasks_and_nothing_else(
-    running: Stand, path: Path
-) -> None:
-    link = running.connect()
-    running.drive(link, 2.0)
-    away = path.with_name("away")
-    path.rename(away)
-    for nonce in (11, 12):
-        refused = command_long(link, MOVE, 1.0, 0, 0, nonce)
-        assert (refused.result, refused.result_param2) == (TEMPORARILY_REJECTED, STORE_UNAVAILABLE)
-    wait_for(link, "STATUSTEXT", "'Task 1 done' in STATUSTEXT.text", within=20)
-    assert command_long(link, STOP).result == 0
-    hold_is_seen(link)
-    assert "removed or replaced" in running.server.text
-    assert not path.exists()
-    away.rename(path)
-    command_long(link, CONTINUE, 1)
-    taken = wait_until(
-        lambda: (ack := command_long(link, MOVE, 0.2, 0, 0, 13)).result == 0 and ack,
-        within=10,
-        what="a task to be accepted again",
-    )
-    text = f"'Task {taken.result_param2} done' in STATUSTEXT.text"
-    wait_for(link, "STATUSTEXT", text, within=20)
-    assert {1, taken.result_param2} <= set(stored(path))
-    assert "Traceback" not in running.server.text
-
-
 def test_stop_does_not_wait_for_a_blocked_store(serving: Stand, place: str) -> None:
     link = serving.connect()
     rover = serving.connect_to_rover()

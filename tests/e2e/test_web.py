@@ -2,7 +2,6 @@
 
 import json
 import shlex
-import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from itertools import groupby
@@ -14,7 +13,7 @@ import pytest
 from aiopenapi3 import OpenAPI
 
 from tests.kit.awaited import awaited
-from tests.kit.processes import Stand, process, stand, wait_until
+from tests.kit.processes import Stand, stand, wait_until
 from tests.kit.web import Web, add_key, has_rover, web
 
 pytestmark = pytest.mark.slow
@@ -139,16 +138,6 @@ def test_why_a_task_waits_and_what_helps(page: Web, check: Check) -> None:
     assert rover["control"] == "paused"
     page.resume()
     page.wait_for(task["id"], "completed")
-
-
-def test_a_stale_page_cannot_release_a_newer_stop(page: Web) -> None:
-    page.post("/vehicles/1/pause", {})
-    seen = page.get("/vehicles/1/queue")["halt_epoch"]
-    page.post("/stop", {"vehicle": 1})
-    refused = page.send("POST", "/vehicles/1/resume", {"epoch": seen})
-    assert refused.status_code == 409
-    assert refused.json()["reason"] == "stale"
-    assert page.get("/vehicles/1/queue")["paused"] == "stopped"
 
 
 def test_a_stop_says_what_came_of_it(page: Web, check: Check) -> None:
@@ -314,37 +303,6 @@ def test_a_session_is_a_cookie_that_scripts_cannot_read(
         assert it.get("/session")["name"] == "anna"
         assert it.send("DELETE", "/session", None).status_code == 204
         assert it.send("GET", "/session", None).status_code == 401
-
-
-def test_a_server_that_is_killed_is_missed_and_found_again(tmp_path: Path) -> None:
-    store = str(tmp_path / "tasks.sqlite3")
-    with stand(tmp_path, serve_store=store) as it, web(tmp_path, it) as page:
-        has_rover(page)
-        stream = page.events()
-        next(stream)
-        it.server.end(signal.SIGKILL)
-        for kind, _, data in stream:
-            if kind == "server" and not data["reachable"]:
-                assert "is it running?" in data["detail"]
-                break
-        stop = page.send("POST", "/stop", {})
-        assert stop.status_code == 504
-        with process(
-            *("-m", "mav_tasks.cli", "serve", "--no-push", "--store", store),
-            *("--client", f"udpin:127.0.0.1:{it.client_port}"),
-            *("--vehicle", f"udpout:127.0.0.1:{it.rover_port}"),
-            folder=tmp_path,
-            name="again",
-        ):
-            for kind, _, data in stream:
-                if kind == "server":
-                    assert data["reachable"] is True
-                    break
-            wait_until(
-                lambda: page.send("POST", "/vehicles/1/pause", {}).status_code == 204,
-                within=20,
-                what="a pause",
-            )
 
 
 #: as in the guide

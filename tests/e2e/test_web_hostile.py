@@ -1,17 +1,13 @@
 """Attacks on a real web process, beside a real server and rover. Each was one that worked."""
 
 import socket
-import subprocess
-import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
 import pytest
 
-from tests.kit.processes import Stand, environment_with, process, stand, wait_until
+from tests.kit.processes import Stand, process, stand, wait_until
 from tests.kit.web import Web, add_key, has_rover, web
 
 pytestmark = pytest.mark.slow
@@ -81,39 +77,6 @@ def test_an_id_out_of_range_is_not_found_and_never_asked_for(page: Web, path: st
     assert answer.status_code == 404
 
 
-@contextmanager
-def flood(page: Web, send: Callable[[httpx.Client], object], *, clients: int) -> Iterator[None]:
-    """Let so many clients send requests one after the other for a ``with`` block."""
-    is_over = threading.Event()
-
-    def run() -> None:
-        with httpx.Client(base_url=page.url, timeout=30) as client:
-            while not is_over.is_set():
-                send(client)
-
-    threads = [threading.Thread(target=run) for _ in range(clients)]
-    for thread in threads:
-        thread.start()
-    try:
-        yield
-    finally:
-        is_over.set()
-        for thread in threads:
-            thread.join(60)
-
-
-def test_who_floods_stop_keeps_nobody_from_an_answer_nor_a_rover_stopped(page: Web) -> None:
-    def stop(client: httpx.Client) -> None:
-        client.post("/api/v1/stop", json={})
-
-    with flood(page, stop, clients=12):
-        answers = [page.post("/stop", {}) for _ in range(3)]
-    assert {each["phase"] for each in answers} == {"acknowledged"}
-    page.resume()
-    task = page.post("/vehicles/1/tasks", {"goals": [{"kind": "move", "distance": 0.3}]})
-    page.wait_for(task["id"], "completed")
-
-
 @pytest.mark.parametrize("epoch", [0, 1 << 24, 1 << 25, -1, 1 << 32, 1.0, True])
 def test_an_epoch_that_names_no_halt_does_not_release_a_stop(page: Web, epoch: object) -> None:
     page.post("/stop", {})
@@ -175,29 +138,6 @@ def _near(rover: dict[str, float]) -> tuple[float, float]:
 
 def _circle(rover: dict[str, float]) -> dict[str, float]:
     return {"latitude": rover["latitude"], "longitude": rover["longitude"], "radius": 50.0}
-
-
-def test_a_log_that_nobody_reads_keeps_no_stop_back(both: tuple[Stand, Web]) -> None:
-    command = ["-m", "mav_tasks.cli", "web", "--listen", "127.0.0.1:0", "--store", ""]
-    command += ["--server", f"udpout:127.0.0.1:{both[0].client_port}"]
-    with subprocess.Popen(
-        [sys.executable, *command],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,  # of which nobody reads anything
-        env=environment_with(XDG_CONFIG_HOME="/nonexistent"),
-    ) as popen:
-        try:
-            assert popen.stdout is not None
-            url = popen.stdout.readline().decode().split()[-1].rstrip("/")
-            port = int(url.rpartition(":")[2])
-            for _ in range(3000):  # each is a line of the log
-                with socket.create_connection(("127.0.0.1", port), 10) as each:
-                    each.sendall(b"\0\r\n\r\n")
-                    assert each.recv(20).startswith(b"HTTP/1.1 400")
-            stop = httpx.post(f"{url}/api/v1/stop", json={}, timeout=15)
-            assert stop.json()["phase"] == "acknowledged"
-        finally:
-            popen.kill()
 
 
 def _raw(page: Web, request: str) -> bytes:

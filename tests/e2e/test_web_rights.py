@@ -177,9 +177,7 @@ def test_the_first_key_closes_an_open_page(rig: Rig, tmp_path: Path) -> None:
     ("options", "words"),
     [
         (("--listen", "0.0.0.0:0"), "--listen 0.0.0.0:0: who sits elsewhere needs a token"),
-        (("--name", "rover.example"), "--name rover.example: who sits elsewhere needs a token"),
         (("--role", "observer"), "--role: the server decides"),
-        (("--tokens", "x.json"), "keys of the key ring now: mav-tasks keys add NAME"),
         (("tokens", "add", "anna", "--role", "operator"), "keys of the key ring now"),
         (("--keys", "none.toml"), "key ring none.toml does not exist"),
     ],

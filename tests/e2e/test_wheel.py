@@ -1,7 +1,6 @@
 """The wheel, installed into an empty environment, has what each of its extras promises."""
 
 import json
-import shutil
 import subprocess
 import sys
 import venv
@@ -11,9 +10,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from typer.main import get_command
 
-from mav_tasks.cli.app import app
 from tests.kit.plugin_example import EXAMPLE
 from tests.kit.processes import Process, environment_with, free_udp_ports, process
 
@@ -82,53 +79,6 @@ def test_the_wheel_serves_by_itself_and_has_more_with_its_extras(tmp_path: Path)
 
     install(python, f"{wheel}[testing]")
     with_testing(python, tmp_path)
-
-
-def interpreter(version: str) -> str | None:
-    """Return a Python of this version that can make environments, or None."""
-    there = (Path.home() / ".pyenv" / "versions").glob(f"{version}.*/bin/python")
-    for candidate in (shutil.which(f"python{version}"), *map(str, there)):
-        command = [candidate or "false", "-c", "import venv, ensurepip"]
-        if subprocess.run(command, capture_output=True, check=False).returncode == 0:
-            return candidate
-    return None
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize("version", ["3.12", "3.13"])
-def test_a_later_python_has_all_but_the_real_body(version: str, tmp_path: Path) -> None:
-    base = interpreter(version)
-    if base is None:
-        pytest.skip(f"no Python {version} here")
-    wheel = built(tmp_path / "dist")
-    subprocess.run([base, "-m", "venv", str(tmp_path / "venv")], check=True)
-    python = str(tmp_path / "venv" / "bin" / "python")
-    install(python, f"{wheel}[testing]")
-
-    for command in (*registered(), "fence upload", "keys add", "submit move"):
-        done = run(python, "-m", "mav_tasks.cli", *command.split(), "--help", folder=tmp_path)
-        assert (done.returncode, done.stderr) == (0, ""), command
-    bullet = ("-m", "rover_sim", "--port", "0", "--body", "bullet")
-    refused = run(python, *bullet, folder=tmp_path)
-    assert refused.returncode == 2
-    assert "wheels are for Python 3.11 at most" in refused.stderr
-    with serving(python, tmp_path) as (rover, url):
-        rover.wait_for(r"rover 1 \(ardupilot, kinematic\)")
-        ask = partial(run, python, "-m", "mav_tasks.cli", folder=tmp_path)
-        done = ask("submit", "move", "0.3", "--wait", "--server", url)
-        assert (done.returncode, done.stderr) == (0, "")
-    (tmp_path / "test_patrol.py").write_text(EXAMPLE, encoding="utf-8")
-    tested = run(python, "-m", "pytest", "-q", "test_patrol.py", folder=tmp_path)
-    assert tested.returncode == 0, tested.stdout + tested.stderr
-    demo = run(python, "-m", "mav_tasks.cli", "demo", "--fast", folder=tmp_path)
-    assert demo.returncode == 0, demo.stdout + demo.stderr
-    assert "pip install matplotlib" in demo.stdout
-
-
-def registered() -> list[str]:
-    """Return the names of all commands of the command line."""
-    return sorted(get_command(app).commands)  # type: ignore[attr-defined]
 
 
 def without_extras(python: str, folder: Path) -> None:

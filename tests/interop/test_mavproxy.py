@@ -45,18 +45,16 @@ def test_an_ardupilot_rover(tmp_path: Path) -> None:
         assert_nothing_lost(it, restarts=1)
 
 
-@pytest.mark.parametrize("persona", ["px4", "generic"])
-def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
+def test_a_px4_rover(tmp_path: Path) -> None:
     """Its modes by number, and the tasks' texts not shown: see tests/kit/mavproxy.py."""
     with (
-        stand(tmp_path, persona=persona) as running,
+        stand(tmp_path, persona="px4") as running,
         mavproxy(running.client_port, tmp_path) as it,
     ):
         connect(it)
         it.ask("status GLOBAL_POSITION_INT", "lat : -353632620, lon : 1491652370, .*hdg : 0")
         change(it, "COM_OF_LOSS_T", 1.5)
-        if persona == "px4":  # integers bytewise are MAVProxy's for a PX4 only
-            change(it, "COM_FLTMODE1", -7)
+        change(it, "COM_FLTMODE1", -7)  # an integer, whose bytes are in the place of a float
         it.ask("long DO_SET_MODE 1 4 3", "DO_SET_MODE: ACCEPTED")
         it.ask("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
         it.wait_for("^ARMED")
@@ -66,12 +64,11 @@ def test_a_px4_rover(persona: str, tmp_path: Path) -> None:
         it.ask("long 54003", TASK_SHOWN % 54003)
         running.server.wait_for("task 1 killed: STOP")
         it.ask("resume", "DO_PAUSE_CONTINUE: ACCEPTED")
-        if persona == "px4":
-            load(it, "wp", [(3, WAYPOINT, 0.0, *place) for place in PLACES], tmp_path)
-            it.ask("long DO_SET_MODE 1 4 4", "DO_SET_MODE: ACCEPTED")
-            it.wait_for("waypoint 1", within=15)
-            running.server.wait_for("task 2 completed")
-            assert place(running) == pytest.approx((2.0, 0.0), abs=0.4)
+        load(it, "wp", [(3, WAYPOINT, 0.0, *place) for place in PLACES], tmp_path)
+        it.ask("long DO_SET_MODE 1 4 4", "DO_SET_MODE: ACCEPTED")
+        it.wait_for("waypoint 1", within=15)
+        running.server.wait_for("task 2 completed")
+        assert place(running) == pytest.approx((2.0, 0.0), abs=0.4)
         lat, lon = PLACES[1]
         it.ask(f"guided {lat + METRE} {lon} 0", "DO_REPOSITION: ACCEPTED")
         running.server.wait_for(r"rover 1: task (\d) submitted: go to(.|\n)*task \1 executing")

@@ -1,5 +1,6 @@
-"""MAVSDK 4, unmodified: missions and places through the server, by both faces, over good and bad
-nets. No answer may take its process down.
+"""MAVSDK 4, unmodified: missions and places through the server, over good and bad nets.
+
+No answer may take its process down.
 """
 
 import re
@@ -14,9 +15,9 @@ pytestmark = [pytest.mark.interop, pytest.mark.slow, pytest.mark.timeout(200)]
 
 
 @some_cases
-def test_missions_are_driven_as_tasks(persona: str, face: str, loss: float, tmp_path: Path) -> None:
+def test_missions_are_driven_as_tasks(persona: str, loss: float, tmp_path: Path) -> None:
     with stand(tmp_path, persona=persona) as running:
-        said = run_script(f"{face}missions", running, persona=persona, loss=loss)
+        said = run_script("missions", running, persona=persona, loss=loss)
         assert "raw downloaded [(16, 80), (16, 160), (16, 240)]" in said
         assert "downloaded 2" in said
         log = running.server.text

@@ -3,7 +3,6 @@
 import os
 import select
 import socket
-import tty
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -92,62 +91,6 @@ class SerialFar:
     def mend(self) -> None:
         """Plug the device in again."""
         self._device.plug()
-
-
-class LineFar:
-    """The far end is a serial line at whose other end ``UdpEnd`` is."""
-
-    def __init__(self, path: Path, url: str) -> None:
-        self.url = url
-        self._line = _opened(path)
-
-    def descriptor(self) -> int | None:
-        """Return the line."""
-        return self._line
-
-    def cut(self) -> None:
-        """Close the line."""
-        os.close(self._line)
-
-    def mend(self) -> None:
-        """Do nothing."""
-
-
-class UdpEnd:
-    """Sends what comes by a serial line to who sends to its UDP port, in pieces, and back."""
-
-    def __init__(self, path: Path, port: int, *, piece: int) -> None:
-        self._line, self._piece = _opened(path), piece
-        self._server = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._server.bind((LOOPBACK, port))
-        self._is_over = Event()
-        self._thread = Thread(target=self._run, name="UDP end", daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Die: pass nothing on."""
-        if not self._is_over.is_set():
-            self._is_over.set()
-            self._thread.join(END_LIMIT)
-            self._server.close()
-            os.close(self._line)
-
-    def _run(self) -> None:
-        data, server = self._server.recvfrom(4096)
-        os.write(self._line, data)
-        while not self._is_over.is_set():
-            ready = select.select([self._line, self._server.fileno()], [], [], TICK)[0]
-            with suppress(OSError):  # the server has ended
-                if self._line in ready:
-                    self._server.sendto(os.read(self._line, self._piece), server)
-                if self._server.fileno() in ready:
-                    os.write(self._line, self._server.recv(4096))
-
-
-def _opened(path: Path) -> int:
-    line = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    tty.setraw(line)
-    return line
 
 
 class Bridge:

@@ -13,7 +13,6 @@ from mav_tasks.engine.inputs import LinkChanged, LinkSide
 from mav_tasks.engine.snapshot import VehicleSnapshot
 from mav_tasks.in_memory import CLIENT_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
-from mav_tasks.runner import link_changed
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -131,13 +130,12 @@ class FleetServer(InMemoryServer):
     def up(self, link: MemoryLink, *, now: float) -> None:
         """Bring a vehicle link up."""
         self._links[link.name] = link
-        self.pump.handle(link_changed(link, LinkSide.VEHICLES), now=now)
-        self.pump.turn(now=now)
+        change = LinkChanged(link.name, LinkSide.VEHICLES, up=True, peers=link.peers, is_local=True)
+        self.take_in(change, now=now)
 
     def down(self, link: MemoryLink, *, now: float) -> None:
         """Take a vehicle link down, and report it to the engine as its owner does."""
-        self.pump.handle(LinkChanged(link.name, LinkSide.VEHICLES, up=False), now=now)
-        self.pump.turn(now=now)
+        self.take_in(LinkChanged(link.name, LinkSide.VEHICLES, up=False), now=now)
 
 
 class Radio:

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
-from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
+from mav_tasks.links.memory import Conditions, MemoryNet
 from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.task import Task
 from rover_sim.virtual import VirtualWorld
 from tests.kit.client import FakeClient
-from tests.kit.mission import COUNT, MISSION_ACK, REQUEST, REQUEST_INT, Ack
+from tests.kit.mission import MISSION_ACK, Ack
 
 ROVER = "rover1"
 
@@ -49,41 +49,18 @@ class QuietWorld(VirtualWorld):
 
 
 class Wire(MemoryNet):
-    """A net that records the traffic of uploads: requests, counts and acks."""
+    """A net that records the acks of uploads."""
 
     def __init__(self, *, seed: int, conditions: Conditions) -> None:
         super().__init__(seed=seed, conditions=conditions)
-        #: (client, item) per request of the server; item None: a client's count arrived
-        self.asked: list[tuple[str, int | None]] = []
         #: (client, ack) per ack of the server, whether it arrived or not
         self.acks: list[tuple[str, Ack]] = []
-        self._newest: dict[str, int] = {}
 
     def send(self, source: str, target: str, data: bytes) -> None:
-        """Record the server's requests and acks."""
-        if source == CLIENT_LINK and (_is(data, REQUEST) or _is(data, REQUEST_INT)):
-            self.asked.append((target, int.from_bytes(_payload(data)[:2], "little")))
-        elif source == CLIENT_LINK and _is(data, MISSION_ACK):
-            self.acks.append((target, Ack.of(_payload(data))))
+        """Record the server's acks."""
+        if source == CLIENT_LINK and int.from_bytes(data[7:10], "little") == MISSION_ACK:
+            self.acks.append((target, Ack.of(data[10 : 10 + data[1]].ljust(9, b"\0"))))
         super().send(source, target, data)
-
-    def arrive(self, link: MemoryLink, source: str, data: bytes) -> None:
-        """Record a count that is newer than all packets before."""
-        if link.name == CLIENT_LINK:
-            newest = self._newest.get(source)
-            if newest is None or (data[4] - newest) % 256 < 128:
-                self._newest[source] = data[4]
-                if _is(data, COUNT):
-                    self.asked.append((source, None))
-        super().arrive(link, source, data)
-
-
-def _is(data: bytes, message_id: int) -> bool:
-    return int.from_bytes(data[7:10], "little") == message_id
-
-
-def _payload(data: bytes) -> bytes:
-    return data[10 : 10 + data[1]].ljust(9, b"\0")
 
 
 class Beacon:

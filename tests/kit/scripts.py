@@ -4,26 +4,17 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
 
-from mav_tasks.links.memory import Conditions
-from tests.kit.lossy_udp import lossy_udp
+from tests.kit.lossy_udp import LossyUdp
 from tests.kit.processes import STOP_LIMIT, Stand
 from tests.kit.volume import some
 
-FACES = {"sync": "", "asyncio": "asyncio_"}
 LOSS = 0.2  # of the datagrams, each way
 NETS = {0.0: "nothing lost", LOSS: "a fifth lost"}
-#: each make, each face and each net
-CASES = (
-    ("ardupilot", "sync", 0.0),
-    ("ardupilot", "asyncio", LOSS),
-    ("px4", "sync", 0.0),
-    ("generic", "asyncio", LOSS),
-)
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 150.0  # s for a script
 SEED = 20
@@ -31,13 +22,10 @@ SEED = 20
 #: it gives up.
 TRIES = 8
 
-_PARAMS = [
-    pytest.param(make, FACES[face], loss, id=f"{make}-{face}-{NETS[loss]}")
-    for make, face, loss in CASES
-]
 #: of tests of half a minute
-some_cases = pytest.mark.parametrize(("persona", "face", "loss"), some(_PARAMS, 1, 2))
-#: where blocking calls show the same as awaited ones
+some_cases = pytest.mark.parametrize(
+    ("persona", "loss"), some([("ardupilot", 0.0), ("ardupilot", LOSS), ("px4", 0.0)], 1, 2)
+)
 some_makes = pytest.mark.parametrize(
     ("persona", "loss"), [("ardupilot", 0.0), ("px4", 0.0), ("generic", LOSS)]
 )
@@ -50,7 +38,7 @@ def clients_port(running: Stand, loss: float) -> Iterator[int]:
     if not loss:
         yield running.client_port
         return
-    with lossy_udp(running.client_port, Conditions(loss=loss), seed=SEED) as proxy:
+    with closing(LossyUdp(running.client_port, loss=loss, seed=SEED)) as proxy:
         yield proxy.port
     came, lost = (
         sum(getattr(way, what) for way in (proxy.to_server, proxy.to_clients))

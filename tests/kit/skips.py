@@ -6,7 +6,6 @@ What a machine may lack is listed here. Each skip is named in pytest's summary i
 import pytest
 
 MAY_LACK = (
-    "no Python 3.",  # test_wheel tries later ones where they are
     "no systemd-analyze",
     "root may write anywhere",
     "may not make a small file system",

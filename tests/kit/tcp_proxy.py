@@ -19,11 +19,8 @@ class TcpProxy:
         (self.port,) = free_tcp_ports(1)
         self._is_silent = Event()
         self._is_refusing = Event()
-        self._is_held = Event()
-        self._is_closing_far = Event()
         self._over = Event()
         self._pairs: dict[socket.socket, socket.socket] = {}
-        self._far: set[socket.socket] = set()  # those towards the port
         self._stuck: list[socket.socket] = []  # of a net that was cut: open at both ends
         self._selector = selectors.DefaultSelector()
         self._listener = socket.create_server(("127.0.0.1", self.port))
@@ -39,21 +36,6 @@ class TcpProxy:
         self._is_silent.set()
         while self._is_silent.is_set():
             self._over.wait(LOOK)
-
-    def close_far_side(self) -> None:
-        """Close the connections that exist on the port's side; their clients are told nothing."""
-        self._is_closing_far.set()
-        while self._is_closing_far.is_set():
-            self._over.wait(LOOK)
-
-    @contextmanager
-    def held(self) -> Iterator[None]:
-        """Forward nothing during a block, also of new connections; then what came meanwhile."""
-        self._is_held.set()
-        try:
-            yield
-        finally:
-            self._is_held.clear()
 
     @contextmanager
     def refusing(self) -> Iterator[None]:
@@ -79,20 +61,10 @@ class TcpProxy:
                     self._selector.unregister(each)
                     self._stuck.append(each)
                 self._pairs.clear()
-                self._far.clear()
                 self._is_silent.clear()
-            if self._is_closing_far.is_set():
-                for each in tuple(self._far & self._pairs.keys()):
-                    self._stuck.append(self._pairs[each])
-                    self._part(each, self._pairs[each])
-                    each.close()
-                self._is_closing_far.clear()
             if self._is_refusing.is_set():
                 for each in tuple(self._pairs):
                     self._end(each)
-            if self._is_held.is_set():
-                self._over.wait(LOOK)
-                continue
             for key, _ in self._selector.select(LOOK):
                 found = key.fileobj
                 assert isinstance(found, socket.socket)
@@ -112,7 +84,6 @@ class TcpProxy:
             one.close()
             return
         self._pairs |= {one: other, other: one}
-        self._far.add(other)
         for each in (one, other):
             self._selector.register(each, selectors.EVENT_READ)
 
@@ -130,13 +101,8 @@ class TcpProxy:
         other = self._pairs.get(one)
         if other is None:
             return
-        self._part(one, other)
-        for each in (one, other):
-            with suppress(OSError):
-                each.close()
-
-    def _part(self, one: socket.socket, other: socket.socket) -> None:
         for each in (one, other):
             del self._pairs[each]
-            self._far.discard(each)
             self._selector.unregister(each)
+            with suppress(OSError):
+                each.close()

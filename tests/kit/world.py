@@ -1,17 +1,19 @@
 """The virtual world of the scenarios: server, rovers and clients on one net, always observed."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from math import degrees, hypot, nan, radians, remainder
 from pathlib import Path
 from typing import Any, TypeVar
 
+from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK, InMemoryServer
 from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet
 from mav_tasks.links.policy import LinkPolicy
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.messages import CommandInt
 from mav_tasks.mavlink.signing import Key
+from mav_tasks.observer import EngineObserver
 from mav_tasks.recording.decisions import Decisions
 from mav_tasks.settings import Settings
 from mav_tasks.store import Store
@@ -106,6 +108,23 @@ def is_ready_to_be_driven(rover: Vehicle) -> bool:
     return rover.autopilot.armed and rover.autopilot.mode is Mode.GUIDED
 
 
+class Outputs:
+    """Collects the packets of a server, with their times."""
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[float, Outgoing]] = []
+
+    def on_input(self, item: object, *, now: float) -> None:
+        """Ignore what comes in."""
+
+    def on_output(self, packets: Iterable[Outgoing], _events: object, *, now: float) -> None:
+        """Keep what goes out."""
+        self.sent += [(now, packet) for packet in packets]
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
 class World(VirtualWorld):
     """One server, one or more rovers, and one or more clients.
 
@@ -132,12 +151,13 @@ class World(VirtualWorld):
         heading: float = 0.0,
         first_id: int = 1,
         more_links: tuple[str, ...] = (),
+        outputs: Outputs | None = None,
     ) -> None:
         """Create a world; ``records`` is a folder for a record of each server.
 
         Rovers start at a ``heading`` in degrees, and have system ids from ``first_id`` on. With
         ``rover_key`` they sign, and accept only signed packets. ``more_links``: to clients, besides
-        CLIENT_LINK. The other arguments are InMemoryServer's.
+        CLIENT_LINK. ``outputs`` are told what leaves. The other arguments are InMemoryServer's.
         """
         self._policies, self._keys, self._wall_offset = policies, keys, wall_offset
         self.seed = seed
@@ -173,7 +193,7 @@ class World(VirtualWorld):
             self.rover_parties.append(party)
             self.join(party)
         names = tuple(f"rover{number}" for number in numbers)
-        self._names, self._settings = names, settings
+        self._names, self._settings, self._outputs = names, settings, outputs
         self._more_links = [self.net.link(name) for name in more_links]
         self.watched.to_clients |= set(more_links)
         self._records = records
@@ -423,13 +443,12 @@ class World(VirtualWorld):
             observer.check()
 
     def _new_server(self, store: Store | None, restored: Restored | None) -> InMemoryServer:
-        observers: list[Decisions] = []
+        observers: list[EngineObserver] = [] if self._outputs is None else [self._outputs]
         if self._records is not None:
             settings = self._settings or Settings()
-            observers = [
-                Decisions(self._records, settings, restored, now=self.now, size=100_000_000)
-            ]
-            self.recorders += observers
+            recorder = Decisions(self._records, settings, restored, now=self.now, size=100_000_000)
+            self.recorders.append(recorder)
+            observers.append(recorder)
         return InMemoryServer(
             self.net,
             vehicles=self._names,
@@ -470,6 +489,8 @@ class ObservedNet(MemoryNet):
         self.cut: set[frozenset[str]] = set()
         #: returns whether to lose (source, target, datagram)
         self.loses: Callable[[str, str, bytes], bool] = lambda *_: False
+        #: returns the pieces in which a datagram arrives at a link
+        self.cut_up: Callable[[str, bytes], Iterable[bytes]] = lambda _, data: [data]
         #: called with (client, datagram) when the server reads it
         self.on_read: Callable[[str, bytes], None] = lambda *_: None
         #: called with (rover, source, datagram) on its arrival
@@ -502,7 +523,8 @@ class ObservedNet(MemoryNet):
             return
         elif link.name in self.to_vehicles or link.name in self.to_clients:
             self._unread.append((link.name, source, data))
-        super().arrive(link, source, data)
+        for piece in self.cut_up(link.name, data):
+            super().arrive(link, source, piece)
 
     def read_again(self, name: str) -> None:
         """Let the server read a link again, with the times at which its packets arrived."""

@@ -16,8 +16,7 @@ from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import ACCEPTED, DENIED, HOLD
-from tests.kit.gateways.engines import FleetWorld, Gateway
-from tests.kit.gateways.serving import moves
+from tests.kit.gateways.engines import FleetWorld, Gateway, moves
 from tests.kit.volume import tries
 
 NAMES = ("server", "b", "c")
@@ -38,6 +37,7 @@ class Life:
         self.chance = Random(seed)
         settings = Settings(on_takeover=on_takeover, on_restart="continue")
         self.world = FleetWorld(folder, names=NAMES, seed=seed, settings=settings, **kw)
+        self.world.slow = 0.01
         self.world.watched.to_clients.clear()  # words wait at gateways that pass them on
         for observer in self.world.observers:
             observer.expects_gaps = True  # a gateway that failed leaves one
@@ -83,7 +83,7 @@ class Life:
         last = chance.uniform(0.05, 3.0)
         if not well(it):
             return
-        match chance.randrange(7):
+        match chance.randrange(10):
             case 0:
                 world.kill(it.name)
                 self._later(last, lambda: world.start(it.name))
@@ -101,6 +101,14 @@ class Life:
                 self._later(3 * last, lambda: world.mend(it.name))
             case 5:
                 it.set_clock(chance.choice((3_600.0, -3_600.0, 5.0, -5.0, 0.0)))
+            case 6:
+                world.database.sessions.pop(it.name, None)
+            case 7:  # what it asks is carried out, and it does not hear so
+                it.hears = False
+                self._later(last, lambda: setattr(it, "hears", True))
+            case 8:
+                it.is_pinged = False
+                self._later(last, lambda: setattr(it, "is_pinged", True))
             case _:
                 world.database.restart()
                 world.database.is_up = False

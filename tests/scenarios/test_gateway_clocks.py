@@ -7,7 +7,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
-from tests.kit.gateways.serving import moves
+from tests.kit.gateways.engines import moves
 from tests.kit.volume import some
 from tests.scenarios.test_gateways import KEY, UTC, Fleet
 

@@ -5,7 +5,6 @@ from math import inf
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import Outgoing
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -13,7 +12,8 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
-from tests.kit.world import World, near_pose
+from tests.kit.world import Outputs, World, near_pose
+from tests.scenarios.conftest import MakeWorld
 
 HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
 SETPOINT, COMMAND = 84, 76
@@ -182,25 +182,21 @@ def test_a_late_tick_is_a_zero_first_and_holds_the_task(driving: World, late: fl
     assert world.rover.autopilot.mode is Mode.HOLD
 
 
-@pytest.mark.patches_core
-def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(world: World) -> None:
-    server, left = world.server, list[tuple[common.MAVLink_message, float]]()
-    take_packets = server.engine.take_packets
-
-    def taken() -> list[Outgoing]:
-        packets = take_packets()
-        for packet in packets:
-            if packet.link == VEHICLE_LINK:
-                message = common.MAVLink(None).decode(bytearray(packet.data))
-                left.append((message, packet.until - world.now))
-        return packets
-
-    server.engine.take_packets = taken  # type: ignore[method-assign]
+def test_what_moves_a_rover_must_not_leave_late_and_what_stops_it_may(
+    make_world: MakeWorld,
+) -> None:
+    outputs = Outputs()
+    world = make_world(outputs=outputs)
     world.client.move(1)
     world.until_state(1, S.EXECUTING)
     world.run(1)
     world.client.stop()
     world.run(3)
+    left = [
+        (common.MAVLink(None).decode(bytearray(packet.data)), packet.until - at)
+        for at, packet in outputs.sent
+        if packet.link == VEHICLE_LINK
+    ]
     late = Settings().watch.motion_fresh
     moving = [until for each, until in left if each.get_msgId() == SETPOINT and each.vx]
     zeros = [until for each, until in left if each.get_msgId() == SETPOINT and not each.vx]

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from pymavlink.dialects.v20 import common
+from pymavlink.dialects.v20 import ardupilotmega, common
 
 from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.mavlink import messages as m
 from mav_tasks.settings import ROLES, Clients, Limits, Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskState
 from rover_sim.personas import Mode
@@ -41,10 +42,16 @@ class Word(NamedTuple):
     forwarded: str
 
 
+def tables() -> tuple[str, str]:
+    """Return what the document has about commands, and about messages."""
+    text = DOCUMENT.read_text("utf-8").partition("<!-- policy table")[2].partition("<!-- end of")[0]
+    commands, _, messages = text.partition("\nCommands:")[2].partition("\nMessages:")
+    return commands, messages
+
+
 def words() -> Iterator[Word]:
     """Yield what the table has about words that the server itself does not handle."""
-    text = DOCUMENT.read_text("utf-8").partition("<!-- policy table")[2].partition("<!-- end of")[0]
-    commands, _, messages = text.partition("\nMessages:")
+    commands, messages = tables()
     for part, is_command in ((commands, True), (messages, False)):
         for line in part.splitlines():
             cells = [cell.strip() for cell in line.strip("|").split("|")]
@@ -140,3 +147,29 @@ def test_what_reaches_the_rover_is_what_the_table_says(make_world: MakeWorld, st
                 if not passes:
                     wrong.append(f"{word} by {role}: {before} becomes {after}")
     assert wrong == []
+
+
+ENVELOPES = (75, 76)  # COMMAND_INT and COMMAND_LONG are judged by the command in them
+
+
+def test_each_message_and_command_of_mavlink_is_judged_by_name() -> None:
+    commands, messages = (
+        {int(number): name for number, name in re.findall(r"\b(\d+) ([A-Z]\w+)", part)}
+        for part in tables()
+    )
+    entries = ardupilotmega.enums["MAV_CMD"].items()
+    wanted = {number: entry.name.removeprefix("MAV_CMD_") for number, entry in entries}
+    wanted = {number: name for number, name in wanted.items() if name != "ENUM_END"}
+    assert {number: commands.get(number) for number in wanted} == wanted
+    wanted = {number: kind.msgname for number, kind in m.ALL.items() if number not in ENVELOPES}
+    assert {number: messages.get(number) for number in wanted} == wanted
+
+
+def test_what_moves_a_rover_is_for_no_observer_and_nobody_s_at_any_time() -> None:
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in "".join(tables()).splitlines()
+        if line.startswith(("| go", "| motion", "| manual", "| action"))
+    ]
+    assert len(rows) > 20
+    assert [row for row in rows if row[1] == "observer" or row[3] == "always"] == []

@@ -1,19 +1,14 @@
 """The buttons of QGroundControl: each does what it says, once, and nothing pops up."""
 
-from math import nan
-
-import pytest
-
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
+from rover_sim.personas import ARDUPILOT, Mode, Persona
 from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.qgc.joined import (
     degrees,
     each_guided,
     each_make,
-    each_pair,
     each_version,
     join,
     slowest_ack,
@@ -57,53 +52,6 @@ class TestWhileDriving:
         assert party.qgc.screen.complaints == []
 
 
-class TestAlsoWhileDriving:
-    @each_pair
-    def test_the_mode_menu_is_obeyed(
-        self, make_world: MakeWorld, persona: Persona, profile: Profile
-    ) -> None:
-        world = make_world(persona=persona)
-        party = driving(world, profile)
-        manual = {True: 0, False: 1 << 16}[persona is PROMPT]
-        party.operator.set_mode(manual)
-        active = world.now
-        world.until(lambda: party.vehicle.state.mode == manual, within=1.3)
-        assert world.now - active < 0.3, "the heartbeat comes at once"
-        assert world.rover.autopilot.mode is Mode.MANUAL
-        assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-        assert party.qgc.screen.complaints == []
-
-
-@for_each("persona", [ARDUPILOT, PX4])
-def test_a_mode_is_shown_at_once_also_of_a_rover_that_shows_it_once_a_second(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    manual = {True: 0, False: 1 << 16}[persona is ARDUPILOT]
-    party.operator.set_mode({True: 4, False: 0x03040000}[persona is ARDUPILOT])
-    world.run(2.1)
-    world.until(lambda: party.vehicle.state.beat_at > world.now - 0.05, within=1.5)
-    party.operator.set_mode(manual)
-    world.until(lambda: party.vehicle.state.mode == manual, within=0.4)
-    party.check()
-
-
-@each_make
-def test_emergency_stop_disarms_at_once(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    party = driving(world, V4)
-    pressed = party.operator.emergency_stop()
-    world.run(0.05)
-    assert not world.rover.autopilot.armed
-    assert pressed.result == 0
-    world.run(4)
-    assert world.stands()
-    assert not world.rover.autopilot.armed
-    assert "arm" in party.operator.offers
-    assert party.qgc.screen.complaints == []
-
-
 @each_version
 @each_make
 def test_actions_are_acknowledged_in_time_from_whom_they_were_sent_to(
@@ -126,61 +74,6 @@ def test_actions_are_acknowledged_in_time_from_whom_they_were_sent_to(
     assert [each.result for each in pressed] == [0] * len(pressed)
     assert slowest_ack(party) < 0.6
     assert party.qgc.screen.complaints == []
-
-
-@each_make
-def test_what_is_refused_is_shown_with_the_reason(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.operator.action(MOVE, nan, component=191)
-    world.run(0.5)
-    assert [each.split(" ", 1)[1] for each in party.qgc.screen.complaints] == [
-        f"MAV_CMD({MOVE}) command denied",
-        "param1 distance is not given",  # the box on the map: the popup says no reason
-    ]
-
-
-@each_make
-def test_arming_and_disarming(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    for force in (False, True):
-        party.operator.arm(force=force)
-        world.run(1.5)
-        assert world.rover.autopilot.armed
-        party.operator.disarm()
-        world.run(1.5)
-        assert not world.rover.autopilot.armed
-    party.check()
-
-
-@each_make
-def test_home_is_set(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.operator.set_home(*degrees(30, 0), 584)
-    world.run(2)
-    party.check()
-    assert party.vehicle.state.home is not None
-    latitude, longitude = degrees(30, 0)
-    assert party.vehicle.state.home[:2] == pytest.approx((latitude, longitude), abs=1e-5)
-
-
-@each_make
-def test_a_joystick_takes_the_rover_over(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    party = driving(world, V4)
-    party.operator.sticks(0, 0, 0, 0)
-    world.run(2)
-    assert world.state(1)[0] is S.EXECUTING, "centred"
-    party.operator.sticks(700, 0, 0, 0)
-    world.run(2)
-    party.operator.let_go()
-    assert world.state(1) == (S.PAUSED, R.TAKEOVER)
-    own = [text for text in party.popups if text == "Failsafe activated"]
-    assert len(own) == (persona is not PROMPT), "a PX4 rover itself says so, and stands"
-    assert party.popups == own
-    assert party.qgc.screen.violations == []
 
 
 # clicks on the map

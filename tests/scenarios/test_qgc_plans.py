@@ -8,10 +8,10 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode, Persona
 from tests.kit.cases import for_each
 from tests.kit.mission import ITEM_INT, REQUEST, REQUEST_INT
-from tests.kit.qgc.joined import each_guided, each_make, each_version, join, place, slowest_ack
+from tests.kit.qgc.joined import each_guided, each_version, join, place, slowest_ack
 from tests.kit.qgc.party import QgcParty
 from tests.kit.qgc.plan_master import Plan
-from tests.kit.qgc.profile import V4, Profile
+from tests.kit.qgc.profile import Profile
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
@@ -100,22 +100,6 @@ def test_is_interrupted_and_gone_on_with(
     assert is_near(world, 3.0, 3.0)
     assert len(world.tasks()) == 1
     party.check()
-
-
-@each_make
-def test_a_bad_item_is_named(make_world: MakeWorld, persona: Persona) -> None:
-    world = make_world(persona=persona)
-    party = join(world, V4)
-    party.plans.upload(FIRST._replace(waypoints=[place(1, 0), place(30_000, 0), place(1, 1)]))
-    world.until(lambda: party.plans.is_done, within=5)
-    number = 2 if persona is PROMPT else 1
-    popup, box = party.popups  # its own, and the reason
-    assert box == "item 2 is 30.0 km away, more than 10 km"
-    assert popup.startswith("Mission transfer failed. Error: ")
-    assert popup.endswith(f"Item #{number} Command: 16")
-    assert party.plans.outcome == {0: False, 1: True, 2: True}
-    assert world.tasks() == ()
-    assert party.qgc.screen.violations == []
 
 
 @each_version

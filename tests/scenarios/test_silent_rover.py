@@ -68,7 +68,7 @@ def test_every_question_is_answered_while_its_rover_is_silent(make_world: MakeWo
         assert tasks.queue().paused is TaskReason.OPERATOR
 
 
-def test_a_server_that_has_not_heard_its_rover_yet_tells_of_its_tasks(
+def test_a_server_that_has_not_heard_its_rover_yet_tells_of_its_tasks_and_takes_a_stop(
     make_world: MakeWorld,
 ) -> None:
     world = make_world()
@@ -94,10 +94,15 @@ def test_a_server_that_has_not_heard_its_rover_yet_tells_of_its_tasks(
             tasks.timing(1)
         with pytest.raises(NoAnswer, match="rover 1 is silent"):
             tasks.mission_file()
+        with pytest.raises(Refused, match="silent"):
+            tasks.stop()  # it counts, and the rover cannot be told
     world.rovers[0].set_faults(Faults())
     world.sleep(3)
     with world.sync_client() as tasks:
         assert (tasks.vehicles()[0].is_heard, tasks.submit(Move(1.0)).id) == (True, 2)
+        assert (tasks.queue().paused, tasks.vehicles()[0].mode) == (TaskReason.STOPPED, "HOLD")
+        world.sleep(3)
+        assert world.rovers[0].stands
 
 
 def test_a_script_that_submits_just_after_the_server_came_back_is_not_refused(

@@ -10,18 +10,16 @@ from mav_tasks.engine.inputs import (
     Input,
     LinkChanged,
     LinkSide,
-    Outgoing,
     PeerChanged,
 )
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
-from mav_tasks.links.base import Peer
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
-from tests.kit.world import COMMAND_ID, MODE_COMMAND, World, at, near_pose
+from tests.kit.world import COMMAND_ID, MODE_COMMAND, Outputs, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 SEED = 31
@@ -37,32 +35,31 @@ def tell(world: World, item: Input) -> None:
     world.server.pump.turn(now=world.now)
 
 
-def cut_anywhere(world: World, name: str, side: LinkSide, peers: tuple[str, ...]) -> None:
-    """From now on a link of the server's is a stream."""
-    random, link = Random(SEED), world.server._links[name]
-    whole = link.receive
+@anew
+def streams(make_world: MakeWorld, outputs: Outputs) -> World:
+    """Return a world in which both links of the server are streams, cut anywhere."""
+    world, random = make_world(outputs=outputs), Random(SEED)
 
-    def receive(limit: int) -> list[tuple[Peer, bytes]]:
-        pieces: list[tuple[Peer, bytes]] = []
-        for peer, data in whole(limit):
-            edges = sorted({0, len(data), *random.choices(range(len(data)), k=random.randrange(4))})
-            pieces += [(peer, data[a:b]) for a, b in pairwise(edges)]
-        return pieces
+    def cut(link: str, data: bytes) -> list[bytes]:
+        count = random.randrange(4) if link.startswith("server:") else 0
+        edges = sorted({0, len(data), *random.choices(range(len(data)), k=count)})
+        return [data[a:b] for a, b in pairwise(edges)]
 
-    link.receive = receive  # type: ignore[method-assign]
-    tell(world, LinkChanged(name, side, up=True, is_stream=True))
-    for peer in peers:
+    world.watched.cut_up = cut
+    for name, side, peer in (
+        (VEHICLE_LINK, LinkSide.VEHICLES, "rover1"),
+        (CLIENT_LINK, LinkSide.CLIENTS, "client"),
+    ):
+        tell(world, LinkChanged(name, side, up=True, is_stream=True))
         tell(world, PeerChanged(name, peer, up=True))
+    world.run(1.5)
+    return world
 
 
 @anew
-def streams(make_world: MakeWorld) -> World:
-    """A world in which both links of the server are streams."""
-    world = make_world()
-    cut_anywhere(world, VEHICLE_LINK, LinkSide.VEHICLES, ("rover1",))
-    cut_anywhere(world, CLIENT_LINK, LinkSide.CLIENTS, ("client",))
-    world.run(1.5)
-    return world
+def outputs() -> Outputs:
+    """Return what collects what leaves the server."""
+    return Outputs()
 
 
 def gaps(client: FakeClient, since: float) -> int:
@@ -108,24 +105,17 @@ def test_who_drove_and_is_gone_leaves_no_velocity_behind_and_must_ask_again(
     assert world.truth.forward_speed > 0.4
 
 
-@pytest.mark.patches_core
-def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(streams: World) -> None:
-    world, sent = streams, list[Outgoing]()
-    take_packets = world.server.engine.take_packets
-
-    def taken() -> list[Outgoing]:
-        packets = take_packets()
-        sent.extend(packets)
-        return packets
-
-    world.server.engine.take_packets = taken  # type: ignore[method-assign]
+def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(
+    streams: World, outputs: Outputs
+) -> None:
+    world = streams
     world.client.move(3)
     world.until_state(1, S.EXECUTING)
     world.run(1)
-    assert not any(outgoing.is_first for outgoing in sent)
+    assert not any(outgoing.is_first for _, outgoing in outputs.sent)
     world.client.stop()
     world.until(world.stands, within=3)
-    firsts = [outgoing for outgoing in sent if outgoing.is_first]
+    firsts = [outgoing for _, outgoing in outputs.sent if outgoing.is_first]
     assert firsts[0].data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
     assert {outgoing.data[7] for outgoing in firsts} == {MODE_COMMAND}
 

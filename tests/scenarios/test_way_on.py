@@ -185,24 +185,3 @@ def test_stop_ends_clicks_and_is_left_by_continue_only(
     world.run(4)
     assert world.stands()
     assert {"go to", "return"} <= party.operator.offers
-
-
-@one
-def test_start_and_return_drive_beside_a_held_task_and_one_warning_names_it(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = joined(make_world, persona, ROUND)
-    world.client.move(5.0)
-    world.until(lambda: world.truth.north > 0.5, within=20)
-    world.observer.expects_gaps = True
-    world.suspend_server(3.0)
-    world.until(lambda: world.state(2) == (S.HELD, R.LATE), within=10)
-    world.run(4)
-    at = world.now
-    party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
-    world.until_state(1, S.COMPLETED, within=60)
-    assert world.state(2)[0] is S.HELD
-    assert [text for text in texts(party, since=at) if "task 2" in text] == [
-        'Rover 1 keeps task 2 on hold: press "Held: remainder", "Held: again" or "Held: skip"'
-    ]
-    assert texts(party, since=at, worst=3) == []

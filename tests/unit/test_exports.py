@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import mav_tasks
-from mav_tasks import Client, SyncClient, SyncTask, Task, errors, settings
+from mav_tasks import errors, settings
 from mav_tasks.engine.engine import Engine
 from mav_tasks.errors import MavTasksError
 
@@ -97,24 +97,3 @@ def test_what_a_script_may_import_is_there_and_no_more() -> None:
         assert getattr(mav_tasks, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute 'Rover'"):
         mav_tasks.Rover  # noqa: B018
-
-
-#: of the asyncio face, what only its own loop may call
-INSIDE = {"rearm", "streaming", "listening", "some_vehicles", "wake", "close"}
-
-
-def test_both_faces_of_the_library_take_the_same() -> None:
-    for one, other in [(Client, SyncClient), (Task, SyncTask)]:
-
-        def calls(kind: type) -> dict[str, list[str]]:
-            methods = inspect.getmembers(kind, inspect.isfunction)
-            return {
-                name: list(inspect.signature(method).parameters)
-                for name, method in methods
-                if not name.startswith("_") and name not in INSIDE
-            }
-
-        ours, theirs = calls(one), calls(other)
-        if one is Task:
-            ours["done"].append("timeout")  # asyncio has asyncio.timeout
-        assert theirs == ours

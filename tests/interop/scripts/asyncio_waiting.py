@@ -1,4 +1,4 @@
-"""How scripts of the asyncio faces, the old and the new one, wait for what streams bring."""
+"""How a script with asyncio waits for what streams bring."""
 
 import asyncio
 from collections.abc import AsyncGenerator, Awaitable, Callable

@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import inf
 from pathlib import Path
 from random import Random
-from struct import Struct
+from struct import Struct, unpack_from
 from typing import Any
 
 from mav_tasks.engine.inputs import (
@@ -47,6 +47,7 @@ TOWARDS, BACK, ARRIVED = "to", "from", Struct(">d")  # of packets between gatewa
 STEP, MOST_LEAD = 3.0, 50.0  # s, of the lead of signatures
 
 STOP = 54003
+SETPOINTS, COMMAND, ARM = (84, 86), 76, 400
 BLOCK = 1_000  # task ids
 CARRIED = 0.01  # s, for which a packet is under way between gateways
 GIVEN_UP = 0.4  # s, for which an answer is awaited
@@ -58,6 +59,21 @@ SESSION_ENDS = 0.02  # s after the death of its process
 def is_stop(data: bytes) -> bool:
     """Return whether a MAVLink 2 packet is a COMMAND_LONG that stops a rover."""
     return data[7:10] == b"\x4c\0\0" and data[38:40] == STOP.to_bytes(2, "little")
+
+
+def moves(data: bytes) -> bool:
+    """Return whether a MAVLink 2 packet moves a rover, or arms it."""
+    payload = data[10 : 10 + data[1]].ljust(60, b"\0")
+    kind = int.from_bytes(data[7:10], "little")
+    if kind in SETPOINTS:
+        forward, side = unpack_from("<2f", payload, 16)
+        (turn,) = unpack_from("<f", payload, 44)
+        return any((forward, side, turn))
+    if kind == COMMAND:
+        (command,) = unpack_from("<H", payload, 28)
+        (first,) = unpack_from("<f", payload)
+        return bool(command == ARM and first == 1.0)
+    return False
 
 
 def part_of(restored: Restored, vehicles: frozenset[int]) -> Restored:
@@ -288,10 +304,13 @@ class Gateway:
         self.got: list[tuple[float, int]] = []
         self.let_go: list[tuple[float, int]] = []  # when the engine forgot each vehicle
         self.is_reached = True  # the database
+        self.hears = True  # the database's answers
+        self.is_pinged = True  # by the others, and they by it
         self.is_looking = True  # at other gateways' tasks
         self.is_frozen = False
         self.is_dead = False
-        self._asked: tuple[Request, float, float] | None = None  # when, and when it is answered
+        #: when, when it is answered or given up, and whether the answer comes in time
+        self._asked: tuple[Request, float, float, bool] | None = None
         self._ping_at = 0.0
         self._begin()
 
@@ -400,7 +419,7 @@ class Gateway:
     def _talk(self, now: float) -> None:
         database = self.world.database
         if self._asked is not None:
-            request, sent, at = self._asked
+            request, sent, at, is_in_time = self._asked
             if now < at:
                 return
             self._asked = None
@@ -409,6 +428,10 @@ class Gateway:
                 self._tell(self.member.unanswered(now), now=now)
                 return
             row = database.execute(self.name, request)
+            if not (is_in_time and self.hears):  # it is carried out all the same
+                self.session = None
+                self._tell(self.member.unanswered(now), now=now)
+                return
             self._tell(self.member.answered(request, row, sent=sent, now=now), now=now)
         if self.session is None:
             if self.is_reached and database.is_up:
@@ -422,7 +445,7 @@ class Gateway:
         request_or_none = self.member.request(now)
         if request_or_none is not None:
             delay = self.world.delay() if self.is_reached else GIVEN_UP
-            self._asked = request_or_none, now, now + delay
+            self._asked = request_or_none, now, now + min(delay, GIVEN_UP), delay <= GIVEN_UP
 
     def _ping(self, now: float) -> None:
         for name in self.member.rivals.epochs():
@@ -431,7 +454,7 @@ class Gateway:
                 continue
             if other.is_dead:
                 self.member.peer_refused(name, now=now)
-            elif not other.is_frozen:
+            elif self.is_pinged and other.is_pinged and not other.is_frozen:
                 self.member.peer_answered(name, now=now)
 
     def _tell(self, change: Change, *, now: float) -> None:
@@ -473,6 +496,8 @@ class FleetWorld(World):
         self.shared.notify = self._notify
         #: how many of the notifications about tasks do not arrive
         self.lost_notices = 0.0
+        #: how many of the database's answers take far too long
+        self.slow = 0.0
         self.random = Random(seed)
         self.gateways: dict[str, Gateway] = {}
         self.clock_errors: dict[str, float] = {}  # of machines, s
@@ -562,5 +587,7 @@ class FleetWorld(World):
                 it.notified()
 
     def delay(self) -> float:
-        """Return how long the database takes for an answer."""
+        """Return how long the database takes for an answer: seldom far too long."""
+        if self.random.random() < self.slow:
+            return self.random.uniform(0.05, 1.5)
         return self.random.uniform(0.002, 0.015)

@@ -6,7 +6,8 @@ server.
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache, partial
-from typing import Any, ClassVar, NamedTuple
+from itertools import product
+from typing import Any, ClassVar
 
 from mav_tasks.engine.vehicles.control import Effect, Event, Step, effects_of
 from mav_tasks.engine.vehicles.joint_state import NOTHING, Driver, Grip, Queue, State, Waits, Work
@@ -20,18 +21,6 @@ MAKES: dict[str, dict[str, bool]] = {
 #: conditions of rows that the graph leaves open
 FREE = ("may_be_armed", "is_idle", "is_stopping", "is_late", "brakes")
 NO_TASK = (Work.NONE, Work.WAITS)
-
-#: requests and events after which nothing moves or arms until a newer request releases it
-HALTS = (
-    *(E.STOP, E.HOLD, E.PAUSE, E.DISARM, E.EMERGENCY_STOP, E.CLEAR, E.CLOSE),
-    *(E.TAKEN, E.MODE, E.LAPSED, E.DISARMED, E.STICK, E.DRIVEN_BY_HAND),
-    *(E.LATE, E.TOO_FAST, E.NOT_STANDING),
-)
-#: requests that release it; events such as OPERATOR_LOST release nothing
-GOES = (
-    *(E.CONTINUE, E.GO_ON, E.RELEASE, E.RESTORE, E.RUN_NOW),
-    *(E.ASK_OUR_MODE, E.ASK_OUR_MODE_STREAMING, E.ARM),
-)
 
 
 class Known(State):
@@ -53,13 +42,6 @@ class Known(State):
         if (found := cls._all.get(values)) is None:
             found = cls._all[values] = tuple.__new__(cls, values)
         return found
-
-
-class Deed(NamedTuple):
-    """A transition: its name and the states to which it leads."""
-
-    name: str
-    states: frozenset[State]
 
 
 def happens(event: Event, state: State) -> frozenset[State]:
@@ -364,9 +346,10 @@ def _skipped(state: State) -> Iterator[State]:
 
 def _restarted(state: State) -> Iterator[State]:
     active = () if state.work in NO_TASK else (Work.STANDS, Work.RUNS)
-    for may_arm in {False, state.may_arm}:
+    kept = state._replace(waits=state.waits & ~Waits.RELEASE)
+    for may_arm, is_urgent in product({False, state.may_arm}, {False, state.is_urgent}):
         for work in {state.work, *active}:  # it starts again if it has not driven yet
-            each = state._replace(may_arm=may_arm, work=work, waits=state.waits & ~Waits.RELEASE)
+            each = kept._replace(may_arm=may_arm, is_urgent=is_urgent, work=work)
             yield each
             # one of those that wait may have begun, and is held
             if work is not Work.NONE and each.queue in (Queue.RUNS, Queue.TAKEN):

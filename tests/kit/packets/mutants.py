@@ -5,7 +5,6 @@ complete, with extreme field values.
 """
 
 import struct
-from collections.abc import Callable
 from random import Random
 from typing import Any, NamedTuple
 
@@ -14,8 +13,12 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink import messages
 from tests.kit.client import command_long, heartbeat, rc_override, set_mode, setpoint, sticks
-from tests.kit.packets.whole import CRC_EXTRA
 
+#: of pymavlink's own dialect, and of messages that only ours has
+CRC_EXTRA = {
+    **{number: kind.crc_extra for number, kind in messages.ALL.items()},
+    **{number: kind.crc_extra for number, kind in common.mavlink_map.items()},
+}
 SIGNED = 1
 SIGNATURE = 13  # bytes: link id, 48 bits of time, 48 bits of hash
 HEADER = 10
@@ -30,9 +33,6 @@ ODD_FLOATS = tuple(
 ODD_BYTES = (b"\x00", b"\xff", b"\x7f", b"\x80", b"\x01")
 SYSTEMS = (1, 1, 1, 2, 0, 255, 250, 9)
 COMPONENTS = (1, 1, 191, 190, 0)
-
-#: adds a signature to a packet
-Sign = Callable[[bytes, Random], bytes]
 
 
 class Mutant(NamedTuple):
@@ -60,9 +60,8 @@ def mended(packet: bytes) -> bytes:
 class Mutants:
     """An endless source of mutants; only ``random`` decides."""
 
-    def __init__(self, random: Random, *, sign: Sign = badly_signed) -> None:
+    def __init__(self, random: Random) -> None:
         self._random = random
-        self._sign = sign
         self._sent: list[bytes] = []  # recent mutants, to be replayed
         self._kinds = list(common.mavlink_map.values())
         self._mav = common.MAVLink(None, 255, 190)
@@ -84,7 +83,7 @@ class Mutants:
         if self._sent and random.random() < 0.3:
             return Mutant("replayed", random.choice(self._sent))
         if random.random() < 0.3:
-            return self._keep(Mutant("badly signed", self._sign(self.good(), random)))
+            return self._keep(Mutant("badly signed", badly_signed(self.good(), random)))
         return self.absurd()
 
     def broken(self) -> Mutant:
@@ -145,7 +144,9 @@ class Mutants:
         if random.random() < 0.3:
             kind = random.choice(self._kinds)
             return _Raw(kind, random.randbytes(kind.unpacker.size))
-        return random.choice((self._command, self._motion, self._plan, self._telemetry, _beat))()
+        return random.choice(
+            (self._command, self._motion, self._plan, self._telemetry, heartbeat)
+        )()
 
     def _command(self) -> Any:
         random = self._random
@@ -205,10 +206,6 @@ class Mutants:
                 common.MAVLink_mission_current_message(0),
             )
         )
-
-
-def _beat() -> Any:
-    return heartbeat()
 
 
 class _Raw:

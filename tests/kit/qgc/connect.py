@@ -10,15 +10,12 @@ from tests.kit.qgc.core import AUTOPILOT, Core
 from tests.kit.qgc.parameters import Parameters
 from tests.kit.qgc.plan_master import PlanMaster
 from tests.kit.qgc.requests import MessageRequests
-from tests.kit.qgc.vehicle import APM, GENERIC, PX4
+from tests.kit.qgc.vehicle import APM, GENERIC
 from tests.kit.qgc.wire import Message
 
 STREAMS = {1: 2, 2: 2, 3: 2, 6: 3, 10: 10, 11: 10, 12: 10}  # MAV_DATA_STREAM: Hz [1.2], [11.3]
 STREAM_EACH, ROUNDS = 0.5, 5  # s [11.3]
-STREAMS_AGAIN = 10.0  # s without BATTERY_STATUS or HOME_POSITION [1.2]
 MISSION_INT, COMMAND_INT, FENCE, RALLY, MAVLINK2 = 4, 8, 0x4000, 0x8000, 0x2000
-OLDEST_PX4 = (1, 4, 1)
-TOO_OLD = "QGroundControl supports PX4 Pro firmware Version 1.4.1 and above."
 
 Next = Callable[[], None]
 
@@ -41,30 +38,21 @@ class Connecting:
         self._requests = requests
         self._plans = plans
         self._fall_back = fall_back
-        self._seen = {"BATTERY_STATUS": core.timers.now, "HOME_POSITION": core.timers.now}
         self.parameters = Parameters(core, firmware, self._parameters_ready)
-        self.modes: dict[int, str] = {}
         self.is_complete = False
-        self.completed_at: float | None = None
-        self.seconds = 0.0
-        self._began = core.timers.now
         self._after_parameters: Next | None = None
         self._states = iter(self._order())
 
     def begin(self) -> None:
         """Start with the first state."""
         if self._firmware == APM and self._core.profile.streams_at_once:
-            self._ask_streams()
+            for number in STREAMS:
+                self._ask_stream(number)
             self._ask_intervals()
         self._next()
         if self._firmware == APM and not self._core.profile.streams_at_once:
             self._ask_intervals()
             self._core.timers.live(self._ask_streams_slowly())
-
-    def heard(self, name: str) -> None:
-        """Note that the vehicle sent a message."""
-        if name in self._seen:
-            self._seen[name] = self._core.timers.now
 
     def _order(self) -> list[Callable[[Next], None]]:
         profile, states = self._core.profile, [self._version]
@@ -80,8 +68,6 @@ class Connecting:
             state(self._next)
             return
         self.is_complete = True
-        self.completed_at = self._core.timers.now
-        self.seconds = self.completed_at - self._began
 
     def _ask(self, name: str, number: int, then: Callable[[Message], None]) -> None:
         """Request once, and again without an answer in versions that do so."""
@@ -106,10 +92,6 @@ class Connecting:
                 self._plans.capabilities = MAVLINK2 | assumed
             else:
                 self._plans.capabilities = message.capabilities
-                version = message.flight_sw_version
-                numbers = version >> 24, version >> 16 & 255, version >> 8 & 255
-                if self._firmware == PX4 and numbers < OLDEST_PX4:  # [11.1]
-                    self._core.popup(TOO_OLD)
             then()
 
         self._ask("AUTOPILOT_VERSION", 148, done)
@@ -131,12 +113,10 @@ class Connecting:
             self._requests.ask("AVAILABLE_MODES", 435, done, index=index)
 
         def done(message: Message, _is_answered: bool) -> None:
-            if message is not None:
-                self.modes[message.custom_mode] = message.mode_name
-                if message.mode_index < message.number_modes:
-                    ask(message.mode_index + 1)
-                    return
-            then()
+            if message is not None and message.mode_index < message.number_modes:
+                ask(message.mode_index + 1)
+            else:
+                then()
 
         ask(1)
 
@@ -175,18 +155,6 @@ class Connecting:
     def _ask_stream(self, number: int) -> None:
         ask = mavlink.MAVLink_request_data_stream_message
         self._core.send(ask(self._core.system, AUTOPILOT, number, STREAMS[number], 1))
-
-    def _ask_streams(self) -> None:
-        for number in STREAMS:
-            self._ask_stream(number)
-        self._core.timers.after(STREAMS_AGAIN, self._ask_streams_again)
-
-    def _ask_streams_again(self) -> None:
-        if self._core.timers.now - min(self._seen.values()) > STREAMS_AGAIN:
-            self._ask_streams()
-            self._ask_intervals()
-        else:
-            self._core.timers.after(1.0, self._ask_streams_again)
 
     def _ask_streams_slowly(self) -> Iterator[float]:
         numbers = cycle(STREAMS)

@@ -7,19 +7,15 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from tests.kit.qgc.commands import ACCEPTED, UNSUPPORTED, Command, CommandQueue
 from tests.kit.qgc.core import AUTOPILOT, Core
-from tests.kit.qgc.parameters import Parameters
 from tests.kit.qgc.plan_master import PlanMaster
 from tests.kit.qgc.plans import MISSION
-from tests.kit.qgc.timers import Timer
-from tests.kit.qgc.vehicle import APM, GENERIC, PX4, Modes, VehicleState
+from tests.kit.qgc.vehicle import APM, GENERIC, Modes, VehicleState
 
 ARM, SET_MODE, REPOSITION, START = 400, 176, 192, 300
-CHANGE_SPEED, SET_HOME, SET_ITEM = 178, 179, 224
-FORCE_ARM, FORCE_DISARM = 2989, 21196
+SET_ITEM, FORCE_DISARM = 224, 21196
 CUSTOM_MODE = 1
 COMMAND_INT = 8  # MAV_PROTOCOL_CAPABILITY
 LOOK_EACH, LOOKS, MODE_TRIES = 0.1, 13, 3  # [2.5]
-STICKS_EACH = 0.04  # s; assumed: 25 Hz
 
 NOT_GUIDED = "Guided mode not supported by Vehicle."
 NO_ALTITUDE = "Change altitude not supported."
@@ -39,21 +35,18 @@ class Operator:
         vehicle: VehicleState,
         commands: CommandQueue,
         plans: PlanMaster,
-        parameters: Parameters,
     ) -> None:
         self._core = core
         self._vehicle = vehicle
         self._commands = commands
         self._plans = plans
-        self._parameters = parameters
         self._repositions: bool | None = None  # unknown until the first ack
-        self._sticks: Timer | None = None
 
     @property
     def offers(self) -> set[str]:
         """The buttons that are shown now [2.6], [1.5], [11.4]."""
         vehicle, firmware = self._vehicle, self._vehicle.firmware
-        shown = {"disarm" if vehicle.armed else "arm", "force arm", "actions", "set home"}
+        shown = {"disarm" if vehicle.armed else "arm"}
         if firmware != GENERIC:
             shown.add("mode")
         if not vehicle.is_flying:
@@ -64,17 +57,14 @@ class Operator:
             shown |= {"return", "pause"}
         if vehicle.place is not None and vehicle.relative_altitude == vehicle.relative_altitude:
             shown.add("go to")
-        names = {APM: ("WP_SPD", "WPNAV_SPEED"), PX4: ("MPC_XY_VEL_MAX",)}.get(firmware, ())
-        if any(self._parameters.value(name) is not None for name in names):
-            shown.add("change speed")
         return shown
 
     # all makes
 
-    def arm(self, *, force: bool = False) -> Command:
+    def arm(self) -> Command:
         """Arm."""
-        self._need("force arm" if force else "arm")
-        return self._commands.send_long(ARM, 1, FORCE_ARM if force else 0)
+        self._need("arm")
+        return self._commands.send_long(ARM, 1)
 
     def disarm(self) -> Command:
         """Disarm."""
@@ -90,17 +80,6 @@ class Operator:
         """Press a MAVLink action: any command with seven params [5.2], [11.7]."""
         return self._commands.send_long(number, *params, component=component)
 
-    def set_home(self, latitude: float, longitude: float, altitude: float) -> Command:
-        """Set home to a place; degrees, metres."""
-        self._need("set home")
-        return self._commands.send_long(SET_HOME, 0, 0, 0, nan, latitude, longitude, altitude)
-
-    def change_speed(self, speed: float, *, is_offered: bool = True) -> Command:
-        """Change the speed, m/s. ``is_offered`` False: even if the button is hidden."""
-        if is_offered:
-            self._need("change speed")
-        return self._commands.send_long(CHANGE_SPEED, 1, speed, -1, 0)
-
     def set_item(self, seq: int) -> None:
         """Continue with another item of the plan [2.5]; 4.x by message [11.4]."""
         message = mavlink.MAVLink_mission_set_current_message(self._core.system, AUTOPILOT, seq)
@@ -113,17 +92,6 @@ class Operator:
                 self._core.send(message)
 
         self._commands.send_long(SET_ITEM, seq, handler=answered)
-
-    def sticks(self, x: int, y: int, z: int, r: int) -> None:
-        """Hold a joystick in this position, from now on."""
-        self.let_go()
-        self._core.send(mavlink.MAVLink_manual_control_message(self._core.system, x, y, z, r, 0))
-        self._sticks = self._core.timers.after(STICKS_EACH, lambda: self.sticks(x, y, z, r))
-
-    def let_go(self) -> None:
-        """Switch the joystick off."""
-        if self._sticks is not None:
-            self._sticks.cancel()
 
     # differs between makes
 
@@ -240,7 +208,7 @@ class Operator:
     def _go_to_apm(self, latitude: float, longitude: float) -> Iterator[float]:
         """Send up to three messages, until the vehicle's support is known [2.5], [11.3]."""
         assert self._vehicle.place is not None
-        knows = self._repositions if self._core.profile.repositions else False
+        knows = self._repositions
         if knows is not False:
             self._commands.send_int(
                 *(REPOSITION, -1, CUSTOM_MODE, 0, nan),

@@ -15,8 +15,6 @@ each_make = for_each("persona", [PROMPT, PROMPT_PX4, PROMPT_GENERIC])
 #: makes that the station can guide [1.5]
 each_guided = for_each("persona", [PROMPT, PROMPT_PX4])
 each_version = for_each("profile", [V4, MASTER])
-#: for behaviour that both versions share
-each_pair = for_each("persona, profile", [(PROMPT, V4), (PROMPT_PX4, MASTER)])
 
 
 def join(world: World, profile: Profile, name: str = "qgc") -> QgcParty:

@@ -1,6 +1,5 @@
-"""The parameters of every component of one vehicle: reading, and popups if some are missing."""
+"""The parameters of every component of one vehicle: reading, and popups if some do not come."""
 
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -8,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from tests.kit.qgc.core import AUTOPILOT, Core
 from tests.kit.qgc.timers import Timer
-from tests.kit.qgc.vehicle import APM, PX4
+from tests.kit.qgc.vehicle import APM, GENERIC, PX4
 from tests.kit.qgc.wire import Message
 
 LIST_EACH, LIST_TRIES = 5.0, 5  # s [1.4], [11.1]
@@ -16,7 +15,6 @@ HASH_WAIT = 1.0  # s [1.4]
 FTP_WAIT, FTP_TRIES = 1.0, 3  # s; assumed: "silence costs FTP retries"
 MISSING_WAIT = 3.0  # s without a value; assumed
 BATCH, READ_TRIES = 10, 5  # [1.4]
-SET_WAIT = 3.0  # s; assumed
 UNNUMBERED = 65535
 HASH = "_HASH_CHECK"
 PACKED_FILE = b"@PARAM/param.pck?withdefaults=1"
@@ -27,23 +25,6 @@ NO_ANSWER = (
     " unable to display its full user interface."
 )
 NOT_ALL = "QGroundControl was unable to retrieve the full set of parameters from vehicle {}."
-SETUP = "One or more vehicle components require setup prior to flight."
-MISSING = (
-    "Parameters are missing from firmware. You may be running a version of firmware which is not"
-    " fully supported or your firmware has a bug in it. Missing params: {}"
-)
-
-#: required at connect [11.2], [11.3]
-NEEDED = {
-    PX4: ("SYS_AUTOSTART", "COM_RC_IN_MODE", "CAL_GYRO0_ID", "CAL_ACC0_ID"),
-    APM: (
-        *(f"RCMAP_{name}" for name in ("ROLL", "PITCH", "THROTTLE", "YAW")),
-        *(f"RC{n}_{what}" for n in (1, 2, 3, 4) for what in ("MIN", "MAX", "TRIM")),
-        *("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
-        *("INS_ACCOFFS_X", "INS_ACCOFFS_Y", "INS_ACCOFFS_Z"),
-        "FRAME_CLASS",
-    ),
-}
 
 
 @dataclass(slots=True)
@@ -51,7 +32,7 @@ class Component:
     """The known parameters of one component."""
 
     count: int
-    values: dict[str, float] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
     missing: set[int] = field(default_factory=set)
     tries: int = 0
 
@@ -60,7 +41,7 @@ class Component:
 
 
 class Parameters:
-    """Reads all parameters once, and edits single ones."""
+    """Reads all parameters once."""
 
     def __init__(self, core: Core, firmware: str, ready: Callable[[], None]) -> None:
         self._core = core
@@ -73,7 +54,6 @@ class Parameters:
         self._has_asked = False
         self._list_tries = 0
         self._timer: Timer | None = None
-        self._sets: dict[tuple[int, str], Timer] = {}
 
     def load(self) -> None:
         """Start: by file from ArduPilot, by the hash from PX4, else by the list [1.4]."""
@@ -91,23 +71,6 @@ class Parameters:
         else:
             self._ask_list()
 
-    def value(self, name: str, component: int = AUTOPILOT) -> float | None:
-        """Return a parameter's value, or None if it is unknown."""
-        known = self.components.get(component)
-        return None if known is None else known.values.get(name)
-
-    def set(self, name: str, value: float, type_: int, *, component: int = AUTOPILOT) -> None:
-        """Edit a parameter; the echo confirms it [11.5]."""
-        wire = value if self._firmware == APM or type_ == 9 else _as_float(value, type_)
-        self._core.send(
-            mavlink.MAVLink_param_set_message(
-                self._core.system, component, name.encode(), wire, type_
-            )
-        )
-        self._sets[component, name] = self._core.timers.after(
-            SET_WAIT, lambda: self._core.popup(f"Parameter write failed: {component} {name}")
-        )
-
     def receive(self, message: Message, component: int) -> None:
         """Take a PARAM_VALUE of any component of the vehicle."""
         name: str = message.param_id
@@ -122,11 +85,8 @@ class Parameters:
         known = self.components.get(component)
         if known is None:
             known = self.components[component] = Component(message.param_count)
-        known.values[name] = self._value(message)
+        known.names.add(name)
         known.missing.discard(message.param_index)
-        timer = self._sets.pop((component, name), None)
-        if timer is not None:
-            timer.cancel()
         if not self.is_ready:
             self._list_tries = 0
             if all(not each.missing for each in self.components.values()) and (
@@ -162,7 +122,7 @@ class Parameters:
         self._asks_hash = False
         self._has_asked = True
         if self._list_tries >= LIST_TRIES:
-            if self._firmware in NEEDED:  # generic: no popup [1.4]
+            if self._firmware != GENERIC:  # no popup [1.4]
                 self._core.popup(NO_ANSWER.format(self._core.system))
             return
         self._list_tries += 1
@@ -195,54 +155,9 @@ class Parameters:
         self.is_ready = True
         if self._timer is not None:
             self._timer.cancel()
-        self._check_setup()
         self._ready()
-
-    def _check_setup(self) -> None:
-        """Show two popups, the second one a second later [11.2]; none for generic [11.4]."""
-        needed = NEEDED.get(self._firmware, ())
-        missing = [name for name in needed if self.value(name) is None]
-        either = self.value("CAL_MAG0_ID"), self.value("SYS_HAS_MAG")
-        if self._firmware == PX4 and either == (None, None):
-            missing.append("SYS_HAS_MAG")
-        if missing or not self._is_set_up():
-            self._core.popup(SETUP)
-        if missing:
-            words = MISSING.format(", ".join(missing))
-            self._core.timers.after(1.0, lambda: self._core.popup(words))
-
-    def _is_set_up(self) -> bool:
-        value = self.value
-        if self._firmware == PX4:
-            return (
-                all(value(name) for name in ("SYS_AUTOSTART", "CAL_GYRO0_ID", "CAL_ACC0_ID"))
-                and value("COM_RC_IN_MODE") == 1
-                and (value("SYS_HAS_MAG") == 0 or bool(value("CAL_MAG0_ID")))
-            )
-        if self._firmware == APM:
-            radio = [value(f"RC{n}_{what}") for n in (1, 2, 3, 4) for what in ("MIN", "MAX")]
-            return (
-                all(value(f"INS_ACCOFFS_{axis}") for axis in "XYZ")
-                and bool(value("FRAME_CLASS"))
-                and any(each not in (1100, 1900, 1500) for each in radio)
-            )
-        return True
-
-    def _value(self, message: Message) -> float:
-        """Return the value: ArduPilot casts, others put an integer's bytes into the float [1.4]."""
-        if self._firmware == APM or message.param_type == 9:
-            return float(message.param_value)
-        layout = {5: "<I", 6: "<i"}.get(message.param_type)
-        if layout is None:
-            return float(message.param_value)
-        return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])
 
     def _wait(self, seconds: float, call: Callable[[], None]) -> None:
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self._core.timers.after(seconds, call)
-
-
-def _as_float(value: float, type_: int) -> float:
-    layout = {5: "<I", 6: "<i"}[type_]
-    return float(struct.unpack("<f", struct.pack(layout, int(value)))[0])

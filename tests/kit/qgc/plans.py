@@ -69,11 +69,6 @@ class PlanManager:
         #: the plan as last read or written; None if never
         self.known: tuple[Item, ...] | None = None
 
-    @property
-    def is_busy(self) -> bool:
-        """Whether a transfer is under way."""
-        return self._state != "idle"
-
     def read(self, done: Callable[[bool], None]) -> None:
         """Download the plan [3.2]."""
         self._begin("list", done)

@@ -3,7 +3,7 @@
 from collections import defaultdict
 from typing import Any, NamedTuple
 
-CRITICAL, NOTICE = 3, 5  # MAV_SEVERITY: up to ERROR a box on the map [4]
+CRITICAL = 3  # MAV_SEVERITY: up to ERROR a box on the map [4]
 TAB = "\t"
 
 

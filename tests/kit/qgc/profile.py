@@ -22,7 +22,6 @@ class Profile:
     parameters_given_up: float | None  # [1.4]: s until it continues without them; None: never
     streams_at_once: bool  # [1.2] ArduPilot's data streams; [11.3]: 4.x one each half second
     intervals: tuple[int, ...]  # [1.2], [11.3]: requested from ArduPilot at 1 Hz
-    repositions: bool  # [2.5]: DO_REPOSITION to ArduPilot for "go to"; 4.2 sends an item only
     sets_item_by_command: bool  # [2.5], [11.4]
 
 
@@ -40,7 +39,6 @@ V4 = Profile(
     parameters_given_up=None,
     streams_at_once=False,
     intervals=(HOME_POSITION,),
-    repositions=True,
     sets_item_by_command=False,
 )
 MASTER = Profile(
@@ -57,6 +55,5 @@ MASTER = Profile(
     parameters_given_up=120.0,
     streams_at_once=True,
     intervals=(HOME_POSITION, EXTENDED_SYS_STATE),
-    repositions=True,
     sets_item_by_command=True,
 )

@@ -32,7 +32,7 @@ class Session:
             core, self.state.firmware, self.commands, self._requests, self.plans, fall_back
         )
         self.parameters = self.connecting.parameters
-        self.operator = Operator(core, self.state, self.commands, self.plans, self.parameters)
+        self.operator = Operator(core, self.state, self.commands, self.plans)
         self._texts = Texts(core.screen, drops_tabs=self.state.firmware == PX4)
         self._gimbals_asked: dict[int, int] = {}
         self._silence: Timer | None = None
@@ -54,7 +54,6 @@ class Session:
                 self._core.screen.dialogs.append(
                     Shown(self._core.timers.now, "Flight Plan complete")
                 )
-        self.connecting.heard(name)
         self._requests.receive(name, message, component)
         match name:
             case "HEARTBEAT":

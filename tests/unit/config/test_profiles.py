@@ -63,21 +63,6 @@ def test_each_rover_has_a_file_and_the_last_one_counts(home: Path) -> None:
     assert set(profiles.read(str(home))) == {again, replace(FULL, uid="another")}
 
 
-def test_a_file_that_cannot_be_written_leaves_the_one_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "mine.toml"
-    profiles.write(FULL, str(path))
-
-    def full(_fd: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(ConfigError, match=r"mine\.toml: No space left on device"):
-        profiles.write(LEAST, str(path))
-    assert (profiles.read(str(path)), list(tmp_path.iterdir())) == ((FULL,), [path])
-
-
 NEEDED = 'system_id = 1\nautopilot = "px4"\nfirmware = "1"\nprobed = "2026"\n'
 
 

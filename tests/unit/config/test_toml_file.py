@@ -1,17 +1,14 @@
 """A file gives settings, or all its faults, each by file, line and key."""
 
 import os
-import string
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 
 from mav_tasks.config.configuration import Configuration, merged
-from mav_tasks.config.toml_file import LARGEST, decoded, layer_of, read_text
+from mav_tasks.config.toml_file import LARGEST, layer_of, read_text
 from mav_tasks.errors import ConfigError
-from mav_tasks.settings import KEYS, TABLES, ServerSettings
+from mav_tasks.settings import ServerSettings
 
 
 def read(text: str) -> Configuration:
@@ -126,56 +123,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         with pytest.raises(ConfigError, match=says) as raised:
             read_text(tmp_path / name)
         assert str(raised.value).startswith(str(tmp_path / name))
-
-
-def outcome(text: str | bytes) -> tuple[ServerSettings | None, tuple[str, ...]]:
-    """The settings, or the faults; any other exception is a failure."""
-    try:
-        if isinstance(text, bytes):
-            text = decoded(text, name="c.toml")
-        return read(text).settings, ()
-    except ConfigError as error:
-        return None, error.faults
-
-
-KEY_TEXTS = st.sampled_from([*KEYS, *TABLES, "x", "driving.speed.x", '"driving.speed"'])
-VALUES = st.sampled_from(
-    [
-        "1",
-        "0.5",
-        "-1",
-        "nan",
-        "'a'",
-        "[]",
-        "{}",
-        "[1]",
-        "true",
-        "{a=1}",
-        '"""\n"""',
-        "07:32:00",
-        "1e400",
-    ]
-)
-LINES = st.one_of(
-    st.builds("{} = {}".format, KEY_TEXTS, VALUES),
-    st.builds("[{}]".format, KEY_TEXTS),
-    st.text(string.printable + "ü\u2028\x00", max_size=30),
-)
-
-
-@settings(deadline=None)
-@given(st.lists(LINES, max_size=8).map("\n".join))
-@example("[" * 3000)
-@example("a={" * 3000)
-@example("a." * 3000 + "a=1")
-def test_any_text_gives_settings_or_a_clear_fault(text: str) -> None:
-    got, told = outcome(text)
-    if got is None:
-        assert told
-        assert all(each.startswith("c.toml") and each.isprintable() for each in told)
-    else:
-        for key in KEYS.values():
-            assert key.shape.kept(key.plain_of(got)) == key.of(got)
 
 
 def test_the_lines_of_keys_are_found_in_odd_texts() -> None:

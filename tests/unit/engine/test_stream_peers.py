@@ -1,13 +1,10 @@
-"""Who is on a stream comes and goes, as the link tells; what it says is cut anywhere."""
-
-import struct
+"""Where peers are: who comes and goes on a stream, and a rover that is heard at another place."""
 
 import pytest
 
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import (
     Committed,
-    Congestion,
     LinkChanged,
     LinkSide,
     Outgoing,
@@ -103,14 +100,6 @@ def test_a_packet_may_come_in_pieces(link: str) -> None:
         assert len(rig.engine.snapshot(now=0.0).vehicles) == 1, cut
 
 
-def test_half_a_packet_in_a_datagram_delays_no_whole_one(rig: Rig) -> None:
-    """It would wait for as many bytes as the first one promises."""
-    attitude = rig.packer.pack(ATTITUDE, Address(1, 1), seq=0)
-    rig.says("u", OLD, attitude[:11])
-    rig.rover(OLD, link="u", seq=1)
-    assert len(rig.engine.snapshot(now=0.0).vehicles) == 1
-
-
 def test_what_two_senders_cut_is_not_mixed(rig: Rig) -> None:
     packets = [rig.packer.pack(ROVER, Address(number, 1), seq=0) for number in (1, 2)]
     for begin in range(0, 21, 5):
@@ -135,31 +124,6 @@ def test_a_client_that_is_gone_is_forgotten_at_once(rig: Rig) -> None:
     assert rig.engine.snapshot(now=0.0).clients == ()
     rig.rover(OLD)
     assert ids(rig.engine.take_packets(), "c", CLIENT) == []
-
-
-def test_a_client_on_a_stream_is_told_of_its_task_however_long_it_was_silent(rig: Rig) -> None:
-    """It said hello once, as a script does; on a datagram link pushed to it would be unheard."""
-    rig.peer("c", CLIENT, up=True)
-    rig.client()
-    rig.rover(OLD)
-    for second in range(50):
-        rig.passes(1.0)
-        rig.rover(OLD, seq=second)
-    attitude = rig.packer.pack(m.Attitude(0, 0, 0, 0, 0, 0, 0), Address(1, 1), seq=60)
-    rig.engine.take_packets()
-    rig.says("v", OLD, attitude)
-    assert ids(rig.engine.take_packets(), "c", CLIENT) == [m.Attitude.id]
-
-
-def test_one_that_said_nothing_for_a_minute_gets_heartbeats_only_and_stays(rig: Rig) -> None:
-    rig.peer("c", CLIENT, up=True)
-    rig.client()
-    for second in range(70):
-        rig.rover(OLD, seq=second)
-        rig.passes(1.0)
-    rig.says("v", OLD, rig.packer.pack(m.Attitude(0, 0, 0, 0, 0, 0, 0), Address(1, 1), seq=70))
-    rig.rover(OLD, seq=71)
-    assert ids(rig.engine.take_packets(), "c", CLIENT) == [0]
 
 
 def test_a_vehicle_that_is_gone_may_be_back_at_once_from_anywhere(rig: Rig) -> None:
@@ -203,22 +167,6 @@ def test_heartbeats_are_not_overtaken_by_many_other_packets_between_them(rig: Ri
     assert not rig.is_armed
 
 
-@pytest.mark.parametrize("place", [OLD, NEW])
-def test_what_is_on_another_connection_is_asked_again_which_it_is(rig: Rig, place: object) -> None:
-    rig.peer("v", OLD, up=True)
-    rig.rover(OLD)
-    version = m.AutopilotVersion(0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 7)
-    rig.rover(OLD, seq=1, message=version)
-    rig.passes(2.0)
-    rig.peer("v", OLD, up=False)
-    rig.peer("v", place, up=True)
-    rig.engine.take_packets()
-    rig.rover(place, seq=2)
-    sent = [o.data for o in rig.engine.take_packets() if o.peer == place and o.data[7] == 76]
-    asked = [data for data in sent if data[38:40] == (512).to_bytes(2, "little")]
-    assert [data[10:14] for data in asked] == [struct.pack("<f", m.AutopilotVersion.id)]
-
-
 @pytest.mark.parametrize(
     ("is_local", "arming", "begins"),
     [(True, "auto", True), (False, "auto", False), (False, "server", True)],
@@ -255,20 +203,6 @@ def test_what_is_at_another_place_is_armed_only_if_we_may_arm_there(
     assert (task.state is S.STARTING, task.state is S.QUEUED) == (begins, not begins)
 
 
-def test_as_long_as_it_is_there_another_of_its_id_is_ignored(rig: Rig) -> None:
-    rig.peer("v", OLD, up=True)
-    rig.peer("v", NEW, up=True)
-    rig.rover(OLD)
-    for step in range(12):  # it is asked meanwhile which one it is, and does not answer
-        rig.passes(1.0)
-        rig.rover(OLD, seq=step)
-        rig.rover(NEW, seq=step)
-    assert "shares its id with a rover" in " ".join(map(str, rig.engine.take_events()))
-    rig.peer("v", OLD, up=False)
-    rig.rover(NEW, seq=9)
-    assert "is now at" not in " ".join(map(str, rig.engine.take_events()))
-
-
 def test_a_vehicle_comes_back_however_often_its_connection_breaks(rig: Rig) -> None:
     for port in range(MANY):
         rig.peer("v", ("10.0.0.1", port), up=True)
@@ -296,26 +230,41 @@ def test_numbers_towards_a_line_that_comes_back_go_on(rig: Rig) -> None:
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
 
 
-def test_a_congested_client_is_spared_telemetry_and_sees_no_loss(rig: Rig) -> None:
+def reached(rig: Rig) -> set[object]:
+    """Return to where what a client has for the rover goes."""
+    rig.passes(0.4)
+    rig.says("c", CLIENT, rig.packer.pack(m.SetMode(1, 0, 0), Address(255, 190), seq=1))
+    return {o.peer for o in rig.engine.take_packets() if o.data[7] == m.SetMode.id}
+
+
+@pytest.mark.parametrize("overlap", [False, True])
+def test_who_is_heard_elsewhere_is_followed_once_the_old_place_is_silent(
+    rig: Rig, *, overlap: bool
+) -> None:
     rig.peer("c", CLIENT, up=True)
-    rig.client()
-    rig.rover(OLD)
-    rig.engine.take_packets()
-    sent: list[Outgoing] = []
-    for seq in range(1, 60):
-        if seq in (10, 40):
-            rig.engine.handle(Congestion("c", CLIENT, seq == 10), now=rig.now)
-        rig.now += 0.1
-        message = ROVER if seq % 10 == 5 else m.Attitude(0, 0, 0, 0, 0, 0, 0)
-        rig.says("v", OLD, rig.packer.pack(message, Address(1, 1), seq=seq))
-        came = [o for o in rig.engine.take_packets() if o.link == "c"]
-        if 10 <= seq < 40:
-            assert [o.data[7] for o in came] == [0] * (seq % 10 == 5)
-        sent += came
-    assert sum(o.data[7] == m.Attitude.id for o in sent[-20:]) > 5
-    assert [o.data[4] for o in sent] == list(range(1, len(sent) + 1))
+    for at in range(3):
+        rig.rover(OLD, seq=at, link="u")
+        rig.passes(0.7 if at == 2 else 1.0)
+    rig.rover(NEW, seq=3, link="u")
+    rig.passes(0.9)
+    if overlap:
+        rig.rover(OLD, seq=4, link="u")  # late on the net
+    rig.passes(0.1)
+    for seq in range(5, 8):
+        rig.passes(1.0)
+        rig.rover(NEW, seq=seq, link="u")
+    assert reached(rig) == ({OLD} if overlap else {NEW})
+    for seq in range(8, 14):
+        rig.passes(0.9)
+        rig.rover(NEW, seq=seq, link="u")
+    assert reached(rig) == {NEW}
 
 
-def test_congestion_of_who_is_not_there_means_nothing(rig: Rig) -> None:
-    rig.engine.handle(Congestion("c", CLIENT, True), now=0.0)
-    rig.engine.handle(Congestion("v", OLD, True), now=0.0)
+def test_however_many_have_called_a_vehicle_can_come_back_elsewhere(rig: Rig) -> None:
+    rig.peer("c", CLIENT, up=True)
+    rig.rover(OLD, link="u")
+    for port in range(1_000):
+        rig.rover(("10.9.9.9", port), link="u")
+    rig.passes(Settings().watch.heartbeat_lost + 1.0)
+    rig.rover(NEW, seq=1, link="u")
+    assert reached(rig) == {NEW}

@@ -2,8 +2,6 @@
 
 from math import inf
 
-import pytest
-
 from mav_tasks.fleet.exchange import BEAT, SILENCE, Arrived, Exchange
 from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
 from mav_tasks.fleet.outbox import LIMIT, Outbox, Waiting
@@ -142,19 +140,6 @@ def test_what_is_first_is_sent_again_after_a_lost_connection_and_the_rest_is_not
     assert [each for _ in range(4) for each in net.exchange()] == []
 
 
-def test_one_that_is_silent_cannot_be_reached_any_more() -> None:
-    net = Net()
-    net.is_cut = True
-    net.now += SILENCE + 0.1
-    net.exchange()
-    assert net.gateways["a"].peers == frozenset()
-    net.is_cut = False
-    for _ in range(4):
-        net.now += 1.0
-        net.exchange()
-    assert net.gateways["a"].peers == {"b"}
-
-
 def test_too_many_that_wait_are_dropped_the_oldest_first_but_no_stop() -> None:
     box = Outbox()
     for number in range(LIMIT + 10):
@@ -163,30 +148,3 @@ def test_too_many_that_wait_are_dropped_the_oldest_first_but_no_stop() -> None:
     taken = box.take("b", 10**6, each=6, now=0.0)
     assert [each.payload for each in taken[:2]] == [b"stop", b"10"]
     assert (len(taken), box.dropped) == (LIMIT + 1, 10)
-
-
-def test_a_datagram_leaves_in_time_or_not_at_all() -> None:
-    box = Outbox()
-    box.put("b", Waiting(b"old", 0.0, 0.5))
-    box.put("b", Waiting(b"new", 0.4, 0.9))
-    assert [each.payload for each in box.take("b", 1000, each=6, now=0.6)] == [b"new"]
-    assert box.expired == 1
-
-
-def test_a_stop_for_all_reaches_one_that_is_met_a_moment_later() -> None:
-    box = Outbox()
-    box.meet(frozenset({"b"}), now=0.0)
-    box.put("", Waiting(b"stop", 0.0, 1.0, first=True))
-    box.meet(frozenset({"b", "c"}), now=0.5)
-    for name in "bc":
-        assert [each.payload for each in box.take(name, 1000, each=6, now=0.5)] == [b"stop"]
-    box.meet(frozenset({"b", "c", "d"}), now=1.5)
-    assert box.take("d", 1000, each=6, now=1.5) == []
-
-
-@pytest.mark.parametrize("size", [0, 1, 400])
-def test_a_packet_comes_back_as_it_was(size: int) -> None:
-    one = Datagram(b"x" * size, age=0.25, left=1.5, first=True)
-    packet = Packet(Kind.MAIL, "north-1", session(7), 3, 4, 5, 6, 7, [one, Datagram(b"", 0.0, inf)])
-    assert SEAL.packet(SEAL.text(packet, session(9)), session(9)) == packet
-    assert SEAL.packet(SEAL.text(packet, session(9)), session(8)) is None

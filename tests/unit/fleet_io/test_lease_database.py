@@ -107,20 +107,6 @@ def test_each_answer_is_that_of_the_model(postgres: PostgresServer, seed: int) -
     assert evicted > 3
 
 
-def test_the_number_of_a_takeover_only_rises(postgres: PostgresServer) -> None:
-    url = postgres.new_database()
-    numbers = []
-    with gateways(url) as real:
-        for name in NAMES:
-            epoch = real[name].execute(Join(name)).row.epoch
-            me = Renew(name, epoch)
-            assert real[name].execute(Take(me, frozenset({7}))).row.holds == {7}
-            with connected(url) as it:
-                numbers += it.execute("SELECT number FROM holdings").fetchall()
-            assert real[name].execute(Free(me, 7)).row.holds == set()
-    assert numbers == [(1,), (2,), (3,)]
-
-
 def test_two_that_evict_each_other_do_not_wait_for_each_other(postgres: PostgresServer) -> None:
     """The second one is refused: its own row was evicted before."""
     url = postgres.new_database()

@@ -1,81 +1,49 @@
 """A net in memory: as bad as asked for, and the same each time."""
 
-from mav_tasks.links.memory import Conditions, MemoryLink, MemoryNet, Queue, Radio
+from mav_tasks.links.memory import Buffer, Conditions, MemoryNet, Queue, Radio
 
 BAD = Conditions(delay=0.01, jitter=0.05, loss=0.2, duplication=0.2)
+SENT = [bytes([number]) for number in range(200)]
 
 
-def pair(net: MemoryNet) -> tuple[MemoryLink, MemoryLink]:
-    return net.link("a", peers=("b",)), net.link("b")
-
-
-def arrivals(net: MemoryNet, at: MemoryLink) -> list[tuple[float, bytes]]:
-    """Let everything arrive; gives when, and what."""
+def arrivals(
+    conditions: Conditions,
+    datagrams: list[bytes],
+    *,
+    every: float = 0.001,
+    seed: int = 7,
+    buffer: Buffer | None = None,
+) -> list[tuple[float, bytes]]:
+    """Send datagrams from a to b; return when each arrived."""
+    net = MemoryNet(seed=seed, conditions=conditions)
+    a, b = net.link("a", peers=("b",)), net.link("b")
+    if buffer is not None:
+        net.buffers["a", "b"] = buffer
+    for number, data in enumerate(datagrams):
+        net.now = number * every
+        a.send("b", data)
     came: list[tuple[float, bytes]] = []
     while (when := net.next_arrival()) is not None:
         net.now = when
         net.deliver()
-        came += [(when, data) for _, data in at.receive(1000)]
+        came += [(round(when, 6), data) for sender, data in b.receive(1000) if sender == "a"]
     return came
 
 
-def traffic(seed: int, conditions: Conditions) -> list[tuple[float, bytes]]:
-    net = MemoryNet(seed=seed, conditions=conditions)
-    a, b = pair(net)
-    for number in range(200):
-        net.now = number * 0.001
-        a.send("b", bytes([number]))
-    return arrivals(net, b)
-
-
-def test_a_datagram_arrives_after_its_delay_and_names_its_sender() -> None:
-    net = MemoryNet(conditions=Conditions(delay=0.25))
-    a, b = pair(net)
-    a.send("b", b"hello")
-    net.now = 0.2
-    net.deliver()
-    assert b.receive(10) == []
-    assert net.next_arrival() == 0.25
-    net.now = 0.25
-    net.deliver()
-    assert b.receive(10) == [("a", b"hello")]
-    assert net.next_arrival() is None
-
-
-def test_a_good_net_keeps_everything_in_order() -> None:
-    came = traffic(1, Conditions())
-    assert [data for _, data in came] == [bytes([n]) for n in range(200)]
-
-
-def test_the_same_seed_gives_the_same_losses_doubles_and_delays() -> None:
-    assert traffic(7, BAD) == traffic(7, BAD)
-    assert traffic(7, BAD) != traffic(8, BAD)
-
-
-def test_a_bad_net_loses_doubles_and_reorders() -> None:
-    came = [data for _, data in traffic(7, BAD)]
-    assert len(set(came)) < 200
-    assert len(came) > len(set(came))
+def test_a_good_net_keeps_the_order_and_a_bad_one_loses_doubles_and_reorders() -> None:
+    assert [data for _, data in arrivals(Conditions(), SENT)] == SENT
+    assert arrivals(Conditions(delay=0.25), SENT[:1]) == [(0.25, SENT[0])]
+    came = [data for _, data in arrivals(BAD, SENT)]
+    assert len(set(came)) < min(len(SENT), len(came))
     assert came != sorted(came)
+    assert arrivals(BAD, SENT) == arrivals(BAD, SENT) != arrivals(BAD, SENT, seed=8)
 
 
-def through(net: MemoryNet, sizes: list[int], *, every: float) -> list[tuple[float, int]]:
-    """Send datagrams from a to b; gives when each arrived, and how long it was."""
-    a, b = pair(net)
-    for number, size in enumerate(sizes):
-        net.now = number * every
-        a.send("b", bytes(size))
-    return [(round(at, 6), len(data)) for at, data in arrivals(net, b)]
-
-
-def test_a_radio_lets_through_what_its_rate_allows_and_keeps_the_rest_in_order() -> None:
-    net = MemoryNet(conditions=Conditions(delay=0.1))
-    net.buffers["a", "b"] = Radio(bytes_per_second=1000, buffer=16_000)
-    assert through(net, [100, 50, 200], every=0.01) == [(0.2, 100), (0.25, 50), (0.45, 200)]
-
-
-def test_a_delay_that_shrinks_lets_nothing_overtake() -> None:
-    net = MemoryNet(conditions=Conditions(delay=0.0))
-    net.buffers["a", "b"] = Queue(lambda now: max(0.0, 1.0 - 2 * now))
-    came = through(net, [1, 2, 3, 4], every=0.4)
-    assert came == [(1.0, 1), (1.0, 2), (1.0, 3), (1.2, 4)]
+def test_what_queues_is_in_order_at_the_rate_of_a_radio_or_by_a_delay_that_shrinks() -> None:
+    sizes = [bytes(100), bytes(50), bytes(200)]
+    radio = Radio(bytes_per_second=1000, buffer=16_000)
+    came = arrivals(Conditions(delay=0.1), sizes, every=0.01, buffer=radio)
+    assert came == [(0.2, sizes[0]), (0.25, sizes[1]), (0.45, sizes[2])]
+    queue = Queue(lambda now: max(0.0, 1.0 - 2 * now))
+    came = arrivals(Conditions(delay=0.0), SENT[:4], every=0.4, buffer=queue)
+    assert [at for at, _ in came] == [1.0, 1.0, 1.0, 1.2]

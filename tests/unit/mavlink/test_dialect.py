@@ -11,29 +11,6 @@ from mav_tasks.mavlink import _dialect, enums
 from mav_tasks.mavlink import messages as m
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 
-QUEUE_STATUS = "time_boot_ms version running_id next_id capacity counts paused_reason flags"
-
-
-def test_our_messages_are_as_the_contract_draws_them() -> None:
-    status, queue, timing = m.TaskStatus, m.TaskQueueStatus, m.TaskTiming
-    assert [(kind.id, kind.unpacker.size) for kind in (status, queue, timing)] == [
-        (54000, 200),
-        (54001, 126),
-        (54002, 34),
-    ]
-    assert status.unpacker.format == "<IIIIIffffHHHHBBBBBBBBBB50sI24sI64s"
-    assert timing.unpacker.format == "<IIIIffffBB"
-    for kind in (status, timing):
-        assert kind.ordered_fieldnames == kind.fieldnames
-    assert queue.ordered_fieldnames == [
-        *QUEUE_STATUS.split(),
-        *("halt_epoch", "heartbeat_age", "gateway"),
-    ]
-    assert queue.array_lengths[5] == 14
-    assert sorted(number for number in m.ALL if 54000 <= number < 60000) == [54000, 54001, 54002]
-    commands = sorted(n for n in _dialect.enums["MAV_CMD"] if 54000 <= n < 60000)
-    assert commands[:9] == [*range(54000, 54004), *range(54010, 54015)]
-
 
 def test_what_the_base_lacks_is_as_the_set_that_has_it() -> None:
     for number in (435, 436, 437):  # AVAILABLE_MODES, CURRENT_MODE, AVAILABLE_MODES_MONITOR

@@ -3,8 +3,6 @@
 from random import Random
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink.address import Address
@@ -76,18 +74,6 @@ def test_packets_come_out_in_order_and_junk_is_skipped() -> None:
 def test_a_packet_cut_at_any_length_is_no_packet() -> None:
     for raw in (V1, V2, SIGNED):
         assert [split_datagram(raw[:length]) for length in range(len(raw))] == [[]] * len(raw)
-
-
-ANY = st.binary(max_size=700) | st.lists(
-    st.sampled_from([V1, V2, b"\xfd\xfe", b"\xfe", b"\xfd" * 12]), max_size=8
-).map(b"".join)
-
-
-@given(ANY)
-def test_packets_of_any_bytes_are_pieces_of_them_in_order(data: bytes) -> None:
-    start = 0
-    for packet in split_datagram(data):
-        start = data.index(packet.raw, start) + len(packet.raw)
 
 
 def test_two_thousand_packets_are_renumbered_as_stock_pymavlink_packs_them() -> None:

@@ -82,33 +82,6 @@ def window(clock: int, *, now: float = 0.0, latest: int | None = None) -> Window
     return Window(clock - WINDOW, newest, latest or newest, WINDOW, now)
 
 
-def test_in_a_stream_time_only_goes_on() -> None:
-    times = StreamTimes()
-    for timestamp, is_news in ((1000, True), (1000, False), (999, False), (1001, True)):
-        assert times.is_news(ONE, timestamp, window(1000)) is is_news
-        if is_news:
-            times.note(ONE, timestamp, window(1000))
-
-
-def test_a_stream_begins_within_the_window() -> None:
-    times, clock = StreamTimes(), 5 * WINDOW
-    for seconds, is_news in ((-61, False), (-60, True), (60, True), (61, False)):
-        timestamp = clock + int(seconds * UNITS)
-        assert times.is_news(ONE, timestamp, window(clock)) is is_news
-
-
-def test_a_known_clock_may_be_far_off_and_is_believed_as_fast_as_ours() -> None:
-    """Held back is what comes later after the one before than it was signed after it."""
-    hour, clock = int(3600 * UNITS), 200 * WINDOW
-    for far in (-100 * WINDOW, 0, 100 * WINDOW):
-        times, latest = StreamTimes(), clock + abs(far) + 10 * WINDOW
-        times.note(ONE, clock, window(clock))
-        for late, is_news in ((0.0, True), (59.0, True), (61.0, False), (1800.0, False)):
-            wall = clock + far + hour + int(late * UNITS)
-            seen = window(wall, now=3600.0 + late, latest=latest + hour)
-            assert times.is_news(ONE, clock + hour, seen) is is_news, (far, late)
-
-
 def test_a_clock_that_counts_packets_is_believed_while_it_is_not_silent() -> None:
     times, clock = StreamTimes(), 10 * WINDOW
     for number in range(10):
@@ -117,14 +90,6 @@ def test_a_clock_that_counts_packets_is_believed_while_it_is_not_silent() -> Non
         times.note(ONE, clock + number, seen)
     late = window(clock + 511 * int(UNITS), now=511.0)
     assert not times.is_news(ONE, clock + 10, late)
-
-
-def test_of_an_earlier_run_only_the_clock_tells_what_is_new() -> None:
-    times, clock = StreamTimes(), 10 * WINDOW
-    times.restore(ONE, clock)
-    assert not times.is_news(ONE, clock, window(clock))
-    assert times.is_news(ONE, clock + 1, window(clock))
-    assert not times.is_news(ONE, clock + 1, window(clock + 2 * WINDOW, now=100.0))
 
 
 def test_a_time_that_cannot_be_right_keeps_nobody_out() -> None:

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.mavlink.packet import MAX_PACKET
 from mav_tasks.mavlink.stream import PATIENCE, StreamSplitter
 from tests.unit.mavlink.samples import stock_message, stock_packet
 from tests.unit.mavlink.test_packet import HEARTBEAT, V1, V2, signed, unknown
@@ -40,14 +39,6 @@ def split(*chunks: bytes, at: float = 0.0) -> list[bytes]:
 def test_however_a_stream_is_cut_the_packets_are_the_same(cuts: list[int]) -> None:
     edges = [0, *sorted(cuts), len(STREAM)]
     assert split(*(STREAM[a:b] for a, b in pairwise(edges))) == PACKETS
-
-
-def test_byte_by_byte_each_packet_comes_with_its_last_byte() -> None:
-    splitter = StreamSplitter()
-    came = [(n, p.raw) for n in range(len(STREAM)) for p in splitter.feed(STREAM[n : n + 1], now=0)]
-    ends = [sum(map(len, PACKETS[: n + 1])) - 1 for n in range(len(PACKETS))]
-    assert came == list(zip(ends, PACKETS, strict=True))
-    assert splitter.noise == 0
 
 
 @given(st.lists(QUIET_NOISE, min_size=len(PACKETS), max_size=len(PACKETS)), st.integers(1, 300))
@@ -103,15 +94,3 @@ def test_a_packet_with_a_flipped_bit_is_none_and_the_next_is_whole() -> None:
             came = split(bytes(bad) + STREAM)
             assert [raw for raw in came if raw in PACKETS][-len(PACKETS) :] == PACKETS, index
             assert packet not in came[: len(came) - len(PACKETS)]
-
-
-@given(st.lists(st.binary(max_size=600), max_size=20))
-def test_any_bytes_are_survived_and_little_is_kept(chunks: list[bytes]) -> None:
-    splitter = StreamSplitter()
-    whole = fed = 0
-    for chunk in chunks:
-        fed += len(chunk)
-        whole += sum(len(packet.raw) for packet in splitter.feed(chunk, now=0.0))
-        kept = int(repr(splitter).partition("(")[2].partition(" bytes kept")[0])
-        assert kept < MAX_PACKET
-        assert whole + splitter.noise + kept == fed

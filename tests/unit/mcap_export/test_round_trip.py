@@ -183,14 +183,6 @@ def test_logs_of_one_run_are_merged_by_time_and_come_back_each(tmp_path: Path) -
     assert times == sorted(times)
 
 
-def test_the_same_recordings_make_the_same_file(tmp_path: Path) -> None:
-    contents = []
-    for folder in (tmp_path / "one", tmp_path / "other"):
-        folder.mkdir()
-        contents.append(exported(folder, log=ODD["several rovers"])[0].read_bytes())
-    assert contents[0] == contents[1]
-
-
 def rewritten(path: Path, change: Callable[[list[Any]], list[Any]], **options: Any) -> Path:
     """Copy a file as another program would, with changes to its messages."""
     out = path.with_name("changed.mcap")

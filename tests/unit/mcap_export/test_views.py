@@ -1,7 +1,6 @@
 """What viewers draw of a recording: poses, places, set-points, texts and tasks."""
 
 import json
-from dataclasses import replace
 from math import nan, pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -12,27 +11,11 @@ pytest.importorskip("mcap", reason="the extra mcap is not installed")
 
 from mcap.reader import make_reader
 
-from mav_tasks.engine.inputs import WallClock
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.mcap_export.exporting import export
-from mav_tasks.recording import observers
-from mav_tasks.settings import Recording, Settings
-from mav_tasks.tasks.events import (
-    Event,
-    QueuePaused,
-    TaskAssigned,
-    TaskChanged,
-    TaskModified,
-    TaskProgressed,
-    TaskSubmitted,
-)
-from mav_tasks.tasks.goal import Move
-from mav_tasks.tasks.lifecycle import TaskReason, TaskState
-from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.task import Marks, Progress, Submitter, Task, TaskId, Terms
 from tests.unit.mcap_export.test_round_trip import check_messages, json_of, stamped
 
 ROVER, SERVER = Address(1, 1), Address(250, 191)
@@ -136,17 +119,6 @@ def test_places_of_estimate_and_receiver(tmp_path: Path) -> None:
     assert fix["position_covariance_type"] == 1
 
 
-def test_a_setpoint_has_what_its_mask_says(tmp_path: Path) -> None:
-    target: dict[str, Any] = dict.fromkeys(("x", "y", "z", "afx", "afy", "afz"), 9.0)
-    target |= {"vx": 0.5, "vy": 0.0, "vz": 0.0, "yaw": 9.0, "yaw_rate": -0.25}
-    message = m.SetPositionTargetLocalNed(0, 2, 1, 8, 0b0101_1100_0111, **target)
-    ((topic, values),) = seen(tmp_path, message, source=SERVER)
-    assert topic == "/rover/2/setpoints/250/191"
-    told = {name: value for name, value in values.items() if value is not None}
-    del told["timestamp"]
-    assert told == {"frame": "BODY_NED", "vx": 0.5, "vy": 0.0, "vz": 0.0, "yaw_rate": -0.25}
-
-
 def test_long_texts_are_joined_and_levels_are_foxgloves(tmp_path: Path) -> None:
     first, second = b"x" * 50, b"the rest"
     texts = [m.Statustext(4, first, 7, 0), m.Statustext(4, second, 7, 1)]
@@ -158,69 +130,3 @@ def test_long_texts_are_joined_and_levels_are_foxgloves(tmp_path: Path) -> None:
     for sent in ([texts[0]], [texts[0], (3 * SECOND, m.Heartbeat(6, 8, 0, 0, 4, 3))]):
         ((_, late),) = seen(tmp_path, *sent)  # that never becomes whole
         assert late["message"] == "x" * 50 + "[…]"
-
-
-SENDER = Submitter("clients", "127.0.0.1:5", 255, 190)
-TERMS = Terms(priority=7, label="patrol")
-TASK = Task(TaskId(3), 1, 54000, Move(2.0), SENDER, Marks(), 0.0, terms=TERMS)
-HOME = replace(TERMS, label="home", priority=2)
-
-
-def changed(old: TaskState, new: TaskState, reason: TaskReason, version: int) -> TaskChanged:
-    return TaskChanged(TaskId(3), 1, version, old, new, reason, "server", 1.0, Progress())
-
-
-def test_each_change_of_a_task_has_all_that_is_known_of_it(tmp_path: Path) -> None:
-    held = replace(TASK, id=TaskId(2), state=TaskState.HELD, reason=TaskReason.RESTARTED, version=9)
-    over = replace(TASK, id=TaskId(1), state=TaskState.COMPLETED)
-    restored = Restored(tasks=(over, held))
-    (record,) = observers(Recording(decisions=str(tmp_path)), Settings(), restored, now=0.0)
-    record.on_input(WallClock(START / 1e6), now=0.0)
-    fails = changed(TaskState.STARTING, TaskState.FAILED, TaskReason.STUCK, 5)
-    paused = QueuePaused(1, TaskReason.TAKEOVER, "server", 1.0)
-    events: list[Event] = [
-        TaskSubmitted(TASK, 0.0),
-        TaskModified(TaskId(3), 1, 2, HOME, "255/190", 1.0, TERMS),
-        TaskAssigned(TaskId(3), 2, 3, 1, "rover 1: silent; free", 1.0),
-        changed(TaskState.QUEUED, TaskState.STARTING, TaskReason.NONE, 4),
-        TaskProgressed(TaskId(3), 1, 4, Progress(), 1.0),
-        fails,
-        paused,
-    ]
-    record.on_output([], events, now=5.0)
-    record.close()
-    (path,) = tmp_path.iterdir()
-    with (tmp_path / "out.mcap").open("wb") as file:
-        assert export([path], file).events == len(events)
-    check_messages(tmp_path / "out.mcap")
-    found = json_of(tmp_path / "out.mcap")
-    before, submitted, *later, failed = found["/tasks/changes"]
-    names = ("event", "task", "rover", "version", "state", "reason", "label", "priority")
-    assert [before[name] for name in names] == [
-        *("restored", 2, 1, 9, "held", "restarted", "patrol", 7)
-    ]
-    assert submitted == {
-        "timestamp": {"sec": 1_763_726_405, "nsec": 0},
-        "event": "submitted",
-        "rover": 1,
-        "task": 3,
-        "version": 1,
-        "state": "queued",
-        "old": "unknown",
-        "reason": "none",
-        "label": "patrol",
-        "priority": 7,
-        "actor": str(SENDER),
-        "words": str(events[0]),
-    }
-    assert [[each[name] for name in names] for each in later] == [
-        ["modified", 3, 1, 2, "queued", "none", "home", 2],
-        ["assigned", 3, 2, 3, "queued", "none", "home", 2],
-        ["changed", 3, 2, 4, "starting", "none", "home", 2],
-    ]
-    assert [failed[name] for name in (*names, "old", "actor")] == [
-        *("changed", 3, 2, 5, "failed", "stuck", "home", 2, "starting", "server")
-    ]
-    log = [(each["level"], each["message"]) for each in found["/tasks/log"]]
-    assert log[-1] == (3, str(paused))
-    assert len(log) == len(events) - 1  # progress is no text

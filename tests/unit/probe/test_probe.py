@@ -8,7 +8,6 @@ from math import nan
 
 import pytest
 
-from mav_tasks.links.memory import Conditions
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
@@ -200,17 +199,6 @@ def test_a_car_is_driven_in_a_larger_area_and_not_asked_to_turn_on_the_spot() ->
     assert not [each for _, each in world.setpoints() if each.vx == 0.0 and each.yaw_rate]
 
 
-def test_a_bad_radio_spoils_the_figures_and_not_the_end() -> None:
-    for persona in (ARDUPILOT, PX4):
-        world = ProbeWorld(drive=True, persona=persona)
-        world.net.conditions = Conditions(delay=0.05, jitter=0.05, loss=0.08, duplication=0.05)
-        world.finish()
-        world.run(2.0)
-        assert (world.driven.ended, world.driven.loss_stop) == ("", "yes")
-        assert (world.rests(), world.farthest < BOX) == (True, True)
-        assert world.probe.findings.rates_given_back == "as before"
-
-
 def test_what_cannot_be_driven_safely_is_not_driven() -> None:
     withheld = [Faults(withheld=frozenset({kind.id})) for kind in (m.LocalPositionNed, m.Attitude)]
     unknown = "not driven: its position is unknown or too old"
@@ -328,20 +316,6 @@ def test_a_rover_that_would_not_stand_by_itself_is_not_left_alone_while_it_drive
         assert marks_of(world)["without setpoints"][0] is Mark.BAD
         times = [at for at, _ in world.setpoints()]
         assert max(later - earlier for earlier, later in pairwise(times)) < 0.2
-
-
-def test_one_that_drives_on_in_spite_of_what_it_says_is_stopped_and_found_out() -> None:
-    """Here a bridge repeats the last set-point, whether the probe still sends or not."""
-    world = ProbeWorld(drive=True)
-    bridge = world.net.link("bridge", peers=("rover1",))
-    while not world.probe.is_over:
-        world.run(0.1)
-        for _, setpoint in world.setpoints()[-1:]:
-            bridge.send("rover1", Encoder(Address(250, 191)).encode(setpoint))
-    assert world.driven.loss_stop == "no"
-    assert world.driven.ended
-    assert (world.rests(), world.farthest < BOX) == (True, True)
-    assert profile_of(world.probe.findings, probed="2026-11-21").loss_stop == "no"
 
 
 @EACH

@@ -29,7 +29,6 @@ from mav_tasks.settings import Clients, Recording, Retention, Settings
 from mav_tasks.tasks.goal import Move
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.restored import Restored
-from mav_tasks.tasks.server_events import ParameterSet
 from mav_tasks.tasks.task import Marks, Pose, Progress, Submitter, Task, TaskId, Terms
 from rover_sim.body import Pose as RoverPose
 from rover_sim.kinematic import KinematicBody
@@ -160,23 +159,6 @@ def test_settings_tasks_and_all_inputs_come_back_bit_for_bit(tmp_path: Path) -> 
     assert list(back.restored.paused) == [2, 1]  # in their order, too
     came = [(repr(back.input_of(entry)), repr(entry.now)) for entry in back.entries()]
     assert came == [(repr(item), repr(now)) for item, now in noted]
-
-
-def test_outputs_that_are_equal_to_others_are_told_apart(tmp_path: Path) -> None:
-    values = [0.0, -0.0, 0, 1, 1.0, True, nan, inf, -inf, None]
-    one = i.Outgoing("link", "peer", b"data")
-    packets = [one._replace(link="knil"), one._replace(data=b"Data"), one._replace(is_first=True)]
-    packets += [one._replace(peer=peer) for peer in ("reep", ("peer",))]
-    record = begun(tmp_path, Settings())
-    for value in values:
-        record.on_output([], [ParameterSet("X", value, "server", 1.0)], now=1.0)
-    sent = [[], [one], [one, one], *([each] for each in packets)]
-    sent += [[one, packets[0]], [packets[0], one]]
-    for each in sent:
-        record.on_output(each, [], now=1.0)
-    record.close()
-    lines = [entry.raw for entry in read(only_file(tmp_path)).entries()]
-    assert len(set(lines)) == len(lines) == len(values) + len(sent)
 
 
 def test_a_peer_that_no_link_has_ends_the_record(

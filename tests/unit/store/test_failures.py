@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.errors import StoreError
-from mav_tasks.store import Kept
 from mav_tasks.tasks.events import TaskSubmitted
 from tests.kit.databases import foreign, newer, tables
 from tests.kit.volume import some
@@ -121,34 +120,6 @@ def test_a_full_disk_is_said_and_nothing_is_lost_over_it(path: Path) -> None:
         assert ids == list(range(1, len(ids) + 1))
         assert len(ids) >= through
         assert [number for number, _ in store.journal()] == ids
-
-
-@pytest.mark.parametrize("way", ["moved away", "another in its place", "its log removed"])
-def test_what_is_written_to_a_file_that_is_gone_is_not_kept(path: Path, way: str) -> None:
-    with opened(path) as store:
-        store.append([submitted(1)])
-        wait_for(store, 1)
-        away = path.with_name("away")
-        if way == "another in its place":
-            copy = path.with_name("copy")
-            copy.write_bytes(path.read_bytes())
-        if way == "its log removed":
-            path.with_name(f"{path.name}-wal").unlink()
-        else:
-            path.rename(away)
-        if way == "another in its place":
-            copy.rename(path)
-        store.append([submitted(2)])
-        failure = wait_for_failure(store)
-        assert str(path) in failure.text
-        assert "removed or replaced" in failure.text
-        if way != "its log removed":  # which mends itself: all that was in it is still known
-            time.sleep(0.6)  # it tries again, in vain
-            assert not any(isinstance(outcome, Kept) for outcome in store.take_outcomes())
-            away.rename(path)
-        wait_for(store, 2)
-    with opened(path) as store:
-        assert [task.id for task in loaded(store).tasks] == [1, 2]
 
 
 def test_a_file_that_is_gone_for_good_ends_with_what_is_lost_said(path: Path) -> None:

@@ -116,19 +116,6 @@ def test_what_is_no_record_is_refused_in_one_line(
         opened(path).__enter__()
 
 
-def test_a_record_with_holes_gets_its_blocks_when_it_is_opened(
-    path: Path, record_path: Path
-) -> None:
-    life(path, STOP)
-    content = record_path.read_bytes()
-    with record_path.open("wb") as file:  # as a backup that leaves zeros out puts it back
-        file.truncate(len(content))
-        file.write(content[: content.rindex(b"14550") + 5])
-    assert record_path.stat().st_blocks * 512 < len(content)
-    assert restored(path).paused == {1: R.STOPPED}
-    assert record_path.stat().st_blocks * 512 >= len(content)
-
-
 def test_a_halt_that_neither_keeps_is_reported_and_one_that_the_database_keeps_is_not(
     place: str, tmp_path: Path
 ) -> None:
@@ -163,3 +150,16 @@ def test_on_a_file_system_that_is_full_the_record_takes_a_stop_and_nothing_else_
     if done.returncode == NO_NAMESPACE or done.stderr.startswith("unshare:"):
         pytest.skip("this machine gives no file system of one's own")
     assert done.stdout.split() == ["not", "kept", "STOPPED"], done.stderr
+
+
+def test_a_record_with_holes_gets_its_blocks_when_it_is_opened(
+    path: Path, record_path: Path
+) -> None:
+    life(path, STOP)
+    content = record_path.read_bytes()
+    with record_path.open("wb") as file:  # as a backup that leaves zeros out puts it back
+        file.truncate(len(content))
+        file.write(content[: content.rindex(b"14550") + 5])
+    assert record_path.stat().st_blocks * 512 < len(content)
+    assert restored(path).paused == {1: R.STOPPED}
+    assert record_path.stat().st_blocks * 512 >= len(content)

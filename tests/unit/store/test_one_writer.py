@@ -180,15 +180,3 @@ def test_what_was_copied_over_it_is_left_as_it_is(path: Path) -> None:
         found(path)
     path.with_name(f"{path.name}.halts").unlink()
     assert len(found(path)) == 99
-
-
-def test_a_record_of_halts_is_not_taken_for_another_stores(path: Path) -> None:
-    other = path.with_name("other.sqlite3")
-    for each in (path, other):
-        with opened(each) as store:
-            store.append([submitted(1)])
-    shutil.copyfile(f"{other}.halts", f"{path}.halts")
-    with pytest.raises(StoreError, match=r"tasks\.sqlite3\.halts: it is the record of another"):
-        opened(path).__enter__()
-    path.with_name(f"{path.name}.halts").unlink()
-    assert found(path) == [1]

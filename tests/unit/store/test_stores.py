@@ -1,6 +1,5 @@
 """What every durable store does, on each kind of database."""
 
-import stat
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -33,7 +32,6 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
 from mav_tasks.tasks.task import MAX_TASK_ID, Pose, Progress, TaskId, Terms
 from tests.kit.databases import locked, tables
@@ -56,20 +54,6 @@ st.register_type_strategy(int, st.integers(0, 2**20))
 st.register_type_strategy(str, st.text(st.characters(min_codepoint=32, max_codepoint=0x2FFF)))
 #: the others only change what the next life knows
 JOURNALLED = [each for each in get_args(Event) if each not in (TaskProgressed, SignaturesSeen)]
-
-
-def test_a_new_store_holds_nothing(place: str) -> None:
-    with opened(place) as store:
-        assert store.load() == Restored(wall_offset=OFFSET)
-        assert store.take_outcomes() == []
-
-
-def test_events_are_kept_and_the_descriptor_says_so(place: str) -> None:
-    with opened(place) as store:
-        store.append([submitted(1), submitted(2)])
-        store.append([VehicleSeen(1, "found", 1.0)])
-        assert wait_for(store, 3)[-1] == Kept(3)
-        assert store.take_outcomes() == []
 
 
 def test_every_event_comes_back_as_it_was(place: str) -> None:
@@ -273,13 +257,6 @@ def test_a_stuck_disk_is_given_up_in_the_end(place: str) -> None:
         assert (found.tasks, found.ended_well) == ((), False)
 
 
-def test_our_own_mistake_is_raised_where_outcomes_are_taken(place: str) -> None:
-    with opened(place) as store:
-        store.append([VehicleSpeedSet(1, float("nan"), "client", 1.0)])
-        with pytest.raises(ValueError, match="JSON"):
-            wait_for(store, 1)
-
-
 #: of the first version: what its files and databases had
 FIRST_FILE = """
 PRAGMA application_id = 1297503315; PRAGMA user_version = 1;
@@ -312,16 +289,6 @@ def test_a_file_of_the_first_version_is_read_and_brought_up_to_date(tmp_path: Pa
         with opened(place) as store:
             found = loaded(store)
     assert ([task.id for task in found.tasks], found.paused) == ([1], {1: R.STOPPED})
-
-
-def test_files_are_their_users_alone(tmp_path: Path) -> None:
-    path = tmp_path / "folder" / "tasks.sqlite3"
-    with opened(path) as store:
-        keep(store, submitted(1))
-        modes = {entry.name: stat.S_IMODE(entry.stat().st_mode) for entry in path.parent.iterdir()}
-    assert set(modes.values()) == {0o600}
-    assert set(modes) >= {"tasks.sqlite3", "tasks.sqlite3.halts", "tasks.sqlite3-wal"}
-    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
 
 
 def test_a_place_of_an_unknown_kind_is_no_path_and_its_password_is_not_told(

@@ -9,7 +9,6 @@ from mav_tasks.tasks.lifecycle import (
     TERMINAL,
     TRANSITIONS,
     WAITING,
-    TaskReason,
     TaskState,
     check_transition,
 )
@@ -48,26 +47,3 @@ def test_states_are_waiting_active_or_over() -> None:
     assert INITIAL == WAITING
     assert set(PICTURE) == WAITING | ACTIVE, "what is over is over for good"
     assert all(S.KILLED in ways for ways in PICTURE.values())
-
-
-REASONS = {
-    0: "NONE",
-    1: """START_TIME DEPENDENCY BEHIND_OTHERS QUEUE_PAUSED WAITING_FOR_START DISARMED WRONG_MODE
-          NO_POSITION VEHICLE_SILENT OTHER_CONTROLLER HELD_AHEAD RESTARTED NOT_READY
-          LOSS_FAILSAFE OUTSIDE_OWN_FENCE""",
-    30: "OPERATOR PREEMPTED TAKEOVER LINK_LOST POSITION_LOST STOPPED FAILSAFE LEASE_LOST",
-    50: "OUTCOME_UNKNOWN FENCE LATE OFF_TRACK FRAME_RESET STOP_UNCONFIRMED OVERSPEED",
-    70: """STUCK ARM_REFUSED MODE_REFUSED START_TIMEOUT LINK_TIMEOUT DEPENDENCY_FAILED DEADLINE
-           CANCELLED CLEARED REPLACED STOP SKIPPED""",
-    100: """QUEUE_FULL QUOTA STORE_UNAVAILABLE BAD_PARAMETER BAD_FRAME OUTSIDE_FENCE
-            NOT_SUPPORTED_BY_VEHICLE NOT_FOUND NOT_ALLOWED UNKNOWN_DEPENDENCY CYCLE NONCE_REUSED
-            WRONG_STATE RATE_LIMITED STALE""",
-}
-
-
-def test_reasons_are_numbered_in_order_from_the_base_of_their_kind() -> None:
-    assert {reason.name: reason.value for reason in TaskReason} == {
-        name: base + number
-        for base, names in REASONS.items()
-        for number, name in enumerate(names.split())
-    }

@@ -1,6 +1,5 @@
 """When a task that repeats runs next: periods, cron expressions, daylight saving time."""
 
-from dataclasses import replace
 from datetime import UTC, datetime
 from zoneinfo import ZoneInfo
 
@@ -9,8 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mav_tasks.tasks.cron import Cron, parse_cron, utc_text
-from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.repetition import (
     MAX_PERIOD,
     MAX_REPEAT,
@@ -19,7 +16,6 @@ from mav_tasks.tasks.repetition import (
     next_run,
     repeating,
     rule_of,
-    why_series_ends,
 )
 from mav_tasks.tasks.task import Marks, Task, TaskId, Terms
 from tests.unit.tasks.samples import FORWARD_2, SOMEBODY, TASK_MOVE
@@ -57,23 +53,6 @@ def test_a_period_counts_from_the_planned_start_and_leaves_out_what_has_passed()
         if (run := next_run(HOURLY, now=now, wall_offset=OFFSET)) is not None
     ]
     assert starts == [(3700.0, 0), (3700.0, 0), (7300.0, 1), (90_100.0, 24)]
-
-
-def test_a_period_after_a_time_of_day_follows_the_clock() -> None:
-    terms = Terms(repeat=str(DAY), series=1, start_utc=int(OFFSET) + 50)
-    run = next_run(terms, now=60.0, wall_offset=OFFSET)
-    assert run is not None
-    assert run.terms == replace(terms, start_utc=int(OFFSET) + 50 + DAY)
-
-
-def test_a_run_that_is_cancelled_before_its_time_is_followed_by_the_one_after() -> None:
-    run = next_run(HOURLY, now=50.0, wall_offset=OFFSET)
-    assert run is not None
-    assert (run.terms.start_at, run.left_out) == (3700.0, 0)
-    six = Terms(repeat="0 6 * * *", series=1, start_utc=int(utc("2026-11-27T06:00")))
-    run = next_run(six, now=utc("2026-11-26T12:00") - OFFSET, wall_offset=OFFSET)
-    assert run is not None
-    assert (run.terms.start_utc, run.left_out) == (utc("2026-11-28T06:00"), 0)
 
 
 def test_an_expression_is_read_in_its_zone() -> None:
@@ -181,19 +160,3 @@ def test_times_after_a_clock_that_was_set_back_count_from_now() -> None:
     assert brought_forward(daily, utc=utc("2026-11-26T12:00")).start_utc == moved.start_utc
     assert brought_forward(HOURLY, utc=0.0) is HOURLY
     assert brought_forward(moved, utc=utc("2026-11-26T12:00")) is moved
-
-
-def test_some_ends_end_the_series() -> None:
-    for state, reason, why in (
-        (S.COMPLETED, R.NONE, ""),
-        (S.FAILED, R.STUCK, ""),
-        (S.EXPIRED, R.DEADLINE, ""),
-        (S.CANCELLED, R.CANCELLED, ""),
-        (S.CANCELLED, R.SKIPPED, ""),
-        (S.FAILED, R.DEPENDENCY_FAILED, "dependency failed"),
-        (S.CANCELLED, R.CLEARED, "cleared"),
-        (S.KILLED, R.CANCELLED, "killed"),
-        (S.KILLED, R.STOP, "STOP"),
-    ):
-        over = replace(task(terms=HOURLY), state=state, reason=reason)
-        assert why_series_ends(over) == why, (state, reason)

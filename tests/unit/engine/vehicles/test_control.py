@@ -12,8 +12,7 @@ import pytest
 from mav_tasks.engine.vehicles.control import STANDS, TABLE, Effect, Event, Step, effects_of
 from mav_tasks.engine.vehicles.joint_state import Driver, Grip, Queue, State, Work
 from rover_sim.personas import Persona
-from tests.kit.joint.agreement import Agreement
-from tests.kit.joint.deeds import DEEDS, Scene
+from tests.kit.joint.agreement import Agreement, deeds
 from tests.kit.joint.graph import PEOPLE, TIME, Graph, variants
 from tests.kit.joint.model import MAKES
 from tests.kit.px4 import PROMPT_PX4
@@ -173,9 +172,10 @@ def test_the_server_does_what_the_graph_is_made_of(
 ) -> None:
     agreement, random = Agreement(), Random(0)
     agreement.look_on(monkeypatch)
-    scene = Scene(World(persona=persona).ready())
+    world = World(persona=persona).ready()
+    possible = deeds(world)
     for _ in range(120):
-        random.choice(DEEDS).act(scene)
-        scene.world.run(random.choice((0.3, 1.5, 4.0)))
+        random.choice(possible)()
+        world.run(random.choice((0.3, 1.5, 4.0)))
     assert agreement.compared > 50
     assert agreement.surprises == []

@@ -132,18 +132,6 @@ def end_sessions(postgres: PostgresServer, url: str) -> None:
     )
 
 
-def test_a_session_that_was_lost_while_nothing_was_written_delays_no_submission(
-    postgres: PostgresServer, url: str
-) -> None:
-    with opened(url) as store:
-        write_through(store, [1], through=1)
-        (before,) = holders(postgres, url)
-        postgres.execute("SELECT pg_terminate_backend(%s)", (before,))
-        wait_until(lambda: before not in holders(postgres, url), within=10, what="its end")
-        assert write_through(store, [2], through=2) == []
-        assert len(holders(postgres, url)) == 1
-
-
 def test_an_answer_that_is_lost_after_the_commit_is_found_out(url: str, proxy: TcpProxy) -> None:
     with opened(by_way_of(proxy, url)) as store:
         write_through(store, [1], through=1)
@@ -226,46 +214,6 @@ def test_a_full_disk_is_told_and_nothing_is_lost_over_it(postgres: PostgresServe
         disk.rmdir()
 
 
-def test_a_standby_that_must_confirm_and_does_not_is_waited_for(
-    postgres: PostgresServer, url: str
-) -> None:
-    with opened(url) as store:
-        write_through(store, [1], through=1)
-        standbys(postgres, "nobody")
-        try:
-            store.append([submitted(2)])
-            (waiting,) = wait_until(
-                lambda: waiters(postgres), within=10, what="a commit that waits"
-            )
-            postgres.execute("SELECT pg_cancel_backend(%s)", waiting)
-            told = wait_for_failure(store)
-            assert "not confirmed by the database: canceling wait for synchronous" in told.text
-            store.append([submitted(3)])
-            wait_until(lambda: waiters(postgres) not in ([], [waiting]), within=20, what="another")
-            assert not any(isinstance(each, Kept) for each in store.take_outcomes())
-        finally:
-            standbys(postgres, "")
-        wait_for(store, 3)
-    check_whole(url, at_least=3)
-
-
-def waiters(postgres: PostgresServer) -> list[Any]:
-    """Return the processes whose commit waits for a replica."""
-    query = "SELECT pid FROM pg_stat_activity WHERE wait_event = 'SyncRep'"
-    return postgres.execute(query)
-
-
-def standbys(postgres: PostgresServer, names: str) -> None:
-    """Set which replicas must have each commit."""
-    postgres.execute(f"ALTER SYSTEM SET synchronous_standby_names = '{names}'")
-    postgres.execute("SELECT pg_reload_conf()")
-    wait_until(
-        lambda: postgres.execute("SHOW synchronous_standby_names") == [(names,)],
-        within=10,
-        what="the setting in force",
-    )
-
-
 def test_an_older_copy_in_the_place_of_the_database_is_not_written_to(
     postgres: PostgresServer, url: str
 ) -> None:
@@ -341,3 +289,43 @@ def test_a_store_is_no_reason_to_import_psycopg() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+def test_a_standby_that_must_confirm_and_does_not_is_waited_for(
+    postgres: PostgresServer, url: str
+) -> None:
+    with opened(url) as store:
+        write_through(store, [1], through=1)
+        standbys(postgres, "nobody")
+        try:
+            store.append([submitted(2)])
+            (waiting,) = wait_until(
+                lambda: waiters(postgres), within=10, what="a commit that waits"
+            )
+            postgres.execute("SELECT pg_cancel_backend(%s)", waiting)
+            told = wait_for_failure(store)
+            assert "not confirmed by the database: canceling wait for synchronous" in told.text
+            store.append([submitted(3)])
+            wait_until(lambda: waiters(postgres) not in ([], [waiting]), within=20, what="another")
+            assert not any(isinstance(each, Kept) for each in store.take_outcomes())
+        finally:
+            standbys(postgres, "")
+        wait_for(store, 3)
+    check_whole(url, at_least=3)
+
+
+def waiters(postgres: PostgresServer) -> list[Any]:
+    """Return the processes whose commit waits for a replica."""
+    query = "SELECT pid FROM pg_stat_activity WHERE wait_event = 'SyncRep'"
+    return postgres.execute(query)
+
+
+def standbys(postgres: PostgresServer, names: str) -> None:
+    """Set which replicas must have each commit."""
+    postgres.execute(f"ALTER SYSTEM SET synchronous_standby_names = '{names}'")
+    postgres.execute("SELECT pg_reload_conf()")
+    wait_until(
+        lambda: postgres.execute("SHOW synchronous_standby_names") == [(names,)],
+        within=10,
+        what="the setting in force",
+    )

@@ -84,15 +84,3 @@ def test_of_two_batches_at_once_the_first_that_is_committed_has_the_nonce(url: s
         (taken,) = (each for each in told if isinstance(each, NonceTaken))
         assert {taken.task_id, taken.known} == {1, 1001}
         assert ids_in(url) == [taken.known]
-
-
-def test_a_task_that_moved_is_loaded_with_its_new_vehicle_only(url: str) -> None:
-    with gateways(url, "a", "b") as (a, b):
-        moved = TaskAssigned(TaskId(1), 2, 2, 1, "rover 1: silent; free", 102.0)
-        a.store.append([*to_any(1), moved])
-        a.kept(3)
-        b.store.load_vehicles(frozenset({1}))
-        assert b.next(VehiclesLoaded).restored.tasks == ()
-        b.store.load_vehicles(frozenset({2}))
-        (task,) = b.next(VehiclesLoaded).restored.tasks
-        assert (task.vehicle, task.choice, task.version) == (2, moved.choice, 2)

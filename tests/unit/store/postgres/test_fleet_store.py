@@ -14,7 +14,6 @@ from mav_tasks.store.postgres.failures import PostgresError
 from mav_tasks.tasks.events import Event, QueuePaused, VehicleHalted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.task import MAX_TASK_ID
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import wait_until
 from tests.kit.tcp_proxy import TcpProxy
@@ -42,16 +41,6 @@ def test_a_gateway_begins_with_nothing_but_ids(url: str) -> None:
         assert b.next(IdsGranted) == IdsGranted(1001, 1000)
         a.store.append([submitted(number) for number in range(1, 502)])
         assert a.next(IdsGranted) == IdsGranted(2001, 1000)
-
-
-def test_ids_go_on_at_1_after_the_last(url: str) -> None:
-    with gateways(url, "a") as (a,):
-        a.next(IdsGranted)
-    with connected(url) as connection:
-        connection.execute("UPDATE meta SET next_id = %s", (MAX_TASK_ID - 1,))
-    with gateways(url, "b") as (b,):
-        assert b.next(IdsGranted) == IdsGranted(MAX_TASK_ID - 1, 2)
-        assert b.next(IdsGranted) == IdsGranted(1, 1000)
 
 
 def test_another_gateway_loads_what_one_has_stored_about_a_vehicle(url: str) -> None:

@@ -12,7 +12,6 @@ import pytest
 from mav_tasks.fleet.member import Renew, Take
 from mav_tasks.store import VehiclesLoaded, Which, kind_of
 from mav_tasks.store.postgres.failures import PostgresError
-from rover_sim.postgres import installed
 from tests.kit.postgres import PostgresServer
 from tests.kit.processes import wait_until
 from tests.kit.volume import some
@@ -24,7 +23,7 @@ from tests.unit.store.postgres.gateways import (
     ids_in,
     of_vehicle,
 )
-from tests.unit.store.samples import OFFSET, loaded, opened, submitted
+from tests.unit.store.samples import OFFSET
 
 STEP = 3.0  # s, by which the next holder of a vehicle signs ahead
 ROOT = Path(__file__).resolve().parents[4]
@@ -85,30 +84,6 @@ def test_another_gateway_has_all_that_a_killed_one_had_kept(url: str, life: int)
     with closing(kind_of(url).open_journal(url, Which())) as journal:
         entries = list(journal.take(offset=OFFSET))
     assert [number for number, _ in entries] == list(range(1, len(ids_in(url)) + 1))
-
-
-def test_a_standby_is_not_asked_what_a_vehicle_has(postgres: PostgresServer, url: str) -> None:
-    """It may not have yet what the former holder has stored."""
-    standby = PostgresServer(installed())
-    try:
-        standby.start()
-        name = url.rpartition("/")[2]
-        standby.create_database(name)
-        with opened(standby.url(name)):
-            pass
-        both = url.replace("@", f"@127.0.0.1:{standby.port},")
-        with standby.as_replica(), gateways(url, "a") as (a,):
-            a.store.append([submitted(1)])
-            a.kept(1)
-            a.store.close()
-            a.open(both)
-            a.store.load_vehicles(frozenset({1}))
-            assert [task.id for task in a.next(VehiclesLoaded).restored.tasks] == [1]
-            a.store.close()
-            with opened(both) as store:
-                assert [task.id for task in loaded(store).tasks] == [1]
-    finally:
-        standby.close()
 
 
 @pytest.mark.parametrize("wrong", [-3600.0, 3600.0])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from mav_tasks.store import TaskStates
-from mav_tasks.tasks.events import TaskChanged, TaskSubmitted, TaskWithdrawn
+from mav_tasks.tasks.events import TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Progress, TaskId
@@ -57,16 +57,6 @@ def test_every_question_is_answered_and_then_the_end_is_told(
     a.store.append([becomes(1, S.COMPLETED)])
     assert b.next(TaskStates).states == ((1, S.COMPLETED),)
     assert time.monotonic() - began < NOTIFIED  # it was notified
-
-
-def test_a_withdrawn_task_is_none(pair: tuple[Gateway, Gateway]) -> None:
-    a, b = pair
-    b.store.watch_tasks(frozenset({1}))
-    b.next(TaskStates)
-    began = time.monotonic()
-    a.store.append([TaskWithdrawn(TaskId(1), 1, 101.0)])
-    assert b.next(TaskStates).states == ((1, None),)
-    assert time.monotonic() - began < NOTIFIED
 
 
 def test_an_end_while_the_session_is_lost_is_told_in_the_next_one(

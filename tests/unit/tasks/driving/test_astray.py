@@ -96,14 +96,6 @@ def test_what_rolls_on_before_it_reverses_is_not_counted_until_it_has_stood() ->
     assert rig.drives(2.0, north=2.0) is not None
 
 
-def test_what_drifts_while_it_turns_on_the_spot_is_not_counted() -> None:
-    rig = Rig(DRIVE)
-    rig.watch.commanded(Velocity(0.0, 0.5))
-    assert rig.drives(2.0, east=0.2) is None
-    rig.watch.commanded(AHEAD)
-    assert rig.drives(2.0, east=0.2) is not None
-
-
 def test_who_leaves_its_line_is_found_at_a_metre_more_than_it_began_with() -> None:
     rig = Rig(Move(10.0))
     assert not rig.is_moved_to(0.0, 0.6)
@@ -120,12 +112,6 @@ def test_a_corrected_position_is_not_driving_and_hides_none() -> None:
     assert not rig.is_moved_to(1.0, 1.9)
     assert not rig.is_moved_to(1.0, -0.4)
     assert rig.drives(3.0, 0.4, -0.3, -0.5) is not None
-
-
-def test_one_that_turns_to_its_course_in_a_bow_may_leave_its_line() -> None:
-    rig = Rig(Move(10.0), Velocity(0.2, 0.0, course=0.0))
-    assert rig.drives(3.0, east=0.2, yaw=pi / 2) is None
-    assert rig.drives(3.0, north=0.2, yaw=0.1) is None
 
 
 def test_a_heading_that_nobody_can_have_turned_by_is_a_jump() -> None:

@@ -1,8 +1,4 @@
-"""Places and ways against a fence: cases in words, and two oracles that share nothing with it.
-
-One is shapely, with random fences. The other works in whole numbers on a grid, exactly, where ways
-run through corners and along edges all the time.
-"""
+"""Places and ways against a fence: its boundary in cases, and random ones as shapely judges."""
 
 from collections import Counter
 from math import atan2, cos, inf, nan, pi, sin, tau
@@ -10,8 +6,6 @@ from random import Random
 
 import pytest
 import shapely
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 from shapely.geometry import LineString
 from shapely.geometry import Polygon as Shape
 
@@ -67,37 +61,18 @@ ROUND_YARD, ROUND_POND = Circle(ORIGIN, 5.0, True), Circle(ORIGIN, 5.0, False)
 N, E = spot(10, 10)  # of the box's corner
 STAR = [(10 * cos(2 * i * tau / 5), 10 * sin(2 * i * tau / 5)) for i in range(5)]
 RIGHT = box(0, 6, 10, 16)  # overlaps the box between 6 and 10 east
-BOTH = polygon(*BOX, group=3), polygon(*RIGHT, group=3)
 EITHER = polygon(*BOX, group=1), polygon(*RIGHT, group=2)
-DIAMOND = polygon((0, -10), (10, 0), (0, 10), (-10, 0))
 MM = 0.001  # m: the boundary is that wide, on either side
 
 PLACES: tuple[tuple[tuple[Zone, ...], dict[Point, bool]], ...] = (
-    ((), {(1e6, -1e6): True}),
-    ((YARD,), {(5, 5): True, (5, 11): False, (5, -1): False, (11, 5): False, (-1, 5): False}),
-    ((POND,), {(5, 5): False, (5, 11): True}),
-    (
-        (YARD, Circle(corner(5, 5), 2.0, False)),
-        {(1, 1): True, (5, 6): False, (20, 20): False},
-    ),
     ((YARD,), {(N, E): False, (N - 0.9 * MM, 5): False, (N - 1.1 * MM, 5): True}),
     ((POND,), {(N, 5): False, (N + 0.9 * MM, 5): False, (N + 1.1 * MM, 5): True}),
     ((YARD,), {(5, E - 0.9 * MM): False, (5, E - 1.1 * MM): True, (5, E + 1.1 * MM): False}),
     ((POND,), {(N + 0.6 * MM, E + 0.6 * MM): False, (N + 0.9 * MM, E + 0.9 * MM): True}),
     ((ROUND_YARD,), {(5 - 0.9 * MM, 0): False, (5, 0): False, (5 - 1.1 * MM, 0): True}),
     ((ROUND_POND,), {(5 + 0.9 * MM, 0): False, (5, 0): False, (5 + 1.1 * MM, 0): True}),
-    ((polygon(*U),), {(1, 5): True, (5, 5): False, (5, 8): True}),
-    ((polygon(*reversed(U)),), {(1, 5): True, (5, 5): False, (5, 8): True}),
     ((polygon(*(p for p in U for _ in "ab")),), {(1, 5): True, (5, 5): False}),  # each twice
     ((polygon(*STAR),), {(7, 0): True, (0, 0): False}),  # where it covers twice is a hole
-    ((DIAMOND,), {(spot(0, 10)[0], 0): True, (spot(0, 10)[0], -20): False, (N, -5): False}),
-    (BOTH, {(5, 3): False, (5, 8): True, (5, 13): False}),
-    (EITHER, {(5, 3): True, (5, 8): True, (5, 13): True, (5, 17): False}),
-    (
-        (polygon(*BOX, group=1), Circle(corner(5, 10), 3.0, True, 1)),
-        {(5, 3): False, (5, 8): True, (5, 12): False},
-    ),
-    ((*EITHER, Circle(corner(5, 13), 1.0, False, 1)), {(5, 13): False}),
 )
 
 
@@ -108,32 +83,20 @@ def test_places_are_allowed_or_not() -> None:
 
 
 WAYS: tuple[tuple[tuple[Zone, ...], Point, Point, bool], ...] = (
-    ((), (1e6, -1e6), (-1e6, 1e6), True),
-    ((polygon(*U),), (8, 1), (8, 9), False),  # across the notch
-    ((polygon(*U),), (1, 1), (1, 9), True),
-    ((polygon(*U, inclusion=False),), (12, 5), (3, 5), True),  # into the notch
-    ((polygon(*U, inclusion=False),), (12, 5), (1, 5), False),
     ((POND,), (5, -5), (5, 15), False),  # through it, though both ends are allowed
-    ((Circle(ORIGIN, 1.0, False),), (0, -50), (0, 50), False),
     ((POND,), (N + 4, E - 4), (N - 4, E + 4), False),  # touching a corner
     ((POND,), (N + 4 + 2 * MM, E - 4), (N - 4 + 2 * MM, E + 4), True),
     ((POND,), (N, 2), (N, 8), False),  # along an edge, or in line with it through a corner
     ((POND,), (N, -5), (N, 15), False),
     ((POND,), (N, 11), (N, 15), True),
     ((POND,), (N + 0.9 * MM, 11), (N, -5), False),
-    ((POND,), (N + 0.5 * MM, -50), (N + 0.5 * MM, 15), False),  # beside it
     ((POND,), (N + 1.5 * MM, -50), (N + 1.5 * MM, 15), True),
     ((ROUND_POND,), (5, -9), (5, 9), False),  # a tangent
     ((ROUND_POND,), (5 + 0.9 * MM, -9), (5 + 0.9 * MM, 9), False),
     ((ROUND_POND,), (5 + 1.1 * MM, -9), (5 + 1.1 * MM, 9), True),
-    ((ROUND_YARD,), (0, -4.99), (0, 4.99), True),
-    ((ROUND_YARD,), (0, -4.99), (0, 5.01), False),
-    ((YARD,), (5, -1), (5, 5), False),  # it begins outside
-    ((POND,), (5, 5), (5, 5.1), False),
     ((YARD,), (5, 5), (5, 5), True),  # of no length
     ((YARD,), (N, 5), (N, 5), False),
     (EITHER, (5, 1), (5, 15), True),  # from one group to another
-    (BOTH, (5, 1), (5, 15), False),
     ((EITHER[0], polygon(*box(0, 10, 10, 16), group=2)), (5, 1), (5, 15), False),  # a shared edge
 )
 
@@ -144,41 +107,15 @@ def test_ways_are_allowed_or_not_in_both_directions() -> None:
         assert (there, back) == (is_allowed, is_allowed), (zones, start, end)
 
 
-def test_a_way_back_in_leads_over_the_boundary_once_and_ends_where_it_may_be() -> None:
-    ponds = POND, polygon(*box(0, 8, 10, 20), inclusion=False)
-    cases: tuple[tuple[tuple[Zone, ...], Point, Point, bool], ...] = (
-        ((YARD,), (5, -3), (5, 5), True),
-        ((POND,), (5, 5), (5, -3), True),
-        ((YARD,), (5, 5), (5, 6), False),  # from where it may be
-        ((YARD,), (5, 5), (5, -3), False),
-        ((YARD,), (5, -3), (5, -1), False),  # to where it may not be either
-        ((YARD,), (5, -3), (5, 13), False),
-        ((polygon(*U),), (8, -2), (8, 2), True),
-        ((polygon(*U),), (8, -2), (8, 9), False),  # it leads out again
-        (ponds, (5, 5), (5, 25), True),
-        ((YARD,), (N, 5), (N, 5), False),
-    )
-    for zones, start, end, escapes in cases:
-        found = fence(*zones).escapes(LocalPlace(*start), LocalPlace(*end))
-        assert found is escapes, (zones, start, end)
-
-
 def test_the_room_ends_a_millimetre_before_the_boundary() -> None:
-    spike = polygon((0, 0), (100, 10), (100, -10), inclusion=False)
     hole = Circle(ORIGIN, 10.0, True), Circle(corner(3, 4), 1.0, False)
     ahead = Pose(0.0, 0.0, atan2(4, 3))
     cases: tuple[tuple[tuple[Zone, ...], Pose, bool, float], ...] = (
-        ((), Pose(0, 0, 1), True, 50.0),
         ((YARD,), Pose(5, 2, EAST), True, E - 2 - MM),
         ((YARD,), Pose(5, E - 8, EAST), False, E - 8 - spot(0, 0)[1] - MM),
-        ((YARD,), Pose(N - 4, 5, 0), True, 4 - MM),
         ((ROUND_POND,), Pose(-9, 0, pi), False, 4 - MM),
-        ((ROUND_YARD,), Pose(1, 0, 0), True, 4 - MM),
-        ((spike,), Pose(-5, 0, 0), True, 5 - MM),
         ((polygon(*(p for p in U for _ in "ab")),), Pose(1, 5, 0), True, spot(2, 3)[0] - 1 - MM),
-        (EITHER, Pose(5, 1, EAST), True, spot(10, 16)[1] - 1 - MM),
         ((POND,), Pose(5, 5, 0), True, 0.0),  # where it may not be
-        ((YARD,), Pose(15, 5, pi), True, 0.0),
     )
     for zones, pose, forward, wanted in cases:
         found = room(fence(*zones), pose, forward=forward)
@@ -187,17 +124,6 @@ def test_the_room_ends_a_millimetre_before_the_boundary() -> None:
     assert room(fence(*hole), ahead, forward=False) == pytest.approx(10.0, abs=ROUNDING)
     for limit in (0.0, 3.0):
         assert room(fence(YARD), Pose(5, 2, EAST), limit=limit) == limit
-
-
-def test_a_fence_of_a_hundred_kilometres_is_as_exact() -> None:
-    size = 100_000
-    spike = polygon((0, 0), (size, 10), (size, -10), inclusion=False)
-    yard = fence(polygon(*box(-size, -size, size, size)), spike)
-    for off, is_allowed in ((0.9 * MM, False), (1.1 * MM, True)):
-        assert allows(yard, (-off, -9e4), (-off, 9e4)) is is_allowed
-    wanted = spot(size, size)[1] + 99_000.0 - MM
-    found = room(yard, Pose(-5.0, -99_000.0, EAST), limit=1e6)
-    assert found == pytest.approx(wanted, abs=1e-6)
 
 
 def test_across_the_date_line_it_is_one_fence() -> None:
@@ -230,7 +156,7 @@ def test_what_is_wrong_with_a_fence_is_said_in_words() -> None:
     assert check(Fence()) is None
 
 
-# The first oracle: shapely.
+# The oracle: shapely.
 
 SURE = 0.003  # m; nearer to a boundary than that the two need not agree
 SEGMENTS = 256  # of a quarter of a circle: 0.1 mm off at 5 m
@@ -311,52 +237,3 @@ def test_places_ways_and_rooms_are_as_shapely_says() -> None:
     unsure = said["place", None] + said["way", None]
     assert unsure < said.total() / 50, "it has an opinion nearly always"
     assert min(said[name, True] for name in ("place", "way", "escape")) > 50
-
-
-# The second oracle: corners and ends of ways on a grid of 11 m, and all reckoning in whole numbers.
-
-CELL = 1000  # degE7
-
-Node = tuple[int, int]
-nodes = st.tuples(st.integers(-4, 4), st.integers(-4, 4))
-
-
-def turn(a: Node, b: Node, c: Node) -> int:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def is_between(a: Node, b: Node, c: Node) -> bool:
-    """Whether c, which is in line with a and b, is on the edge from a to b."""
-    return (a[0] - c[0]) * (b[0] - c[0]) + (a[1] - c[1]) * (b[1] - c[1]) <= 0
-
-
-def meet(a: Node, b: Node, c: Node, d: Node) -> bool:
-    """Whether two edges have any point in common."""
-    turns = turn(a, b, c), turn(a, b, d), turn(c, d, a), turn(c, d, b)
-    if turns[0] * turns[1] < 0 and turns[2] * turns[3] < 0:
-        return True
-    inline = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
-    return any(t == 0 and is_between(*three) for t, three in zip(turns, inline, strict=True))
-
-
-def on_grid(node: Node) -> GlobalPlace:
-    return GlobalPlace(node[0] * CELL, node[1] * CELL)
-
-
-@settings(max_examples=300, deadline=None)
-@given(st.lists(nodes, min_size=3, max_size=8), nodes, nodes)
-@example([(0, 0), (0, 2), (2, 2), (2, 0)], (2, -1), (2, 3))  # along an edge
-@example([(0, 0), (0, 2), (2, 2), (2, 0)], (3, 1), (1, 3))  # by a corner
-@example([(0, 0), (0, 0), (4, 4), (4, 0), (0, 4)], (2, 1), (2, 3))  # where it crosses itself
-def test_on_a_grid_ways_are_allowed_as_whole_numbers_say(
-    corners: list[Node], start: Node, end: Node
-) -> None:
-    edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
-    touches = any(meet(start, end, *edge) for edge in edges)
-    beyond = (start[0] + 1, start[1] + 1000)  # a ray that passes no corner
-    is_within = sum(meet(start, beyond, *edge) for edge in edges) % 2 == 1
-    ends = to_local(on_grid(start), ORIGIN), to_local(on_grid(end), ORIGIN)
-    ring = tuple(on_grid(node) for node in corners)
-    for inclusion in (True, False):
-        is_allowed = fence(Polygon(ring, inclusion)).allows_way(*ends)
-        assert is_allowed == (not touches and is_within is inclusion)

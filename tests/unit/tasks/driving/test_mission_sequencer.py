@@ -6,11 +6,9 @@ from hypothesis import strategies as st
 from mav_tasks.tasks.driving.mission_sequencer import (
     END,
     following,
-    goes_on_to_a_place,
     is_over,
     loops_in_vain,
     present_goal,
-    skipped_to,
     started,
 )
 from mav_tasks.tasks.goal import (
@@ -72,28 +70,6 @@ def test_what_lies_between_belongs_to_the_way_to_the_next() -> None:
     assert (last.step, last.pending, is_over(plan, last)) == (7, (1, 2, 3, 5, 6), True)
     assert present_goal(plan, last) is END
     assert following(plan, last) is None
-
-
-def test_what_is_still_pending_when_a_loop_comes_round_is_pending_once() -> None:
-    progress = started(plan := Plan((A, Delay(86_400.0), Perform(), Jump(0, -1))), Progress())
-    for _ in range(10):
-        after = following(plan, progress)
-        assert after is not None
-        progress = after
-    assert (progress.step, progress.pending) == (0, (1, 2))
-
-
-def test_another_step_can_be_gone_on_with_and_whether_a_place_follows_is_known() -> None:
-    plan = Plan((A, Nothing(), B, C))
-    assert skipped_to(plan, started(plan, Progress()), 1).step == 2
-    assert is_over(plan, skipped_to(plan, Progress(), 9))
-    plan = Plan((A, SetSpeed(1.0), B, Wait(1.0), C))
-    first = started(plan, Progress())
-    second = following(plan, first)
-    assert second is not None
-    assert [goes_on_to_a_place(plan, each) for each in (first, second)] == [B, None]
-    # before the beginning the present goal is the first
-    assert [present_goal(each, Progress()) for each in (Plan((Nothing(), B)), A)] == [B, A]
 
 
 def test_a_loop_in_which_nothing_is_driven_is_found() -> None:

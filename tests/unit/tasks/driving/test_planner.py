@@ -2,7 +2,6 @@
 
 from math import cos, hypot, pi, sin
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,7 +14,6 @@ from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
 from mav_tasks.tasks.task import Pose
 
 RADIUS = 1.5
-CAR = Steering(RADIUS, reverses=True)
 FORWARD_ONLY = Steering(RADIUS, reverses=False)
 EARTH = GlobalPlace(473977420, 85455940)
 HERE = Pose(0.0, 0.0, 0.0)
@@ -75,16 +73,6 @@ def way(place: LocalPlace, steering: Steering) -> Path:
     return found
 
 
-def test_what_lies_ahead_is_driven_to_straight_and_what_lies_behind_on_an_arc() -> None:
-    ahead = way(LocalPlace(5.0, 0.0), CAR)
-    assert [bend.curvature for bend in ahead] == [0.0]
-    assert path_length(ahead) == pytest.approx(5.0)
-    assert [bend.curvature > 0 for bend in way(LocalPlace(-10.0, 4.0), CAR)] == [True, False]
-    beside_it = LocalPlace(0.0, 1.0)  # by reversing, or by a loop
-    assert [run[0].length < 0 for run in runs_of(way(beside_it, CAR))] == [True, False]
-    assert path_length(way(beside_it, FORWARD_ONLY)) > pi * RADIUS
-
-
 def test_a_loop_that_leaves_the_fence_becomes_a_turn_with_reversing() -> None:
     alley, behind = box(-8.0, -1.6, 8.0, 1.6), LocalPlace(-6.0, 0.0)
     assert way_to(HERE, behind, Steering(RADIUS, reverses=False, fence=alley)) is None
@@ -101,13 +89,6 @@ def test_a_bend_keeps_clear_of_the_fence_where_it_can() -> None:
     careful = way(place, Steering(RADIUS, reverses=False, fence=fence))
     assert is_allowed(HERE, careful, fence, clear=0.3)
     assert not is_allowed(HERE, bold, fence, clear=0.3)
-
-
-def test_from_outside_the_fence_a_way_leads_in_and_stays() -> None:
-    fence = box(2.0, -10.0, 20.0, 10.0)
-    found = way(LocalPlace(6.0, 3.0), Steering(RADIUS, reverses=True, fence=fence))
-    assert is_allowed(HERE, found, fence)
-    assert way_to(HERE, LocalPlace(-6.0, 0.0), Steering(RADIUS, True, fence)) is None
 
 
 @given(poses, places, st.floats(0, 1), st.floats(-0.4, 0.4))

@@ -90,12 +90,6 @@ def test_a_move_displaced_anywhere_goes_back_to_where_it_was(
     assert is_led(Move(sign * 10.0), 3.0, pose, beside(sign * 3.0, 0.0))
 
 
-def test_near_its_end_past_it_or_turned_on_its_line_it_goes_back() -> None:
-    assert is_led(Move(10.0), 9.0, beside(9.0, 0.5), beside(9.0, 0.0))
-    assert is_led(Move(10.0), 9.5, beside(10.0 + 2 * PAST_END, 0.0), beside(9.5, 0.0))
-    assert is_led(Move(10.0), 3.0, beside(3.0, 0.0, radians(90)), beside(3.0, 0.0))
-
-
 def test_a_rotation_displaced_anywhere_goes_back_to_its_spot_and_heading() -> None:
     for angle in (pi, -pi, radians(700)):
         end = beside(0.0, 0.0, copysign(2.0, angle))
