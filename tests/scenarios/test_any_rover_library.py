@@ -1,6 +1,5 @@
 """Tasks for any rover with the client library: the handle follows the task to its rover."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -13,21 +12,17 @@ from mav_tasks import (
     Refused,
     TaskState,
 )
-from mav_tasks.settings import Settings
 from rover_sim.faults import Faults
-from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
+from tests.scenarios.conftest import MakeRoverWorld
 
 
 @pytest.fixture
-def world() -> Iterator[RoverWorld]:
+def world(make_rover_world: MakeRoverWorld) -> RoverWorld:
     """Return a world of two rovers with a server that is ready."""
-    it = RoverWorld(RoverOptions(count=2), seed=1, settings=Settings())
-    it.server.start()
-    it.until(lambda: it.server.is_ready)
-    it.sleep(3)  # until their positions are known
-    yield it
-    it.close()
+    world = make_rover_world(count=2)
+    world.sleep(3)  # until their positions are known
+    return world
 
 
 def test_a_command_and_a_plan_go_to_the_free_rover(world: RoverWorld) -> None:
