@@ -1,5 +1,6 @@
 """Tasks for any rover: which one the server chooses, what it says, and when it chooses again."""
 
+from pathlib import Path
 from typing import Any
 
 from mav_tasks.settings import Settings
@@ -12,6 +13,7 @@ from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, ACK, DENIED, MOVE, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -155,11 +157,18 @@ def failsafe_of_rover_2(world: World) -> int:
     return task
 
 
-def test_a_rover_that_its_own_failsafe_has_stopped_loses_the_task(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
+def test_a_rover_that_its_own_failsafe_has_stopped_loses_the_task_also_over_a_restart(
+    make_world: MakeWorld, path: Path
+) -> None:
+    world = make_world(rovers=2, store=PromptSqliteStore(path, wall_offset=UTC))
     task = failsafe_of_rover_2(world)
     world.until(lambda: rover_of(world, task) == 1, within=GRACE + 2.2)
     assert world.events(TaskAssigned)[-1].choice.startswith("rover 2: rover's failsafe; ")
+    before = world.task(task)
+    restart(world, path)
+    after = world.task(task)
+    assert (after.vehicle, after.choice, after.version) == (1, before.choice, before.version)
+    assert submit(world, 0.5, nonce=9).task_id == task
 
 
 def halt_by_a_person(world: World, halt: str) -> None:
