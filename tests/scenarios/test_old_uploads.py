@@ -3,6 +3,7 @@
 import struct
 from dataclasses import dataclass, field
 
+import pytest
 from pymavlink.dialects.v20 import common
 
 from rover_sim.personas import ARDUPILOT, Persona
@@ -85,3 +86,19 @@ def stored(world: World) -> int:
     download = Download(world.client)
     world.until(lambda: download.is_done, within=3)
     return len(download.items)
+
+
+def test_a_download_is_answered_in_the_form_in_which_it_is_asked_for(world: World) -> None:
+    client = DroneKit(world.client, PLACES)
+    world.until(lambda: len(client.sent) == len(PLACES), within=2)
+    world.run(0.2)
+    world.client.send(common.MAVLink_mission_request_message(0, 0, 1))
+    world.run(0.1)
+    (item,) = world.client.of_type("MISSION_ITEM")
+    assert (item.seq, item.command, item.frame) == (1, WAYPOINT, 3)
+    wanted = at(*PLACES[1])
+    assert item.x == pytest.approx(wanted["x"] / 1e7, abs=1e-5)
+    assert item.y == pytest.approx(wanted["y"] / 1e7, abs=1e-5)
+    world.client.send(common.MAVLink_mission_request_int_message(0, 0, 1))
+    world.run(0.1)
+    assert len(world.client.of_type("MISSION_ITEM_INT")) == 1

@@ -4,9 +4,11 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.engine import Engine
+from mav_tasks.engine.inputs import ParametersChanged
 from mav_tasks.services.parameter_table import PARAMETERS
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.restored import Restored
@@ -188,3 +190,23 @@ def test_the_rovers_own_parameters_are_the_rovers(world: World) -> None:
     assert dict(told(world.client, ROVER)) == {"WP_SPEED": 3.0, "SYSID_THISMAV": 1.0}
     assert told(world.client) == []
     assert world.rover.autopilot.parameters["WP_SPEED"] == 3.0
+
+
+def test_a_parameter_that_was_set_at_another_gateway_is_in_force_and_told(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(store=LateStore(delay=0.3))
+    world.server.take_in(ParametersChanged((("TSK_SPEED", 0.3),)), now=world.now)
+    world.run(0.5)
+    assert told(world.client) == [("TSK_SPEED", 0.3)]
+    assert world.server.engine.parameters == {"TSK_SPEED": 0.3}
+    assert world.events(ParameterSet) == []
+    world.client.send(put("TSK_SPEED", 0.4))
+    world.run(0.1)
+    # what was read meanwhile is older than what is being stored here
+    world.server.take_in(ParametersChanged((("TSK_SPEED", 0.2),)), now=world.now)
+    world.run(1.0)
+    assert world.server.engine.parameters == {"TSK_SPEED": pytest.approx(0.4)}
+    world.server.take_in(ParametersChanged(()), now=world.now)
+    world.run(0.5)
+    assert told(world.client)[-1] == ("TSK_SPEED", 0.5)
