@@ -233,7 +233,7 @@ def test_one_wrong_heartbeat_stops_the_rover_and_loses_no_task(
 def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
     world: World, autopilot: int, words: set[tuple[int, float, float]]
 ) -> None:
-    """A copter may be in the air: it is not disarmed either."""
+    """A copter may be in the air: it is not disarmed either. Then the rover is back."""
     running(world)
     world.observers.clear()  # whose rules are for a rover
     world.leave(world.rover_parties[0])
@@ -268,7 +268,10 @@ def test_what_is_no_rover_is_asked_to_stay_and_never_driven(
     passes(5)
     assert commands() == words
     assert world.state(1)[0] is S.KILLED
+    world.join(world.rover_parties[0])
+    world.run(20)
     assert world.paused() is R.STOPPED
+    assert world.stands()
 
 
 def test_another_rover_of_the_same_make_is_told_by_its_unique_id(world: World) -> None:
