@@ -336,6 +336,10 @@ class FakeClient:
             open_id = message.id
         return texts
 
+    def said(self, words: str) -> bool:
+        """Return whether a received STATUSTEXT has these words."""
+        return any(words in text for text in self.texts())
+
     def statuses(self, task_id: int | None = None) -> list[TaskStatus]:
         """Return the TASK_STATUS messages received, of one task or of all."""
         statuses = [TaskStatus.of(packet.payload) for packet in self.of_id(TASK_STATUS)]

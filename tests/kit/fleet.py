@@ -251,11 +251,6 @@ class Fleet(World):
         self.watched.down.add(self.links[name].name)
         self.server.down(self.links[name], now=self.now)
 
-    def link_up(self, name: str) -> None:
-        """Bring the link up again."""
-        self.watched.down.remove(self.links[name].name)
-        self.server.up(self.links[name], now=self.now)
-
     def moves_house(self, number: int, *, source: str, target: str) -> None:
         """Move a rover to another endpoint."""
         vehicle = self.rovers[number - 1]

@@ -1,6 +1,6 @@
 """The virtual world of the scenarios: server, rovers and clients on one net, always observed."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from math import degrees, hypot, nan, radians, remainder
 from pathlib import Path
@@ -31,7 +31,8 @@ from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from rover_sim.realism import Realism
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
-from tests.kit.client import ACK, REQUEST, FakeClient
+from tests.kit.client import ACK, REQUEST, FakeClient, TaskStatus
+from tests.kit.mission import Item, Upload
 from tests.kit.observer import ARDUPILOT_WAYS, PX4_WAYS, Observer, Ways
 from tests.kit.store import LateStore
 
@@ -217,6 +218,15 @@ class World(VirtualWorld):
         """The first rover's true state."""
         return self.rover.truth
 
+    def mode(self) -> Mode:
+        """Return the first rover's true mode."""
+        return self.rover.autopilot.mode
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether the first rover is truly armed."""
+        return self.rover.autopilot.armed
+
     def add_client(
         self,
         name: str,
@@ -237,6 +247,19 @@ class World(VirtualWorld):
         )
         self.join(client)
         return client
+
+    def upload(
+        self,
+        items: Sequence[Item],
+        *,
+        client: FakeClient | None = None,
+        kind: int = 0,
+        target: tuple[int, int] = (1, 1),
+    ) -> Upload:
+        """Upload a plan, by default by the first client; let time pass until it is answered."""
+        upload = Upload(client or self.client, items, kind=kind, target=target)
+        self.until(lambda: upload.result is not None, within=15)
+        return upload
 
     # time
 
@@ -346,6 +369,18 @@ class World(VirtualWorld):
         self.watched.loses = look
         return numbers
 
+    def overheard(self, is_it: Callable[[str, str, bytes], bool]) -> list[bytes]:
+        """Return a list that collects packets by their source, target and bytes, from now on."""
+        packets: list[bytes] = []
+
+        def look(source: str, target: str, data: bytes) -> bool:
+            if is_it(source, target, data):
+                packets.append(data)
+            return False
+
+        self.watched.loses = look
+        return packets
+
     def bring_late(self, data: bytes) -> None:
         """Deliver a packet of the server to the first rover late."""
         MemoryNet.send(self.net, VEHICLE_LINK, "rover1", data)
@@ -379,6 +414,12 @@ class World(VirtualWorld):
             if task.id == task_id:
                 return task.state, task.reason
         return TaskState.UNKNOWN, TaskReason.NONE
+
+    def shown(self, task_id: int) -> TaskStatus:
+        """Return a task's status as the first client is shown it now."""
+        self.client.request_status(task_id)
+        self.run(0.1)
+        return self.client.statuses(task_id)[-1]
 
     def tasks(self) -> tuple[Task, ...]:
         """Return every task of the server."""

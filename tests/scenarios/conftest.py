@@ -1,10 +1,14 @@
 """Every world of a scenario is checked at its end, whether the scenario thinks of it or not."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Protocol
 
 import pytest
 
+from mav_tasks.settings import Settings
+from rover_sim.testing.options import RoverOptions
+from rover_sim.testing.rover_world import RoverWorld
 from tests.kit.cases import anew
 from tests.kit.fleet import Fleet, Layout
 from tests.kit.world import World
@@ -38,6 +42,12 @@ def world(make_world: MakeWorld) -> World:
     return make_world()
 
 
+@anew
+def path(tmp_path: Path) -> Path:
+    """Return where a store is."""
+    return tmp_path / "tasks.sqlite3"
+
+
 class MakeFleet(Protocol):
     """Makes a fleet (see Fleet) whose observers are asked at the end of the test."""
 
@@ -58,3 +68,28 @@ def make_fleet() -> Iterator[MakeFleet]:
     yield make
     for fleet in fleets:
         fleet.check()
+
+
+class MakeRoverWorld(Protocol):
+    """Makes a world of scripts that use the client library (see RoverWorld)."""
+
+    def __call__(
+        self, *, seed: int = 1, settings: Settings | None = None, **options: Any
+    ) -> RoverWorld: ...
+
+
+@pytest.fixture
+def make_rover_world() -> Iterator[MakeRoverWorld]:
+    """Return a factory of worlds with a server that is ready."""
+    worlds: list[RoverWorld] = []
+
+    def make(*, seed: int = 1, settings: Settings | None = None, **options: Any) -> RoverWorld:
+        world = RoverWorld(RoverOptions(**options), seed=seed, settings=settings or Settings())
+        worlds.append(world)
+        world.server.start()
+        world.until(lambda: world.server.is_ready)
+        return world
+
+    yield make
+    for world in worlds:
+        world.close()

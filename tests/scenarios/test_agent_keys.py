@@ -1,7 +1,7 @@
 """An agent's idempotency keys: for how long, and for what, a key is one task; in virtual time."""
 
 import asyncio
-from collections.abc import AsyncIterator, Coroutine, Iterator
+from collections.abc import AsyncIterator, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -12,9 +12,8 @@ from mav_tasks.agents import submission
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.submission import Wish
 from mav_tasks.errors import Refused, UsageError
-from mav_tasks.settings import Settings
-from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
+from tests.scenarios.conftest import MakeRoverWorld
 
 NONCE_KEPT = 600.0  # s, in which the server knows a task by its nonce
 
@@ -23,13 +22,9 @@ TERMS = dict.fromkeys(("priority", "after", "start_in", "deadline", "label"))
 
 
 @pytest.fixture
-def world() -> Iterator[RoverWorld]:
-    """A rover and a server that is ready."""
-    world = RoverWorld(RoverOptions(), seed=1, settings=Settings())
-    world.server.start()
-    world.until(lambda: world.server.is_ready)
-    yield world
-    world.close()
+def world(make_rover_world: MakeRoverWorld) -> RoverWorld:
+    """Return a rover and a server that is ready."""
+    return make_rover_world()
 
 
 @asynccontextmanager
@@ -71,26 +66,5 @@ def test_a_key_is_one_task_until_the_server_forgets_it_and_is_refused_from_then_
         assert world.rovers[0].north == pytest.approx(north, abs=0.01)
         async with agent(world) as rovers:
             assert (await driven(rovers, "twice")).id != first.id
-
-    world.run(script())
-
-
-def test_a_key_outlives_the_server(world: RoverWorld) -> None:
-    async def script() -> None:
-        async with agent(world) as rovers:
-            task = await submitted(rovers, "kept", start_in=3000.0)
-        world.server.kill()
-        world.server.start()
-        async with agent(world) as rovers:
-            assert (await submitted(rovers, "kept", start_in=3000.0)).id == task.id
-
-    world.run(script())
-
-
-def test_equal_submissions_at_once_are_one_task(world: RoverWorld) -> None:
-    async def script() -> None:
-        async with agent(world) as rovers:
-            tasks = await asyncio.gather(*(submitted(rovers, "at once") for _ in range(5)))
-        assert len({task.id for task in tasks}) == 1
 
     world.run(script())

@@ -1,5 +1,6 @@
 """Tasks for any rover: which one the server chooses, what it says, and when it chooses again."""
 
+from pathlib import Path
 from typing import Any
 
 from mav_tasks.settings import Settings
@@ -12,6 +13,7 @@ from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, ACK, DENIED, MOVE, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -20,7 +22,7 @@ GRACE = 5.0  # s, in which a rover that is lost keeps its tasks
 
 ANY = (250, 191)
 LOST = 3.5  # s; see Watch.heartbeat_lost
-WAYPOINT, OPTIONS, REQUEST, CANCEL = 16, 54014, 512, 54010
+WAYPOINT, OPTIONS = 16, 54014
 
 
 def submit(world: World, metres: float = 0.5, **kw: Any) -> Sent:
@@ -35,9 +37,7 @@ def go_to(world: World, north: float, east: float, *, nonce: int = 0) -> Upload:
     x, y = DEFAULT_ORIGIN.to_global(north, east)
     items = [Item(WAYPOINT, x, y, param1=0.01, param4=0.0)]
     items += [Item(OPTIONS, nonce, 0, 5.0, 0.0, 0.0, 0.0, frame=2)] if nonce else []
-    upload = Upload(world.client, items, target=ANY)
-    world.until(lambda: upload.result is not None, within=5)
-    return upload
+    return world.upload(items, target=ANY)
 
 
 def rover_in(sent: Sent) -> int:
@@ -114,30 +114,6 @@ def test_places_that_depend_on_the_rover_are_refused(make_world: MakeWorld) -> N
     assert not world.events(TaskSubmitted)
 
 
-def test_the_status_of_a_task_can_be_requested_without_its_rover(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = submit(world, nonce=1).task_id
-    world.client.received.clear()
-    known = world.client.command(REQUEST, 54000, task, target=ANY)
-    unknown = world.client.command(REQUEST, 54000, 99, target=ANY)
-    world.run(0.1)
-    assert known.result == ACCEPTED
-    assert next(packet.source for packet in world.client.of_id(54000)) == (1, 191)
-    assert world.client.acks_of(REQUEST)[-1] == (DENIED, R.NOT_FOUND)
-    assert unknown.times_sent == 1
-
-
-def test_a_stop_to_the_server_stops_every_rover(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    for number in (1, 2):
-        world.client.move(5.0, nonce=number, target=(number, 191))
-    world.run(3.0)
-    sent = world.client.stop(target=ANY)
-    world.until(lambda: world.stands(1) and world.stands(2), within=3)
-    assert sent.result == ACCEPTED
-    assert [world.state(task)[0] for task in (1, 2)] == [S.KILLED, S.KILLED]
-
-
 # choosing again
 
 
@@ -162,21 +138,11 @@ def test_a_lost_rover_loses_the_task_that_it_has_not_begun(make_world: MakeWorld
     (*_, event) = world.events(TaskAssigned)
     assert (event.before, event.version) == (2, 2)
     assert event.choice.startswith("rover 2: silent; free in ")
-    moved = f"is now rover {event.vehicle}'s: rover 2: silent"
-    assert any(moved in text for text in world.client.texts())
+    assert world.client.said(f"is now rover {event.vehicle}'s: rover 2: silent")
     world.until_state(task, S.COMPLETED, within=60)
     again = submit(world, 0.5, nonce=9)
     assert again.task_id == task  # whichever rover it went to
     assert rover_in(again) == event.vehicle
-
-
-def test_a_low_battery_moves_the_task(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    task = queued_behind(world, 2)
-    world.client.move(30.0, nonce=3, priority=9, target=(2, 191))  # it does not come to its turn
-    world.rovers[1].autopilot.set_faults(Faults(battery=5))
-    world.until(lambda: rover_of(world, task) == 1, within=15)
-    assert world.events(TaskAssigned)[-1].choice.startswith("rover 2: battery 5%; ")
 
 
 def failsafe_of_rover_2(world: World) -> int:
@@ -191,11 +157,18 @@ def failsafe_of_rover_2(world: World) -> int:
     return task
 
 
-def test_a_rover_that_its_own_failsafe_has_stopped_loses_the_task(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
+def test_a_rover_that_its_own_failsafe_has_stopped_loses_the_task_also_over_a_restart(
+    make_world: MakeWorld, path: Path
+) -> None:
+    world = make_world(rovers=2, store=PromptSqliteStore(path, wall_offset=UTC))
     task = failsafe_of_rover_2(world)
     world.until(lambda: rover_of(world, task) == 1, within=GRACE + 2.2)
     assert world.events(TaskAssigned)[-1].choice.startswith("rover 2: rover's failsafe; ")
+    before = world.task(task)
+    restart(world, path)
+    after = world.task(task)
+    assert (after.vehicle, after.choice, after.version) == (1, before.choice, before.version)
+    assert submit(world, 0.5, nonce=9).task_id == task
 
 
 def halt_by_a_person(world: World, halt: str) -> None:
@@ -259,21 +232,3 @@ def test_a_task_that_has_begun_never_moves(make_world: MakeWorld) -> None:
     world.run(30.0)
     assert rover_of(world, task) == 1
     assert len(world.events(TaskAssigned)) == 1
-
-
-def test_a_restarted_server_knows_where_the_task_went(make_world: MakeWorld, tmp_path: Any) -> None:
-    store = PromptSqliteStore(tmp_path / "tasks.sqlite3", wall_offset=0.0)
-    world = make_world(rovers=3, store=store)
-    task = queued_behind(world, 2)
-    world.rovers[1].autopilot.set_faults(Faults(silent=True))
-    world.until(lambda: rover_of(world, task) != 2, within=15)
-    rover, choice = rover_of(world, task), world.task(task).choice
-    world.end_server()
-    restored = store.load()
-    found = {int(each.id): each for each in restored.tasks}
-    assert (found[task].vehicle, found[task].choice, found[task].version) == (rover, choice, 2)
-    world.start_server(store, restored)
-    world.run(4.0)
-    again = world.client.move(0.5, nonce=9, target=ANY)
-    world.run(0.2)
-    assert again.task_id == task

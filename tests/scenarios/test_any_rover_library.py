@@ -1,8 +1,5 @@
 """Tasks for any rover with the client library: the handle follows the task to its rover."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import pytest
 
 from mav_tasks import (
@@ -10,24 +7,19 @@ from mav_tasks import (
     GlobalPlace,
     GoTo,
     Move,
-    Refused,
     TaskState,
 )
-from mav_tasks.settings import Settings
 from rover_sim.faults import Faults
-from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
+from tests.scenarios.conftest import MakeRoverWorld
 
 
 @pytest.fixture
-def world() -> Iterator[RoverWorld]:
+def world(make_rover_world: MakeRoverWorld) -> RoverWorld:
     """Return a world of two rovers with a server that is ready."""
-    it = RoverWorld(RoverOptions(count=2), seed=1, settings=Settings())
-    it.server.start()
-    it.until(lambda: it.server.is_ready)
-    it.sleep(3)  # until their positions are known
-    yield it
-    it.close()
+    world = make_rover_world(count=2)
+    world.sleep(3)  # until their positions are known
+    return world
 
 
 def test_a_command_and_a_plan_go_to_the_free_rover(world: RoverWorld) -> None:
@@ -42,14 +34,6 @@ def test_a_command_and_a_plan_go_to_the_free_rover(world: RoverWorld) -> None:
         assert near.longitude is not None
         place = GlobalPlace(round(near.latitude * 1e7), round(near.longitude * 1e7))
         assert tasks.submit(GoTo(place), vehicle="any").vehicle == 2
-
-
-@pytest.mark.parametrize("goal", [Move(1.0), [Move(1.0), Face(0.0)]])
-def test_the_words_of_a_refusal_come_with_it(world: RoverWorld, goal: Any) -> None:
-    with world.sync_client() as tasks:
-        tasks.stop()
-        with pytest.raises(Refused, match="rover 1: STOP in force; rover 2: STOP in force"):
-            tasks.submit(goal, vehicle="any")
 
 
 def test_the_handle_follows_a_task_that_moves(world: RoverWorld) -> None:

@@ -34,7 +34,7 @@ def test_one_that_does_not_follow_is_told_of_within_3_s(make_world: MakeWorld) -
     world.until_state(1, S.EXECUTING)
     active = world.now
     words = "does not move (told 0.5 m/s)"
-    world.until(lambda: any(words in text for text in world.client.texts()), within=3.0)
+    world.until(lambda: world.client.said(words), within=3.0)
     assert world.state(1)[0] is S.EXECUTING, "before it is stuck"
     assert world.now - active < 3.0
     world.until_state(1, S.FAILED)

@@ -1,5 +1,7 @@
 """Tasks are called off: promptly, visibly, and the rover stands before anything else begins."""
 
+from math import nan
+
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink import messages as m
@@ -80,7 +82,7 @@ def test_a_rover_that_does_not_stop_leaves_the_task_held_and_is_told_on(world: W
     assert world.state(2)[0] is S.QUEUED
     assert "HOLD" in world.observer.sent_since(world.now - 0.9)
     world.fault(Faults())
-    world.until(lambda: world.stands() and world.rover.autopilot.mode is Mode.HOLD, within=5)
+    world.until(lambda: world.stands() and world.mode() is Mode.HOLD, within=5)
     world.run(1)
     assert world.state(1) == (S.HELD, R.STOP_UNCONFIRMED)
 
@@ -114,6 +116,7 @@ def test_clear_takes_what_waits_or_everything(world: World, scope: int) -> None:
         ((0, 0), (DENIED, R.NOT_FOUND)),
         ((-1, 0), (DENIED, R.BAD_PARAMETER)),
         ((1.5, 0), (DENIED, R.BAD_PARAMETER)),
+        ((nan, 0), (DENIED, R.BAD_PARAMETER)),
         ((1, 2), (DENIED, R.BAD_PARAMETER)),
         ((1, 0), (DENIED, R.WRONG_STATE)),
     ],

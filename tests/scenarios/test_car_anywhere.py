@@ -11,8 +11,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.car import Car
-from tests.kit.client import DRIVE
-from tests.kit.mission import Item, Upload
+from tests.kit.mission import Item
 from tests.kit.px4 import PROMPT_PX4, go_to
 from tests.kit.volume import tries
 from tests.kit.world import OFF_WAY, PROMPT, World, at
@@ -96,8 +95,7 @@ def test_corners_are_passed_without_stopping_and_slowly_enough(
     world = car(make_world, persona)
     corners = (8.0, 0.0), (8.0, 8.0), (0.0, 8.0), (0.0, 1.0)
     home = [Item(WAYPOINT, frame=0, current=1)] if persona is PROMPT else []
-    upload = Upload(world.client, home + [Item(WAYPOINT, **at(*corner)) for corner in corners])
-    world.until(lambda: upload.result is not None, within=5)
+    world.upload(home + [Item(WAYPOINT, **at(*corner)) for corner in corners])
     nearest, slowest = [99.0] * len(corners), 99.0
     world.client.command(START, target=(1, 1))
     world.until(lambda: world.truth.forward_speed > 0.4, within=20)
@@ -109,25 +107,3 @@ def test_corners_are_passed_without_stopping_and_slowly_enough(
     assert world.state(1)[0] is S.COMPLETED
     assert max(nearest) <= 0.55  # acceptance radius 0.5 m
     assert slowest > 0.3
-
-
-def test_a_pause_in_the_bend_changes_nothing_of_the_way_and_a_drive_bends(
-    make_world: MakeWorld,
-) -> None:
-    world = car(make_world, PROMPT)
-    go_to(world, -4.0, 6.0)
-    world.until(lambda: world.truth.yaw > 0.8, within=30)
-    before = world.task(1).progress
-    world.client.pause()
-    world.run(3)
-    assert world.stands()
-    world.client.proceed()
-    world.run(2)
-    after = world.task(1).progress
-    assert (after.path, after.anchor) == (before.path, before.anchor)
-    world.until_idle(tasks=1, within=90)
-    assert off(world, -4.0, 6.0) <= 0.1
-    yaw = world.pose()[2]
-    world.client.command(DRIVE, 0.5, 12.0, 5.0)
-    world.until_idle(tasks=2)
-    assert (world.pose()[2] - yaw) % 360 == pytest.approx(60, abs=10)

@@ -51,7 +51,6 @@ GOALS: tuple[tuple[Ask, Goal], ...] = (
     (long(RETURN), GoTo(None)),
     (long(DELAY, 4.5), Wait(4.5)),
     (long(DELAY, -1, 14, 5), Wait(86_400.0, (14, 5, 0))),
-    (long(DELAY, 0, -1, 30, -1), Wait(3_600.0, (-1, 30, -1))),
     (long(LOITER, 3), Wait(3.0)),
     (whole(LOITER, 3, **XY), GoTo(PLACE, wait=3.0)),
     (long(YAW, 90, 20, -1, 0), Face(pi / 2, -1, radians(20))),

@@ -41,4 +41,4 @@ def test_a_rover_behind_the_server_passes_as_it_does_without(
     world = make_world(persona=PERSONAS[name])
     report = check_vehicle(WorldWire(world), EVERYTHING, system_id=1, show=lambda _line: None)
     assert {line.name for line in report.failed} == KNOWN, [str(each) for each in report.failed]
-    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
+    assert (world.mode(), world.is_armed) == (Mode.HOLD, False)

@@ -22,7 +22,7 @@ from tests.scenarios.conftest import MakeWorld
 
 UTC = 1.8e9  # s, when the worlds begin
 STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
-PAUSE, CANCEL, MODIFY, SPEED = 193, 54010, 54012, 178
+CANCEL, MODIFY, SPEED = 54010, 54012, 178
 ENDS = 45.0  # s, of the story
 #: when somebody sends a command, and which: submissions have nonces
 STORY: dict[float, Callable[[World], Sent]] = {

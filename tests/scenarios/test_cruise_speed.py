@@ -7,11 +7,10 @@ import pytest
 from mav_tasks.settings import Driving, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
-from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
-WAYPOINT, REPOSITION, CHANGE_SPEED, START = 16, 192, 178, 300
+REPOSITION, CHANGE_SPEED = 192, 178
 FAR = 20.0  # m
 
 
@@ -62,11 +61,4 @@ def test_other_tasks_keep_their_speed(make_world: MakeWorld, what: str) -> None:
         case _:
             world.client.move(FAR)
             world.run(0.2)
-    assert top_speed(world) == pytest.approx(0.5, abs=0.15)
-
-
-def test_a_rover_that_does_not_say_is_driven_as_the_settings_say(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)  # without RO_SPEED_LIM
-    world.run(8)
-    goes(world)
     assert top_speed(world) == pytest.approx(0.5, abs=0.15)

@@ -68,7 +68,7 @@ def test_one_that_is_much_too_fast_is_stopped_and_its_task_held(
     world.until_state(1, S.HELD, within=0.6)
     assert world.state(1)[1] is R.OVERSPEED
     world.run(0.3)
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
 
 
 @pytest.mark.parametrize(
@@ -82,12 +82,12 @@ def test_one_that_circles_on_in_hold_is_disarmed_and_one_that_rolls_out_is_not(
     world, body = driven(make_world, 1.0, settings)
     body.brakes = brakes
     world.client.stop()
-    world.until(lambda: world.rover.autopilot.mode is Mode.HOLD, within=0.9)
+    world.until(lambda: world.mode() is Mode.HOLD, within=0.9)
     at = world.now
     for _ in range(300):
         world.run(LOOK)
-        if not world.rover.autopilot.armed:
+        if not world.is_armed:
             break
-    assert world.rover.autopilot.armed is not is_disarmed
+    assert world.is_armed is not is_disarmed
     if is_disarmed:
         assert 1.8 < world.now - at < 2.4

@@ -22,7 +22,7 @@ def test_an_empty_queue_hands_the_rover_back_and_the_stream_ends(world: World) -
     world.until_idle(tasks=1)
     at = world.now
     world.run(5)
-    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
+    assert (world.mode(), world.is_armed) == (Mode.HOLD, False)
     assert world.stands()
     assert world.observer.sent_since(at) == []
 
@@ -36,7 +36,7 @@ def test_the_next_task_right_after_the_hand_back_works(world: World, after: floa
     world.client.move(0.3, nonce=2)
     world.until_idle(tasks=2)
     assert [t.state for t in world.tasks()] == [S.COMPLETED, S.COMPLETED]
-    assert not world.rover.autopilot.armed
+    assert not world.is_armed
 
 
 def test_the_orderly_end_is_zero_and_hold(world: World) -> None:
@@ -49,7 +49,7 @@ def test_the_orderly_end_is_zero_and_hold(world: World) -> None:
     world.until(lambda: world.events(ServerStopped), within=3.1)
     world.run(4)
     assert world.stands()
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
     assert [world.state(k) for k in (1, 2)] == [(S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE)]
 
 
@@ -61,7 +61,7 @@ def test_a_lost_hold_is_sent_again_on_the_way_out(world: World) -> None:
     world.run(0.4)
     world.fault(Faults())
     world.run(5)
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
 
 
 def test_submissions_are_refused_and_nothing_begins_on_the_way_out(world: World) -> None:
@@ -100,7 +100,7 @@ def test_last_words_stop_a_driving_rover(make_world: MakeWorld, persona: Persona
     world.observer.expects_gaps = True
     world.run(5)
     assert world.stands()
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
 
 
 def test_a_server_that_vanishes_leaves_a_rover_that_stops_by_itself(world: World) -> None:

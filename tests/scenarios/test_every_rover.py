@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import pytest
-from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
@@ -19,17 +18,14 @@ from tests.kit.client import (
     REQUEST,
     SET_MODE,
     FakeClient,
-    Received,
 )
 from tests.kit.fleet import Fleet
-from tests.kit.mission import COUNT, Count, Download, Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import ask_mode
-from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 ALL = (0, 0)
-AUTOPILOT_VERSION, WAYPOINT, DELAY = 148, 16, 93
+AUTOPILOT_VERSION = 148
 
 
 @pytest.fixture
@@ -91,38 +87,10 @@ def test_modes_and_capabilities_are_answered(make_world: MakeWorld, persona: Per
     assert {ack for ack, _ in answers(world.client, REQUEST)} == {(1, 1)}
 
 
-def test_a_plan_is_taken_in_given_back_and_cleared(world: World) -> None:
-    plan = [Item(WAYPOINT, **at(north, 0.0)) for north in (0.0, 1.0, 2.0)]
-    upload = ToAll(world.client, plan)
-    world.until(lambda: upload.result is not None, within=5)
-    assert upload.result == 0
-    world.client.send(common.MAVLink_mission_request_list_message(*ALL, 0))
-    world.run(0.2)
-    assert Count.of(list(world.client.of_id(COUNT))[-1].payload).items == 3
-    world.client.send(common.MAVLink_mission_clear_all_message(*ALL, 0))
-    world.run(0.2)
-    download = Download(world.client)
-    world.until(lambda: download.is_done, within=3)
-    assert download.items == []
-
-
-class ToAll(Upload):
-    """An upload to system 0, which the rover answers as itself."""
-
-    def turn(self, *, now: float) -> None:
-        self.target = ALL
-        super().turn(now=now)
-
-    def take(self, packet: Received, *, now: float) -> None:
-        self.target = packet.source
-        super().take(packet, now=now)
-        self.target = ALL
-
-
 def test_a_task_command_must_name_its_rover_and_is_told_so_once(fleet: Fleet) -> None:
     sent = fleet.client.move(1, target=ALL, repeats=REPEATS)
     fleet.run(1)
     assert sent.answer == (DENIED, R.BAD_PARAMETER)
     assert [source for source, _ in answers(fleet.client, MOVE)] == [(1, 191)]
     assert fleet.tasks() == ()
-    assert any("must name one rover" in text for text in fleet.client.texts())
+    assert fleet.client.said("must name one rover")

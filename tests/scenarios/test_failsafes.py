@@ -5,7 +5,6 @@ import pytest
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
-from rover_sim.modes import Mode
 from rover_sim.personas import ARDUPILOT, PX4, Persona
 from tests.kit.cases import anew, for_each
 from tests.kit.world import World
@@ -35,16 +34,7 @@ def test_a_mode_that_a_failsafe_sets_is_no_person_s_takeover(driving: World) -> 
     world.fault(Faults(gps_lost=True))
     world.until(lambda: world.paused() is R.FAILSAFE, within=10)
     assert world.state(1)[0] is S.PAUSED
-    assert any("set by its failsafe: " in text for text in world.client.texts())
-
-
-@for_each("persona", [ARDUPILOT, PX4])
-def test_a_person_s_mode_is_a_takeover(driving: World) -> None:
-    world = driving
-    world.operator_mode(Mode.MANUAL)
-    world.until(lambda: world.paused() is R.TAKEOVER, within=3)
-    world.run(3)
-    assert world.paused() is R.TAKEOVER
+    assert world.client.said("set by its failsafe: ")
 
 
 class TestOwnFence:
@@ -67,7 +57,7 @@ class TestOwnFence:
         assert (world.truth.north, world.truth.east) == pytest.approx(
             (before.north, before.east), abs=0.02
         )
-        assert any("is outside its own fence" in text for text in world.client.texts())
+        assert world.client.said("is outside its own fence")
 
     def test_a_task_that_comes_while_it_is_outside_waits_and_says_why(
         self, make_world: MakeWorld
@@ -77,19 +67,9 @@ class TestOwnFence:
         world.run(3)
         world.client.move(2)
         world.run(3)
-        world.client.request_status(1)
-        world.run(0.1)
-        status = world.client.statuses(1)[-1]
+        status = world.shown(1)
         assert (status.state, status.reason) == (S.QUEUED, R.OUTSIDE_OWN_FENCE)
         words = "Task 1 waits: outside its own fence; drive it back by hand"
         assert words in world.client.texts()
         world.fault(Faults())
-        world.until_state(1, S.COMPLETED, within=40)
-
-    def test_back_inside_the_task_is_driven_to_its_end(self, outside: World) -> None:
-        world = outside
-        world.run(3)
-        world.fault(Faults())
-        world.run(2)
-        world.client.proceed()
         world.until_state(1, S.COMPLETED, within=40)

@@ -104,7 +104,7 @@ def test_a_rover_that_does_not_stop_on_hold_is_told_so_as_long_as_it_moves(
     world.client.stop()
     world.run(20)
     assert world.state(1) == (S.KILLED, R.STOP)
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
     holds = [t for t, m in world.observer.driven if t >= since and is_hold(m)]
     assert len(holds) >= 20
     assert max(b - a for a, b in pairwise([*holds, world.now])) < 1.1

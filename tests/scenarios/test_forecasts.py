@@ -6,18 +6,12 @@ import pytest
 
 from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.client import DRIVE, MOVE, ROTATE, TaskStatus
-from tests.kit.mission import Item, Upload
+from tests.kit.client import DRIVE, MOVE, ROTATE
+from tests.kit.mission import Item
 from tests.kit.world import World, at
 
 WAYPOINT, DELAY, SPEED, JUMP, YAW, REPOSITION, HEAD = 16, 93, 178, 177, 115, 192, 213
 START = 300
-
-
-def told(world: World, task: int) -> TaskStatus:
-    world.client.request_status(task)
-    world.run(0.1)
-    return world.client.statuses(task)[-1]
 
 
 def submit(world: World, command: int, *params: float) -> int:
@@ -42,7 +36,7 @@ def test_each_kind_begins_and_ends_when_it_was_foreseen(world: World) -> None:
     ]
     # behind another, and more urgent than all
     later = submit(world, MOVE, 0.5, 0, 0, 0, driven[2], 0, 9)
-    foreseen = {task: (told(world, task), world.now) for task in (*driven[1:], later)}
+    foreseen = {task: (world.shown(task), world.now) for task in (*driven[1:], later)}
     world.until_idle(tasks=len(driven) + 1, within=200)
     came = {(int(e.task_id), e.new): e.at for e in world.events(TaskChanged)}
     for task, (status, told_at) in foreseen.items():
@@ -52,8 +46,7 @@ def test_each_kind_begins_and_ends_when_it_was_foreseen(world: World) -> None:
 
 
 def test_a_plan_ends_when_it_was_foreseen(world: World) -> None:
-    plan = Upload(
-        world.client,
+    world.upload(
         [
             Item(WAYPOINT, frame=0, current=1),
             Item(WAYPOINT, **at(4.0, 7.0)),
@@ -61,27 +54,26 @@ def test_a_plan_ends_when_it_was_foreseen(world: World) -> None:
             Item(WAYPOINT, **at(0.0, 7.0)),
             Item(DELAY, param1=3, frame=2),
             Item(JUMP, param1=1, param2=1, frame=2),
-        ],
+        ]
     )
-    world.until(lambda: plan.result is not None, within=5)
     world.client.command(START, target=(1, 1))
     world.until_state(1, S.EXECUTING)
-    status, since = told(world, 1), world.now
+    status, since = world.shown(1), world.now
     world.until_idle(tasks=1, within=200)
     assert status.time_to_finish == pytest.approx(world.now - since, rel=0.2)
 
 
-def test_whtold_atnobody_can_know_is_not_foreseen(world: World) -> None:
+def test_what_nobody_can_know_is_not_foreseen(world: World) -> None:
     first = submit(world, DELAY, 100)
     world.until_state(first, S.EXECUTING)
     waiting = submit(world, MOVE, 1.0)
     due = submit(world, MOVE, 2.0, 0, 0, 0, 0, 300)
-    begin, end = told(world, waiting).time_to_start, told(world, waiting).time_to_finish
+    begin, end = world.shown(waiting).time_to_start, world.shown(waiting).time_to_finish
     assert 98 < begin < end < 110
-    assert told(world, due).time_to_start == pytest.approx(299.5, abs=1)
-    assert told(world, due).time_to_finish > 300
+    assert world.shown(due).time_to_start == pytest.approx(299.5, abs=1)
+    assert world.shown(due).time_to_finish > 300
     world.client.pause()
     world.run(1)
-    assert isnan(told(world, waiting).time_to_start)
-    assert told(world, due).time_to_start == pytest.approx(298, abs=2)
-    assert isnan(told(world, due).time_to_finish)
+    assert isnan(world.shown(waiting).time_to_start)
+    assert world.shown(due).time_to_start == pytest.approx(298, abs=2)
+    assert isnan(world.shown(due).time_to_finish)

@@ -1,36 +1,13 @@
-"""Finished tasks, as any client may list them; and when those that wait will start and end."""
+"""Finished tasks, as any client may list them."""
 
 import asyncio
-from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
 
-from mav_tasks import Client, GoTo, LocalPlace, Move, TaskReason, TaskState, Wait
-from mav_tasks.settings import Settings
-from rover_sim.faults import Faults
-from rover_sim.testing.options import RoverOptions
-from rover_sim.testing.rover_world import RoverWorld
+from mav_tasks import Client, Move, TaskReason, TaskState
+from tests.scenarios.conftest import MakeRoverWorld
 
-MakeWorld = Callable[..., RoverWorld]
 S = TaskState
-
-
-@pytest.fixture
-def make_world() -> Iterator[MakeWorld]:
-    """Return a factory of worlds with a server that is ready."""
-    worlds: list[RoverWorld] = []
-
-    def make(*, seed: int = 1, **options: Any) -> RoverWorld:
-        world = RoverWorld(RoverOptions(**options), seed=seed, settings=Settings())
-        worlds.append(world)
-        world.server.start()
-        world.until(lambda: world.server.is_ready)
-        return world
-
-    yield make
-    for world in worlds:
-        world.close()
 
 
 async def cancelled(client: Client, count: int, *, vehicle: int | None = None) -> list[int]:
@@ -44,9 +21,9 @@ async def cancelled(client: Client, count: int, *, vehicle: int | None = None) -
 
 
 def test_finished_tasks_are_listed_newest_first_with_the_age_of_their_end(
-    make_world: MakeWorld,
+    make_rover_world: MakeRoverWorld,
 ) -> None:
-    world = make_world()
+    world = make_rover_world()
 
     async def script() -> None:
         async with world.client() as client:
@@ -68,49 +45,5 @@ def test_finished_tasks_are_listed_newest_first_with_the_age_of_their_end(
             assert last.reason is TaskReason.CANCELLED
             assert [task.id for task in await other.history(limit=2)] == ids[:2]
             assert (await other.status(done.id)).ended_ago is not None
-
-    world.run(script())
-
-
-def test_history_outlives_a_restart_also_before_the_rover_is_heard(make_world: MakeWorld) -> None:
-    world = make_world()
-
-    async def before() -> list[int]:
-        async with world.client() as client:
-            return await cancelled(client, 3)
-
-    ids = world.run(before())
-    world.server.stop()
-    world.rovers[0].set_faults(Faults(silent=True))
-    world.sleep(60.0)
-    world.server.start()
-
-    async def after() -> None:
-        async with world.client() as client:
-            history = await client.history()
-            assert [task.id for task in history] == ids
-            assert history[0].ended_ago == pytest.approx(60.0, abs=5.0)
-
-    world.run(after())
-
-
-def test_a_waiting_task_starts_and_ends_about_when_it_was_foreseen(make_world: MakeWorld) -> None:
-    world = make_world()
-
-    async def script() -> None:
-        async with world.client() as client:
-            await client.submit(Move(2.0))
-            way = await client.submit(GoTo(LocalPlace(2.0, 3.0), wait=2.0))
-            last = await client.submit([Wait(3.0), GoTo(LocalPlace(0.0, 3.0))], after=way)
-            await asyncio.sleep(2.0)
-            asked_at = world.now
-            queue = await client.queue()
-            assert [task.id for task in queue.waiting] == [way.id, last.id]
-            foreseen = [(task.time_to_start, task.time_to_finish) for task in queue.waiting]
-            await way.done()
-            assert foreseen[0][1] == pytest.approx(world.now - asked_at, abs=4.0)
-            assert foreseen[1][0] == foreseen[0][1]
-            await last.done()
-            assert foreseen[1][1] == pytest.approx(world.now - asked_at, abs=8.0)
 
     world.run(script())

@@ -7,7 +7,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, set_mode
-from tests.kit.px4 import HOLD, PROMPT_GENERIC, PROMPT_PX4, REPOSITION, ask_mode, go_to
+from tests.kit.px4 import HOLD, PROMPT_PX4, REPOSITION, ask_mode, go_to
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
@@ -33,9 +33,9 @@ class TestAHoldBeforeAGoTo:
         assert world.state(1) == (S.PAUSED, R.OPERATOR)
         world.run(0.8)
         assert set(world.observer.sent_since(asked_at)) == {"zero"}
-        modes = [world.rover.autopilot.mode]
+        modes = [world.mode()]
         world.run(1.5)
-        modes.append(world.rover.autopilot.mode)
+        modes.append(world.mode())
         assert modes == [Mode.GUIDED, Mode.HOLD]
         assert world.stands()
 
@@ -91,12 +91,4 @@ class TestAHoldBeforeAGoTo:
         assert sent.ack is not None
         assert world.paused() is (R.STOPPED if wish == "stop" else R.OPERATOR)
         assert world.stands()
-        assert world.rover.autopilot.mode is Mode.HOLD
-
-    def test_a_generic_rover_is_held_at_once(self, make_world: MakeWorld) -> None:
-        world = make_world(persona=PROMPT_GENERIC)
-        asked_at = driving(world).now
-        ask_mode(world.client, HOLD)
-        world.run(0.05)
-        assert world.observer.sent_since(asked_at)[-2:].count("HOLD") == 1
-        assert world.rover.autopilot.mode is Mode.HOLD
+        assert world.mode() is Mode.HOLD

@@ -5,16 +5,15 @@ from pathlib import Path
 
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
-from tests.kit.cases import anew, for_each
-from tests.kit.mission import Item, Upload
-from tests.kit.px4 import PROMPT_PX4, ask_mode
+from tests.kit.cases import for_each
+from tests.kit.mission import Item
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.restarts import restart
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_restart import restart
 
 WAYPOINT, RETURN, SET_HOME = 16, 20, 179
-RTL, PX4_RETURN = 11, 4 << 16 | 5 << 24
 NEAR = 0.2  # m
 HERE = Item(SET_HOME, frame=2, param1=1)
 
@@ -38,20 +37,13 @@ def go_home(world: World, *, tasks: int) -> None:
 def drive(world: World, *places: tuple[float, float] | Item) -> None:
     """Drive a plan, armed by the operator and left armed."""
     items = [each if isinstance(each, Item) else Item(WAYPOINT, **at(*each)) for each in places]
-    upload = Upload(world.client, items, target=(1, 191))
-    world.until(lambda: upload.result is not None, within=5)
-    assert upload.result == 0
+    assert world.upload(items, target=(1, 191)).result == 0
 
 
 def arm(world: World) -> None:
     world.client.arm()
-    world.until(lambda: world.rover.autopilot.armed, within=3)
+    world.until(lambda: world.is_armed, within=3)
     world.run(1.0)
-
-
-@anew
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "tasks.sqlite3"
 
 
 def make(make_world: MakeWorld, persona: Persona, path: Path) -> World:
@@ -61,7 +53,7 @@ def make(make_world: MakeWorld, persona: Persona, path: Path) -> World:
         world.client.move(1.5)
         world.until_idle(tasks=number)
     assert far_from(world, 3.0, 0.0) < NEAR
-    world.until(lambda: not world.rover.autopilot.armed, within=10)
+    world.until(lambda: not world.is_armed, within=10)
     return world
 
 
@@ -84,7 +76,7 @@ def test_a_return_begins_nowhere_before_the_home_of_its_arming_is_known(
     world = make_world(persona=PROMPT_PX4)
     world.client.move(0.8)
     world.until_idle(tasks=1)
-    world.until(lambda: not world.rover.autopilot.armed, within=10)
+    world.until(lambda: not world.is_armed, within=10)
     world.run(1.0 + phase)
     world.client.command(RETURN, target=(1, 1))
     farthest = 0.0
@@ -121,22 +113,3 @@ def test_a_client_sets_home_and_it_lasts_over_arming_and_the_server(
     restart(world, path, well=True)
     go_home(world, tasks=5)
     assert far_from(world, 2.0, 1.0) < NEAR
-
-
-@both
-def test_a_return_that_was_paused_goes_on_to_the_home_of_now(
-    make_world: MakeWorld, persona: Persona, path: Path
-) -> None:
-    world = make(make_world, persona, path)
-    arm(world)
-    drive(world, (3.0, 4.0))
-    world.until_idle(tasks=3)
-    ask_mode(world.client, PX4_RETURN) if persona is PROMPT_PX4 else world.client.mode(RTL)
-    world.run(3)
-    world.client.pause()
-    world.run(2)
-    world.client.command_int(SET_HOME, 0, 0, 0, nan, **at(1.0, 3.0), frame=0, target=(1, 1))
-    world.run(0.5)
-    world.client.proceed()
-    world.until_idle(tasks=4)
-    assert far_from(world, 1.0, 3.0) < NEAR

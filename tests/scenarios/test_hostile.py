@@ -3,7 +3,7 @@
 from pymavlink.dialects.v20 import ardupilotmega as ardupilot
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, PeerChanged, SettingsChanged
+from mav_tasks.engine.inputs import KeysChanged, PeerChanged, SettingsChanged
 from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Clients, Limits, Roles, Settings
@@ -22,6 +22,7 @@ from tests.kit.client import (
     setpoint,
 )
 from tests.kit.px4 import MISSION, PROMPT_PX4
+from tests.kit.restarts import UTC
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_roles import (
@@ -38,7 +39,8 @@ from tests.scenarios.test_roles import (
     upload,
 )
 from tests.scenarios.test_roles import with_roles as with_roles
-from tests.scenarios.test_signing import ALICE, BOB, UTC, put, signing
+from tests.scenarios.test_signed_rovers import sent_to_rover
+from tests.scenarios.test_signing import ALICE, BOB, put, signing
 
 
 def radio_status() -> object:
@@ -50,18 +52,11 @@ def test_a_radio_s_status_makes_nobody_a_client_where_all_is_signed(world: World
     put(world, ALICE)
     stranger = world.add_client("stranger", system_id=51, component_id=68)
     stranger.heartbeats = False
-    towards: list[int] = []
-
-    def listen(source: str, target: str, data: bytes) -> bool:
-        if source == "server:vehicles" and target == "rover1":
-            towards.append(data[7])
-        return False
-
-    world.watched.loses = listen
+    towards = sent_to_rover(world)
     stranger.stream(radio_status(), rate=5)
     world.run(3.0)
     assert not stranger.received
-    assert 109 not in towards
+    assert 109 not in [data[7] for data in towards]
 
 
 def connected(world: World, key: Key) -> FakeClient:
@@ -84,62 +79,6 @@ def test_a_key_that_may_less_now_may_less_at_once(world: World, role: str) -> No
     sent = client.move(2.0)
     assert answer(world, sent) == ((DENIED, R.NOT_ALLOWED) if role else None)
     assert len(world.tasks()) == 1
-
-
-def test_a_link_s_own_key_that_is_of_vehicles_now_is_no_client_s(world: World) -> None:
-    put(world, ALICE)
-    for up in (False, True):
-        change = LinkChanged(CLIENT_LINK, LinkSide.CLIENTS, up=up, key="alice")
-        world.server.pump.handle(change, now=world.now)
-    client = connected(world, ALICE)
-    vehicles = Key("alice", ALICE.secret, "")
-    world.server.pump.handle(KeysChanged((vehicles, BOB)), now=world.now)
-    world.run(2.0)
-    assert answer(world, client.move(2.0)) is None
-    assert world.tasks() == ()
-
-
-def test_requests_are_counted_whoever_else_signs_at_the_same_endpoint(world: World) -> None:
-    """Or else a packet of another role between would begin each count anew."""
-    few = Roles(unsigned="observer", submitter=Limits(rate=1.0), observer=Limits(rate=0.8))
-    submitter = Key("alice", ALICE.secret, "submitter")
-    put(world, submitter, takes_unsigned=True)
-    world.server.pump.handle(SettingsChanged(Settings(roles=few)), now=world.now)
-    client = signing(world, submitter)
-    client.heartbeats = False
-    unsigned = common.MAVLink(None, 255, 190)
-    beat = common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(unsigned)
-    for number in range(30):
-        client.rotate(10.0 + number)
-        client.send_raw(beat)
-    world.run(0.3)
-    assert len(world.tasks()) <= 7
-
-
-@for_each("message", ["ping", "timesync", "mission request", "mission ack"])
-def test_who_may_only_look_does_not_flood_the_way_to_a_rover(
-    with_roles: MakeRoles, message: str
-) -> None:
-    world = with_roles(observer=Limits(rate=2.0))
-    observer = join(world, OBSERVER)
-    sent = {
-        "ping": common.MAVLink_ping_message(1, 1, 1, 154),
-        "timesync": common.MAVLink_timesync_message(0, 1),
-        "mission request": common.MAVLink_mission_request_int_message(1, 154, 0, 0),
-        "mission ack": common.MAVLink_mission_ack_message(1, 154, 0, 0),
-    }[message]
-    towards: list[int] = []
-
-    def listen(source: str, target: str, data: bytes) -> bool:
-        if source == "server:vehicles" and target == "rover1" and data[7] == sent.get_msgId():
-            towards.append(data[7])
-        return False
-
-    world.watched.loses = listen
-    for _ in range(200):
-        observer.send(sent)
-    world.run(0.5)
-    assert 1 <= len(towards) <= 20
 
 
 @for_each("persona, mode", [(PROMPT, AUTO), (PROMPT_PX4, MISSION)])
@@ -177,7 +116,6 @@ def test_only_an_operator_s_stop_clears_the_queue(with_roles: MakeRoles) -> None
 
 
 BOUNDING = {
-    "fence": common.MAVLink_mission_count_message(1, 1, 1, FENCE),
     "fence item": common.MAVLink_mission_item_int_message(
         1, 1, 0, 6, 5003, 0, 1, 9, 0, 0, 0, 0, 0, 0, FENCE
     ),
@@ -185,8 +123,6 @@ BOUNDING = {
     "nothing at all": common.MAVLink_mission_clear_all_message(1, 1, 255),
     "old fence": ardupilot.MAVLink_fence_point_message(1, 1, 0, 0, 0, 0),
     "old rally": ardupilot.MAVLink_rally_point_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0),
-    "shell": common.MAVLink_serial_control_message(10, 0, 0, 0, 1, [10] * 70),
-    "knob": common.MAVLink_param_map_rc_message(1, 1, b"CRUISE_SPEED", -1, 0, 1, 1, 0, 5),
     "device": ardupilot.MAVLink_device_op_write_message(1, 1, 0, 0, 0, 0, b"x", 0, 1, [0] * 128),
 }
 
@@ -201,17 +137,10 @@ def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
     world = make_world(settings=Settings(roles=roles, claim=False))
     client = join(world, who)
     message = BOUNDING[what]
-    towards: list[int] = []
-
-    def listen(source: str, target: str, data: bytes) -> bool:
-        if source == "server:vehicles" and target == "rover1":
-            towards.append(int.from_bytes(data[7:10], "little"))
-        return False
-
-    world.watched.loses = listen
+    passed = world.passed_on((who, 190))
     client.send(message)
     world.run(0.2)
-    assert (message.get_msgId() in towards) == (who != OPERATOR)
+    assert (message.get_msgId() in passed) == (who != OPERATOR)
 
 
 def test_switching_the_fence_off_as_a_switch_does_is_of_safety(with_roles: MakeRoles) -> None:
@@ -235,21 +164,6 @@ def test_what_a_revoked_key_drives_stands(world: World) -> None:
     revoked = Key("alice", b"", "operator", ALICE.fingerprint)
     world.server.pump.handle(KeysChanged((revoked, BOB)), now=world.now)
     world.until(world.stands, within=1.5)
-
-
-def test_who_signs_has_a_place_however_many_are_there_who_do_not(world: World) -> None:
-    put(world, ALICE, takes_unsigned=True)
-    crowd = Settings(clients=Clients(max_clients=4), roles=Roles(unsigned="observer"))
-    world.server.pump.handle(SettingsChanged(crowd), now=world.now)
-    for number in range(6):
-        world.add_client(f"stranger {number}", system_id=20 + number)
-    world.run(3.5)
-    client = signing(world, ALICE)
-    world.run(1.5)
-    sent = client.move(1.0)
-    world.run(0.3)
-    assert sent.result == ACCEPTED
-    assert client.heard("LOCAL_POSITION_NED")
 
 
 def test_commands_that_have_ended_keep_nobody_away_for_long(world: World) -> None:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from mav_tasks import Drive, Face, GoTo, LocalPlace, Move, Rotate, SyncClient, Wait
 from mav_tasks.settings import Driving, Settings
-from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
+from tests.scenarios.conftest import MakeRoverWorld
 
 rates = st.none() | st.floats(0.01, 1.5)
 moves = st.builds(
@@ -44,13 +44,8 @@ def assert_close(one: Any, other: Any) -> None:
 
 
 @pytest.fixture
-def world() -> Iterator[RoverWorld]:
-    far = Settings(driving=Driving(max_distance=10_000.0))
-    made = RoverWorld(RoverOptions(), seed=1, settings=far)
-    made.server.start()
-    made.until(lambda: made.server.is_ready)
-    yield made
-    made.close()
+def world(make_rover_world: MakeRoverWorld) -> RoverWorld:
+    return make_rover_world(settings=Settings(driving=Driving(max_distance=10_000.0)))
 
 
 @pytest.fixture

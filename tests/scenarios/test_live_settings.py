@@ -2,7 +2,6 @@
 
 from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.settings import (
-    Clients,
     Driving,
     Settings,
     Watch,
@@ -11,19 +10,13 @@ from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import for_each
-from tests.kit.client import FakeClient
 from tests.kit.world import World
-from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_parameters import ask, put, told
 
 
 def change(world: World, settings: Settings) -> None:
     world.server.pump.handle(SettingsChanged(settings), now=world.now)
     world.server.pump.turn(now=world.now)
-
-
-def count(client: FakeClient, message_id: int) -> int:
-    return len(list(client.of_id(message_id)))
 
 
 def test_the_next_task_is_driven_at_the_new_speed(world: World) -> None:
@@ -54,29 +47,6 @@ def test_a_rover_is_lost_after_the_new_time(world: World, limit: float, is_lost:
     world.run(1.5 if is_lost else 6.0)
     silent = [event for event in world.events(VehicleNoted) if "silent" in str(event)]
     assert bool(silent) is is_lost
-
-
-def test_telemetry_comes_at_the_new_rate_to_who_is_there(world: World) -> None:
-    for settings, least, most in (
-        (Settings(clients=Clients(stream_interval=1.0)), 4, 6),
-        (Settings(clients=Clients(stream_interval=0.1)), 30, 60),
-    ):
-        change(world, settings)
-        world.run(1.0)
-        before = count(world.client, 32)
-        world.run(5.0)
-        assert least <= count(world.client, 32) - before <= most
-
-
-@for_each("claim", [True, False])
-def test_whether_standard_commands_become_tasks_is_as_said_now(
-    make_world: MakeWorld, claim: bool
-) -> None:
-    world = make_world(settings=Settings(claim=not claim))
-    change(world, Settings(claim=claim))
-    world.client.command(115, 90.0, 0.0, 1.0, 1.0, target=(1, 1))
-    world.run(0.5)
-    assert len(world.tasks()) == claim
 
 
 def test_what_a_client_has_set_stays_and_everybody_is_told_of_the_rest(world: World) -> None:

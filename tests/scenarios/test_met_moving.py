@@ -16,10 +16,11 @@ from rover_sim.personas import Mode, Persona
 from tests.kit.car import Car
 from tests.kit.cases import anew, for_each
 from tests.kit.px4 import PROMPT_PX4
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_restart import REMAINDER, UTC, release, restart
+from tests.scenarios.test_restart import REMAINDER, release
 
 AWAY = 0.4  # s, of a server that a supervisor starts again at once
 
@@ -51,7 +52,7 @@ def driving(make_world: MakeWorld, path: Path, persona: Persona) -> World:
 
 
 def in_control_mode(world: World) -> bool:
-    return world.rover.autopilot.mode is Mode.GUIDED  # OFFBOARD
+    return world.mode() is Mode.GUIDED  # OFFBOARD
 
 
 def phase_of(world: World) -> str:
@@ -139,5 +140,5 @@ def test_who_switches_it_to_manual_meanwhile_has_it(make_world: MakeWorld, path:
     at = world.now
     world.run(3)
     assert phase_of(world) == "IDLE"
-    assert world.rover.autopilot.mode is Mode.MANUAL
+    assert world.mode() is Mode.MANUAL
     assert "HOLD" not in world.observer.sent_since(at + 1.1)  # after its next heartbeat

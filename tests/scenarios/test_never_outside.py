@@ -52,9 +52,7 @@ def drawn(items: list[Item]) -> LocalFence:
 
 
 def fenced(world: World, items: list[Item]) -> int | None:
-    upload = Upload(world.client, items, kind=FENCE)
-    world.until(lambda: upload.result is not None, within=15)
-    return upload.result
+    return world.upload(items, kind=FENCE).result
 
 
 def tasks(world: World, random: Random) -> list[Callable[[], object]]:

@@ -50,9 +50,7 @@ def test_it_says_so_in_the_rovers_own_words(waiting: World) -> None:
     world = waiting
     words = "Arm: refused by a simulated fault"
     assert f"Task 1 waits: the rover is not ready to arm: {words}" in world.client.texts()
-    world.client.request_status(1)
-    world.run(0.1)
-    status = world.client.statuses(1)[-1]
+    status = world.shown(1)
     assert status.why == (S.STARTING, R.NOT_READY)
     assert status.text == f"move 0.3 m: starting (not ready: {words})"[:50]
     said = world.client.texts().count(f"Task 1 waits: the rover is not ready to arm: {words}")
@@ -97,5 +95,5 @@ def test_what_halts_a_task_halts_one_that_waits(waiting: World, halt: str, phase
     world.run(10)
     assert world.state(1) == becomes
     assert arm_requests(world, since=at + 0.1) == 0
-    assert not world.rover.autopilot.armed
+    assert not world.is_armed
     assert near_pose(world.pose(), (0.0, 0.0, 0.0))

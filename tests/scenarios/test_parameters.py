@@ -10,11 +10,12 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import ParametersChanged
 from mav_tasks.services.parameter_table import PARAMETERS
-from mav_tasks.settings import Driving, Settings
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.restored import Restored
 from mav_tasks.tasks.server_events import ParameterSet
 from tests.kit.cases import for_each
 from tests.kit.client import FakeClient
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -151,22 +152,15 @@ def test_a_bad_value_changes_nothing_and_is_named(world: World, message: Any, sa
 
 def test_a_restart_keeps_what_was_set(make_world: MakeWorld, tmp_path: Path) -> None:
     path = tmp_path / "tasks.sqlite3"
-    store = PromptSqliteStore(path, wall_offset=1.8e9)
-    world = make_world(store=store)
+    world = make_world(store=PromptSqliteStore(path, wall_offset=UTC))
     world.client.send(put("TSK_SPEED_MAX", 4.0))
     world.client.send(put("TSK_SPEED", 3.0))
     world.run(0.5)
-    world.end_server()
-    store.close()
-    again = PromptSqliteStore(path, wall_offset=1.8e9)
-    world.start_server(again, again.load())
-    world.run(3)
+    restart(world, path, well=True, away=0.0)
     world.client.received.clear()
     world.client.send(ask(191, "TSK_SPEED"))
     world.run(0.2)
     assert told(world.client) == [("TSK_SPEED", 3.0)]
-    assert world.server.engine.snapshot(now=world.now).vehicles
-    again.close()
 
 
 def test_what_was_kept_and_is_out_of_range_now_is_named() -> None:
@@ -186,14 +180,6 @@ def test_what_is_not_stored_in_time_is_not_set(make_world: MakeWorld) -> None:
     assert [event.value for event in world.events(ParameterSet)] == [0.8, None]
 
 
-def test_it_comes_before_what_is_configured(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(driving=Driving(speed=0.3)))
-    world.client.send(ask(191, "TSK_SPEED"))
-    world.client.send(put("TSK_SPEED", 0.8))
-    world.run(0.2)
-    assert told(world.client) == [("TSK_SPEED", 0.3), ("TSK_SPEED", 0.8)]
-
-
 def test_the_rovers_own_parameters_are_the_rovers(world: World) -> None:
     world.run(2)  # the server has asked the rover for its speed
     world.client.received.clear()
@@ -209,24 +195,18 @@ def test_the_rovers_own_parameters_are_the_rovers(world: World) -> None:
 def test_a_parameter_that_was_set_at_another_gateway_is_in_force_and_told(
     make_world: MakeWorld,
 ) -> None:
-    store = LateStore(delay=0.3)
-    world = make_world(store=store)
-    world.run(2.0)
-    world.client.received.clear()
-    shared = (("TSK_SPEED", 0.3),)
-    world.server.take_in(ParametersChanged(shared), now=world.now)
+    world = make_world(store=LateStore(delay=0.3))
+    world.server.take_in(ParametersChanged((("TSK_SPEED", 0.3),)), now=world.now)
     world.run(0.5)
     assert told(world.client) == [("TSK_SPEED", 0.3)]
-    assert world.server.engine.parameters == dict(shared)
+    assert world.server.engine.parameters == {"TSK_SPEED": 0.3}
     assert world.events(ParameterSet) == []
     world.client.send(put("TSK_SPEED", 0.4))
     world.run(0.1)
     # what was read meanwhile is older than what is being stored here
     world.server.take_in(ParametersChanged((("TSK_SPEED", 0.2),)), now=world.now)
-    assert world.server.engine.parameters == dict(shared)
     world.run(1.0)
     assert world.server.engine.parameters == {"TSK_SPEED": pytest.approx(0.4)}
     world.server.take_in(ParametersChanged(()), now=world.now)
     world.run(0.5)
-    assert world.server.engine.parameters == {}
     assert told(world.client)[-1] == ("TSK_SPEED", 0.5)

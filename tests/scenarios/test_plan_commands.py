@@ -8,28 +8,19 @@ from typing import NamedTuple
 
 import pytest
 
-from mav_tasks.settings import Roles, Settings, VehicleProfile
+from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.car import Car
 from tests.kit.cases import anew, for_each
-from tests.kit.mission import Item, Upload
+from tests.kit.mission import Item
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_profiles import ARDUPILOT_PROFILE
 
 WAYPOINT, CIRCLE, LAND, TAKEOFF, SPLINE, DELAY, SPEED = 16, 18, 21, 22, 82, 93, 178
-SERVO, PAUSE, REVERSE, FENCE, TAG, JUMP_TO_TAG, GATE, START = (
-    183,
-    193,
-    194,
-    207,
-    600,
-    601,
-    4501,
-    300,
-)
+SERVO, REVERSE, GATE = 183, 194, 4501
 ARDUPILOT_CAR = replace(ARDUPILOT_PROFILE, turning="steered", turning_radius=1.2)
 NOON = 1_800_014_400.0 + 43_200.0 - (1_800_014_400.0 % 86_400.0)
 
@@ -58,8 +49,7 @@ class Seen(NamedTuple):
 
 def driven(world: World, *items: Item, within: float = 90.0) -> list[Seen]:
     """Upload a plan, drive it to its end, and return how the rover truly went."""
-    upload = Upload(world.client, items, target=(1, 191))
-    world.until(lambda: upload.result is not None, within=5)
+    upload = world.upload(items, target=(1, 191))
     assert upload.result == 0, world.client.texts()
     track: list[Seen] = []
 
@@ -74,8 +64,7 @@ def driven(world: World, *items: Item, within: float = 90.0) -> list[Seen]:
 
 def refused(world: World, *items: Item) -> str:
     """Return why a plan was refused."""
-    upload = Upload(world.client, items, target=(1, 191))
-    world.until(lambda: upload.result is not None, within=5)
+    upload = world.upload(items, target=(1, 191))
     assert upload.result != 0
     world.run(0.2)
     return world.client.texts()[-1]
@@ -164,8 +153,7 @@ def test_no_speed_means_what_it_means_to_the_autopilot(
 def test_a_gate_holds_back_a_command_until_it_is_passed(world: World) -> None:
     sent: list[float] = []
     items = (place(1, 0), Item(GATE, **at(2, 0)), do(SERVO, 9, 1700), place(3, 0))
-    upload = Upload(world.client, items, target=(1, 191))
-    world.until(lambda: upload.result is not None, within=5)
+    upload = world.upload(items, target=(1, 191))
 
     def is_over() -> bool:
         if not sent and str(SERVO) in world.observer.sent_since(0):
@@ -187,12 +175,6 @@ def test_what_is_skipped_is_said_once(world: World) -> None:
     assert is_at(world, 1.0, 0.0)
 
 
-def test_a_landing_is_a_place_to_a_px4(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4)
-    driven(world, Item(LAND, **at(1, 0)))
-    assert hypot(world.truth.north - 1, world.truth.east) < 0.3
-
-
 REFUSALS = {
     176: "176 DO_SET_MODE is not for a plan: the server starts, stops and arms the rover",
     192: "see 16",
@@ -209,9 +191,3 @@ REFUSALS = {
 def test_what_is_refused_is_told_with_the_reason(world: World) -> None:
     for command, words in REFUSALS.items():
         assert words in refused(world, place(1, 0), do(command, 1))
-
-
-def test_what_limits_a_rover_needs_the_role_for_that(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(roles=Roles(unsigned="operator")))
-    assert "safety may" in refused(world, place(1, 0), do(FENCE, 0))
-    driven(world, place(0.3, 0), do(SERVO, 9, 1500))

@@ -14,7 +14,6 @@ from tests.kit.volume import tries
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
-MODIFY, PREEMPTIBLE, PREEMPTIVE = 54012, 5, 6
 GAP = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
 
 
@@ -44,25 +43,6 @@ def test_a_task_that_outranks_enough_interrupts_and_the_other_resumes(
     assert ended == [3, 2, 1]
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 3
     assert near_pose(world.pose(), (3.0, 0.0, 0.0))
-
-
-def test_a_preemptive_task_interrupts_whatever_its_priority_but_not_a_firm_one(
-    world: World,
-) -> None:
-    world.client.move(4)
-    world.run(3)
-    world.client.rotate(30, priority=1)
-    world.run(0.1)
-    world.client.command(MODIFY, 1, PREEMPTIBLE, 0)
-    world.run(0.6)
-    world.client.command(MODIFY, 2, PREEMPTIVE, 1)
-    world.run(1)
-    assert world.state(1)[0] is S.EXECUTING
-    world.client.command(MODIFY, 1, PREEMPTIBLE, 1)
-    world.until_state(1, S.PAUSED, within=1)
-    world.until_state(2, S.COMPLETED)
-    world.until_idle(tasks=2)
-    assert near_pose(world.pose(), (4.0, 0.0, 0.0))
 
 
 @for_each("goal", ["move", "back", "rotate", "turns"])

@@ -14,9 +14,7 @@ from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_fence import YARD, fenced
-from tests.scenarios.test_live_settings import change
 
-ROTATE = 54001
 TURNING = replace(PROMPT_PX4, honours_yaw_rate=True)
 PX4_PROFILE = VehicleProfile(
     system_id=1,
@@ -71,7 +69,7 @@ def test_a_px4_that_was_measured_to_turn_is_turned(make_world: MakeWorld) -> Non
     world.until_idle(tasks=2)
     assert near_pose(world.pose(), (0, -0.5, 90))
     assert noted(world) == ["uses the profile of 2026-11-20"]
-    assert any("uses the profile of 2026-11-20" in text for text in world.client.texts())
+    assert world.client.said("uses the profile of 2026-11-20")
 
 
 @for_each(
@@ -91,65 +89,13 @@ def test_a_profile_of_something_else_is_told_and_not_used(
     assert noted(world) == [words]
 
 
-def test_of_two_of_one_rover_the_later_counts(make_world: MakeWorld) -> None:
-    later = replace(PX4_PROFILE, yaw_rate="ignored", probed="2026-11-21T10:00:00Z")
-    world = make_world(persona=TURNING, settings=known(later, PX4_PROFILE))
-    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    assert noted(world) == ["uses the profile of 2026-11-21"]
-
-
-def test_an_ardupilot_that_does_not_turn_on_the_spot_is_steered_by_course(
-    make_world: MakeWorld,
-) -> None:
-    profile = replace(ARDUPILOT_PROFILE, yaw_rate="ignored")
-    world = make_world(settings=known(profile))
-    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    world.client.move(1.0)
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-    assert near_pose(world.pose(), (1, 0, 0))
-
-
-@for_each("ask", [(ROTATE, 90.0), (115, 90.0, 0.0, 1.0, 0.0)])
-def test_a_car_is_not_turned_on_the_spot_and_its_client_reads_why(
-    make_world: MakeWorld, ask: tuple[float, ...]
-) -> None:
-    world = make_world(settings=known(replace(ARDUPILOT_PROFILE, turning="steered")))
-    sent = world.client.command(int(ask[0]), *ask[1:])
-    world.run(0.3)
-    assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    words = "rover 1 steers like a car and cannot turn on the spot"
-    assert any(words in text for text in world.client.texts())
-
-
-def test_a_profile_that_comes_while_it_drives_counts_when_it_is_handed_back(
-    make_world: MakeWorld,
-) -> None:
-    world = make_world(persona=TURNING)
-    world.client.move(2.0)
-    world.until(lambda: world.truth.north > 0.5, within=20)
-    change(world, known(PX4_PROFILE))
-    world.run(1.1)
-    assert noted(world) == ["uses the profile of 2026-11-20"]
-    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-    world.until_idle(tasks=1)
-    world.run(1.1)
-    assert rotate(world) == (ACCEPTED, 2)
-    world.until_idle(tasks=2)
-    assert near_pose(world.pose(), (2, 0, 90))
-    change(world, known())
-    world.run(1.1)
-    assert noted(world)[-1] == "uses no profile any more"
-    assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-
-
 def test_a_rover_that_was_seen_not_to_stop_by_itself_is_not_driven(make_world: MakeWorld) -> None:
     world = make_world(settings=known(replace(ARDUPILOT_PROFILE, loss_stop="no")))
     sent = world.client.move(1.0)
     world.run(3.0)
     assert sent.answer == (ACCEPTED, 1)
-    assert any("does not stop without setpoints" in text for text in world.client.texts())
-    assert (world.rover.autopilot.armed, world.truth.north) == (False, 0.0)
+    assert world.client.said("does not stop without setpoints")
+    assert (world.is_armed, world.truth.north) == (False, 0.0)
 
 
 class TestBrakes:

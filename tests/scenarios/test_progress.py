@@ -5,7 +5,7 @@ from math import hypot, nan
 import pytest
 
 from tests.kit.client import ACCEPTED
-from tests.kit.mission import Item, Upload
+from tests.kit.mission import Item
 from tests.kit.world import World, at
 
 REPOSITION, START, WAYPOINT = 192, 300, 16
@@ -42,8 +42,7 @@ def test_a_go_to_behind_it_is_not_half_done_after_the_turn(world: World) -> None
 
 def test_a_plan_counts_by_its_way_and_not_by_its_items(world: World) -> None:
     plan = [Item(WAYPOINT, **at(n, 0.0)) for n in (0.0, 0.5, 1.0, 1.5, 8.0)]
-    upload = Upload(world.client, plan)
-    world.until(lambda: upload.result is not None, within=5)
+    world.upload(plan)
     world.client.command(START, target=(1, 1))
     world.run(0.2)
     told = watch(world, 1)

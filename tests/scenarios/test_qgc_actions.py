@@ -1,6 +1,7 @@
 """Every button of the actions file does what is on it."""
 
 import json
+from math import pi
 
 from mav_tasks.qgc_actions import ACTIONS, file_of
 from mav_tasks.tasks.goal import Move, Rotate
@@ -23,21 +24,19 @@ def press(world: World, label: str) -> Sent:
     return sent
 
 
-@for_each(
-    "label, goal",
-    [
-        ("Forward 1 m", Move(1.0)),
-        ("Back 1 m", Move(-1.0)),
-        ("Right 90", Rotate),
-        ("Left 90", Rotate),
-    ],
-)
-def test_a_task_is_queued_at_the_usual_priority(world: World, label: str, goal: object) -> None:
-    assert press(world, label).answer == (ACCEPTED, 1)
-    (task,) = world.tasks()
-    assert task.goal == goal or type(task.goal) is goal
-    assert task.terms.priority == 5
-    world.until_idle(tasks=1)
+GOALS = {
+    "Forward 1 m": Move(1.0),
+    "Back 1 m": Move(-1.0),
+    "Right 90": Rotate(pi / 2),
+    "Left 90": Rotate(-pi / 2),
+}
+
+
+def test_each_task_is_queued_at_the_usual_priority(world: World) -> None:
+    for number, (label, goal) in enumerate(GOALS.items(), 1):
+        assert press(world, label).answer == (ACCEPTED, number)
+        assert (world.task(number).goal, world.task(number).priority) == (goal, 5)
+    world.until_idle(tasks=4)
 
 
 def test_what_runs_is_paused_continued_stopped_and_called_off(world: World) -> None:
@@ -75,8 +74,10 @@ def test_a_held_task_is_decided_about(world: World, label: str, ends: S) -> None
 
 
 def test_none_is_left_untried() -> None:
-    tried = {"Forward 1 m", "Back 1 m", "Right 90", "Left 90", "Pause", "Continue", "Clear queue"}
-    assert set(BUTTONS) == tried | {
+    assert set(BUTTONS) == GOALS.keys() | {
+        "Pause",
+        "Continue",
+        "Clear queue",
         "Cancel task",
         "STOP",
         "Held: again",

@@ -90,7 +90,7 @@ def test_is_interrupted_and_gone_on_with(
     world.run(3)
     assert world.state(1) == (S.PAUSED, R.OPERATOR)
     assert world.stands()
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
     # an ArduPilot rover says in HOLD that it is on standby: for the station it does not fly
     party.operator.go_on() if "continue" in party.operator.offers else party.operator.start()
     world.until(lambda: world.truth.north > 2.0, within=20)

@@ -5,7 +5,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.cases import anew, for_each
 from tests.kit.client import AUTO, HOLD
-from tests.kit.mission import Item, Upload
+from tests.kit.mission import Item
 from tests.kit.observer import ARDUPILOT_WAYS
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
@@ -32,9 +32,7 @@ def is_ardupilot(world: World) -> bool:
 
 def upload(world: World, *norths: float) -> None:
     home = [Item(WAYPOINT, **at(0, 0))] if is_ardupilot(world) else []
-    sent = Upload(world.client, [*home, *(Item(WAYPOINT, **at(n, 0.0)) for n in norths)])
-    world.until(lambda: sent.result is not None, within=5)
-    assert sent.result == 0
+    assert world.upload([*home, *(Item(WAYPOINT, **at(n, 0.0)) for n in norths)]).result == 0
 
 
 def start(world: World) -> None:
@@ -74,17 +72,4 @@ def test_paused_edited_uploaded_and_started(world: World, halt: str, by: str) ->
     assert world.paused() is R.NONE, "nothing waits, and who paused it has started it"
     world.client.proceed()
     world.run(5)
-    assert is_at(world, -2.0, 0.0)
-
-
-@for_each("persona", [PROMPT, PROMPT_PX4])
-def test_one_that_drives_is_told_of_and_ends_when_the_new_one_starts(world: World) -> None:
-    upload(world, -2.0)
-    told = [text for text in world.client.texts() if text.startswith("Task 2 ready to start")]
-    assert "task 1 goes on until then" in told[0]
-    world.run(1)
-    assert world.state(1)[0] is S.EXECUTING
-    ask(world, AUTO, MISSION)
-    world.until(lambda: world.state(2)[0] is S.COMPLETED, within=60)
-    assert world.state(1) == (S.CANCELLED, R.REPLACED)
     assert is_at(world, -2.0, 0.0)

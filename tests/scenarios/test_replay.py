@@ -16,14 +16,13 @@ from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import rc_override
-from tests.kit.mission import Item, Upload
-from tests.kit.px4 import PROMPT_PX4
+from tests.kit.mission import Item
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 
 HASHES = "12345"  # PYTHONHASHSEED of the other process; this one's is random
-UTC = 1.8e9  # s
 RELEASE, AGAIN = 54013, 0
 
 
@@ -35,16 +34,6 @@ def one_rover(make_world: MakeWorld, folder: Path) -> World:
         world.client.move(0.3 * number, priority=priority, nonce=number, repeats=(0.0, 0.5, 1.0))
         world.run(0.1)
     world.until(lambda: all(t.state is S.COMPLETED for t in world.tasks()), within=60)
-    return world
-
-
-def many_rovers(make_world: MakeWorld, folder: Path) -> World:
-    world = make_world(records=folder, rovers=4)
-    other = world.add_client("script", system_id=245)
-    for number in range(1, 5):
-        world.client.move(0.5, target=(number, 191))
-        other.rotate(45.0 * number, target=(number, 191))
-    world.until_idle(tasks=8)
     return world
 
 
@@ -61,16 +50,6 @@ def any_rover(make_world: MakeWorld, folder: Path) -> World:
     world.until(lambda: world.task(3).vehicle == 1, within=20)
     world.rovers[1].autopilot.set_faults(Faults())
     world.until_state(3, S.COMPLETED, within=60)
-    return world
-
-
-def plans(make_world: MakeWorld, folder: Path) -> World:
-    world = make_world(records=folder, persona=PROMPT_PX4)
-    items = [Item(16, **at(0.0, 0.0), frame=0), Item(16, **at(1.0, 0.0)), Item(16, **at(1.0, 1.0))]
-    upload = Upload(world.client, items, target=(1, 1))
-    world.until(lambda: upload.result is not None, within=5)
-    world.client.command(300, target=(1, 1))
-    world.until_state(1, S.COMPLETED, within=60)
     return world
 
 
@@ -93,17 +72,6 @@ def stop_and_takeover(make_world: MakeWorld, folder: Path) -> World:
     return world
 
 
-def parameters(make_world: MakeWorld, folder: Path) -> World:
-    world = make_world(records=folder)
-    message = common.MAVLink_param_set_message(1, 191, b"TSK_SPEED", 0.3, 9)
-    world.client.send(message)
-    world.client.send(common.MAVLink_param_request_list_message(1, 191))
-    world.run(0.5)
-    world.client.move(0.5)
-    world.until_idle(tasks=1)
-    return world
-
-
 def failing_store(make_world: MakeWorld, folder: Path) -> World:
     store = LateStore()
     world = make_world(records=folder, store=store)
@@ -122,23 +90,17 @@ def restarted(make_world: MakeWorld, folder: Path) -> World:
     settings = Settings(queueing=Queueing(preemption_gap=3))
     world = make_world(records=folder, store=store, settings=settings)
     world.client.send(common.MAVLink_param_set_message(1, 191, b"TSK_SPEED", 0.4, 9))
-    upload = Upload(world.client, [Item(16, **at(0.0, 0.0), frame=0), Item(16, **at(1.0, 0.0))])
-    world.until(lambda: upload.result is not None, within=5)
+    world.upload([Item(16, **at(0.0, 0.0), frame=0), Item(16, **at(1.0, 0.0))])
     world.client.move(2)
     world.run(3)
     world.client.rotate(90, nonce=5)
     world.run(0.5)
-    world.end_server()
-    store.close()
-    world.run(6)
-    later = PromptSqliteStore(folder / "tasks.sqlite3", wall_offset=UTC)
-    world.start_server(later, later.load())
-    world.run(4.0)
+    restart(world, folder / "tasks.sqlite3", well=True)
     world.client.command(RELEASE, 2, AGAIN)
     world.run(0.2)
     world.client.proceed()
     world.until(lambda: world.state(3)[0] is S.COMPLETED, within=60)
-    later.close()
+    world.server.store.close()
     return world
 
 
@@ -146,11 +108,8 @@ WORLDS: dict[str, Callable[[MakeWorld, Path], World]] = {
     each.__name__: each
     for each in (
         one_rover,
-        many_rovers,
         any_rover,
-        plans,
         stop_and_takeover,
-        parameters,
         failing_store,
         restarted,
     )

@@ -2,35 +2,25 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from shutil import copy
 
 import pytest
 
 from mav_tasks.engine.inputs import Shutdown
 from mav_tasks.settings import Queueing, Settings
-from mav_tasks.tasks.events import TaskProgressed
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, DENIED, HOLD, MOVE, TEMPORARILY_REJECTED, command_long
-from tests.kit.mission import Download, Item, Upload, reached
+from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
+from tests.kit.mission import Download, Item, reached
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import OFF, World, at, is_at, near_pose
-from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, away_from_home, stays
 from tests.scenarios.conftest import MakeWorld
 
 VERSION = 148  # AUTOPILOT_VERSION
-UTC = 1.8e9  # s, when the worlds begin
 RELEASE, AGAIN, REMAINDER, SKIP = 54013, 0, 1, 2
 RETURN = 11  # the mode
-TO_LAUNCH = 20  # the command
-STOP_TIME = 6.0  # s, an abandoned rover's own time-out and its way to a stand
-
-
-@anew
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "tasks.sqlite3"
 
 
 @anew
@@ -40,30 +30,8 @@ def world(make_world: MakeWorld, path: Path) -> World:
     return make_world(store=store, settings=settings)
 
 
-def restart(
-    world: World, path: Path, *, well: bool = False, away: float = STOP_TIME, settles: float = 4.0
-) -> None:
-    """Let the server be killed, or end; and start another one on a copy of what is on the disk.
-
-    What lets go does not count just after that.
-    """
-    store = world.server.store
-    world.end_server()
-    if well:
-        store.close()
-    again = path.with_name(f"{path.stem}+{path.suffix}")
-    for suffix in ("", "-wal"):
-        if Path(f"{path}{suffix}").exists():
-            copy(f"{path}{suffix}", f"{again}{suffix}")
-    store.close()
-    world.run(away)
-    later = PromptSqliteStore(again, wall_offset=UTC)
-    world.start_server(later, later.load())
-    world.run(settles)
-
-
 def in_mode(world: World) -> Mode:
-    return world.rover.autopilot.mode
+    return world.mode()
 
 
 def release(world: World, task: int, how: int) -> tuple[int, int] | None:
@@ -84,9 +52,7 @@ def test_what_ran_is_held_and_the_rover_is_put_to_hold(world: World, path: Path)
     restart(world, path)
     assert world.state(1) == (S.HELD, R.OUTCOME_UNKNOWN)
     assert in_mode(world) == Mode.HOLD
-    world.client.request_status(1)
-    world.run(0.1)
-    kept = world.client.statuses(1)[-1]  # of the second in which the server was killed, or before
+    kept = world.shown(1)  # of the second in which the server was killed, or before
     assert 0.5 < 3.0 - kept.remaining <= world.pose()[0]
     assert kept.progress == pytest.approx(100 * (3.0 - kept.remaining) / 3.0, abs=15), "by time"
     assert world.paused() is R.RESTARTED
@@ -121,31 +87,13 @@ def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> No
     sent = world.client.proceed()
     world.run(0.1)
     assert sent.answer == (ACCEPTED, 0), "the queue goes on when that is decided"
-    assert any("keeps task 1 on hold: press" in text for text in world.client.texts())
+    assert world.client.said("keeps task 1 on hold: press")
     world.run(3)
     assert (world.state(1)[0], world.stands()) == (S.HELD, True)
     again = world.client.proceed()
     world.run(0.1)
     assert again.answer == (DENIED, R.WRONG_STATE)
-    assert any("release it (again" in text for text in world.client.texts())
-
-
-def test_the_stop_latch_is_kept(world: World, path: Path) -> None:
-    world.client.move(3)
-    world.run(0.1)
-    world.client.rotate(20)
-    world.run(3)
-    world.client.stop()
-    world.run(0.1)
-    restart(world, path, away=0.0)
-    assert world.paused() is R.STOPPED
-    assert in_mode(world) == Mode.HOLD
-    assert [world.state(i) for i in (1, 2)] == [(S.KILLED, R.STOP), (S.QUEUED, R.NONE)]
-    world.run(3)
-    assert world.stands()
-    world.client.proceed()
-    world.until_idle(tasks=2)
-    assert world.state(2)[0] is S.COMPLETED
+    assert world.client.said("release it (again")
 
 
 def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
@@ -174,14 +122,8 @@ def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
     world.run(3)
     world.client.pause()
     world.run(3)
-    store = world.server.store
-    world.end_server()
-    store.close()
-    world.rover_parties[0].vehicle.autopilot.reboot(now=world.now)
-    world.run(8)
-    later = PromptSqliteStore(path, wall_offset=UTC)
-    world.start_server(later, later.load())
-    world.run(3)
+    world.rover.autopilot.reboot(now=world.now)
+    restart(world, path, well=True, away=8.0)
     world.operator_mode(Mode.HOLD)
     world.run(1)
     world.client.proceed()
@@ -204,31 +146,9 @@ def test_a_rover_that_somebody_disarmed_is_armed_only_after_continue(
     at_once = world.client.mode(RETURN)
     world.run(2)
     assert at_once.answer == (TEMPORARILY_REJECTED, R.DISARMED)
-    assert not world.rover.autopilot.armed
+    assert not world.is_armed
     assert world.client.proceed()
     world.until_state(1, S.COMPLETED)
-
-
-@for_each("halt", ["HOLD", "pause"])
-@for_each("ends", [1, 2])
-def test_a_rover_that_was_told_to_stand_just_before_a_kill_is_told_again(
-    world: World, path: Path, halt: str, ends: int
-) -> None:
-    """It was under a return of its own, HOLD was lost on the way, and nobody repeated it."""
-    away_from_home(world)
-    world.client.send(command_long(TO_LAUNCH, target=ELSEWHERE))
-    world.run(2)
-    assert in_mode(world) is Mode.RTL
-    world.watched.loses = lambda _source, target, _data: target == "rover1"
-    halted = world.client.mode(HOLD) if halt == "HOLD" else world.client.pause()
-    world.run(0.3)
-    assert halted.result == ACCEPTED
-    for number in range(ends):
-        restart(world, path.with_stem("tasks" + "+" * number), away=0.5, settles=0.3)
-    world.watched.loses = lambda *_: False
-    world.run(4)
-    assert in_mode(world) is Mode.HOLD
-    assert stays(world, 3)
 
 
 @for_each("answers_lost", [0, 1, 1000])
@@ -261,12 +181,7 @@ def test_after_a_good_end_waiting_tasks_go_on_unless_it_was_long_ago(
 ) -> None:
     world.client.command(MOVE, 0.5, 0, 0, 0, 0, 30, 5)
     world.run(1)
-    store = world.server.store
-    world.end_server()
-    store.close()
-    later = PromptSqliteStore(path, wall_offset=UTC + idle)
-    world.start_server(later, later.load())
-    world.run(1)
+    restart(world, path, well=True, away=0.0, settles=1.0, utc=UTC + idle)
     assert world.paused() is paused
     if paused is R.NONE:
         world.until_idle(tasks=1)  # its time has come while nobody looked
@@ -297,8 +212,7 @@ def test_a_submission_is_known_again(world: World, path: Path) -> None:
 def upload(
     world: World, items: Sequence[Item], *, kind: int = 0, target: tuple[int, int] = (1, 1)
 ) -> None:
-    under_way = Upload(world.client, items, kind=kind, target=target)
-    world.until(lambda: under_way.result == 0, within=5)
+    assert world.upload(items, kind=kind, target=target).result == 0
 
 
 def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:
@@ -334,17 +248,6 @@ def test_a_plan_goes_on_with_the_item_that_was_driven(world: World, path: Path) 
     world.until_state(1, S.COMPLETED, within=60)
     assert reached(world.client) == [0, 1, 2]
     assert is_at(world, 3, 2)
-
-
-def test_after_a_kill_the_progress_of_the_last_second_is_known(world: World, path: Path) -> None:
-    world.client.move(8, speed=1.0)
-    world.until(lambda: world.truth.north > 4.0, within=15)
-    restart(world, path)
-    task = world.task(1)
-    assert (task.state, task.reason) == (S.HELD, R.OUTCOME_UNKNOWN)
-    assert 3.0 <= task.progress.done <= 4.0
-    kept = [event.at for event in world.events(TaskProgressed)]
-    assert kept == []  # by this server
 
 
 @for_each("is_frame_lost", [False, True])

@@ -2,19 +2,14 @@
 
 import pytest
 
-from mav_tasks.links.memory import Conditions
 from mav_tasks.settings import Queueing, Settings
-from mav_tasks.store import MemoryStore
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.restored import Restored
 from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
     MOVE,
-    REPEATS,
-    ROTATE,
     TEMPORARILY_REJECTED,
     command_long,
 )
@@ -101,13 +96,6 @@ def test_a_b_a_is_three_tasks_if_b_is_the_same_command(paused: World) -> None:
     assert ids == [1, 2, 3]
 
 
-def test_two_clients_may_ask_for_the_same(paused: World) -> None:
-    twin = paused.add_client("twin")
-    sent = [paused.client.move(1), twin.move(1)]
-    paused.run(0.1)
-    assert [s.task_id for s in sent] == [1, 2]
-
-
 def test_what_was_refused_can_be_tried_again_at_once(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(queueing=Queueing(capacity=1)))
     world.client.stop()
@@ -122,25 +110,6 @@ def test_what_was_refused_can_be_tried_again_at_once(make_world: MakeWorld) -> N
     again = world.client.rotate(20)
     world.run(0.1)
     assert again.answer == (ACCEPTED, 2)
-
-
-@for_each("seed", range(6))
-def test_repeats_over_a_bad_net_give_one_task_each(make_world: MakeWorld, seed: int) -> None:
-    bad = Conditions(delay=0.005, jitter=0.1, loss=0.25, duplication=0.2)
-    world = make_world(seed=seed, conditions=bad)
-    world.client.pause(repeats=REPEATS)
-    world.run(2)
-    for distance in (1.0, 2.0):
-        world.client.move(distance, repeats=REPEATS)
-        world.client.rotate(distance, repeats=REPEATS)
-        world.run(4)
-    tasks = [(t.id, t.command) for t in world.tasks()]
-    commands = [command for _, command in tasks]
-    assert max(commands.count(MOVE), commands.count(ROTATE)) <= 2
-    # an answer names the task of its command, whichever copy it answers
-    for command in (MOVE, ROTATE):
-        ids = {task_id for task_id, c in tasks if c == command}
-        assert {param2 for _, param2 in world.client.acks_of(command)} <= ids
 
 
 def test_each_command_is_answered_once_in_time_and_never_later(world: World) -> None:
@@ -186,25 +155,3 @@ def test_an_old_nonce_does_not_swallow_an_equal_task(world: World) -> None:
     before = world.truth.north
     assert done(world) == first + 1
     assert world.truth.north - before == pytest.approx(0.5, abs=0.05)
-
-
-@pytest.mark.volume
-@for_each("late", [20.0, KEPT - 30.0])
-def test_a_late_copy_is_still_the_same_task(world: World, late: float) -> None:
-    first = done(world)
-    world.run(late)
-    assert done(world) == first
-
-
-@for_each("away, task_id", [(20.0, 1), (KEPT + 60.0, 2)])
-def test_after_a_restart_too(world: World, away: float, task_id: int) -> None:
-    assert done(world) == 1
-    task = world.task(1)
-    world.end_server()
-    world.run(away)
-    restored = Restored(tasks=(task,), next_id=2)
-    world.start_server(MemoryStore(), restored)
-    world.run(5.0)
-    again = world.client.move(0.5, nonce=NONCE)
-    world.run(0.2)
-    assert again.task_id == task_id

@@ -36,15 +36,9 @@ def signed_world(make_world: MakeWorld, *, records: Path | None = None) -> World
 
 def sent_to_rover(world: World) -> list[bytes]:
     """Return the list that all packets to the first rover are noted in from now on."""
-    sent: list[bytes] = []
-
-    def listen(source: str, target: str, data: bytes) -> bool:
-        if (source, target) == (VEHICLE_LINK, "rover1"):
-            sent.append(data)
-        return False
-
-    world.watched.loses = listen
-    return sent
+    return world.overheard(
+        lambda source, target, _data: (source, target) == (VEHICLE_LINK, "rover1")
+    )
 
 
 def test_all_that_drives_it_is_signed_with_its_key(make_world: MakeWorld) -> None:
@@ -118,5 +112,5 @@ def test_a_stop_reaches_it_though_its_key_was_revoked(make_world: MakeWorld) -> 
     world.until(lambda: world.truth.forward_speed > 0.3, within=20)
     world.server.pump.handle(KeysChanged((REVOKED, OTHER)), now=world.now)
     world.client.stop()
-    world.until(lambda: world.rover.autopilot.mode is Mode.HOLD, within=1.0)
+    world.until(lambda: world.mode() is Mode.HOLD, within=1.0)
     world.until(world.stands, within=2.0)

@@ -1,7 +1,6 @@
 """Signed clients, as pymavlink signs: who is believed, what is signed to them, what is no news."""
 
 from pathlib import Path
-from shutil import copy
 
 import pytest
 from pymavlink.dialects.v20 import common
@@ -11,13 +10,13 @@ from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.settings import Settings, Signing
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.cases import anew, for_each
+from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, Received, command_long
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
-UTC = 1.8e9  # s, when the worlds begin
 ALICE = Key("alice", bytes(range(32)), "operator")
 BOB = Key("bob", bytes(range(1, 33)), "safety")
 REVOKED = Key("alice", b"", "operator", ALICE.fingerprint)
@@ -126,14 +125,9 @@ def test_a_packet_that_was_changed_is_nobody_s(world: World, place: int) -> None
 
 def recorded(world: World, client: FakeClient) -> tuple[bytes, int]:
     """Have a task submitted, and give the very bytes that did it, with its id."""
-    sent: list[bytes] = []
-
-    def listen(source: str, _target: str, data: bytes) -> bool:
-        if source == client.name and data[7] == COMMAND_LONG:
-            sent.append(data)
-        return False
-
-    world.watched.loses = listen
+    sent = world.overheard(
+        lambda source, _target, data: source == client.name and data[7] == COMMAND_LONG
+    )
     command = client.move(1.0)
     world.until_idle(tasks=1)
     return sent[-1], command.task_id
@@ -155,11 +149,6 @@ def test_a_replayed_command_is_not_done_again(world: World) -> None:
     assert not attacker.received
 
 
-@anew
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "tasks.sqlite3"
-
-
 @pytest.fixture
 def kept(make_world: MakeWorld, path: Path) -> World:
     """Return a world whose server keeps everything on a disk."""
@@ -171,7 +160,9 @@ def test_nor_by_a_server_that_was_started_since(kept: World, path: Path, well: b
     world = put(kept, ALICE)
     client = signing(world, ALICE)
     raw, task = recorded(world, client)
-    restart(world, path, well=well)
+    restart(world, path, well=well, away=3.0, settles=0.0)
+    put(world, ALICE)
+    world.run(2.5)
     attacker = world.add_client("attacker")
     attacker.heartbeats = False
     attacker.send_raw(raw)
@@ -181,23 +172,6 @@ def test_nor_by_a_server_that_was_started_since(kept: World, path: Path, well: b
     again = client.move(0.5)  # whose time goes on
     world.run(0.3)
     assert again.task_id == task + 1
-
-
-def restart(world: World, path: Path, *, well: bool, keys: tuple[Key, ...] = (ALICE,)) -> None:
-    store = world.server.store
-    world.end_server()
-    if well:
-        store.close()
-    again = path.with_name("again.sqlite3")
-    for suffix in ("", "-wal"):
-        if Path(f"{path}{suffix}").exists():
-            copy(f"{path}{suffix}", f"{again}{suffix}")
-    store.close()
-    world.run(3.0)
-    later = PromptSqliteStore(again, wall_offset=UTC)
-    world.start_server(later, later.load())
-    put(world, *keys)
-    world.run(2.5)
 
 
 def test_a_sender_heard_for_the_first_time_may_be_a_minute_behind(world: World) -> None:

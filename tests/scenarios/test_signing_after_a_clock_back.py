@@ -1,14 +1,14 @@
 """A server whose clock was set back over a restart signs no packet with a time that it had used."""
 
 from pathlib import Path
-from shutil import copy
 
 from mav_tasks.engine.inputs import KeysChanged, LinkChanged, LinkSide, WallClock
 from mav_tasks.in_memory import CLIENT_LINK
 from tests.kit.client import FakeClient, heartbeat
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_signing import ALICE, UTC, put, signing
+from tests.scenarios.test_signing import ALICE, put, signing
 
 HOUR = 3600.0
 
@@ -24,10 +24,7 @@ def test_times_go_on(make_world: MakeWorld, tmp_path: Path) -> None:
     client = signing(world, ALICE)
     world.run(3.0)
     before = len(client.received)
-    world.end_server()
-    world.server.store.close()
-    later = PromptSqliteStore(Path(copy(path, tmp_path / "again.sqlite3")), wall_offset=UTC - HOUR)
-    world.start_server(later, later.load())
+    restart(world, path, well=True, away=0.0, settles=0.0, utc=UTC - HOUR)
     for change in (
         WallClock(UTC - HOUR),
         KeysChanged((ALICE,)),

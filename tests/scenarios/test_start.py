@@ -1,26 +1,15 @@
 """What a task waits for, and what becomes of it when the rover does not want to."""
 
-from itertools import pairwise
-
 from mav_tasks.settings import Settings, Watch
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 POSITION = 32
-
-
-def shown(world: World, task_id: int) -> tuple[int, int]:
-    """Ask for a task's status; give state and reason as shown."""
-    asked = world.client.request_status(task_id)
-    world.run(0.05)
-    assert asked.result == ACCEPTED
-    return world.client.statuses(task_id)[-1].why
 
 
 @for_each("arming", ["auto", "server"])
@@ -35,14 +24,14 @@ def test_with_arming_by_the_operator_a_task_waits_for_it(make_world: MakeWorld) 
     world = make_world(settings=Settings(arming="operator"))
     world.client.move(0.3)
     world.run(3)
-    assert shown(world, 1) == (S.QUEUED, R.DISARMED)
+    assert world.shown(1).why == (S.QUEUED, R.DISARMED)
     world.operator_mode(Mode.HOLD)
     world.operator_arm(True)
     world.until_idle(tasks=1)
     sent = world.observer.sent_since(0)
     assert "arm" not in sent
     assert "disarm" not in sent
-    assert world.rover.autopilot.armed
+    assert world.is_armed
 
 
 @for_each("mode", [Mode.AUTO, Mode.RTL, Mode.GUIDED, Mode.MANUAL])
@@ -53,7 +42,7 @@ def test_an_armed_rover_in_a_mode_that_is_not_ours_is_waited_for(world: World, m
     at = world.now
     world.client.move(0.3)
     world.run(3)
-    assert shown(world, 1) == (S.QUEUED, R.WRONG_MODE)
+    assert world.shown(1).why == (S.QUEUED, R.WRONG_MODE)
     assert [name for name in world.observer.sent_since(at) if name not in {"511", "512"}] == []
     world.operator_mode(Mode.HOLD)
     if mode is not Mode.GUIDED:  # in which nobody drives by hand
@@ -68,7 +57,7 @@ def test_without_position_a_task_waits(world: World) -> None:
     world.run(1)
     world.client.move(0.3)
     world.run(2)
-    assert shown(world, 1) == (S.QUEUED, R.NO_POSITION)
+    assert world.shown(1).why == (S.QUEUED, R.NO_POSITION)
     world.fault(Faults())
     world.until_idle(tasks=1)
 
@@ -82,7 +71,7 @@ def test_for_a_silent_rover_a_task_waits(world: World) -> None:
     world.run(5)
     world.client.proceed()
     world.run(0.1)
-    assert shown(world, 1) == (S.QUEUED, R.VEHICLE_SILENT)
+    assert world.shown(1).why == (S.QUEUED, R.VEHICLE_SILENT)
     world.fault(Faults())
     world.until_idle(tasks=1)
 
@@ -133,16 +122,3 @@ def test_mode_zero_arm_zeros_motion(world: World) -> None:
     assert order[:5] == ["GUIDED", "zero", "arm", "zero", "move"]
     assert order[-3:] == ["zero", "HOLD", "disarm"]
     assert set(order[5:-3]) <= {"move", "zero"}  # corrections of its end
-
-
-def test_setpoints_to_many_rovers_leave_at_different_times(make_world: MakeWorld) -> None:
-    rovers = 5
-    world = make_world(rovers=rovers)
-    for number in range(1, rovers + 1):
-        world.client.move(20, target=(number, 191), nonce=number)
-    world.run(6)
-    period = Settings().watch.setpoint_period
-    phases = [observer.driven[-1][0] % period / period for observer in world.observers]
-    ordered = sorted(phases)
-    gaps = [b - a for a, b in pairwise([*ordered, ordered[0] + 1.0])]
-    assert min(gaps) > 0.5 / rovers

@@ -5,9 +5,9 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, set_mode
-from tests.kit.mission import Item, Upload
-from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, RETURN, ask_mode
-from tests.kit.world import World, at, is_at, near_pose
+from tests.kit.mission import Item
+from tests.kit.px4 import HOLD, MANUAL, MISSION, PROMPT_PX4, ask_mode
+from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, CANCEL, CLEAR = 16, 54010, 54011
@@ -17,16 +17,13 @@ WAYPOINT, CANCEL, CLEAR = 16, 54010, 54011
 def world(make_world: MakeWorld) -> World:
     """A rover at which a plan waits."""
     world = make_world(persona=PROMPT_PX4)
-    upload = Upload(world.client, [Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))])
-    world.until(lambda: upload.result is not None, within=5)
+    upload = world.upload([Item(WAYPOINT, **at(1.0, 0.0)), Item(WAYPOINT, **at(2.0, 0.0))])
     assert (upload.result, upload.opaque_id) == (0, 1)
     return world
 
 
 def waits_for_start(world: World) -> bool:
-    world.client.request_status(1)
-    world.run(0.1)
-    status = world.client.statuses(1)[-1]
+    status = world.shown(1)
     return (status.state, status.reason) == (S.BLOCKED, R.WAITING_FOR_START)
 
 
@@ -55,7 +52,7 @@ def test_the_mode_alone_marks_and_arming_starts(world: World, by: str) -> None:
     world.run(3)
     assert shown(world) == MISSION, "and as long as it is marked"
     assert waits_for_start(world)
-    assert not world.rover.autopilot.armed
+    assert not world.is_armed
     world.client.arm()
     world.until_state(1, S.COMPLETED, within=40)
     assert is_at(world, 2.0, 0.0)
@@ -109,18 +106,6 @@ def test_another_wish_removes_the_mark(world: World, other: str) -> None:
     assert waits_for_start(world)
 
 
-def test_a_return_is_shown_and_driven(world: World) -> None:
-    world.client.arm()
-    world.run(0.3)
-    world.client.command(54000, 1.0)
-    world.until_state(2, S.COMPLETED, within=20)
-    world.client.send(set_mode(RETURN))
-    world.run(0.05)
-    assert shown(world) == RETURN
-    world.until_state(3, S.COMPLETED, within=30)
-    assert near_pose(world.pose(), (0.0, 0.0, 180.0), angle=5)
-
-
 @for_each("call_off", [(CANCEL, 1), (CANCEL, 1, 1), (CLEAR,), (CLEAR, 1)])
 def test_a_mission_that_was_called_off_does_not_start(
     world: World, call_off: tuple[int, ...]
@@ -141,13 +126,12 @@ def test_a_person_who_arms_to_drive_by_hand_keeps_the_rover(
     make_world: MakeWorld, persona: Persona
 ) -> None:
     world = make_world(persona=persona)
-    upload = Upload(world.client, [Item(WAYPOINT, **at(1.0, 0.0))])
-    world.until(lambda: upload.result is not None, within=5)
+    world.upload([Item(WAYPOINT, **at(1.0, 0.0))])
     world.operator_mode(Mode.MANUAL)
     world.run(1.5)
     ask_mode(world.client, MISSION)
     world.run(2)
     world.operator_arm(True)
     world.run(4)
-    assert world.rover.autopilot.mode is Mode.MANUAL
+    assert world.mode() is Mode.MANUAL
     assert world.stands()

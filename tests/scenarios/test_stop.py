@@ -1,7 +1,6 @@
 """STOP: whatever the rover does, it stands soon, and nothing moves it until continue."""
 
 from collections.abc import Callable
-from typing import Any
 
 from pymavlink.dialects.v20 import common
 
@@ -19,7 +18,6 @@ from tests.kit.client import (
     GUIDED,
     MANUAL,
     REPEATS,
-    RTL,
     TEMPORARILY_REJECTED,
     rc_override,
     set_mode,
@@ -56,7 +54,7 @@ def drive_by_itself(world: World, mode: Mode) -> None:
 
 
 def stands_in_hold(world: World) -> bool:
-    return world.stands() and world.rover.autopilot.mode is Mode.HOLD and world.control() == "IDLE"
+    return world.stands() and world.mode() is Mode.HOLD and world.control() == "IDLE"
 
 
 @for_each("component", [0, 1, 191, 154])
@@ -76,16 +74,6 @@ def test_a_driving_rover_is_stopped_and_its_task_killed(world: World, component:
     assert world.state(2)[0] is S.QUEUED
 
 
-def test_the_queue_goes_on_after_continue(world: World) -> None:
-    drive(world)
-    world.client.stop()
-    world.run(5)
-    proceed = world.client.proceed()
-    world.until_idle(tasks=2)
-    assert proceed.result == ACCEPTED
-    assert world.state(2) == (S.COMPLETED, R.NONE)
-
-
 @for_each("mode", [Mode.AUTO, Mode.RTL])
 def test_a_rover_that_drives_by_itself_is_stopped(world: World, mode: Mode) -> None:
     drive_by_itself(world, mode)
@@ -103,30 +91,6 @@ def test_with_param1_the_queue_is_cleared(world: World) -> None:
     world.client.proceed()
     world.run(2)
     assert world.is_idle(tasks=2)
-
-
-def test_system_0_stops_every_rover(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.move(20, speed=1.0, target=(1, 191))
-    world.client.move(20, speed=1.0, target=(2, 191))
-    world.run(3)
-    assert not world.stands(1)
-    assert not world.stands(2)
-    stop = world.client.stop(target=(0, 0))
-    world.until(lambda: world.stands(1) and world.stands(2), within=BRAKING)
-    assert stop.answer == (ACCEPTED, 1)
-    assert [t.state for t in world.tasks()] == [S.KILLED, S.KILLED]
-
-
-def test_one_rover_is_stopped_and_the_other_drives_on(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    world.client.move(5, speed=1.0, target=(1, 191))
-    world.client.move(5, speed=1.0, target=(2, 191))
-    world.run(3)
-    world.client.stop(target=(1, 191))
-    world.until(lambda: world.stands(1), within=BRAKING)
-    world.until_idle(tasks=2)
-    assert [t.state for t in world.tasks()] == [S.KILLED, S.COMPLETED]
 
 
 def test_stop_with_an_empty_queue_and_twice(world: World) -> None:
@@ -171,25 +135,6 @@ def test_stop_while_the_rover_does_not_answer_our_requests(world: World, phase: 
     assert world.truth.north == 0.0
 
 
-@for_each("mode", [AUTO, RTL])
-@for_each("seed", range(2))
-def test_stop_overtaken_by_a_clients_mode_request(
-    make_world: MakeWorld, mode: int, seed: int
-) -> None:
-    """The request left before STOP came; on this net it may arrive after HOLD."""
-    world = make_world(seed=seed, conditions=Conditions(jitter=0.1))
-    world.operator_arm(True)
-    world.run(1)
-    world.client.mode(mode)
-    world.run(0.06)
-    world.client.stop()
-    world.run(4)
-    where = world.pose()
-    assert stands_in_hold(world)
-    world.run(3)
-    assert world.pose() == where
-
-
 MOTION_OF_CLIENTS = [
     setpoint(1.0),
     common.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5),
@@ -198,20 +143,6 @@ MOTION_OF_CLIENTS = [
     set_mode(GUIDED),
     set_mode(AUTO),
     set_mode(MANUAL),
-]
-#: what may carry anything, or is for a part of the rover that is not known
-OTHER_WAYS = [
-    common.MAVLink_serial_control_message(10, 0, 0, 0, 4, [65] * 70),
-    common.MAVLink_tunnel_message(1, 1, 0, 4, [0] * 128),
-    common.MAVLink_v2_extension_message(0, 1, 1, 7, [0] * 249),
-    common.MAVLink_mission_set_current_message(1, 99, 0),
-    common.MAVLink_mission_count_message(1, 99, 3, 0),
-]
-QUESTIONS = [
-    common.MAVLink_param_request_list_message(1, 1),
-    common.MAVLink_param_set_message(1, 1, b"CRUISE_SPEED", 1.0, 9),
-    common.MAVLink_timesync_message(0, 1),
-    common.MAVLink_file_transfer_protocol_message(0, 1, 1, [0] * 251),
 ]
 MOVING_COMMANDS: list[Callable[[World], object]] = [
     lambda world: world.client.arm(),
@@ -237,47 +168,6 @@ def test_no_motion_message_passes_while_stopped(world: World, message: object) -
     assert stands_in_hold(world)
 
 
-@for_each("number", [65, 81, 91, 92, 93, 420])
-@for_each("is_stopped", [True, False])
-def test_what_may_be_an_input_of_the_rover_passes_neither_after_stop_nor_beside_a_task(
-    world: World, number: int, *, is_stopped: bool
-) -> None:
-    passed = world.passed_on((255, 190))
-    world.client.move(3)
-    world.until_state(1, S.EXECUTING)
-    if is_stopped:
-        world.client.stop()
-        world.run(1)
-    header = bytes((0xFD, 20, 0, 0, 1, 255, 190)) + number.to_bytes(3, "little")
-    world.client.send_raw(header + b"\1" * 22)
-    world.run(0.2)
-    assert number not in passed
-
-
-@for_each("message", OTHER_WAYS)
-def test_other_ways_to_the_rover_are_closed_after_stop(world: World, message: Any) -> None:
-    passed = world.passed_on((255, 190))
-    world.client.send(message)
-    world.run(0.2)
-    assert message.get_msgId() in passed
-    passed.clear()
-    world.client.stop()
-    world.run(1)
-    world.client.send(message)
-    world.run(0.2)
-    assert message.get_msgId() not in passed
-
-
-@for_each("message", QUESTIONS)
-def test_what_asks_or_is_set_for_later_passes_in_spite_of_stop(world: World, message: Any) -> None:
-    passed = world.passed_on((255, 190))
-    world.client.stop()
-    world.run(1)
-    world.client.send(message)
-    world.run(0.2)
-    assert message.get_msgId() in passed
-
-
 @for_each("send", MOVING_COMMANDS)
 def test_no_command_that_moves_passes_while_stopped(
     world: World, send: Callable[[World], object]
@@ -287,7 +177,7 @@ def test_no_command_that_moves_passes_while_stopped(
     send(world)
     world.run(1)
     assert [a.result for a in world.client.acks[1:]] in ([TEMPORARILY_REJECTED], [DENIED])
-    assert (world.rover.autopilot.mode, world.rover.autopilot.armed) == (Mode.HOLD, False)
+    assert (world.mode(), world.is_armed) == (Mode.HOLD, False)
 
 
 def test_hold_by_a_client_does_not_end_a_stop_that_is_under_way(world: World) -> None:

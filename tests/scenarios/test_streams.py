@@ -13,10 +13,8 @@ from mav_tasks.engine.inputs import (
     PeerChanged,
 )
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
-from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
-from tests.kit.cases import anew, for_each
+from tests.kit.cases import anew
 from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
 from tests.kit.world import COMMAND_ID, MODE_COMMAND, Outputs, World, at, near_pose
@@ -118,27 +116,6 @@ def test_stop_asks_for_hold_ahead_of_all_that_waits_for_the_way_out(
     firsts = [outgoing for _, outgoing in outputs.sent if outgoing.is_first]
     assert firsts[0].data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
     assert {outgoing.data[7] for outgoing in firsts} == {MODE_COMMAND}
-
-
-@for_each("seconds", [0.5, 5.0])
-def test_a_rover_whose_connection_breaks_goes_on_when_it_is_back(
-    streams: World, seconds: float
-) -> None:
-    world = streams
-    world.client.move(3)
-    world.until_state(1, S.EXECUTING)
-    world.run(2)
-    tell(world, PeerChanged(VEHICLE_LINK, "rover1", up=False))
-    world.fault(Faults(silent=True))
-    world.run(seconds)
-    if seconds > 1.0:
-        assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
-        assert world.stands()
-    world.fault(Faults())
-    tell(world, PeerChanged(VEHICLE_LINK, "rover1", up=True))
-    world.until_idle(tasks=1)
-    assert world.state(1)[0] is S.COMPLETED
-    assert near_pose(world.pose(), (3.0, 0.0, 0.0))
 
 
 def test_a_congested_client_gets_answers_and_no_telemetry_and_the_other_all(

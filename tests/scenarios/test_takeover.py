@@ -7,13 +7,11 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
-    HOLD,
     MANUAL,
     TEMPORARILY_REJECTED,
     rc_override,
@@ -22,8 +20,6 @@ from tests.kit.client import (
 )
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
-
-CANCEL = 54010
 
 
 def packed(message: object, system_id: int, component_id: int) -> bytes:
@@ -94,23 +90,6 @@ def test_continue_resumes_to_the_exact_end_on_the_original_line(driving: World, 
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 
-def test_pushed_off_its_line_by_more_than_a_metre_it_is_held(driving: World) -> None:
-    world = driving
-    world.operator_mode(Mode.MANUAL)
-    world.rover.autopilot.operator_sticks(0.8, 1.2)
-    world.run(1.2)
-    world.rover.autopilot.operator_sticks(0.8, 0.0)
-    world.run(2.5)
-    world.operator_mode(Mode.HOLD)
-    world.run(3)
-    assert abs(world.truth.east) > 1.0
-    world.client.proceed()
-    world.run(2)
-    assert world.state(1) == (S.HELD, R.OFF_TRACK)
-    assert world.state(2)[0] is S.QUEUED
-    assert world.stands()
-
-
 @for_each("mode", [Mode.MANUAL, Mode.AUTO, Mode.RTL])
 def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, mode: Mode) -> None:
     world = driving
@@ -122,57 +101,11 @@ def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, 
     assert refused.answer == (TEMPORARILY_REJECTED, R.WRONG_MODE)
     assert world.state(1) == (S.PAUSED, R.TAKEOVER)
     assert world.observer.sent_since(at) == []
-    assert world.rover.autopilot.mode is mode
+    assert world.mode() is mode
     world.operator_mode(Mode.HOLD)
     world.run(3)
     assert world.client.proceed()
     world.until_idle(tasks=2)
-
-
-@for_each("mode", [Mode.MANUAL, Mode.AUTO])
-@for_each("kill", [0, 1])
-def test_to_call_the_task_off_does_not_take_the_rover_out_of_anothers_hands(
-    driving: World, mode: Mode, kill: int
-) -> None:
-    world = driving
-    world.operator_mode(mode)
-    world.until_state(1, S.PAUSED, within=0.5)
-    world.run(0.1)
-    at = world.now
-    sent = world.client.command(CANCEL, 1, kill)
-    world.run(3)
-    assert sent.answer == (ACCEPTED, 1)
-    assert world.state(1) == ([S.CANCELLED, S.KILLED][kill], R.CANCELLED)
-    assert world.observer.sent_since(at) == []
-    assert world.rover.autopilot.mode is mode
-
-
-def test_a_foreign_disarm_withdraws_the_permission_to_arm_until_continue(world: World) -> None:
-    world.client.move(1)
-    world.until_state(1, S.EXECUTING)
-    world.operator_arm(False)
-    world.run(1)
-    world.client.stop(clear=True)
-    world.run(2)
-    world.client.proceed()
-    world.run(1)
-    world.operator_mode(Mode.HOLD)
-    world.run(0.5)
-    world.operator_arm(True)
-    world.run(1.2)
-    world.operator_arm(False)  # this time nothing of ours runs
-    world.run(1.2)
-    at = world.now
-    second = world.client.move(1)
-    world.run(3)
-    status = world.client.request_status(second.task_id)
-    world.run(0.1)
-    assert status.result == ACCEPTED
-    assert world.client.statuses(second.task_id)[-1].why == (S.QUEUED, R.DISARMED)
-    assert "arm" not in world.observer.sent_since(at)
-    world.client.proceed()
-    world.until_idle(tasks=2)
-    assert world.state(2)[0] is S.COMPLETED
 
 
 def test_a_client_that_disarms_pauses_as_by_hold(driving: World) -> None:
@@ -183,26 +116,7 @@ def test_a_client_that_disarms_pauses_as_by_hold(driving: World) -> None:
     assert world.paused() is R.OPERATOR
     assert world.observer.sent_since(at)[:2] == ["zero", "HOLD"]
     assert "arm" not in world.observer.sent_since(at)
-    assert world.rover.autopilot.mode is Mode.HOLD
-
-
-def test_a_lost_task_does_not_resume_by_itself_after_an_operator_had_the_rover(
-    driving: World,
-) -> None:
-    world = driving
-    world.fault(Faults(withheld=frozenset({32})))
-    world.run(12)
-    assert world.state(1) == (S.PAUSED, R.POSITION_LOST)
-    world.operator_mode(Mode.MANUAL)
-    world.run(0.5)
-    world.fault(Faults())
-    world.run(1)
-    world.operator_mode(Mode.HOLD)
-    world.run(6)
-    assert world.state(1)[0] is S.PAUSED
-    assert world.paused() is R.TAKEOVER
-    world.client.proceed()
-    world.until_idle(tasks=2)
+    assert world.mode() is Mode.HOLD
 
 
 def test_sticks_at_rest_are_no_takeover(driving: World) -> None:
@@ -223,16 +137,6 @@ def test_other_setpoints_make_waiting_tasks_wait(make_world: MakeWorld, arming: 
         world.run(0.05)
     world.client.move(1)
     world.run(0.5)
-    world.client.request_status(1)
-    world.run(0.1)
-    assert world.client.statuses(1)[-1].why == (S.QUEUED, R.OTHER_CONTROLLER)
+    assert world.shown(1).why == (S.QUEUED, R.OTHER_CONTROLLER)
     world.run(3)
     assert world.state(1)[0] is S.EXECUTING
-
-
-def test_the_mode_hold_by_a_client_is_a_pause_and_no_takeover(driving: World) -> None:
-    world = driving
-    held = world.client.mode(HOLD)
-    world.run(2)
-    assert held.answer == (ACCEPTED, 1)
-    assert world.state(1) == (S.PAUSED, R.OPERATOR)

@@ -1,13 +1,11 @@
-"""What people at ground stations read, and what TASK_STATUS says of who submitted."""
+"""What people at ground stations read, and when a client hears of its task's end."""
 
 import re
 
 from mav_tasks.tasks.lifecycle import TaskState as S
-from tests.kit.cases import for_each
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
-INFO, NOTICE, WARNING, ERROR = 6, 5, 4, 3
 TEXTS = 300
 
 
@@ -36,48 +34,6 @@ def test_what_is_too_much_at_once_is_counted_and_nothing_urgent_is_left_out(
     assert len(refused) == TEXTS // 50
 
 
-def test_each_change_has_its_severity(world: World) -> None:
-    world.client.move(1)
-    world.client.command(54000, 1.0, 0, 0, 9, 0, 0, 5, repeats=(0.0,))
-    world.until_idle(tasks=2)
-    world.client.command(54000, 1.0, 0, 0, 0, 0, 500.0, 5)
-    world.client.command(54012, 3, 3, 0.2)  # a deadline
-    world.until_state(3, S.EXPIRED)
-    world.run(0.2)
-    said = {m.text: m.severity for m in world.client.of_type("STATUSTEXT")}
-    assert said["Task 1 queued: move 1 m"] == INFO
-    assert said["Task 1 started"] == INFO
-    assert said["Task 1 done"] == INFO
-    assert next(s for text, s in said.items() if text.startswith("Task 3 expired")) == ERROR
-    assert not any(text.endswith("\t") for text in said)
-
-
-def severities(world: World) -> dict[str, int]:
-    """Return what the task server has said, with the severity of each."""
-    return {m.text: m.severity for m in world.client.of_type("STATUSTEXT")}
-
-
-def test_what_went_as_asked_is_no_warning(world: World) -> None:
-    world.client.move(2)
-    world.until_state(1, S.EXECUTING)
-    world.client.move(1, nonce=2)
-    world.client.pause()
-    world.run(3)
-    world.client.proceed()
-    world.run(3)
-    world.client.command(54010, 1)
-    world.until_idle(tasks=2)
-    world.run(0.2)
-    said = severities(world)
-    assert {
-        "Task 1 paused by a ground station",
-        "Queue paused by a ground station",
-        "Queue resumed by a ground station: task 1 is next,",
-    } <= set(said)
-    assert {"Task 1 cancelled", "Task 2 done", "Rover 1 found (ardupilot)"} <= set(said)
-    assert set(said.values()) == {INFO}
-
-
 def test_who_only_listens_hears_of_the_end_however_long_it_takes(world: World) -> None:
     quiet = world.add_client("quiet")
     quiet.heartbeats = False
@@ -88,16 +44,3 @@ def test_who_only_listens_hears_of_the_end_however_long_it_takes(world: World) -
     assert quiet.statuses(1)[-1].state == S.COMPLETED
     world.run(90)
     assert not any("quiet" in who for who in world.server.engine.snapshot(now=world.now).clients)
-
-
-@for_each("how, why", [("pause", "queue paused"), ("stop", "STOP in force")])
-def test_who_queues_behind_a_pause_is_told_that_nothing_runs(
-    world: World, how: str, why: str
-) -> None:
-    getattr(world.client, how)()
-    world.run(1)
-    other = world.add_client("other")
-    world.run(1.2)
-    other.move(1)
-    world.run(0.2)
-    assert f"Task 1 waits, press Continue ({why}): move 1 m" in other.texts()

@@ -15,12 +15,11 @@ from tests.kit.qgc.vehicle import APM
 from tests.kit.world import PROMPT, World, is_at
 from tests.scenarios.conftest import MakeWorld
 
-PAUSE_CONTINUE, MOVE, STOP = 193, 54000, 54003
+PAUSE_CONTINUE, STOP = 193, 54003
 WARNING = 4  # this severity and smaller ones are red
 FAR = degrees(20, 0)
 ROUND = Plan(place(0, 0), [place(3, 0), place(3, 1)])
 
-one = for_each("persona", [PROMPT])
 both = for_each("persona", [PROMPT, PROMPT_PX4])
 
 
@@ -80,7 +79,7 @@ def test_an_emergency_stop_ends_a_go_to_and_the_next_click_drives(
     party.operator.emergency_stop()
     world.run(5)
     assert world.state(1) == (S.KILLED, R.STOP)
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
     assert texts(party, since=at) == []
     assert [text for text in texts(party, since=at, worst=6) if "Task" in text] == [
         "Task 1 stopped for good by a ground station"
@@ -115,29 +114,6 @@ def test_a_plan_goes_on_by_the_station_own_button(
 
 
 @both
-@for_each("mode", [Mode.MANUAL, Mode.AUTO, Mode.HOLD])
-def test_return_drives_from_any_mode_and_leaves_the_queue_running(
-    make_world: MakeWorld, persona: Persona, mode: Mode
-) -> None:
-    world, party = joined(make_world, persona)
-    choose(world, party, Mode.HOLD)
-    arm(world, party)
-    party.operator.action(MOVE, 1.0, component=191)
-    world.until_idle(tasks=1)
-    world.run(3)
-    choose(world, party, mode)
-    at = world.now
-    party.operator.return_home()
-    world.until_state(2, S.COMPLETED, within=40)
-    assert is_at(world, 0.0, 0.0)
-    assert texts(party, since=at) == []
-    assert world.paused() is R.NONE
-    party.operator.action(MOVE, 0.5, component=191)
-    world.until_state(3, S.COMPLETED, within=20)
-    party.check()
-
-
-@both
 @for_each("taken", ["hold", "manual at the rover"])
 def test_hold_and_a_click_replace_the_click_before(
     make_world: MakeWorld, persona: Persona, taken: str
@@ -164,24 +140,3 @@ def test_hold_and_a_click_replace_the_click_before(
 
 def party_texts(party: QgcParty) -> list[str]:
     return [each.text for each, _ in party.qgc.screen.texts]
-
-
-@one
-def test_stop_ends_clicks_and_is_left_by_continue_only(
-    make_world: MakeWorld, persona: Persona
-) -> None:
-    world, party = driving_far(make_world, persona)
-    party.operator.go_to(*degrees(0, 5))
-    world.run(0.5)
-    party.operator.action(STOP, component=191)
-    world.run(4)
-    assert [world.state(each) for each in (1, 2)] == [(S.KILLED, R.STOP)] * 2
-    assert {"go to", "return", "continue"}.isdisjoint(party.operator.offers), "it would refuse"
-    choose(world, party, Mode.AUTO)
-    world.run(4)
-    assert world.stands()
-    assert len(world.tasks()) == 2
-    party.operator.action(PAUSE_CONTINUE, 1)
-    world.run(4)
-    assert world.stands()
-    assert {"go to", "return"} <= party.operator.offers

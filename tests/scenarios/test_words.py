@@ -1,20 +1,16 @@
 """What operators are told: once, with the button to press, in the words that people use."""
 
 from math import nan
-from pathlib import Path
 
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import AUTO, RTL, FakeClient
-from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at
-from tests.scenarios.conftest import MakeWorld
 
-REPOSITION, CANCEL, SET_MODE = 192, 54010, 176
+REPOSITION, CANCEL = 192, 54010
 CANCELLED, TEMPORARILY_REJECTED = 6, 1  # MAV_RESULT
-INFO, WARNING = 6, 4  # MAV_SEVERITY
+WARNING = 4  # MAV_SEVERITY
 FIRST_PIECE = 50  # characters that a client shows that does not join pieces
-UTC = 1_700_000_000.0  # s since 1970, as the servers read their clock
 QGC_RETRY = 1.32  # s between its three requests for a mode
 
 
@@ -108,11 +104,6 @@ class TestSummary:
         world.run(20)
         assert screen.texts() == [], "it is told once"
 
-    def test_of_nothing_that_stands(self, world: World) -> None:
-        world.client.move(5)
-        world.until_state(1, S.EXECUTING)
-        assert station(world).texts() == []
-
     def test_of_a_station_that_was_silent_and_is_back(self, world: World) -> None:
         screen = station(world)
         world.client.move(5)
@@ -124,20 +115,3 @@ class TestSummary:
         screen.heartbeats = True
         world.run(2.5)
         assert "STOP in force, press Continue; 1 task waits" in screen.texts()
-
-    def test_of_a_task_that_a_killed_server_has_left(
-        self, make_world: MakeWorld, tmp_path: Path
-    ) -> None:
-        path = tmp_path / "tasks.sqlite3"
-        world = make_world(store=PromptSqliteStore(path, wall_offset=UTC))
-        world.client.move(5)
-        world.until_state(1, S.EXECUTING)
-        world.run(1)
-        world.end_server()
-        world.run(1)
-        world.client.received.clear()
-        world.server.store.close()
-        later = PromptSqliteStore(path, wall_offset=UTC)
-        world.start_server(later, later.load())
-        world.run(3)
-        assert any(t.startswith("Task 1 held:") for t in world.client.texts())

@@ -17,7 +17,7 @@ from tests.kit.world import PROMPT, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_fence import INCLUSION, box, fenced
 
-DRIVE, REPOSITION, RELEASE = 54002, 192, 54013
+DRIVE, REPOSITION = 54002, 192
 SLOW, FAST = 0.5, 2.0  # m/s
 #: m from where it was that it drives at the most: half a metre the wrong way, and what it takes to
 #: stop from the speed that it has by then
@@ -75,7 +75,7 @@ def nothing_follows(world: World) -> None:
     world.until(world.stands, within=STANDS)
     world.run(5)
     assert world.stands()
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
     assert len(world.tasks()) == 1 or world.state(2)[0] is S.QUEUED
 
 
@@ -99,7 +99,7 @@ def test_a_wrong_heading_is_found_within_half_a_metre(
     assert world.state(1) == (S.HELD, R.OFF_TRACK)
     nothing_follows(world)
     assert way.furthest < WRONG[speed]
-    assert any("check its heading" in text for text in world.client.texts())
+    assert world.client.said("check its heading")
 
 
 @for_each("speed", [SLOW, FAST])

@@ -131,11 +131,6 @@ class Operator:
         else:
             self._commands.send_long(REPOSITION, -1, CUSTOM_MODE, 0, nan, nan, nan, nan)
 
-    def return_home(self) -> None:
-        """Press RTL."""
-        self._need("return")
-        self._send_mode(self._modes.back)
-
     def start(self) -> None:
         """Start the mission."""
         self._need("start")

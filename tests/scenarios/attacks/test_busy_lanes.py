@@ -16,7 +16,7 @@ from tests.scenarios.conftest import MakeWorld
 RADIO = Conditions(delay=0.05)
 AUTOPILOT_VERSION, BATTERY = 148, 147
 FLOOD = 150.0  # requests a second
-OBSERVER, OTHER, OPERATOR = 9, 10, 12  # system ids
+OBSERVER, OPERATOR = 9, 12  # system ids
 #: one message, for which requests can be shared, and fifty, for which none can
 FLOODS = for_each("messages", [(BATTERY,), tuple(range(200, 250))])
 ADDRESSES = {"9/190": "observer", "10/190": "observer", "12/190": "operator"}

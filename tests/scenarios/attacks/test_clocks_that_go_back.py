@@ -66,14 +66,7 @@ def test_what_is_delivered_again_late_interrupts_nothing(
 ) -> None:
     world = make_world()
     world.run(30)
-    said: list[bytes] = []
-
-    def keep(source: str, target: str, data: bytes) -> bool:
-        if (source, target) == ("rover1", VEHICLE_LINK) and data[7] in MEASURED:
-            said.append(data)
-        return False
-
-    world.watched.loses = keep
+    said = world.overheard(lambda source, _target, data: source == "rover1" and data[7] in MEASURED)
     world.client.move(12)
     world.run(1.0)
     copies = said[: 2 * times]
@@ -86,7 +79,7 @@ def test_what_is_delivered_again_late_interrupts_nothing(
     assert sum(speed == 0.0 for _, speed in setpoints(world)) == zeros, "it drives on"
     world.until_state(1, S.COMPLETED, within=60)
     assert S.HELD not in [state for state, _ in world.history(1)]
-    assert not any("restarted" in text for text in world.client.texts())
+    assert not world.client.said("restarted")
 
 
 def setpoints(world: World) -> list[tuple[float, float]]:

@@ -25,7 +25,7 @@ from tests.kit.volume import some
 from tests.kit.world import World
 from tests.scenarios.attacks.test_left_waiting import stays
 
-CANCEL, CLEAR, GIMBAL = 54010, 54011, 1000
+CANCEL, CLEAR = 54010, 54011
 CONTINUE = command_long(PAUSE_CONTINUE, 1)
 HALTS: dict[str, Callable[[FakeClient], Sent]] = {
     "pause": lambda person: person.pause(),

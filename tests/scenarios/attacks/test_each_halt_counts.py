@@ -1,15 +1,10 @@
-"""Each halt counts, also one that looks like the last one again, and takes back what waits.
+"""Each halt counts, also one that looks like the last one again.
 
 A continue that left between two quick halts of its sender was obeyed when the net delivered it
 last: the second halt was the first one again. One of a sender that does not count its packets was
-acknowledged as a copy of its last one, and was not carried out. What was released, and a mission
-that waited for arming, outlived a change of the position reference and the last ground station.
+acknowledged as a copy of its last one, and was not carried out.
 """
 
-from dataclasses import replace
-
-from mav_tasks.settings import Settings
-from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
@@ -22,11 +17,8 @@ from tests.kit.client import (
     Message,
     command_long,
 )
-from tests.kit.mission import Item, Upload
-from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
-from tests.kit.world import World, at
-from tests.scenarios.attacks.test_left_waiting import WAYPOINT, stays
-from tests.scenarios.conftest import MakeWorld
+from tests.kit.world import World
+from tests.scenarios.attacks.test_left_waiting import stays
 
 HALTS = {
     "pause": command_long(PAUSE_CONTINUE, 0),
@@ -82,24 +74,3 @@ def test_a_halt_of_one_that_does_not_count_its_packets_is_carried_out_each_time(
     driving.run(1.8)
     assert [ack.result for ack in script.acks[before:]] == [ACCEPTED]
     assert stays(driving, 5)
-
-
-def test_a_mission_does_not_begin_at_an_arming_that_no_station_sees(make_world: MakeWorld) -> None:
-    world = make_world(persona=PROMPT_PX4, settings=replace(Settings(), operator_lost="pause"))
-    plan = (Item(WAYPOINT, **at(3.0, 0.0)), Item(WAYPOINT, **at(0.0, 0.0)))
-    upload = Upload(world.client, plan, target=(1, 1))
-    world.until(lambda: upload.result == 0, within=5)
-    ask_mode(world.client, MISSION)
-    world.run(0.5)
-    world.operator_arm(True)
-    world.until_state(1, S.COMPLETED, within=90)
-    world.run(5)
-    world.operator_arm(False)
-    world.run(2)
-    marked = ask_mode(world.client, MISSION)
-    world.run(0.2)
-    assert marked.result == ACCEPTED
-    world.client.heartbeats = False
-    world.run(8)
-    world.operator_arm(True)
-    assert stays(world, 6)

@@ -7,6 +7,7 @@ from tests.kit.cases import anew, for_each
 from tests.kit.client import FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_roles import join
 
 FILE_TRANSFER = 110
 TERMINATE, OPEN_TO_READ, READ, WRITE = 1, 4, 5, 7
@@ -17,12 +18,6 @@ OBSERVER, SAFETY = 9, 13  # system ids
 def world(make_world: MakeWorld) -> World:
     roles = Roles(unsigned="safety", addresses={"9/190": "observer"})
     return make_world(settings=Settings(roles=roles))
-
-
-def join(world: World, system_id: int) -> FakeClient:
-    client = world.add_client(f"client {system_id}", system_id=system_id)
-    world.run(1.2)
-    return client
 
 
 def request(client: FakeClient, opcode: int) -> None:

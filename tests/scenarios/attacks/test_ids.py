@@ -15,7 +15,7 @@ from tests.kit.client import ACCEPTED, DENIED, MOVE, REQUEST, TASK_STATUS
 from tests.kit.world import World
 
 CANCEL, MODIFY = 54010, 54012
-PRIORITY, RUN_AFTER = 1, 4  # TASK_PROPERTY
+PRIORITY = 1  # TASK_PROPERTY
 LAST_EXACT = 2**24 - 1
 A_DAY = 86_400
 TEN_YEARS = 3652 * A_DAY  # of a task a second
@@ -61,9 +61,6 @@ def test_an_id_above_what_a_float32_counts_is_named_by_its_bits(world: World) ->
     world.run(0.2)
     assert (asked.result, modified.answer) == (ACCEPTED, (ACCEPTED, number))
     assert world.client.statuses(number)[-1].priority == 7
-    later = world.client.command(MODIFY, param(after.task_id), RUN_AFTER, 0)
-    world.run(0.2)
-    assert later.answer == (ACCEPTED, after.task_id)
     cancelled = world.client.command(CANCEL, param(number))
     world.run(0.2)
     assert cancelled.answer == (ACCEPTED, number)

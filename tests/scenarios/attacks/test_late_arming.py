@@ -11,9 +11,9 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, GUIDED, HOLD, command_long
+from tests.kit.client import ACCEPTED, GUIDED
 from tests.kit.world import World
-from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
+from tests.scenarios.attacks.test_left_waiting import away_from_home, stays
 from tests.scenarios.conftest import MakeWorld
 
 COMMAND_LONG, ARM = 76, 400
@@ -50,11 +50,6 @@ def disarmed_at_last(world: World) -> None:
         answer = world.client.arm(False)
         world.run(0.6)
     assert answer.result == ACCEPTED
-
-
-def mode_of(world: World) -> Mode:
-    """Return the rover's mode."""
-    return world.rover.autopilot.mode
 
 
 @anew
@@ -94,7 +89,7 @@ def test_our_own_arming_is_called_back_as_well(world: World) -> None:
     world.bring_late(caught[0])
     world.run(2)
     assert stays(world, 3)
-    assert not world.rover.autopilot.armed
+    assert not world.is_armed
 
 
 def test_nor_does_one_arm_it_that_comes_after_a_stop(world: World) -> None:
@@ -107,33 +102,7 @@ def test_nor_does_one_arm_it_that_comes_after_a_stop(world: World) -> None:
     world.bring_late(caught[0])
     world.run(2)
     assert stays(world, 3)
-    assert not world.rover.autopilot.armed
-
-
-def test_a_second_copy_of_a_return_does_not_undo_a_hold(world: World) -> None:
-    """The net brings it to the rover twice, once before the HOLD and once after it."""
-    away_from_home(world)
-    world.client.mode(GUIDED)
-    world.run(1)
-    seen: list[bytes] = []
-
-    def loses(_source: str, target: str, data: bytes) -> bool:
-        if target == "rover1" and data[7] == COMMAND_LONG:
-            seen.append(data)
-        return False
-
-    world.watched.loses = loses
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(1.2)
-    assert mode_of(world) is Mode.RTL
-    copies = [data for data in seen if unpack_from("<H", data + bytes(40), NUMBER) == (RETURN,)]
-    held = world.client.mode(HOLD)
-    world.run(0.7)
-    assert held.result == ACCEPTED
-    world.bring_late(copies[0])
-    world.run(2)
-    assert mode_of(world) is Mode.HOLD
-    assert stays(world, 4)
+    assert not world.is_armed
 
 
 def test_a_pause_stops_what_a_client_has_armed_just_now(world: World) -> None:
@@ -148,7 +117,7 @@ def test_a_pause_stops_what_a_client_has_armed_just_now(world: World) -> None:
     paused = world.client.pause()
     world.run(3)
     assert paused.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
+    assert world.mode() is Mode.HOLD
 
 
 @for_each("phase", [0.0, 0.2, 0.4, 0.6, 0.8])

@@ -16,13 +16,13 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.cases import for_each
 from tests.kit.client import DRIVE
-from tests.kit.mission import Item, Upload
+from tests.kit.mission import Item
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import OFF, PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 
 FENCE, CORNER = 1, 5001
-DOWN, UP = ("rover1", VEHICLE_LINK), (VEHICLE_LINK, "rover1")
+DOWN = ("rover1", VEHICLE_LINK)
 BRISK = Settings(driving=Driving(acceleration=1.0))
 
 Delay = Callable[[float], float]
@@ -32,8 +32,7 @@ def fenced(world: World, reach: float) -> None:
     """Draw a square of so many metres to each side about the rover."""
     places = [(-reach, -reach), (reach, -reach), (reach, reach), (-reach, reach)]
     items = [Item(CORNER, **at(*p), param1=4, param4=0, frame=0) for p in places]
-    upload = Upload(world.client, items, kind=FENCE)
-    world.until(lambda: upload.result == 0, within=30)
+    assert world.upload(items, kind=FENCE).result == 0
 
 
 def drive_at(world: World, speed: float, *, seconds: float) -> float:

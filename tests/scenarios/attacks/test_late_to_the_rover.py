@@ -11,21 +11,25 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, AUTO, GUIDED, HOLD, FakeClient, command_long
+from tests.kit.client import ACCEPTED, HOLD, FakeClient, command_long
 from tests.kit.mission import Item, Upload
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import PROMPT_PX4, ask_mode
 from tests.kit.volume import some
 from tests.kit.world import World, at
-from tests.scenarios.attacks.test_late_arming import mode_of
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
 from tests.scenarios.attacks.test_words_passed_on import go_to
 from tests.scenarios.conftest import MakeWorld
 
-MODE, GO_TO, CANCEL, CLEAR, MOVE = 176, 192, 54010, 54011, 54000
+MODE, GO_TO, CLEAR, MOVE = 176, 192, 54011, 54000
 NUMBER = 38  # where the number of a command is in a packet
-COMMANDS, HEARTBEAT, SETPOINT = (75, 76), 0, 84
+COMMANDS, HEARTBEAT = (75, 76), 0
 WAYPOINT = 16
+
+
+def is_command(data: bytes, *commands: int) -> bool:
+    """Whether a packet is one of these commands."""
+    return data[7] in COMMANDS and unpack_from("<H", data + bytes(40), NUMBER)[0] in commands
 
 
 def catch(world: World, *commands: int) -> list[bytes]:
@@ -33,8 +37,7 @@ def catch(world: World, *commands: int) -> list[bytes]:
     caught: list[bytes] = []
 
     def loses(_source: str, target: str, data: bytes) -> bool:
-        is_command = target == "rover1" and data[7] in COMMANDS
-        is_it = is_command and unpack_from("<H", data + bytes(40), NUMBER)[0] in commands
+        is_it = target == "rover1" and is_command(data, *commands)
         caught.extend([data] if is_it else [])
         return is_it
 
@@ -45,26 +48,6 @@ def catch(world: World, *commands: int) -> list[bytes]:
 def mend(world: World) -> None:
     """Let the net lose nothing any more."""
     world.watched.loses = lambda *_: False
-
-
-@for_each("halt", ["HOLD", "pause"])
-def test_a_mode_that_comes_twice(world: World, halt: str) -> None:
-    person = world.add_client("person")
-    away_from_home(world)
-    world.client.mode(GUIDED)
-    world.run(1)
-    caught = catch(world, MODE)
-    world.client.mode(AUTO)
-    world.run(0.1)
-    mend(world)
-    halted = person.mode(HOLD) if halt == "HOLD" else person.pause()
-    world.run(0.5)
-    world.bring_late(caught[0])
-    world.run(0.8)
-    world.bring_late(caught[0])
-    world.run(3)
-    assert halted.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
 
 
 def armed_px4(make_world: MakeWorld) -> tuple[World, FakeClient]:
@@ -123,47 +106,24 @@ def test_a_mode_that_shows_only_with_the_next_heartbeat(
     world.bring_late(caught[0])
     world.run(6)
     assert halted.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
+    assert world.mode() is Mode.HOLD
 
 
 def test_our_own_mode(world: World) -> None:
     """With a set-point behind it."""
     person = world.add_client("person")
-    caught: list[bytes] = []
-
-    def keeps(_source: str, target: str, data: bytes) -> bool:
-        is_mode = data[7] in COMMANDS and unpack_from("<H", data + bytes(40), NUMBER)[0] == MODE
-        caught.extend([data] if target == "rover1" and is_mode else [])
-        return False
-
-    world.watched.loses = keeps
+    caught = world.overheard(
+        lambda _source, target, data: target == "rover1" and is_command(data, MODE)
+    )
     world.client.move(10, speed=0.5)
-    world.until(lambda: bool(caught) and world.rover.autopilot.armed, within=5)
+    world.until(lambda: bool(caught) and world.is_armed, within=5)
     held = person.mode(HOLD)
     world.run(0.7)
     mend(world)
     world.bring_late(caught[0])
     world.run(2)
     assert held.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
-
-
-@for_each("halt", ["HOLD", "pause"])
-def test_the_way_to_the_rover_is_lost_for_longer_than_hold_was_asked_for(
-    world: World, halt: str
-) -> None:
-    person = world.add_client("person")
-    away_from_home(world)
-    world.client.send(command_long(RETURN, target=ELSEWHERE))
-    world.run(1)
-    assert mode_of(world) is Mode.RTL
-    world.watched.loses = lambda _source, target, _data: target == "rover1"
-    halted = person.mode(HOLD) if halt == "HOLD" else person.pause()
-    world.run(3.2)
-    mend(world)
-    world.run(2)
-    assert halted.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
+    assert world.mode() is Mode.HOLD
 
 
 @for_each("halt", ["HOLD", "everything"])
@@ -194,6 +154,3 @@ def test_an_upload_that_has_begun_before_a_halt(world: World, halt: str) -> None
     assert stays(world, 8)
     assert halted.result == ACCEPTED
     assert upload.result not in (None, 0)
-
-
-# a person at the rover

@@ -2,21 +2,14 @@
 
 A plan with a start delay, a mission that begins when the rover is armed, a client that was given
 control, a task that stands only while the rover is not heard, a command that waits for the answer
-to another: each of them did. So did a task after the server was started again: it armed a rover
-that somebody had disarmed.
+to another: each of them did.
 """
 
-import shutil
-import sqlite3
 from collections.abc import Callable
-from contextlib import closing
-from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
@@ -24,7 +17,6 @@ from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
-    DENIED,
     GUIDED,
     HOLD,
     MOVE,
@@ -33,14 +25,12 @@ from tests.kit.client import (
     command_long,
     setpoint,
 )
-from tests.kit.mission import Item, Upload
+from tests.kit.mission import Item
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
-from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
 
-UTC = 1.8e9
 WAYPOINT, OPTIONS, START, RETURN, STANDARD_MODE = 16, 54014, 300, 20, 262
 SECOND_MISSION = 5  # MAV_STANDARD_MODE: mission
 ELSEWHERE = (1, 42)  # a component that nobody has heard of
@@ -90,8 +80,7 @@ def unheard(world: World) -> None:
 
 def stored(world: World, *items: Item, target: tuple[int, int] = (1, 1)) -> None:
     """Upload a plan."""
-    upload = Upload(world.client, items, target=target)
-    world.until(lambda: upload.result == 0, within=5)
+    assert world.upload(items, target=target).result == 0
 
 
 def started_under_a_pause(world: World, delay: float) -> None:
@@ -202,42 +191,6 @@ def packed(message: Message) -> bytes:
     return bytes(message.pack(common.MAVLink(None, 254, 190)))
 
 
-def restarted(world: World, path: Path) -> None:
-    """End the server in order, and start it again with its store."""
-    world.run(1)
-    store = world.server.store
-    world.end_server()
-    store.close()
-    later = PromptSqliteStore(path, wall_offset=UTC)
-    world.start_server(later, later.load())
-
-
-@for_each("who", ["client", "person at the rover"])
-def test_what_somebody_has_disarmed_is_not_armed_by_the_next_run(
-    make_world: MakeWorld, tmp_path: Path, who: str
-) -> None:
-    path = tmp_path / "tasks.sqlite3"
-    world = make_world(store=PromptSqliteStore(path, wall_offset=UTC))
-    world.client.arm()
-    world.run(1)
-    world.client.command(MOVE, 3, 0, 0, 0, 0, 30, 5)
-    world.run(1)
-    if who == "client":
-        world.add_client("person").arm(False)
-    else:
-        world.operator_arm(False)
-    world.run(2)
-    restarted(world, path)
-    assert stays(world, 40)
-    assert not world.rover.autopilot.armed
-    world.client.proceed()
-    world.until_state(1, S.COMPLETED, within=60)
-    restarted(world, path)
-    world.run(2)
-    world.client.move(1)
-    world.until_state(2, S.COMPLETED, within=60)
-
-
 @for_each("halt", ["HOLD", "pause", "STOP"])
 def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
     make_world: MakeWorld, halt: str
@@ -258,39 +211,10 @@ def test_what_waits_behind_an_unanswered_command_does_not_leave_after_a_halt(
     assert stays(world, 6)
 
 
-def test_a_disarming_that_only_the_record_of_halts_took_is_not_undone(
-    make_world: MakeWorld, tmp_path: Path
-) -> None:
-    """The disk is full while somebody disarms; the server is started again, to go on by itself."""
-    path, copy = tmp_path / "tasks.sqlite3", tmp_path / "copy"
-    settings = replace(Settings(), on_restart="continue")
-    world = make_world(store=PromptSqliteStore(path, wall_offset=UTC), settings=settings)
-    world.client.arm()
-    world.run(1)
-    world.client.command(MOVE, 3, 0, 0, 0, 0, 15, 5)
-    world.run(1)
-    with closing(sqlite3.connect(path)) as source, closing(sqlite3.connect(copy)) as target:
-        source.backup(target)
-    disarmed = world.add_client("person").arm(False)
-    world.run(2)
-    assert disarmed.result == ACCEPTED
-    store = world.server.store
-    world.end_server()
-    store.close()
-    for each in tmp_path.glob("tasks.sqlite3*"):
-        if each.suffix != ".halts":
-            each.unlink()
-    shutil.copy(copy, path)
-    later = PromptSqliteStore(path, wall_offset=UTC)
-    world.start_server(later, later.load())
-    assert stays(world, 40)
-    assert not world.rover.autopilot.armed
-
-
 # a release under a pause
 
 
-RELEASE, AGAIN, REMAINDER = 54013, 0, 1
+RELEASE, AGAIN = 54013, 0
 
 
 PAUSES = ("pause", "HOLD", "takeover")
@@ -340,24 +264,3 @@ def test_the_next_halt_takes_it_back(world: World, how: str) -> None:
     world.run(4)
     assert world.pose() == pytest.approx(before, abs=0.001)
     assert world.state(1)[0] is S.HELD
-
-
-def test_a_submitter_who_may_not_continue_does_not_drive_by_a_release(
-    make_world: MakeWorld,
-) -> None:
-    roles = Roles(addresses={"245/190": "submitter"})
-    world = make_world(settings=Settings(roles=roles))
-    script = world.add_client("script", system_id=245)
-    script.move(10)
-    world.until(lambda: world.truth.forward_speed > 0.3, within=10)
-    world.fault(Faults(position_jump=(5.0, 0.0)))
-    world.until_state(1, S.HELD, within=2)
-    world.run(3)
-    world.client.pause()
-    world.run(4)
-    before = world.pose()
-    continued = script.proceed()
-    script.command(RELEASE, 1, AGAIN)
-    world.run(5)
-    assert continued.result == DENIED
-    assert world.pose() == pytest.approx(before, abs=0.001)

@@ -24,8 +24,9 @@ from tests.kit.client import (
     command_long,
     set_mode,
 )
-from tests.kit.mission import Item, Upload
+from tests.kit.mission import Item
 from tests.kit.world import World, at
+from tests.scenarios.attacks.test_older_words import driven_since
 from tests.scenarios.conftest import MakeWorld
 
 SECOND = "server:second"
@@ -55,8 +56,7 @@ def world(make_world: MakeWorld) -> World:
     """Return a world whose rover has driven the first metres of a mission, and is paused."""
     world = make_world(more_links=(SECOND,)).ready()
     plan = (Item(WAYPOINT, frame=0, current=1), Item(WAYPOINT, **at(12.0, 0.0)))
-    upload = Upload(world.client, plan, target=(1, 1))
-    world.until(lambda: upload.result is not None, within=5)
+    world.upload(plan)
     world.client.send(GO_WORDS["start"])
     world.until(lambda: world.truth.forward_speed > 0.3, within=10)
     world.client.pause()
@@ -73,25 +73,17 @@ def read(
     world.server.take_in(packets, now=world.now)
 
 
-def driven_since(world: World, seconds: float) -> float:
-    """Return how far the rover really gets from where it stands now."""
-    before = world.pose()
-    world.run(seconds)
-    after = world.pose()
-    return abs(after[0] - before[0]) + abs(after[1] - before[1])
-
-
 @for_each("halt", HALTS)
 @for_each("word", GO_WORDS)
 def test_an_older_word_of_another_link_undoes_no_halt(world: World, word: str, halt: str) -> None:
     person, script = world.add_client("person"), world.add_client("script", system_id=245)
     now = world.now
-    is_armed = world.rover.autopilot.armed
+    is_armed = world.is_armed
     read(world, CLIENT_LINK, person, HALTS[halt], arrived=now + MS / 2, at=now + MS)
     read(world, SECOND, script, GO_WORDS[word], arrived=now, at=now + 3 * MS)
     assert driven_since(world, 4) < 0.001
-    assert world.rover.autopilot.mode is Mode.HOLD
-    assert world.rover.autopilot.armed is (is_armed and halt != "disarm")
+    assert world.mode() is Mode.HOLD
+    assert world.is_armed is (is_armed and halt != "disarm")
     assert (world.paused() is R.STOPPED) is (halt == "STOP")
     assert world.paused() is not R.NONE
 

@@ -4,26 +4,20 @@ What had left before the halt may still come, to the new server as well as to th
 """
 
 from pathlib import Path
-from shutil import copy
 
 from mav_tasks.settings import Settings
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, HOLD, MOVE, command_long
+from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
-from tests.scenarios.attacks.test_late_arming import is_arming, mode_of
+from tests.scenarios.attacks.test_late_arming import is_arming
 from tests.scenarios.attacks.test_late_to_the_rover import mend
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home, stays
 from tests.scenarios.conftest import MakeWorld
 
-UTC = 1.8e9  # s, when the worlds begin
 ENDS = for_each("ends", ["well", "killed"])
-
-
-@anew
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "tasks.sqlite3"
 
 
 @anew
@@ -31,23 +25,12 @@ def world(make_world: MakeWorld, path: Path) -> World:
     return make_world(store=PromptSqliteStore(path, wall_offset=UTC))
 
 
-def restart(world: World, path: Path, *, ends: str, away: float = 0.3) -> None:
+def end(world: World, path: Path, how: str) -> None:
     """Let the server end, or be killed, and another one start on what it has stored."""
-    store = world.server.store
-    if ends == "well":
+    if how == "well":
         world.server.shut_down(now=world.now)
         world.until(lambda: world.server.pump.is_over, within=10)
-        store.close()
-    world.end_server()
-    again = path.with_name(f"{path.stem}+{path.suffix}")
-    for suffix in ("", "-wal", ".halts"):
-        if Path(f"{path}{suffix}").exists():
-            copy(f"{path}{suffix}", f"{again}{suffix}")
-    if ends != "well":
-        store.close()
-    world.run(away)
-    later = PromptSqliteStore(again, wall_offset=UTC)
-    world.start_server(later, later.load())
+    restart(world, path, well=how == "well", away=0.3, settles=0.0)
 
 
 def returning(world: World) -> None:
@@ -55,7 +38,7 @@ def returning(world: World) -> None:
     away_from_home(world)
     world.client.send(command_long(RETURN, target=ELSEWHERE))
     world.run(1)
-    assert mode_of(world) is Mode.RTL
+    assert world.mode() is Mode.RTL
 
 
 @ENDS
@@ -71,11 +54,11 @@ def test_a_halt_that_has_not_come_is_asked_for_again(
     if "disarm" in halt:
         person.arm(False)
         world.run(0.3)
-    restart(world, path, ends=ends)
+    end(world, path, ends)
     mend(world)
     world.run(4)
     assert halted.result == ACCEPTED
-    assert mode_of(world) is Mode.HOLD
+    assert world.mode() is Mode.HOLD
 
 
 @ENDS
@@ -92,20 +75,14 @@ def test_an_arming_that_comes_late_after_it(
     world.run(1)
     world.client.command(MOVE, 5, 0.5, 0, 0, 0, 6, 5)
     world.run(0.3)
-    caught: list[bytes] = []
-
-    def sees(_source: str, target: str, data: bytes) -> bool:
-        caught.extend([data] if target == "rover1" and is_arming(data) else [])
-        return False
-
-    world.watched.loses = sees
+    caught = world.overheard(lambda _source, target, data: target == "rover1" and is_arming(data))
     world.client.arm()
     world.run(0.3)
     mend(world)
     halted = person.arm(False)
     world.run(0.3)
     assert halted.result == ACCEPTED
-    restart(world, path, ends=ends)
+    end(world, path, ends)
     world.run(1.2)
     world.bring_late(caught[0])
     assert stays(world, 14)
@@ -128,7 +105,7 @@ def test_a_halt_after_it_lets_no_older_continue_through(
     world.run(0.5)
     person.pause()
     world.run(0.3)
-    restart(world, path, ends=ends)
+    end(world, path, ends)
     world.run(1.0)
     halted = {"STOP": person.stop, "pause": person.pause}.get(halt, lambda: person.mode(HOLD))()
     world.run(0.5)

@@ -19,7 +19,7 @@ from tests.kit.world import World
 #: of the server towards rovers, and of a rover. That of the server in the rover's system is free
 #: for clients (see ``test_mavros``)
 OWN = ((250, 191), (1, 1))
-SERVO, SPEED, MISSION_START, DO_SET_MODE = 183, 178, 300, 176
+SERVO, SPEED = 183, 178
 MISSION_COUNT = 44
 
 SENT: dict[str, Callable[[FakeClient], object]] = {
@@ -59,14 +59,14 @@ def test_nothing_is_done_for_who_calls_itself_the_server_or_a_rover(
 ) -> None:
     client = borrowed(world, source)
     client.heartbeats = False
-    armed, mode = world.rover.autopilot.armed, world.rover.autopilot.mode
+    armed, mode = world.is_armed, world.mode()
     speed = world.rover.autopilot.parameters["CRUISE_SPEED"]
     reached = len(of_source(world, source))
     SENT[what](client)
     world.run(1.0)
     assert {(ack.result, ack.result_param2) for ack in client.acks} <= {(DENIED, R.NOT_ALLOWED)}
     assert MISSION_COUNT not in [packet.message_id for packet in client.received]
-    assert (world.rover.autopilot.armed, world.rover.autopilot.mode) == (armed, mode)
+    assert (world.is_armed, world.mode()) == (armed, mode)
     assert world.rover.autopilot.parameters["CRUISE_SPEED"] == speed
     assert world.server.engine.parameters == {}
     assert (world.tasks(), world.paused()) == ((), R.NONE)
@@ -94,7 +94,7 @@ def test_its_stop_stops_all_the_same(world: World, source: tuple[int, int]) -> N
     client.stop()
     world.until_state(task.task_id, S.KILLED, within=1.0)
     world.until(world.stands, within=3.0)
-    assert (world.paused(), world.rover.autopilot.mode) == (R.STOPPED, Mode.HOLD)
+    assert (world.paused(), world.mode()) == (R.STOPPED, Mode.HOLD)
     client.proceed()
     world.run(1.0)
     assert world.paused() is R.STOPPED

@@ -6,7 +6,6 @@ from struct import unpack_from
 from rover_sim.personas import ARDUPILOT, PX4, Mode
 from tests.kit.cases import for_each
 from tests.kit.world import World
-from tests.scenarios.attacks.test_late_arming import mode_of
 
 COMMAND_LONG, COMMAND_ACK = 76, 77
 ARM, SET_MODE = 400, 176
@@ -33,7 +32,7 @@ def test_who_disarms_a_rover_while_an_arming_is_unanswered_keeps_it_disarmed(
     world.run(after)
     world.operator_arm(False)
     world.run(6)
-    assert not world.rover.autopilot.armed
+    assert not world.is_armed
 
 
 @for_each("phase", [0.0, 0.2, 0.4])
@@ -58,4 +57,4 @@ def test_who_sets_hold_while_a_mode_is_unanswered_keeps_it(
     world.run(after)
     world.operator_mode(Mode.HOLD)
     world.run(6)
-    assert mode_of(world) is Mode.HOLD
+    assert world.mode() is Mode.HOLD

@@ -10,9 +10,10 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, MOVE, FakeClient, command_long
+from tests.kit.restarts import UTC
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_signing import ALICE, BOB, REVOKED, UTC, put, signing
+from tests.scenarios.test_signing import ALICE, BOB, REVOKED, put, signing
 
 HOUR, YEAR = 3600.0, 365 * 86_400.0
 

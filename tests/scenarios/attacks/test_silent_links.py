@@ -7,7 +7,6 @@ from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, HOLD, RTL, command_long
 from tests.kit.world import World
-from tests.scenarios.attacks.test_late_arming import mode_of
 from tests.scenarios.attacks.test_late_to_the_rover import mend
 from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_from_home
 
@@ -31,11 +30,11 @@ def test_a_halt_during_a_gap_counts_when_it_ends(
     else:
         world.client.mode(RTL)
     world.run(1)
-    assert mode_of(world) is Mode.RTL
+    assert world.mode() is Mode.RTL
     cut(world)
     said = person.mode(HOLD) if halt == "HOLD" else person.pause()
     world.run(seconds)
     assert said.result == ACCEPTED
     mend(world)
     world.run(4)
-    assert mode_of(world) is Mode.HOLD
+    assert world.mode() is Mode.HOLD

@@ -10,6 +10,7 @@ from tests.kit.client import FakeClient, Received
 from tests.kit.mission import MISSION_ACK, REQUEST, REQUEST_INT, Ack, Item, Upload
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_roles import join
 
 MISSION, FENCE = 0, 1
 WAYPOINT, FENCE_CIRCLE = 16, 5003
@@ -66,12 +67,6 @@ def world(make_world: MakeWorld) -> World:
     return make_world(settings=Settings(roles=Roles(unsigned="safety", addresses=ROLES)))
 
 
-def join(world: World, system_id: int) -> FakeClient:
-    client = world.add_client(f"client {system_id}", system_id=system_id)
-    world.run(1.2)
-    return client
-
-
 def result(world: World, upload: Upload) -> int | None:
     world.until(lambda: upload.result is not None, within=5)
     return upload.result
@@ -88,7 +83,7 @@ def test_a_slow_submitter_keeps_no_operator_s_mission_out(
     assert result(world, Upload(operator, PLAN, target=target)) == MISSION_ACCEPTED
     (displaced,) = slow.acks
     assert displaced[1] == MISSION_DENIED
-    assert any("a client with a higher role is uploading" in text for text in submitter.texts())
+    assert submitter.said("a client with a higher role is uploading")
     assert [task.submitter.system_id for task in world.tasks()] == [12]
 
 
@@ -109,6 +104,6 @@ def test_an_upload_that_is_slow_for_ever_ends(world: World) -> None:
     world.until(lambda: slow.acks, within=90)
     ended, how = slow.acks[0]
     assert (how, 70 < ended - began < 85) == (CANCELLED, True)
-    assert any("took more than 60 s" in text for text in slow.client.texts())
+    assert slow.client.said("took more than 60 s")
     assert result(world, Upload(waiting, PLAN)) == MISSION_ACCEPTED
     assert [task.submitter.system_id for task in world.tasks()] == [11]

@@ -1,4 +1,4 @@
-"""Attacks S8, and motor tests beside a task: what would change more than an operator may.
+"""Attacks S8: what would change more than an operator may.
 
 Named one by one, and not taken from the table that is to stop them.
 """
@@ -10,14 +10,12 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
-from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import anew, for_each
-from tests.kit.client import DENIED, TEMPORARILY_REJECTED, FakeClient
+from tests.kit.client import DENIED, FakeClient
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
-ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT, FLASH = 310, 209, 241, 246, 42650
 #: of commands that an operator may not send
 BEYOND_OPERATORS = {
     "calibration": 241,
@@ -103,40 +101,6 @@ def test_a_message_that_does_more_than_move_is_of_safety_alone(
     world.client.send(message)
     world.run(0.2)
     assert message.get_msgId() in passed, "who is in charge of safety may"
-
-
-@for_each("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT, FLASH])
-@for_each("component", [0, 1, 99])
-def test_nobody_tests_or_services_a_rover_that_a_task_drives(
-    world: World, number: int, component: int
-) -> None:
-    world.client.move(5)
-    world.until_state(1, S.EXECUTING)
-    passed = world.commands_passed_on()
-    sent = world.client.command(number, 1, target=(1, component))
-    world.run(0.6)
-    assert sent.answer == NOT_ALLOWED
-    assert f"command {number}: not during a task" in world.client.texts()
-    assert number not in passed
-    assert world.state(1)[0] is S.EXECUTING
-
-
-@for_each("number", [ACTUATOR_TEST, MOTOR_TEST, CALIBRATION, REBOOT])
-def test_one_that_nothing_drives_is_tested_disarmed_but_not_under_stop(
-    world: World, number: int
-) -> None:
-    """An autopilot tests motors only while it is disarmed: nobody can be granted that."""
-    passed = world.commands_passed_on()
-    world.client.command(number, target=(1, 1))
-    world.run(0.2)
-    assert number in passed
-    passed.clear()
-    world.client.stop()
-    world.run(1)
-    stopped = world.client.command(number, target=(1, 1))
-    world.run(0.6)
-    assert stopped.answer == (TEMPORARILY_REJECTED, R.STOPPED)
-    assert number not in passed
 
 
 def test_a_command_in_an_envelope_is_not_carried_past_the_table(with_operator: World) -> None:

@@ -31,7 +31,7 @@ from tests.scenarios.attacks.test_left_waiting import ELSEWHERE, RETURN, away_fr
 from tests.scenarios.conftest import MakeWorld
 
 CHANGE_MODE = 1  # of DO_REPOSITION
-COMMAND_LONG, CANCEL = 76, 54010
+COMMAND_LONG = 76
 
 
 def go_to(north: float, east: float, target: tuple[int, int] = (1, 1)) -> Any:
@@ -54,7 +54,7 @@ def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
     word = command_long(RETURN, target=target) if what == "return" else go_to(20, 0, target)
     world.client.send(word)
     world.run(1)
-    assert world.rover.autopilot.mode in (Mode.RTL, Mode.GUIDED), "it was passed on"
+    assert world.mode() in (Mode.RTL, Mode.GUIDED), "it was passed on"
     held = person.mode(HOLD)
     world.run(2)
     assert held.result == ACCEPTED
@@ -69,7 +69,7 @@ def test_a_copy_of_what_was_passed_on_does_not_undo_a_hold(
         word.confirmation = 0
     world.client.send(word)
     world.run(2)
-    assert world.rover.autopilot.mode in (Mode.RTL, Mode.GUIDED), "it was meant"
+    assert world.mode() in (Mode.RTL, Mode.GUIDED), "it was meant"
 
 
 @for_each("way", ["command", "message", "elsewhere"])
@@ -105,7 +105,7 @@ def test_what_the_net_to_the_rover_delivers_after_a_halt_does_not_undo_it(
     assert halted.result == ACCEPTED
     world.bring_late(caught[0])
     world.run(2)
-    assert world.rover.autopilot.mode is Mode.HOLD
+    assert world.mode() is Mode.HOLD
     assert stays(world, 5)
 
 
@@ -118,7 +118,7 @@ def test_a_person_at_the_rover_has_it_all_the_same(world: World) -> None:
     world.run(1)
     world.operator_mode(Mode.MANUAL)
     world.run(3)
-    assert world.rover.autopilot.mode is Mode.MANUAL
+    assert world.mode() is Mode.MANUAL
 
 
 @anew
