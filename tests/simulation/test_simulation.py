@@ -17,6 +17,7 @@ from mav_tasks.tasks.events import TaskChanged, TaskSubmitted
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import TaskId
 from rover_sim.body import BodyState
+from rover_sim.faults import Faults
 from rover_sim.frames import Frame
 from rover_sim.personas import ARDUPILOT, Mode
 from tests.kit import bounds
@@ -133,6 +134,7 @@ def drives_a_paused_rover(world: SimulatedWorld) -> None:
     drive(world)
     world.client.pause()
     world.run(4)
+    world.fault(Faults(withheld=frozenset({0})))  # its heartbeat would show it at once
     world.bring_late(of_server(command_long(SET_MODE, 1, GUIDED, target=(1, 1))))
     for _ in range(40):
         world.bring_late(setpoint(0.5).pack(common.MAVLink(None, 9, 1)))
