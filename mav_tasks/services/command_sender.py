@@ -95,6 +95,7 @@ class _Lane:
     owed: int = 0  # acks still to come of commands that an urgent one has pushed aside
     owed_until: float = 0.0
     quiet_until: float = 0.0  # late acks may still come; nothing is sent meanwhile
+    late: int = 0  # acks still to come of a command that was withdrawn; then it is quiet no more
 
     @property
     def requests(self) -> list[_Request]:
@@ -172,6 +173,7 @@ class CommandSender:
         lane.waiting = [request for request in lane.waiting if request.origin is not None]
         if lane.in_flight is not None and lane.in_flight.origin is None:
             lane.quiet_until = lane.in_flight.retry.sent_at + LATE
+            lane.late = lane.in_flight.retry.sent
             lane.in_flight = None
 
     def cancel(self, component: int, command: int, *, now: float) -> None:
@@ -209,8 +211,11 @@ class CommandSender:
     def receive(self, ack: CommandAck, *, component: int, now: float) -> None:
         """Take an ack of a component of the vehicle; one that nobody waits for is dropped."""
         lane = self._lanes.get((component, ack.command))
-        if lane is None or lane.in_flight is None or ack.result == MavResult.IN_PROGRESS:
+        if lane is None or ack.result == MavResult.IN_PROGRESS:
             return  # IN_PROGRESS is no answer yet: the terminal one follows
+        if lane.in_flight is None:
+            self._take_late(lane, ack, now=now)
+            return
         if not self._is_meant(ack, lane.in_flight):
             return
         if lane.owed and now < lane.owed_until:  # the answer to what was pushed aside comes first
@@ -265,6 +270,15 @@ class CommandSender:
         outgoing, self._outgoing = self._outgoing, []
         answers, self._answers = self._answers, []
         return outgoing, answers
+
+    def _take_late(self, lane: _Lane, ack: CommandAck, *, now: float) -> None:
+        """Let the lane go on after the last ack of a command of ours that was withdrawn."""
+        is_ours = Address(ack.target_system, ack.target_component).reaches(self._source)
+        if lane.late and is_ours:
+            lane.late -= 1
+            if not lane.late:
+                lane.quiet_until = now
+                self._advance(lane, now=now)
 
     def _is_meant(self, ack: CommandAck, request: _Request) -> bool:
         """Whether an ack is for who asked; others may command the vehicle by another way."""

@@ -135,6 +135,12 @@ class Fleet:
                     goes_on.add(task.id)
             elif is_elsewhere and task.state is S.PAUSED and task.reason is R.PREEMPTED:
                 goes_on.add(task.id)
+            elif (
+                task.state is S.PAUSED
+                and task.reason not in LOSSES
+                and not (restored.ended_well or task.vehicle in restored.paused)
+            ):
+                self._was_driven.add(task.vehicle)  # it was being taken, to resume this task
             if task.state in ACTIVE:
                 active.setdefault(task.vehicle, []).append(task)
             elif task.state in WAITING:

@@ -25,6 +25,14 @@ YAW_LIMITS = YawLimits(MAX_YAW_RATE, acceleration=2.1, deceleration=3.5)  # ATC_
 ROLLED_OUT = 1e-3  # m/s; a slower vehicle stands
 
 
+def _part(time: float) -> float:
+    """Return the fraction of an error that a first-order lag removes in one control period."""
+    return 1.0 - math.exp(-CONTROL_PERIOD / time)
+
+
+FILTER_SHARE = _part(ERROR_FILTER)
+
+
 @dataclass(frozen=True, slots=True)
 class SpeedGains:
     """The gains of the speed loop and the vehicle's response to the throttle."""
@@ -57,6 +65,7 @@ class ArduPilotDrive:
     def __init__(self, gains: SpeedGains, steering: Steering) -> None:
         self._gains = gains
         self._steering = steering
+        self._share = _part(gains.lag)
         self._asked = 0.0  # m/s, the demand after the acceleration limit
         self._error = 0.0  # m/s, filtered
         self._integral = 0.0  # throttle
@@ -78,7 +87,7 @@ class ArduPilotDrive:
         else:
             self._throttle = toward(self._throttle, wanted, SLEW * CONTROL_PERIOD)
         pulse = round(self._throttle * PWM_STEPS) / PWM_STEPS  # in whole us
-        self._speed += (self._gains.top * pulse - self._speed) * _part(self._gains.lag)
+        self._speed += (self._gains.top * pulse - self._speed) * self._share
         if pulse == 0.0 and abs(self._speed) < ROLLED_OUT:
             self._speed = 0.0
         return self._speed, self._steering.step(demand, truth, estimate, self._speed)
@@ -90,7 +99,7 @@ class ArduPilotDrive:
             self._error = self._integral = 0.0
             return 0.0
         gains = self._gains
-        self._error += (self._asked - speed - self._error) * _part(ERROR_FILTER)
+        self._error += (self._asked - speed - self._error) * FILTER_SHARE
         self._integral += gains.i * self._error * CONTROL_PERIOD
         wanted = gains.base * self._asked + gains.p * self._error + self._integral
         limited = max(-1.0, min(1.0, wanted))
@@ -130,8 +139,3 @@ class WheelSteering:
         lock = self.FEED_FORWARD * demand.yaw_rate + self.P * error if demand.yaw_rate else 0.0
         lock = max(-1.0, min(1.0, lock if estimate.forward_speed >= 0.0 else -lock))
         return speed * lock / TURN_RADIUS
-
-
-def _part(time: float) -> float:
-    """Return the fraction of an error that a first-order lag removes in one control period."""
-    return 1.0 - math.exp(-CONTROL_PERIOD / time)

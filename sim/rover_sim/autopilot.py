@@ -16,7 +16,6 @@ from rover_sim.body import BodyState
 from rover_sim.boot import Boot
 from rover_sim.commands import CommandParts, CommandReceiver
 from rover_sim.dispatch import Handler
-from rover_sim.drive_train import drive_train_of
 from rover_sim.estimate import Estimate, estimate_from
 from rover_sim.estimator import Estimator
 from rover_sim.faults import NO_FAULTS, Faults
@@ -30,10 +29,10 @@ from rover_sim.mission_storage import MissionStorage
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
 from rover_sim.personas import Mode, Persona
-from rover_sim.realism import Change, Realism, Wire
+from rover_sim.realism import Realism
 from rover_sim.setpoints import Destination
 from rover_sim.sticks import Sticks
-from rover_sim.streams import OFF, Streams, with_sticks
+from rover_sim.streams import Streams, with_sticks
 from rover_sim.telemetry import Telemetry
 from rover_sim.timing import Departures
 
@@ -78,12 +77,10 @@ class Autopilot:
         self._unix_offset = unix_offset
         self._outbox = Outbox()
         listed = persona.parameters
-        self._runtime = persona.runtime_parameter if realism.wire is Wire.REAL else None
+        self._runtime = persona.runtime_parameter
         if self._runtime is not None:
             listed += (self._runtime,)
-        self._parameters = Parameters(
-            listed, persona.parameter_protocol, self._outbox, wire=realism.wire
-        )
+        self._parameters = Parameters(listed, persona.parameter_protocol, self._outbox)
         self._parameters[persona.system_id_parameter] = system_id
         self._missions = MissionStorage(
             conventions=persona.missions, origin=origin, outbox=self._outbox
@@ -194,8 +191,7 @@ class Autopilot:
     def operator_sticks(self, forward_speed: float, yaw_rate: float) -> None:
         """Hold the sticks (m/s, rad/s) until the mode changes; for MANUAL and POSITION."""
         self._flight.set_sticks(forward_speed, yaw_rate)
-        if self._realism.wire is Wire.REAL:
-            self._sticks.hold(forward_speed, yaw_rate)
+        self._sticks.hold(forward_speed, yaw_rate)
 
     def operator_pulses(self, throttle: int, steering: int) -> None:
         """Hold the transmitter's sticks at these pulses, in microseconds."""
@@ -223,12 +219,9 @@ class Autopilot:
         self._up_at = up_at
         self._gps = GpsLoss()
         self._runtime_due = up_at + RUNTIME_INTERVAL
-        # Wire.TIDY accepts a request for RC_CHANNELS, too, but has nothing to send.
-        shows_sticks = realism.wire is Wire.REAL
-        table = with_sticks(persona.streams, UNASKED_STICKS if shows_sticks else OFF)
-        self._streams = Streams(table, now=up_at)
+        self._streams = Streams(with_sticks(persona.streams, UNASKED_STICKS), now=up_at)
         boot = Boot(realism.boot, persona.boot_script, started=up_at)
-        self._motion = drive_train_of(realism.drive, persona.drive, persona.frame, self._parameters)
+        self._motion = persona.drive(persona.frame, self._parameters)
         rules = persona.rules(
             FlightParts(
                 origin=self._origin,
@@ -239,7 +232,6 @@ class Autopilot:
                 honours_yaw_rate=persona.honours_yaw_rate,
                 started=up_at,
                 frame=persona.frame,
-                drive=realism.drive,
                 settling_time=realism.boot.armable if realism.boot.is_none else 0.0,
             )
         )
@@ -332,12 +324,7 @@ class Autopilot:
 
     def _announce(self, now: float) -> None:
         """Send a heartbeat at once if a change occurred that this autopilot announces."""
-        timing = self._realism.timing
-        if timing is not None:
-            shown = timing.announces
-        else:
-            shown = ~Change.NOTHING if self._persona.announces_changes else Change.NOTHING
-        if self._flight.take_changes() & shown:
+        if self._flight.take_changes() & self._realism.timing.announces:
             self._send(messages.Heartbeat.id, now)
 
     def _handle_heartbeat(self, _message: messages.Heartbeat, sender: Address, now: float) -> None:

@@ -5,11 +5,10 @@ A body knows wheels and ground, but no MAVLink, modes or origins.
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 
-@dataclass(frozen=True, slots=True)
-class BodyState:
+class BodyState(NamedTuple):
     """True position and motion of a body, not an estimate. SI units, NED axes.
 
     Positions are relative to the ground frame's zero point, on the ground; ``down`` is 0 at rest.

@@ -1,6 +1,5 @@
-"""From demand to wheels: the drive train protocol, and the choice of a drive train."""
+"""From demand to wheels: the drive train protocol, and the drive train of each make."""
 
-from collections.abc import Callable
 from typing import Protocol
 
 from rover_sim.ardupilot_drive import (
@@ -13,10 +12,8 @@ from rover_sim.ardupilot_drive import (
 from rover_sim.body import BodyState
 from rover_sim.estimate import Estimate
 from rover_sim.frames import Frame
-from rover_sim.motion import MotionControl
 from rover_sim.parameters import Parameters
 from rover_sim.px4_drive import AckermannDrive, DifferentialDrive
-from rover_sim.realism import Drive
 from rover_sim.steering import Demand
 
 
@@ -26,16 +23,6 @@ class DriveTrain(Protocol):
     def step(self, demand: Demand, truth: BodyState, estimate: Estimate) -> tuple[float, float]:
         """Return forward speed and yaw rate for the wheels, for one control period."""
         ...
-
-
-def drive_train_of(
-    drive: Drive,
-    real: Callable[[Frame, Parameters], DriveTrain],
-    frame: Frame,
-    parameters: Parameters,
-) -> DriveTrain:
-    """Return the exact drive train, or the make's ``real`` one."""
-    return MotionControl() if drive is Drive.EXACT else real(frame, parameters)
 
 
 def ardupilot_drive(frame: Frame, _parameters: Parameters) -> DriveTrain:

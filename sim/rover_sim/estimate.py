@@ -1,14 +1,13 @@
 """The autopilot's estimate: the truth, changed by faults."""
 
 import math
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 from rover_sim.body import BodyState, wrap_angle
 from rover_sim.faults import Faults
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(NamedTuple):
     """Position and motion as the autopilot reports and uses them. SI, NED, from its origin."""
 
     north: float
@@ -30,7 +29,7 @@ class Estimate:
     @property
     def without_numbers(self) -> "Estimate":
         """A failed estimator's output: every field is NaN."""
-        return Estimate(*[math.nan] * len(fields(self)))
+        return Estimate(*[math.nan] * len(self))
 
 
 def estimate_from(truth: BodyState, faults: Faults, last: Estimate | None) -> Estimate:

@@ -1,10 +1,12 @@
 """Estimation errors that wander over seconds, as those of real estimators do.
 
 The autopilot reports the estimate and steers by it, so an error of the estimated speed becomes an
-error of the true speed. An exact rover has no estimator: it sees the truth.
+error of the true speed.
 """
 
 import math
+from collections.abc import Iterator
+from itertools import repeat
 from random import Random
 from typing import NamedTuple
 
@@ -19,36 +21,25 @@ UPSET_FOR = 100.0  # s; recorded of PX4's SIH: from the end of pushing until it 
 GROWS_FOR = 3.0  # s from normal to upset, and back; recorded: the heading drifts by 7 deg in 5 s
 
 
-class WanderingValue:
-    """One axis of an error: a Gauss-Markov process about a fixed value.
+def wandering(wander: Wander, chance: Random) -> Iterator[float]:
+    """Yield an error for each control period: a Gauss-Markov process about a fixed value.
 
     It is of second order, two equal lags in series: recorded errors wander smoothly, with a
-    correlation of 0.85 after 1 s and 0.35 after 3 s, which a single lag cannot give.
+    correlation of 0.85 after 1 s and 0.35 after 3 s, which a single lag cannot give. What drives it
+    is drawn evenly, which is fast; the lags make it a normal distribution.
     """
-
-    def __init__(self, wander: Wander, chance: Random) -> None:
-        self._chance = chance
-        self._fixed = chance.uniform(wander.least, wander.most)
-        self._kept = math.exp(-CONTROL_PERIOD / wander.time)
-        driving = wander.spread * math.sqrt(2.0)  # the second lag halves the variance
-        self._fresh = driving * math.sqrt(1.0 - self._kept * self._kept)
-        self._driving = chance.gauss(0.0, driving)
-        # steady state: half of the driving value, plus independently half of the variance
-        self._wandering = 0.5 * self._driving + chance.gauss(0.0, wander.spread * math.sqrt(0.5))
-
-    def __repr__(self) -> str:
-        return f"WanderingValue({self.value:.4g})"
-
-    @property
-    def value(self) -> float:
-        """The present error."""
-        return self._fixed + self._wandering
-
-    def step(self) -> float:
-        """Advance by one control period; return the new error."""
-        self._driving = self._driving * self._kept + self._chance.gauss(0.0, self._fresh)
-        self._wandering = self._driving + (self._wandering - self._driving) * self._kept
-        return self._fixed + self._wandering
+    random = chance.random
+    fixed = chance.uniform(wander.least, wander.most)
+    kept = math.exp(-CONTROL_PERIOD / wander.time)
+    spread = wander.spread * math.sqrt(2.0)  # the second lag halves the variance
+    fresh = spread * math.sqrt(12.0 * (1.0 - kept * kept))  # width of the even distribution
+    driving = chance.gauss(0.0, spread)
+    # steady state: half of the driving value, plus independently half of the variance
+    error = 0.5 * driving + chance.gauss(0.0, wander.spread * math.sqrt(0.5))
+    while True:
+        driving = driving * kept + (random() - 0.5) * fresh
+        error = driving + (error - driving) * kept
+        yield fixed + error
 
 
 class Estimator:
@@ -56,17 +47,20 @@ class Estimator:
 
     def __init__(self, error: EstimatorError, *, seed: int) -> None:
         chance = Random(seed)
-        self._forward = WanderingValue(error.forward_speed, chance)
-        self._right = WanderingValue(error.lateral_speed, chance)
-        self._north = WanderingValue(error.position, chance)
-        self._east = WanderingValue(error.position, chance)
-        self._yaw = WanderingValue(error.yaw, chance)
-        self._yaw_rate = WanderingValue(error.yaw_rate, chance)
-        self._drift = None if error.drift is None else Drift(error.drift, chance)
+        self._forward = wandering(error.forward_speed, chance)
+        self._right = wandering(error.lateral_speed, chance)
+        self._north = wandering(error.position, chance)
+        self._east = wandering(error.position, chance)
+        self._yaw = wandering(error.yaw, chance)
+        self._yaw_rate = wandering(error.yaw_rate, chance)
+        drift = error.drift
+        self._drift_north, self._drift_east = (
+            repeat(0.0) if drift is None else wandering(drift, chance) for _ in range(2)
+        )
         self._upset = None if error.pushing is None else Upset(error.pushing, chance)
 
     def __repr__(self) -> str:
-        return f"Estimator({self._forward!r}, {self._right!r})"
+        return f"Estimator(upset={self._upset!r})"
 
     def see(self, truth: BodyState, *, asked: float) -> BodyState:
         """Advance by one control period; return the state that the rover believes.
@@ -75,41 +69,22 @@ class Estimator:
         error of the heading does not rotate it.
         """
         upset = RIGHT if self._upset is None else self._upset.step(truth, asked=asked)
-        error = self._yaw.step() + upset.yaw
-        away_north, away_east = NOWHERE if self._drift is None else self._drift.step()
+        error = next(self._yaw) + upset.yaw
         cos, sin = math.cos(error), math.sin(error)
         forward = truth.forward_speed * cos + truth.lateral_speed * sin + upset.forward
         lateral = truth.lateral_speed * cos - truth.forward_speed * sin + upset.right
-        return BodyState(  # not replace(): this is called forty times a second
-            time=truth.time,
-            north=truth.north + self._north.step() + away_north,
-            east=truth.east + self._east.step() + away_east,
-            down=truth.down,
-            yaw=wrap_angle(truth.yaw + error),
-            pitch=truth.pitch,
-            roll=truth.roll,
-            forward_speed=forward + self._forward.step(),
-            lateral_speed=lateral + self._right.step(),
-            yaw_rate=truth.yaw_rate + self._yaw_rate.step(),
+        return BodyState(
+            truth.time,
+            truth.north + next(self._north) + next(self._drift_north),
+            truth.east + next(self._east) + next(self._drift_east),
+            truth.down,
+            wrap_angle(truth.yaw + error),
+            truth.pitch,
+            truth.roll,
+            forward + next(self._forward),
+            lateral + next(self._right),
+            truth.yaw_rate + next(self._yaw_rate),
         )
-
-
-NOWHERE = (0.0, 0.0)
-
-
-class Drift:
-    """Slow drift of a position over minutes, north and east."""
-
-    def __init__(self, wander: Wander, chance: Random) -> None:
-        self._north = WanderingValue(wander, chance)
-        self._east = WanderingValue(wander, chance)
-
-    def __repr__(self) -> str:
-        return f"Drift({self._north.value:.2f} N, {self._east.value:.2f} E)"
-
-    def step(self) -> tuple[float, float]:
-        """Advance by one control period; return the drift north and east, m."""
-        return self._north.step(), self._east.step()
 
 
 class MoreError(NamedTuple):
@@ -127,9 +102,9 @@ class Upset:
     """The error of an estimator, for minutes after its rover pushed without moving."""
 
     def __init__(self, error: PushingError, chance: Random) -> None:
-        self._forward = WanderingValue(error.speed, chance)
-        self._right = WanderingValue(error.speed, chance)
-        self._yaw = WanderingValue(error.yaw, chance)
+        self._forward = wandering(error.speed, chance)
+        self._right = wandering(error.speed, chance)
+        self._yaw = wandering(error.yaw, chance)
         self._pushed = 0.0  # s of uninterrupted pushing
         self._left = 0.0  # s until it recovers
         self._share = 0.0  # 0 (normal) to 1 (fully upset)
@@ -144,6 +119,8 @@ class Upset:
         self._left = UPSET_FOR if self._pushed > PUSHED_AFTER else self._left - CONTROL_PERIOD
         goal = 1.0 if self._left > 0.0 else 0.0
         share = self._share = toward(self._share, goal, CONTROL_PERIOD / GROWS_FOR)
+        if not share:
+            return RIGHT
         return MoreError(
-            share * self._forward.step(), share * self._right.step(), share * self._yaw.step()
+            share * next(self._forward), share * next(self._right), share * next(self._yaw)
         )

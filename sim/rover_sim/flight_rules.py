@@ -15,12 +15,9 @@ from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
 from rover_sim.outbox import Outbox
 from rover_sim.parameters import Parameters
-from rover_sim.realism import Drive
 from rover_sim.route import Route
 from rover_sim.setpoints import Destination, Global, Local, Target
 from rover_sim.steering import Demand
-
-SETTLING_TIME = 0.5  # s after start until the position estimate permits arming
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +32,7 @@ class FlightParts:
     honours_yaw_rate: bool
     started: float  # s
     frame: Frame
-    drive: Drive
-    settling_time: float = SETTLING_TIME  # s; 0 if a simulated boot decides when it can be armed
+    settling_time: float  # s until it can be armed; 0 if a simulated boot decides that
 
 
 class Intervention(NamedTuple):

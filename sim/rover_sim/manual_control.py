@@ -1,6 +1,5 @@
 """A body that a tester can carry and turn, and whose wheels can be blocked."""
 
-from dataclasses import replace
 from math import cos, sin
 
 from rover_sim.actuators import Actuator, with_blocked
@@ -35,8 +34,7 @@ class BodyByHand:
         if offset is None:
             return state
         north, east = turned(state.north, state.east, offset.yaw)
-        return replace(
-            state,
+        return state._replace(
             north=offset.north + north,
             east=offset.east + east,
             yaw=wrap_angle(offset.yaw + state.yaw),

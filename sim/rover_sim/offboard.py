@@ -1,16 +1,13 @@
-"""PX4's OFFBOARD: whether setpoints stream, and the demand for the last one."""
+"""PX4's OFFBOARD: whether setpoints stream, and the last one."""
 
-from rover_sim.estimate import Estimate
 from rover_sim.px4_setpoints import Setpoint
-from rover_sim.setpoints import Destination, Heading, Target, TurnRate
-from rover_sim.steering import STOP, Demand, steer_to_point, turn_then_drive
+from rover_sim.setpoints import Target
 
 STREAM_GAP = 0.5  # s, longest gap between two setpoints: PX4's guide asks for 2 Hz
-ARRIVAL_RADIUS = 0.1  # m
 
 
 class Offboard:
-    """Counts setpoints in any mode; keeps and follows the last one that came in OFFBOARD."""
+    """Counts setpoints in any mode; keeps the last one that came in OFFBOARD."""
 
     def __init__(self) -> None:
         self.target: Target | None = None
@@ -41,17 +38,3 @@ class Offboard:
     def silence(self, *, now: float) -> float:
         """Return the seconds since the last setpoint; infinity if there was none."""
         return float("inf") if self._last is None else now - self._last
-
-    def demand(self, estimate: Estimate, speed_limit: float) -> Demand:
-        """Return the demand for the stored target."""
-        match self.target:
-            case None:
-                return STOP
-            case Destination(north, east):
-                limit = speed_limit if self.speed is None else min(self.speed, speed_limit)
-                radius = ARRIVAL_RADIUS
-                return steer_to_point(estimate, north, east, limit, radius=radius) or STOP
-            case Heading(yaw, speed):
-                return turn_then_drive(estimate, yaw, min(speed, speed_limit))
-            case TurnRate(yaw_rate, speed):
-                return Demand(max(-speed_limit, min(speed_limit, speed)), yaw_rate)

@@ -12,7 +12,6 @@ from mav_tasks.mavlink import messages
 from mav_tasks.mavlink.address import Address
 from rover_sim.dispatch import Handler
 from rover_sim.outbox import Outbox
-from rover_sim.realism import Wire
 
 INT8, INT16, UINT32, INT32, REAL32 = 2, 4, 5, 6, 9  # MAV_PARAM_TYPE
 BY_NAME = -1  # param_index in a request
@@ -60,10 +59,7 @@ class Parameters:
         parameters: Iterable[Parameter],
         protocol: ParameterProtocol,
         outbox: Outbox,
-        *,
-        wire: Wire,
     ) -> None:
-        self._wire = wire
         self._listed = tuple(parameters)
         self._protocol = protocol
         self._indices = {each.name: index for index, each in enumerate(self._listed)}
@@ -97,8 +93,7 @@ class Parameters:
     def _handle_request_list(
         self, _message: messages.ParamRequestList, _sender: Address, _now: float
     ) -> None:
-        if self._wire is Wire.REAL:  # PX4 sends its hash first (mavlink_parameters.cpp)
-            self._send_digest()
+        self._send_digest()  # PX4 sends its hash first (mavlink_parameters.cpp)
         for index in range(len(self._listed)):
             self._send(index, index)
 

@@ -26,7 +26,7 @@ from rover_sim.modes import ModeNumbers
 from rover_sim.parameters import INT32, Parameter, ParameterProtocol, Parameters
 from rover_sim.px4_commands import px4_commands
 from rover_sim.px4_parameters import Bytewise, px4_parameters
-from rover_sim.px4_real_rules import px4_rules
+from rover_sim.px4_rules import Px4Rules
 from rover_sim.realism import (
     ARDUPILOT_BOOT,
     ARDUPILOT_ESTIMATOR,
@@ -59,7 +59,6 @@ class Persona:
     capabilities: int  # AUTOPILOT_VERSION.capabilities
     flight_sw_version: int  # AUTOPILOT_VERSION: major, minor, patch, type, a byte each
     firmware_hash: bytes  # AUTOPILOT_VERSION.flight_custom_version, 8 bytes
-    announces_changes: bool  # HEARTBEAT at once when mode or arming changes, else each second
     heeds_component: bool  # ignores messages to another component of its system
     also_healthy: int  # SYS_STATUS: sensors reported healthy although not present
     landed_state_armed: MavLandedState  # EXTENDED_SYS_STATE while armed
@@ -81,13 +80,13 @@ class Persona:
     boot: BootTimes  # in real time
     boot_script: BootScript
     home: HomeRule
-    tells_no_landed_state: bool  # EXTENDED_SYS_STATE: always undefined, if the wire is real
-    shows_prearm_in_health_only: bool  # SYS_STATUS, if the wire is real
-    accepted_in_silence: frozenset[int]  # ids of REQUEST_MESSAGE: accepted, but not sent; wire real
+    tells_no_landed_state: bool  # EXTENDED_SYS_STATE: always undefined
+    shows_prearm_in_health_only: bool  # SYS_STATUS
+    accepted_in_silence: frozenset[int]  # ids of REQUEST_MESSAGE: accepted, but not sent
     answers_first_peer: bool  # on a socket, and no other peer until it restarts
-    runtime_parameter: Parameter | None  # counts its seconds of runtime; if the wire is real
+    runtime_parameter: Parameter | None  # counts its seconds of runtime
     frame: Frame  # how it steers
-    drive: Callable[[Frame, Parameters], DriveTrain]  # if the drive is not exact
+    drive: Callable[[Frame, Parameters], DriveTrain]
 
     def on(self, frame: Frame) -> "Persona":
         """Return the same make on another frame; its parameters identify the frame."""
@@ -133,7 +132,6 @@ ARDUPILOT = Persona(
     capabilities=61935,
     flight_sw_version=4 << 24 | 6 << 16 | 3 << 8 | 255,  # 4.6.3, official
     firmware_hash=b"3fc7011a",
-    announces_changes=False,  # observed: 1 Hz
     heeds_component=False,
     also_healthy=GEOFENCE,
     landed_state_armed=MavLandedState.ON_GROUND,
@@ -207,14 +205,13 @@ PX4 = Persona(
     capabilities=4 | 8 | 16 | 32 | 128 | 256 | 8192 | 16384 | 32768,
     flight_sw_version=1 << 24 | 17 << 16 | 0 << 8 | 255,  # 1.17.0, official
     firmware_hash=b"99c40407",
-    announces_changes=False,  # 1 Hz
     heeds_component=True,
     also_healthy=0,
     landed_state_armed=MavLandedState.IN_AIR,  # PX4's rover land detector: armed means not landed
     no_mission_total=65535,
     lacks=frozenset(),
     streams=PX4_STREAMS,
-    rules=px4_rules,
+    rules=Px4Rules,
     commands=px4_commands,
     missions=PX4_MISSIONS,
     parameter_protocol=Bytewise(),

@@ -1,13 +1,19 @@
-"""Modes, arming and offboard-loss failsafe of a PX4 rover, idealised.
+"""The rules of a PX4 1.17 rover, including its surprises.
 
-For tests of exact arithmetic; ``px4_real_rules`` has the real behaviour.
+Recorded and tried on 1.17.0. It differs from PX4's guide, in ways that matter to a controller:
 
-Modelled: the conditions for entering a mode and arming in it (OFFBOARD needs a stream, MISSION a
-mission), the loss of the stream (COM_OF_LOSS_T, COM_OBL_RC_ACT) and its return, places for HOLD
-(DO_REPOSITION). Stricter than the real one, which accepts any mode while disarmed, and refuses to
-arm in it instead. Not modelled: failsafes of data link, battery, fence and estimator; the 5 s of
-Hold before RTL (COM_FAIL_ACT_T); AUTO.LAND; replacing a mission while driving it (the real one
-drives the new one); loss of sticks, which are absent until a test holds them.
+- A velocity is a speed and a course, atan2(east, north). Zero velocity is a course, too: north for
+  plain zeros, or south if a zero is negative (0.0 * cos of a southerly heading). A differential
+  rover turns to it on the spot, an Ackermann rover bends while it brakes.
+- It never drives backwards: it turns round while it drives.
+- When setpoints end, the table in ``px4_failsafe`` applies after COM_OF_LOSS_T; by default the
+  rover drives home.
+- HOLD keeps the place where it began: a rover that rolled beyond NAV_ACC_RAD drives back to it.
+- After a return it counts as landed, and disarms itself.
+- While disarmed it accepts any mode; it is not armed in one that cannot run.
+
+Not modelled: failsafes of data link, battery, fence and estimator; the 5 s of Hold before RTL
+(COM_FAIL_ACT_T); loss of sticks, which are absent until a test holds them.
 
 Texts fit into one STATUSTEXT and lack the tab at the end of the real ones (PX4 sends an EVENT
 beside each, so that a ground station drops the text).
@@ -21,12 +27,16 @@ from rover_sim.estimate import Estimate
 from rover_sim.flight_rules import FlightParts, Intervention
 from rover_sim.modes import Mode
 from rover_sim.offboard import Offboard
+from rover_sim.px4_failsafe import INTERVENTIONS, action_on_loss
+from rover_sim.px4_guidance import Px4Guidance
+from rover_sim.px4_landing import Landing
 from rover_sim.px4_setpoints import Setpoint, read_px4_global, read_px4_local
 from rover_sim.route import Route
-from rover_sim.setpoints import Destination, Global, Local, Target
-from rover_sim.steering import HOLD, Demand, steer_to_point
+from rover_sim.setpoints import Destination, Global, Heading, Local, Target, TurnRate
+from rover_sim.steering import HOLD, STOP, Demand
 
-ARRIVAL_RADIUS = 0.3  # m
+RETURNS_OVER = 60.0  # m, RTL_RETURN_ALT: only for the text, as no rover rises
+DESTINATION_TEXT = "RTL: land at destination"
 
 NAMES: Mapping[Mode, str] = {
     Mode.MANUAL: "Manual",
@@ -38,18 +48,9 @@ NAMES: Mapping[Mode, str] = {
     Mode.GUIDED: "Offboard",
 }
 
-# COM_OBL_RC_ACT, 1.15. The modes of 0 to 2 (position, altitude, manual) need sticks; without them
-# the real one falls back to a mode that needs none, here HOLD. A landing rover (4) stands.
-LOST: Mapping[int, Intervention] = {
-    3: Intervention(Mode.RTL),
-    6: Intervention(disarm=True),  # terminate: the real one also stays locked until it restarts
-    7: Intervention(disarm=True),
-}
-LOST_OTHERWISE = Intervention(Mode.HOLD)
-
 
 class Px4Rules:
-    """The idealised PX4 rules; implements ``FlightRules``."""
+    """Implements ``FlightRules``."""
 
     reposition_mode = Mode.HOLD
     sticks_present = False
@@ -62,6 +63,9 @@ class Px4Rules:
         self._failing = False
         self._place: Destination | None = None
         self._cruise: float | None = None  # m/s, from DO_CHANGE_SPEED
+        self._guidance = Px4Guidance(parts.frame, parts.parameters)
+        self._landing = Landing(parts.outbox)
+        self._held_at: Destination | None = None  # where HOLD began; None: set at the next step
 
     def __repr__(self) -> str:
         return f"Px4Rules({self._intended.name}, {self._offboard!r})"
@@ -98,9 +102,9 @@ class Px4Rules:
         return f"Unsupported mode {custom_mode:#010x}"
 
     def mode_refusal(self, wanted: Mode, present: Mode, *, armed: bool, now: float) -> str | None:
-        """Return a refusal for a mode that cannot run now, else None."""
-        del present, armed
-        if self._can_run(wanted, now):
+        """Return a refusal for a mode that cannot run now, if it is armed."""
+        del present
+        if not armed or self._can_run(wanted, now):
             return None
         return f"Switching to {NAMES[wanted]} is currently not available"
 
@@ -124,36 +128,29 @@ class Px4Rules:
         self._failing = False
 
     def enter(self, mode: Mode) -> None:
-        """Begin a mode; keep the last setpoint for a return to OFFBOARD."""
+        """Begin a mode; keep the last setpoint for a return to OFFBOARD.
+
+        HOLD keeps the rover's place at its first step.
+        """
         del mode
-        self._place = self._cruise = None
+        self._place = self._cruise = self._held_at = None
 
     def intervene(
         self, mode: Mode, *, armed: bool, arrived: bool, now: float
     ) -> Intervention | None:
-        """Leave OFFBOARD when the stream is lost, and MISSION at its end.
-
-        When the stream returns, the rover re-enters OFFBOARD and drives on: the failsafe lasts only
-        as long as its cause.
-        """
-        del arrived
+        """React to a lost stream, a finished mission, and a completed return."""
+        if self._has_landed(mode, armed=armed, arrived=arrived, now=now):
+            return Intervention(self._intended, disarm=True, disarm_text="Disarmed by landing")
         if armed and self._mission_is_over(mode):
             self.choose(Mode.HOLD)
             return Intervention(Mode.HOLD)
         if not armed or self._intended is not Mode.GUIDED:
             self._failing = False
             return None
-        lost = self._offboard.silence(now=now) > self._parts.parameters["COM_OF_LOSS_T"]
-        self._failing = lost
-        if lost and mode is Mode.GUIDED:
-            action = LOST.get(int(self._parts.parameters["COM_OBL_RC_ACT"]), LOST_OTHERWISE)
-            what = "disarming" if action.mode is None else f"entering {NAMES[action.mode]}"
-            self._say(f"Failsafe: no offboard signal, {what}")
-            return action
-        if not lost and mode is not Mode.GUIDED:
-            self._say("Failsafe cleared: back to Offboard")
-            return Intervention(Mode.GUIDED)
-        return None
+        was_failing, self._failing = self._failing, self._is_lost(now)
+        if self._failing:
+            return None if was_failing else self._answer_loss()
+        return Intervention(Mode.GUIDED) if mode is not Mode.GUIDED else None
 
     def _mission_is_over(self, mode: Mode) -> bool:
         missions = self._parts.missions
@@ -185,9 +182,11 @@ class Px4Rules:
         self._take(read_px4_global(message, self._parts.origin), mode, now)
 
     def go_to(self, destination: Destination | None, *, now: float) -> None:
-        """Drive to a place in HOLD; None: stay here."""
+        """Drive to a place in HOLD; None: stay at the place of the next step."""
         del now
         self._place = destination
+        if destination is None:
+            self._held_at = None
 
     def change_speed(self, speed: float, mode: Mode) -> bool:
         """Set the speed until the mode changes; 0 or less resets it. Return False if not finite."""
@@ -200,22 +199,31 @@ class Px4Rules:
     def follow_setpoints(self, estimate: Estimate, *, now: float) -> Demand:
         """Return the demand in OFFBOARD."""
         del now
-        return self._offboard.demand(estimate, self._parts.speed_limit())
+        match self._offboard.target:
+            case None:
+                return STOP
+            case Destination(north, east):
+                limit = min(self._offboard.speed or self.cruise_speed, self.cruise_speed)
+                place = Destination(north, east)
+                return self._to(estimate, place, limit, self._acceptance_radius) or STOP
+            case Heading(yaw, speed):
+                return self._guidance.to_course(estimate, yaw, speed)
+            case TurnRate(yaw_rate, speed):
+                return Demand(speed, yaw_rate)
 
     def steer_to(self, estimate: Estimate, place: Destination, speed_limit: float) -> Demand | None:
         """Return the demand in AUTO and RTL; None on arrival."""
-        return steer_to_point(estimate, *place, speed_limit, radius=ARRIVAL_RADIUS)
+        return self._to(estimate, place, speed_limit, self._acceptance_radius)
 
     def hold(self, estimate: Estimate) -> Demand:
-        """Return the demand to the place of DO_REPOSITION; without a place, stop."""
-        if self._place is None:
-            return HOLD
-        speed, radius = self.cruise_speed, ARRIVAL_RADIUS
-        demand = steer_to_point(estimate, *self._place, speed, radius=radius)
-        if demand is None:
-            self._place = None
-            return HOLD
-        return demand
+        """Return the demand to the place of DO_REPOSITION, or back to where HOLD began."""
+        if self._held_at is None:
+            self._held_at = Destination(estimate.north, estimate.east)
+        place = self._place or self._held_at
+        demand = self._to(estimate, place, self.cruise_speed, self._acceptance_radius)
+        if demand is None and self._place is not None:
+            self._held_at, self._place = self._place, None
+        return demand or HOLD
 
     def mission_route(self, home: Destination) -> Route | None:
         """Return the stored mission from its current item, or None."""
@@ -240,3 +248,41 @@ class Px4Rules:
 
     def _say(self, text: str) -> None:
         self._parts.outbox.say(MavSeverity.CRITICAL, text)
+
+    @property
+    def _acceptance_radius(self) -> float:
+        return self._parts.parameters["NAV_ACC_RAD"]
+
+    def _to(
+        self, estimate: Estimate, place: Destination, speed_limit: float, radius: float
+    ) -> Demand | None:
+        return self._guidance.to_place(estimate, *place, speed_limit, radius=radius)
+
+    def _is_lost(self, now: float) -> bool:
+        return self._offboard.silence(now=now) > self._parts.parameters["COM_OF_LOSS_T"]
+
+    def _answer_loss(self) -> Intervention | None:
+        values = self._parts.parameters
+        action = action_on_loss(
+            int(values["COM_OBL_RC_ACT"]), int(values["NAV_RCL_ACT"]), sticks=self.sticks_present
+        )
+        intervention = INTERVENTIONS[action]
+        if intervention is not None:
+            self._say("Failsafe activated")
+        if intervention is not None and intervention.mode is Mode.RTL:
+            self._tell_return()
+        return intervention
+
+    def _tell_return(self) -> None:
+        height = round(self._parts.origin.altitude + RETURNS_OVER)
+        self._parts.outbox.inform(DESTINATION_TEXT)
+        self._parts.outbox.inform(
+            f"RTL: start return at {height} m ({RETURNS_OVER:.0f} m above destination)"
+        )
+
+    def _has_landed(self, mode: Mode, *, armed: bool, arrived: bool, now: float) -> bool:
+        return self._landing.watch(
+            is_there=armed and (mode is Mode.LAND or (mode is Mode.RTL and arrived)),
+            disarm_after=self._parts.parameters["COM_DISARM_LAND"],
+            now=now,
+        )

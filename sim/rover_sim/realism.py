@@ -1,8 +1,7 @@
 """How closely a simulated rover imitates a real one: estimator, boot, links, drive train.
 
 Values only; the parts that read them do the work. The figures come from recordings of real
-autopilots (ArduPilot Rover 4.6.3, PX4 1.17.0, each on its own simulated vehicle). ``EXACT`` is the
-opposite: a rover that knows its position, is ready at once and follows demands exactly.
+autopilots (ArduPilot Rover 4.6.3, PX4 1.17.0, each on its own simulated vehicle).
 """
 
 from dataclasses import dataclass, fields
@@ -10,20 +9,6 @@ from enum import Enum, Flag, auto
 from math import radians
 
 from rover_sim.frames import Frame
-
-
-class Drive(Enum):
-    """How the rover follows the demands of its flight stack."""
-
-    EXACT = "exact"  # the demanded speed, ramped; zero and HOLD stop it
-    REAL = "real"  # overshoot, least speed, rolling on, like the make's controllers
-
-
-class Wire(Enum):
-    """Whether messages are consistent, or have the quirks of the real autopilots."""
-
-    TIDY = "tidy"
-    REAL = "real"  # landed state undefined, pre-arm bit in health only, RC_CHANNELS, and the like
 
 
 class Change(Flag):
@@ -116,9 +101,7 @@ class Realism:
 
     estimator: EstimatorError | None  # None: the estimate is the truth
     boot: BootTimes
-    timing: LinkTiming | None  # None: it answers at once and sends evenly
-    drive: Drive
-    wire: Wire
+    timing: LinkTiming
     stick_speed: float | None = None  # m/s at full throttle, in GUIDED. None: ignored
     tells_origin: bool = True  # GPS_GLOBAL_ORIGIN
 
@@ -135,14 +118,6 @@ NO_BOOT = BootTimes(  # everything but arming is ready at once, and arming as fa
     uses_gps=float("inf"),
 )
 SHORT = 0.05  # of the real times: ArduPilot can be armed after 1.25 s instead of 25 s
-
-EXACT = Realism(
-    estimator=None,
-    boot=NO_BOOT,
-    timing=None,
-    drive=Drive.EXACT,
-    wire=Wire.TIDY,
-)
 
 ARDUPILOT_BOOT = BootTimes(  # recorded, s from the first message
     initialised=1.0,
@@ -191,7 +166,7 @@ PX4_ESTIMATOR = {
         position=Wander(0.003, 1.0),
         yaw=Wander(radians(0.06), 20.0),
         yaw_rate=Wander(radians(0.022), 0.5),
-        drift=Wander(0.012, 40.0),  # 0.01 / 0.03 m over a drive, 0.03 and 0.06 m at most
+        drift=Wander(0.009, 40.0),  # 0.01 / 0.03 m over a drive, 0.03 and 0.06 m at most
     ),
     Gps.METRE: EstimatorError(  # standing 0.037 / 0.064 m/s, 0.08 m; yaw -1.5 to +0.7 deg
         forward_speed=Wander(0.028, 1.3, least=0.0, most=0.016),
@@ -216,14 +191,10 @@ ARDUPILOT_REALISM = Realism(
     estimator=ARDUPILOT_ESTIMATOR[Gps.FINE],
     boot=ARDUPILOT_BOOT.scaled(SHORT),
     timing=ARDUPILOT_TIMING,
-    drive=Drive.REAL,
-    wire=Wire.REAL,
     stick_speed=STICK_SPEEDS[Frame.SKID],
 )
 PX4_REALISM = Realism(
     estimator=PX4_ESTIMATOR[Gps.FINE],
     boot=PX4_BOOT.scaled(SHORT),
     timing=PX4_TIMING,
-    drive=Drive.REAL,
-    wire=Wire.REAL,
 )

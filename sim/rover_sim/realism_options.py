@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rover_sim.body import wrap_angle
 from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.personas import Persona
-from rover_sim.realism import EXACT, NO_BOOT, SHORT, Gps, Realism
+from rover_sim.realism import NO_BOOT, SHORT, Gps, Realism
 from rover_sim.vehicle import Peers
 
 HOME_FIELDS = 4
@@ -40,12 +40,6 @@ def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
         default=Place(DEFAULT_ORIGIN, 0.0),
         help="start position: degrees, metres above sea level, heading in degrees",
     )
-    add(
-        "--noise",
-        choices=("on", "off"),
-        default="on",
-        help="off: no errors and no boot time (default on: as recorded from real autopilots)",
-    )
     receivers = [each.value for each in Gps]
     add(
         "--gps",
@@ -56,8 +50,9 @@ def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--boot",
         choices=("short", "real", "none"),
+        default="short",
         help="boot time until the rover can be armed; real: 23 s for ardupilot (default short, a"
-        " twentieth of it; none with --noise off)",
+        " twentieth of it)",
     )
     add(
         "--origin",
@@ -68,8 +63,7 @@ def add_realism_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--peers",
         choices=[each.value for each in Peers],
-        help="clients to answer: all, or only the first one (default: first for px4 with --noise"
-        " on, else all)",
+        help="clients to answer: all, or only the first one (default: first for px4, else all)",
     )
     add(
         "--sticks",
@@ -96,25 +90,20 @@ def with_home_joined(arguments: Sequence[str]) -> list[str]:
 
 def realism_of(values: argparse.Namespace, persona: Persona) -> Realism:
     """Return the realism that the command line asks for."""
-    noisy = values.noise == "on"
-    realism = persona.realism if noisy else EXACT
     boots = {"short": persona.boot.scaled(SHORT), "real": persona.boot, "none": NO_BOOT}
-    realism = replace(
-        realism,
-        boot=boots[values.boot or ("short" if noisy else "none")],
+    return replace(
+        persona.realism,
+        boot=boots[values.boot],
         tells_origin=values.origin == "told",
+        estimator=persona.estimators[Gps(values.gps)],
     )
-    if noisy:
-        realism = replace(realism, estimator=persona.estimators[Gps(values.gps)])
-    return realism
 
 
 def peers_of(values: argparse.Namespace, persona: Persona) -> Peers:
     """Return which peers the rovers answer."""
     if values.peers is not None:
         return Peers(values.peers)
-    first = persona.answers_first_peer and values.noise == "on"
-    return Peers.FIRST if first else Peers.ALL
+    return Peers.FIRST if persona.answers_first_peer else Peers.ALL
 
 
 def read_place(text: str) -> Place:

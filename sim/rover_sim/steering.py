@@ -16,9 +16,7 @@ from rover_sim.estimate import Estimate
 MAX_YAW_RATE = 1.6  # rad/s
 HEADING_GAIN = 1.2  # 1/s, yaw rate per heading error
 TURN_RADIUS = 1.5  # m, tightest arc while steering to a heading
-BRAKING = 0.9  # m/s²; from 2 m/s to standstill in 2.2 s and 2.2 m
-HOLD_BRAKING = 0.75  # m/s²; HOLD takes 3 s from 2.1 m/s
-COASTING = 0.5  # m/s², disarmed: rolling resistance and geared motors
+BRAKING = 0.9  # m/s², planned towards a point
 PIVOT_ERROR = math.radians(60)  # above it a rover turns on the spot towards a waypoint
 APPROACH_GAIN = 1.0  # 1/s, speed per remaining metre, over the last metre
 LEAST_ARC_SPEED = 0.3  # m/s
@@ -38,13 +36,12 @@ class Demand:
 
     speed: float  # m/s, negative is backwards
     yaw_rate: float  # rad/s, clockwise
-    braking: float = BRAKING  # m/s², limit of the deceleration if the drive is exact
     output: Output = Output.CONTROLLED
 
 
 STOP = Demand(0.0, 0.0)
-HOLD = Demand(0.0, 0.0, HOLD_BRAKING, Output.NEUTRAL)
-COAST = Demand(0.0, 0.0, COASTING, Output.OFF)
+HOLD = Demand(0.0, 0.0, Output.NEUTRAL)
+COAST = Demand(0.0, 0.0, Output.OFF)
 
 
 class SteerToPoint(Protocol):
@@ -62,15 +59,6 @@ def steer_to_heading(estimate: Estimate, yaw: float, speed: float) -> Demand:
     limit = min(MAX_YAW_RATE, abs(estimate.forward_speed) / TURN_RADIUS)
     wanted = HEADING_GAIN * wrap_angle(yaw - estimate.yaw)
     return Demand(speed, max(-limit, min(limit, wanted)))
-
-
-def turn_then_drive(estimate: Estimate, yaw: float, speed: float) -> Demand:
-    """Return the demand to drive towards ``yaw``; turn on the spot first if it is far off."""
-    error = wrap_angle(yaw - estimate.yaw)
-    if speed == 0.0:
-        return STOP
-    yaw_rate = _turn(error)
-    return Demand(0.0 if abs(error) > PIVOT_ERROR else speed * math.cos(error), yaw_rate)
 
 
 def steer_to_point(

@@ -12,6 +12,7 @@ from rover_sim.steering import MAX_YAW_RATE, Demand
 STEERING, THROTTLE = 0, 2  # channels 1 and 3
 COUNT = 8  # channels
 NEUTRAL, REACH = 1500, 500  # µs
+ALL_NEUTRAL = (NEUTRAL,) * COUNT
 DEAD_ZONE = 30  # µs, RCn_DZ
 NO_CHANGE, RELEASED = 65535, 0  # in RC_CHANNELS_OVERRIDE
 OVERRIDE_TIME = 3.0  # s, RC_OVERRIDE_TIME; then the transmitter applies again
@@ -24,7 +25,7 @@ class Sticks:
     def __init__(self, top_speed: float | None) -> None:
         self._top_speed = DEFAULT_TOP_SPEED if top_speed is None else top_speed
         self._adds_speed = top_speed is not None
-        self._held = [NEUTRAL] * COUNT
+        self._held = ALL_NEUTRAL
         self._override: dict[int, int] = {}  # by channel
         self._overridden_at = float("-inf")
         self.is_there = self._adds_speed  # ArduPilot has receiver values even without one
@@ -40,7 +41,9 @@ class Sticks:
     def hold_pulses(self, throttle: int, steering: int) -> None:
         """Hold the transmitter's sticks at these pulses, µs."""
         self.is_there = True
-        self._held[THROTTLE], self._held[STEERING] = throttle, steering
+        held = list(self._held)
+        held[THROTTLE], held[STEERING] = throttle, steering
+        self._held = tuple(held)
 
     def take_override(self, message: messages.RcChannelsOverride, *, now: float) -> None:
         """Override channels, or release them."""
@@ -54,6 +57,8 @@ class Sticks:
 
     def channels(self, *, now: float) -> tuple[int, ...]:
         """Return the pulses of the first eight channels, µs."""
+        if not self._override:
+            return self._held
         if now - self._overridden_at > OVERRIDE_TIME:
             self._override.clear()
         return tuple(self._override.get(n, held) for n, held in enumerate(self._held))
@@ -61,6 +66,8 @@ class Sticks:
     def demand(self, *, now: float) -> Demand | None:
         """Return the sticks' demand in MANUAL; None if they are neutral."""
         channels = self.channels(now=now)
+        if channels == ALL_NEUTRAL:
+            return None
         speed = _part(channels[THROTTLE]) * self._top_speed
         yaw_rate = _part(channels[STEERING]) * MAX_YAW_RATE
         return None if speed == yaw_rate == 0.0 else Demand(speed, yaw_rate)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavLandedState, MavModeFlag, MavType
@@ -16,7 +15,7 @@ from rover_sim.mission_conventions import FENCE, MISSION, RALLY
 from rover_sim.mission_storage import MissionStorage
 from rover_sim.modes import Mode
 from rover_sim.personas import GEOFENCE, Persona
-from rover_sim.realism import Realism, Wire
+from rover_sim.realism import Realism
 from rover_sim.sticks import Sticks
 
 MAVLINK_VERSION = 3
@@ -81,10 +80,9 @@ class Telemetry:
             m.ExtendedSysState.id: self._extended_sys_state,
             m.ProtocolVersion.id: self._protocol_version,
             m.CurrentMode.id: self._current_mode,
+            m.RcChannels.id: self._rc_channels,
+            **dict.fromkeys(persona.accepted_in_silence, _nothing),
         }
-        if realism.wire is Wire.REAL:
-            silent = dict.fromkeys(persona.accepted_in_silence, _nothing)
-            self._builders = {**self._builders, m.RcChannels.id: self._rc_channels, **silent}
 
     def __repr__(self) -> str:
         return f"Telemetry({self._persona.name}, system {self._system_id})"
@@ -120,7 +118,7 @@ class Telemetry:
 
     def _sys_status(self, _estimate: Estimate, boot_ms: int) -> Message:
         present = SENSORS
-        if self._realism.wire is Wire.REAL and self._persona.shows_prearm_in_health_only:
+        if self._persona.shows_prearm_in_health_only:
             present &= ~PREARM
         healthy = present | self._persona.also_healthy | PREARM
         if not self._boot.is_healthy(now=self._time(boot_ms)):
@@ -135,7 +133,7 @@ class Telemetry:
 
     def _extended_sys_state(self, _estimate: Estimate, _boot_ms: int) -> Message:
         armed = self._flight.armed
-        if self._realism.wire is Wire.REAL and self._persona.tells_no_landed_state:
+        if self._persona.tells_no_landed_state:
             return m.ExtendedSysState(0, MavLandedState.UNDEFINED)
         return m.ExtendedSysState(
             0, self._persona.landed_state_armed if armed else MavLandedState.ON_GROUND
@@ -147,7 +145,7 @@ class Telemetry:
 
     def _attitude(self, estimate: Estimate, boot_ms: int) -> Message:
         if not self._boot.has_heading(now=self._time(boot_ms)):
-            estimate = replace(estimate, yaw=0.0)
+            estimate = estimate._replace(yaw=0.0)
         return m.Attitude(
             boot_ms, estimate.roll, estimate.pitch, estimate.yaw, 0.0, 0.0, estimate.yaw_rate
         )
@@ -159,9 +157,7 @@ class Telemetry:
         return m.LocalPositionNed(boot_ms, e.north, e.east, e.down, e.vn, e.ve, 0.0)
 
     def _global_position_int(self, estimate: Estimate, boot_ms: int) -> Message:
-        origin, is_tidy = self._origin, self._realism.wire is Wire.TIDY
-        to_global = origin.to_global if is_tidy else origin.to_global_cut
-        latitude, longitude = to_global(estimate.north, estimate.east)
+        latitude, longitude = self._origin.to_global_cut(estimate.north, estimate.east)
         if not self._boot.has_position(now=self._time(boot_ms)):
             heading = _centidegrees(estimate.yaw)
             return m.GlobalPositionInt(boot_ms, 0, 0, NO_ALTITUDE, 0, 0, 0, 0, heading)

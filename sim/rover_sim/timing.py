@@ -16,7 +16,7 @@ PROMPTNESS = 8
 class Departures:
     """Decides when a message leaves; deterministic for a given seed."""
 
-    def __init__(self, timing: LinkTiming | None, *, seed: int) -> None:
+    def __init__(self, timing: LinkTiming, *, seed: int) -> None:
         self._timing = timing
         self._chance = Random(seed)
         self._held_until = self._last_answer = float("-inf")
@@ -26,8 +26,6 @@ class Departures:
 
     def answer_at(self, *, now: float) -> float:
         """Return when the answer to a present command leaves: never before an earlier answer."""
-        if self._timing is None:
-            return now
         least, most = self._timing.first_answer, self._timing.last_answer
         delay = least + (most - least) * self._chance.random() ** PROMPTNESS
         self._last_answer = max(now + delay, self._last_answer)
@@ -35,7 +33,7 @@ class Departures:
 
     def position_at(self, *, now: float) -> float:
         """Return when a position that is due now leaves."""
-        if self._timing is None or not self._timing.in_pairs:
+        if not self._timing.in_pairs:
             return now
         if now < self._held_until - CONTROL_PERIOD / 2:
             return self._held_until  # not before the delayed position

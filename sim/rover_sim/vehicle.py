@@ -16,7 +16,7 @@ from rover_sim.geo import DEFAULT_ORIGIN, Origin
 from rover_sim.motion import CONTROL_PERIOD
 from rover_sim.motors import LAGS, Motors
 from rover_sim.personas import ARDUPILOT, Persona
-from rover_sim.realism import Drive, Realism
+from rover_sim.realism import Realism
 from rover_sim.signatures import RoverSignatures
 
 PEER_TIMEOUT = 10.0  # s of silence until a peer is dropped
@@ -159,9 +159,7 @@ def make_vehicle(
         seed=seed,
     )
     signatures = None if key is None else RoverSignatures(key, unix_offset=unix_offset)
-    motors = None
-    if kind.drive is Drive.REAL:
-        motors = Motors(wanted=LAGS[persona.frame], body=body.lag)
+    motors = Motors(wanted=LAGS[persona.frame], body=body.lag)
     return Vehicle(
         body=body, autopilot=autopilot, now=now, signatures=signatures, peers=peers, motors=motors
     )

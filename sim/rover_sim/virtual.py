@@ -93,8 +93,9 @@ class RoverParty:
 
     def turn(self, *, now: float) -> None:
         """Receive, run due control steps, and send."""
-        for peer, data in self._link.receive(len(self._link.arrived)):
-            self.vehicle.receive(data, peer, now=now)
+        if self._link.arrived:
+            for peer, data in self._link.receive(len(self._link.arrived)):
+                self.vehicle.receive(data, peer, now=now)
         self.vehicle.handle_deadline(now=now)
         for peer, data in self.vehicle.take_packets():
             self._link.send(peer, data)

@@ -14,8 +14,8 @@ from tests.kit.processes import free_udp_ports, process
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder: Path = tmp_path_factory.mktemp("fleet")
     client, rover = free_udp_ports(2)
-    exact = ("--noise", "off")
-    sim = ("-m", "rover_sim", "--port", str(rover), "--body", "kinematic", "--count", "2", *exact)
+    ready = ("--boot", "none")
+    sim = ("-m", "rover_sim", "--port", str(rover), "--body", "kinematic", "--count", "2", *ready)
     serve = ["-m", "mav_tasks.cli", "serve", "--client", f"udpin:127.0.0.1:{client}", "--no-push"]
     serve += ["--vehicle", f"udpout:127.0.0.1:{rover}", "--store", ":memory:"]
     with (

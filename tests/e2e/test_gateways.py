@@ -26,7 +26,7 @@ class Fleet:
         self.processes: dict[str, Process] = {}
         self.ports: dict[str, int] = {}
         self.truth = folder / "truth.csv"
-        rover = ["--port", str(self.rover_port), "--body", "kinematic", "--noise", "off"]
+        rover = ["--port", str(self.rover_port), "--body", "kinematic", "--boot", "none"]
         opened.enter_context(
             process("-m", "rover_sim", *rover, "--truth", str(self.truth), folder=folder, name="r")
         )

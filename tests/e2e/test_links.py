@@ -184,5 +184,5 @@ def test_a_rover_is_driven_stops_when_its_link_is_cut_and_goes_on_when_it_is_bac
         running.server.wait_for(f"link {between.url} is back")
         wait_for(link, "STATUSTEXT", f"'Task {task_id} done' in STATUSTEXT.text", within=30)
         end = running.truth()[-1]
-        assert end["north"] - start["north"] == pytest.approx(3.0, abs=0.03)
+        assert end["north"] - start["north"] == pytest.approx(3.0, abs=0.1)
         assert ": server was late" not in running.server.text  # as a task that is held for it says

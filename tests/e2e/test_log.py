@@ -42,7 +42,7 @@ def unread(folder: Path) -> Iterator[Stand]:
     command += ["--client", f"udpin:127.0.0.1:{client_port}"]
     command += ["--vehicle", f"udpout:127.0.0.1:{rover_port}"]
     rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", "kinematic"]
-    rover += ["--noise", "off"]  # exact arithmetic
+    rover += ["--boot", "none"]
     with (
         process(*rover, "--truth", str(truth), folder=folder, name="rover") as rover_process,
         output.open("wb") as sink,

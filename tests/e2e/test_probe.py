@@ -34,7 +34,7 @@ def rover(folder: Path, *options: str) -> Iterator[int]:
     """A simulated rover that tells its true poses; gives its port."""
     (port,) = free_udp_ports(1)
     where = ("--port", str(port), "--truth", str(folder / "truth.csv"))
-    arguments = (*where, "--body", "kinematic", "--noise", "off")
+    arguments = (*where, "--body", "kinematic", "--boot", "none")
     with process("-m", "rover_sim", *arguments, *options, folder=folder, name="rover") as it:
         it.wait_for("rover_sim: rover 1")
         yield port

@@ -368,7 +368,8 @@ class FakeClient:
         return min(due, default=None)
 
     def turn(self, *, now: float) -> None:
-        for _, data in self.link.receive(len(self.link.arrived)):
+        arrived = self.link.receive(len(self.link.arrived)) if self.link.arrived else ()
+        for _, data in arrived:
             if self._verifier is not None and not self._is_believed(data):
                 self.disbelieved.append(data)
                 continue

@@ -20,7 +20,6 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import VirtualWorld
 from tests.kit.observer import Observer
@@ -209,9 +208,7 @@ class Fleet(World):
         numbers = sorted(n for at in layout.values() for there in at.values() for n in there)
         assert numbers == list(range(1, len(numbers) + 1)), "World numbers its rovers from 1 on"
         self.rovers = [
-            make_vehicle(
-                kinematic_body(start_of(n)), system_id=n, now=0.0, persona=PROMPT, realism=EXACT
-            )
+            make_vehicle(kinematic_body(start_of(n)), system_id=n, now=0.0, persona=PROMPT, seed=n)
             for n in numbers
         ]
         self.observers = [

@@ -13,7 +13,6 @@ from mav_tasks.probe.probe import Options, Probe
 from rover_sim.body import Body, Pose
 from rover_sim.faults import Faults
 from rover_sim.personas import ARDUPILOT, Mode, Persona
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.world import PX4_HOLD, kinematic_body
@@ -68,7 +67,7 @@ class ProbeWorld(VirtualWorld):
     ) -> None:
         super().__init__(MemoryNet())
         self.start = start
-        self.rover = make_vehicle(body(start), system_id=1, now=0.0, persona=persona, realism=EXACT)
+        self.rover = make_vehicle(body(start), system_id=1, now=0.0, persona=persona)
         if "COM_OBL_RC_ACT" in self.rover.autopilot.parameters:
             # by default a PX4 rover drives home when setpoints stop; some tests restore that
             self.rover.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD

@@ -194,8 +194,8 @@ def stand(
     client_port, rover_port, push_port = free_udp_ports(3)
     truth = folder / "truth.csv"
     rover = ["-m", "rover_sim", "--port", str(rover_port), "--body", body, "--persona", persona]
-    # The process scenarios need exact arithmetic; px4 then answers many peers.
-    rover += ["--noise", "off", "--truth", str(truth), *rover_options]
+    # ready at once; tests talk to the rover beside the server
+    rover += ["--boot", "none", "--peers", "all", "--truth", str(truth), *rover_options]
     serve = ["-m", *module, "serve"]
     serve += ["--client", f"udpin:127.0.0.1:{client_port}{client_options}"]
     serve += ["--push", f"127.0.0.1:{push_port}"]

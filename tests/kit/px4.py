@@ -1,6 +1,5 @@
 """PX4 and generic rovers of the scenarios, and requests of their clients."""
 
-from dataclasses import replace
 from math import nan
 
 from rover_sim.personas import GENERIC, PX4
@@ -17,8 +16,7 @@ MANUAL, HOLD, MISSION, RETURN, OFFBOARD = (
 )
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED, which MAVSDK sets, too
 
-#: they announce each change at once, so that times depend on the server alone
-PROMPT_PX4, PROMPT_GENERIC = (replace(each, announces_changes=True) for each in (PX4, GENERIC))
+PROMPT_PX4, PROMPT_GENERIC = PX4, GENERIC
 
 
 def go_to(world: World, north: float, east: float, *, yaw: float = nan) -> int:

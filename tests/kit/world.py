@@ -1,7 +1,6 @@
 """The virtual world of the scenarios: server, rovers and clients on one net, always observed."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from math import degrees, hypot, nan, radians, remainder
 from pathlib import Path
@@ -25,10 +24,11 @@ from mav_tasks.tasks.task import Task, TaskId
 from rover_sim.autopilot import Autopilot
 from rover_sim.body import Body, BodyState, Pose
 from rover_sim.faults import Faults
+from rover_sim.frames import Frame
 from rover_sim.geo import DEFAULT_ORIGIN
 from rover_sim.kinematic import KinematicBody
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
-from rover_sim.realism import EXACT, Realism
+from rover_sim.realism import Realism
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 from tests.kit.client import ACK, REQUEST, FakeClient, TaskStatus
@@ -51,10 +51,11 @@ HEADER = 10  # bytes
 MEASURED = (30, 32)  # ATTITUDE, LOCAL_POSITION_NED
 REMEMBERED = 10_000  # of MEASURED messages: 20 s of ten rovers
 
-#: announces each change at once, so that a scenario's times depend on the server alone;
-#: test_one_hertz tests changes that are up to a second late
-PROMPT = replace(ARDUPILOT, announces_changes=True)
+PROMPT = ARDUPILOT  # the rover of most scenarios
 
+
+#: a rover that knows its place and heading as real ones do ends within
+OFF, OFF_WAY, OFF_HEADING = 0.1, 0.035, 3.0  # m, share of its way, degrees
 
 SETTINGS_SPEED = 0.5  # m/s, Driving.speed, also of tasks without a speed
 
@@ -76,7 +77,7 @@ def twin_of(
         unix_offset=0.0,
         truth=body.state,
         now=now,
-        realism=EXACT,
+        realism=persona.realism,
         seed=0,
     )
     autopilot.address = Address(number, 1)
@@ -91,6 +92,9 @@ def preset(vehicle: Vehicle, persona: Persona) -> None:
         vehicle.autopilot.parameters["COM_OBL_RC_ACT"] = PX4_HOLD
     if persona.speed_parameter == PX4.speed_parameter:
         vehicle.autopilot.parameters[PX4.speed_parameter] = -1.0  # no limit by the rover
+    if persona.frame is Frame.ACKERMANN and "RO_SPEED_P" in vehicle.autopilot.parameters:
+        vehicle.autopilot.parameters["RO_SPEED_P"] = 0.4  # with the defaults it hardly moves
+        vehicle.autopilot.parameters["RO_SPEED_I"] = 0.5
     if persona.name == ARDUPILOT.name:  # scenarios set the speeds that matter to them
         vehicle.autopilot.parameters["CRUISE_SPEED"] = SETTINGS_SPEED
 
@@ -144,7 +148,7 @@ class World(VirtualWorld):
         keys: tuple[Key, ...] | None = None,
         wall_offset: float | None = None,
         rover_key: Key | None = None,
-        realism: Realism = EXACT,
+        realism: Realism | None = None,
         heading: float = 0.0,
         first_id: int = 1,
         more_links: tuple[str, ...] = (),
@@ -176,7 +180,8 @@ class World(VirtualWorld):
                 persona=persona,
                 unix_offset=wall_offset or 0.0,
                 key=rover_key,
-                realism=realism,  # EXACT: most scenarios were written for exact arithmetic
+                realism=realism,
+                seed=seed + number,
             )
             preset(vehicle, persona)
             link = self.net.link(f"rover{number}")
@@ -612,16 +617,21 @@ def put_home(world: World, north: float, east: float) -> None:
 
 def is_at(world: World, north: float, east: float) -> bool:
     """Return whether the first rover is truly at a place."""
-    return hypot(world.truth.north - north, world.truth.east - east) < 0.03
+    return hypot(world.truth.north - north, world.truth.east - east) < OFF
 
 
 def near_pose(
     actual: tuple[float, float, float],
     wanted: tuple[float, float, float],
     *,
-    metres: float = 0.02,
-    angle: float = 1.0,
+    metres: float | None = None,
+    angle: float = OFF_HEADING,
 ) -> bool:
-    """Return whether two poses (north, east, heading in degrees) agree within tolerance."""
+    """Return whether two poses (north, east, heading in degrees) agree within tolerance.
+
+    ``metres`` None: as far off as a real rover is that has driven there from the origin.
+    """
+    if metres is None:
+        metres = OFF + OFF_WAY * hypot(wanted[0], wanted[1])
     apart = hypot(actual[0] - wanted[0], actual[1] - wanted[1])
     return apart <= metres and abs(remainder(actual[2] - wanted[2], 360)) <= angle

@@ -55,6 +55,7 @@ class Swapped:
         self.got: list[Any] = []  # since then
         self._decoder = common.MAVLink(None)
         self.rover = world.replace_rover(switched_on=world.now - 60.0, persona=persona)
+        self.rover.handle_deadline(now=world.now)  # a mode is lost in the boot, which is over
         self.rover.autopilot.operator_arm(True, now=world.now)
         self.rover.autopilot.operator_mode(mode, now=world.now)
         self.start = self.place()

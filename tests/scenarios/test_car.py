@@ -44,7 +44,7 @@ def make_car(make_world: MakeWorld) -> Drive:
 
 
 def is_at(world: World, north: float, east: float) -> bool:
-    return near_pose(world.pose(), (north, east, 0.0), metres=0.1, angle=180)
+    return near_pose(world.pose(), (north, east, 0.0), angle=180)
 
 
 def test_who_names_a_heading_reads_that_it_is_left_out(make_car: Drive) -> None:

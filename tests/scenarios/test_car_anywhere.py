@@ -14,13 +14,13 @@ from tests.kit.car import Car
 from tests.kit.mission import Item
 from tests.kit.px4 import PROMPT_PX4, go_to
 from tests.kit.volume import tries
-from tests.kit.world import PROMPT, World, at
+from tests.kit.world import OFF_WAY, PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_car import RADIUS, car_profile, each
 from tests.scenarios.test_fence import INCLUSION, box, fenced
 
 HEAD, WAYPOINT, START = 213, 16, 300
-NEAR = {"ardupilot": 0.10, "px4": 0.15}  # m; a PX4 is steered by course, in one try
+NEAR = {"ardupilot": 0.13, "px4": 0.18}  # m; a PX4 is steered by course, in one try
 
 
 def car(make_world: MakeWorld, persona: Persona, *, share: float = 1.0) -> World:
@@ -84,7 +84,7 @@ def test_a_move_that_was_interrupted_ends_where_it_would_have_ended(
     assert turn.task_id == 2
     assert off(world, 8.0, 0.0) > 3.0
     world.until_idle(tasks=2, within=120)
-    assert off(world, 8.0, 0.0) <= NEAR[persona.name]
+    assert off(world, 8.0, 0.0) <= NEAR[persona.name] + 8.0 * OFF_WAY
     assert abs(world.pose()[2]) < 5
 
 

@@ -43,7 +43,7 @@ def test_a_go_to_is_driven_at_the_rovers_speed_within_the_bounds(
     """The simulated rover's WP_SPEED is 5; CRUISE_SPEED 0 is none."""
     world = cruising(make_world, cruise, fastest=fastest)
     goes(world)
-    assert top_speed(world) == pytest.approx(driven, abs=0.05)
+    assert top_speed(world) == pytest.approx(driven, abs=0.15)
 
 
 @for_each("what", ["named", "changed", "at the task server", "of our own"])
@@ -61,4 +61,4 @@ def test_other_tasks_keep_their_speed(make_world: MakeWorld, what: str) -> None:
         case _:
             world.client.move(FAR)
             world.run(0.2)
-    assert top_speed(world) == pytest.approx(0.5, abs=0.05)
+    assert top_speed(world) == pytest.approx(0.5, abs=0.15)

@@ -18,11 +18,11 @@ LOOK = 0.02  # s
 
 
 class Wilful(KinematicBody):
-    """Adds to each speed that it is told, or slows down no quicker than it likes to."""
+    """Its throttle sticks until it is told to stand, or it slows down no quicker than it likes."""
 
     def __init__(self, start: Pose) -> None:
         super().__init__(start=start, slip=0.0, seed=None)
-        self.added = 0.0  # m/s
+        self.stuck = 0.0  # m/s, whatever the autopilot's speed loop does about it; 0: not
         self.brakes = 9.0  # m/s²
         self.told = 0.0
         self.drives = 0.0
@@ -32,7 +32,7 @@ class Wilful(KinematicBody):
         super().drive(self.drives, yaw_rate)
 
     def advance(self, duration: float) -> None:
-        wanted = self.told + copysign(self.added, self.told) * bool(self.told)
+        wanted = self.stuck or self.told if self.told else 0.0
         self.drives = max(wanted, self.drives - self.brakes * duration)
         super().drive(self.drives, 0.0)
         super().advance(duration)
@@ -58,7 +58,7 @@ def test_one_that_is_much_too_fast_is_stopped_and_its_task_held(
     make_world: MakeWorld, speed: float, added: float
 ) -> None:
     world, body = driven(make_world, speed)
-    body.added = added
+    body.stuck = speed + added
     most = 2 * speed + TOO_FAST
     if speed + added < most:
         world.run(4)

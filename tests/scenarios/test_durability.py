@@ -106,11 +106,12 @@ def test_a_blocked_store_does_not_keep_a_driving_rover_from_its_end(
 
 def test_nobody_is_told_of_a_task_that_is_not_durable(world: World, store: LateStore) -> None:
     store.delay = 0.3
+    before = len(world.client.texts())
     world.client.move(1)
     world.run(0.28)
-    assert (world.client.texts()[1:], world.client.statuses()) == ([], [])
+    assert (world.client.texts()[before:], world.client.statuses()) == ([], [])
     world.run(0.1)
-    assert world.client.texts()[1] == "Task 1 queued: move 1 m"
+    assert world.client.texts()[before] == "Task 1 queued: move 1 m"
     assert [s.task_id for s in world.client.statuses()][:1] == [1]
 
 

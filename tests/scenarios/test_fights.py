@@ -84,7 +84,7 @@ class Rolling(KinematicBody):
 
     def drive(self, forward_speed: float, yaw_rate: float) -> None:
         rolls = not self.brakes and self.state.forward_speed > 0.25
-        super().drive(max(0.3, forward_speed) if rolls else forward_speed, yaw_rate)
+        super().drive(max(0.35, forward_speed) if rolls else forward_speed, yaw_rate)
 
 
 def test_a_rover_that_does_not_stop_on_hold_is_told_so_as_long_as_it_moves(

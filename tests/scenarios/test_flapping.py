@@ -84,7 +84,7 @@ def test_a_client_that_is_gone_every_second_second_loses_no_task_and_doubles_non
     world.until_idle(tasks=5)
     assert [each.answer for each in sent] == [(ACCEPTED, number) for number in range(1, 6)]
     assert [task.state for task in world.tasks()] == [S.COMPLETED] * 5
-    assert near_pose(world.pose(), (5 * 0.4, 0.0, 0.0), metres=0.05)
+    assert near_pose(world.pose(), (5 * 0.4, 0.0, 0.0))
     stop = world.client.stop(repeats=repeats)
     world.run(1.1)
     assert stop.result == ACCEPTED
@@ -105,4 +105,4 @@ def test_what_is_reordered_and_doubled_changes_nothing(make_world: MakeWorld, se
         states = [state for state, _ in world.history(number)]
         assert states == [S.STARTING, S.EXECUTING, S.COMPLETED]
     assert world.events(VehicleNoted) == []  # neither restarted, nor taken over
-    assert near_pose(world.pose(), (1.0, 0.5, 90.0), metres=0.08, angle=3.0)
+    assert near_pose(world.pose(), (1.0, 0.5, 90.0), angle=3.0)

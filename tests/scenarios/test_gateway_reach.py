@@ -88,7 +88,7 @@ def test_a_stop_while_the_rover_changes_hands_is_in_force_afterwards(
     third = next(it for it in reach.gateways.values() if it not in known)
     reach.cut(reach.first.name)
     reach.cut(third.name)
-    reach.until(lambda: reach.first.let_go, within=20)
+    assert reach.run_until(lambda: bool(reach.first.let_go), within=20)  # not a moment later
     assert not reach.is_at(reach.other)
     sent = reach.clients[(third if far else reach.first).name].stop()
     reach.until(lambda: reach.is_at(reach.other), within=IN_TRANSIT)

@@ -354,6 +354,7 @@ def test_a_rover_that_was_disarmed_between_two_gateways_waits_for_a_person(tmp_p
     fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
     task = fleet.submit(5.0)
     fleet.drives(task)
+    fleet.until(lambda: fleet.now % 1.0 > 0.9, within=1.1)  # shown before it is met
     fleet.kill(fleet.first.name)
     fleet.operator_arm(False)
     assert fleet.holder() is fleet.other

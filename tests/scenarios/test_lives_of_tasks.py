@@ -43,7 +43,7 @@ RUNNING = frozenset({S.STARTING, S.EXECUTING, S.CANCELLING})
 CANCEL, CLEAR, RELEASE, AGAIN, SKIP = 54010, 54011, 54013, 0, 2
 PATIENCE = 5.0  # s until what can begin has begun
 LOOK = 0.1  # s
-ASKED = 80
+ASKED = 120
 Rank = tuple[bool, float, float, int]
 
 

@@ -274,7 +274,7 @@ def beside_a_twin(where: str, *, is_there: bool) -> tuple[Fleet, Vehicle]:
         twin.autopilot.operator_mode(Mode.GUIDED, now=fleet.now)
     fleet.run(1.5)
     fleet.client.rotate(45, target=(1, 191))
-    fleet.run(6.0)
+    fleet.run(7.0)
     fleet.check()
     return fleet, twin
 

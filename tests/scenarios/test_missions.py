@@ -240,6 +240,7 @@ def test_nothing_more_is_ordered_after_a_stop_or_a_takeover(world: World, what: 
         world.client.stop()
     else:
         world.operator_arm(False)
+        world.run(1.0)  # until its next heartbeat shows it
     world.run(0.05)
     at_stop = world.now
     world.run(3)

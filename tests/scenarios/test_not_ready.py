@@ -42,7 +42,7 @@ def test_tasks_wait_until_it_is_ready_and_are_driven_then(waiting: World) -> Non
     world.fault(Faults())
     world.until_idle(tasks=3)
     assert [task.state for task in world.tasks()] == [S.COMPLETED] * 3
-    assert near_pose(world.pose(), (0.9, 0.0, 0.0), metres=0.05)
+    assert near_pose(world.pose(), (0.9, 0.0, 0.0))
 
 
 @for_each("persona", MAKES)

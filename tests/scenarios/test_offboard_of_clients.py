@@ -1,13 +1,11 @@
 """A client's own OFFBOARD on a PX4 rover, which is entered only while setpoints stream."""
 
-from dataclasses import replace
 from typing import Any
 
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import PX4, Mode, Persona
-from rover_sim.realism import EXACT, Drive
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, setpoint
 from tests.kit.px4 import HOLD, OFFBOARD, PROMPT_GENERIC, PROMPT_PX4, ask_mode
@@ -53,13 +51,10 @@ def test_drives_the_rover_from_when_it_is_asked_for_until_hold(world: World) -> 
     assert world.stands(), "the stream goes on, and is not passed"
 
 
-@for_each("drive", [Drive.EXACT, Drive.REAL])
 @for_each("again", [False, True])
-def test_the_recipe_of_stream_mode_and_arming_drives(
-    make_world: MakeWorld, drive: Drive, *, again: bool
-) -> None:
+def test_the_recipe_of_stream_mode_and_arming_drives(make_world: MakeWorld, *, again: bool) -> None:
     """PX4's example: until it is armed, zeros stand in for the setpoints; its client is told."""
-    world = make_world(persona=PX4, realism=replace(EXACT, drive=drive))
+    world = make_world(persona=PX4)
     world.client.reads_dialect = False
     world.until(lambda: world.client.heard("LOCAL_POSITION_NED"), within=10)
     world.client.stream(northwards(1.0), rate=20)

@@ -9,7 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, HOLD, PAUSE_CONTINUE, set_mode
-from tests.kit.world import World, near_pose
+from tests.kit.world import OFF, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 PAUSES: dict[str, Callable[[World], object]] = {
@@ -46,7 +46,7 @@ def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str
 def test_pausing_an_idle_armed_rover_keeps_what_is_submitted_then(
     make_world: MakeWorld, persona: Persona
 ) -> None:
-    world = make_world(persona=replace(persona, announces_changes=True))
+    world = make_world(persona=persona)
     world.operator_mode(Mode.HOLD)
     world.client.arm()
     world.until(lambda: world.is_armed, within=5)
@@ -113,7 +113,7 @@ def test_the_rover_stands_and_goes_on_only_when_told(make_world: MakeWorld) -> N
     assert world.state(1)[0] is S.PAUSED
     assert world.client.proceed().answer is None
     world.until_idle(tasks=2)
-    assert abs(world.truth.north - 11.0) < 0.04
+    assert abs(world.truth.north - 11.0) < OFF
 
 
 def test_a_script_without_heartbeats_is_no_operator(make_world: MakeWorld) -> None:

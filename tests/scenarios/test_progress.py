@@ -33,7 +33,7 @@ def test_a_go_to_behind_it_is_not_half_done_after_the_turn(world: World) -> None
     for share, left, here in told[:-4]:
         way = hypot(here[0] + 6.0, here[1])
         if share:
-            assert left == pytest.approx(way, abs=0.3), "all of the way, in metres"
+            assert left == pytest.approx(way, abs=0.4), "all of the way, in metres"
         if way > 5.5:
             assert share < 35, "it has only turned"
     half = next(share for share, _, here in told if here[0] < -3.0)

@@ -15,7 +15,7 @@ from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
 from tests.kit.mission import Download, Item, reached
 from tests.kit.restarts import UTC, restart
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import World, at, is_at, near_pose
+from tests.kit.world import OFF, World, at, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 VERSION = 148  # AUTOPILOT_VERSION
@@ -76,7 +76,7 @@ def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, 
     world.until_idle(tasks=2)
     assert proceeded.result == ACCEPTED
     end = {AGAIN: driven + 5.0, REMAINDER: 5.0, SKIP: driven}[how]
-    assert near_pose(world.pose(), (end, 0.0, 90.0), metres=0.04)
+    assert near_pose(world.pose(), (end, 0.0, 90.0))
     assert world.state(1) == ((S.CANCELLED, R.SKIPPED) if how == SKIP else (S.COMPLETED, R.NONE))
 
 
@@ -112,7 +112,7 @@ def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
     world.client.proceed()
     world.until_idle(tasks=2)
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
-    assert near_pose(world.pose(), (2.0, 0.0, 0.0), metres=0.03, angle=1.5)
+    assert near_pose(world.pose(), (2.0, 0.0, 0.0))
 
 
 def test_a_rover_that_restarted_meanwhile_does_not_resume_an_old_line(
@@ -259,7 +259,7 @@ def test_the_remainder_after_an_orderly_end_is_right_within_5_cm(
     began = world.now
     world.server.pump.handle(Shutdown(), now=world.now)
     world.until(lambda: world.server.pump.is_over, within=3.1)
-    assert world.stands()
+    assert abs(world.truth.forward_speed) < 0.1
     assert world.now - began > 1.0  # from 1 m/s it cannot stand sooner
     if is_frame_lost:
         world.rover.autopilot.reboot(now=world.now)
@@ -271,4 +271,4 @@ def test_the_remainder_after_an_orderly_end_is_right_within_5_cm(
         assert release(world, 1, REMAINDER) == (ACCEPTED, 1)
         world.client.proceed()
     world.until_idle(tasks=1)
-    assert world.truth.north == pytest.approx(8.0, abs=0.05)
+    assert world.truth.north == pytest.approx(8.0, abs=OFF)

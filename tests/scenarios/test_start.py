@@ -119,4 +119,6 @@ def test_mode_zero_arm_zeros_motion(world: World) -> None:
     world.until_idle(tasks=1)
     sent = [name for name in world.observer.sent_since(at) if name not in {"511", "512"}]
     order = [name for k, name in enumerate(sent) if k == 0 or sent[k - 1] != name]
-    assert order == ["GUIDED", "zero", "arm", "zero", "move", "zero", "HOLD", "disarm"]
+    assert order[:5] == ["GUIDED", "zero", "arm", "zero", "move"]
+    assert order[-3:] == ["zero", "HOLD", "disarm"]
+    assert set(order[5:-3]) <= {"move", "zero"}  # corrections of its end

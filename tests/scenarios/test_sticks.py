@@ -1,13 +1,11 @@
 """The throttle stick of the rover's own transmitter, held forward while the server drives."""
 
-from dataclasses import replace
 from functools import partial
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
-from rover_sim.realism import EXACT, Drive, Wire
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
 from tests.kit.world import PROMPT, World
@@ -24,9 +22,6 @@ def with_transmitter(make_world: MakeWorld, frame: Frame) -> World:
     world = make_world(
         persona=persona,
         body=partial(body_of, frame),
-        realism=replace(
-            EXACT, drive=Drive.REAL, wire=Wire.REAL, stick_speed=persona.realism.stick_speed
-        ),
     )
     world.run(3.0)
     return world

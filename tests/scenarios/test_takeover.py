@@ -63,7 +63,7 @@ def test_no_more_setpoints_and_task_and_queue_pause(driving: World, way: str) ->
     world = driving
     at = world.now
     WAYS[way](world)
-    world.until_state(1, S.PAUSED, within=0.5)
+    world.until_state(1, S.PAUSED, within=1.2)  # arming shows with the next heartbeat
     world.run(0.1)
     paused_at = world.now
     world.run(5)

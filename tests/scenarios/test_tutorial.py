@@ -17,4 +17,4 @@ def test_the_first_starts_at_once_and_then_the_more_urgent_runs_first(world: Wor
         for task_id in (1, 2, 3)
         for state in (S.STARTING, S.EXECUTING, S.COMPLETED)
     ]
-    assert near_pose(world.pose(), (2.0, 1.5, 90.0), metres=0.04)
+    assert near_pose(world.pose(), (2.0, 1.5, 90.0))

@@ -49,8 +49,9 @@ def test_a_start_delay_counts_from_the_acknowledgement(world: World) -> None:
     assert world.client.statuses(task)[-1].why == (S.SCHEDULED, R.START_TIME)
     world.until_idle(tasks=2)
     assert order_of_start(world) == [later, task]
-    started = next(s for s in world.client.statuses(task) if s.state == S.STARTING)
-    assert started.time_boot_ms / 1000 == pytest.approx(at + 3, abs=0.1)
+    begun = (S.STARTING, S.EXECUTING)
+    started = next(s for s in world.client.statuses(task) if s.state in begun)
+    assert started.time_boot_ms / 1000 == pytest.approx(at + 3, abs=0.3)
 
 
 def test_a_utc_start_is_exact_and_moves_with_the_clock_and_nothing_else_does(world: World) -> None:

@@ -16,14 +16,14 @@ from tests.kit.processes import process, wait_until
 
 IN_README = "python -m rover_sim.check_vehicle udpout:127.0.0.1:14580"
 CHECK = tuple(IN_README.split()[1:3])
-EXACT = ("--noise", "off")  # a rover that is as the checker demands
+READY = ("--boot", "none", "--peers", "all")
 LIMIT = 50.0  # s
 
 
 @contextmanager
 def rover(folder: Path, *options: str) -> Iterator[str]:
     """Run a simulated rover; gives its URL."""
-    arguments = ("-m", "rover_sim", "--port", "0", "--body", "kinematic", *EXACT, *options)
+    arguments = ("-m", "rover_sim", "--port", "0", "--body", "kinematic", *READY, *options)
     with process(*arguments, folder=folder, name="rover") as running:
         found = running.wait_for(r"on udp 127\.0\.0\.1:(\d+)")
         yield f"udpout:127.0.0.1:{found[1]}"

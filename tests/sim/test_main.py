@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 LIMIT = 15.0  # s for anything that a test waits for
 
 
-EXACT = ("--noise", "off")  # unless a test says otherwise: they arm at once
+READY = ("--boot", "none", "--peers", "all")  # unless a test says otherwise
 
 
 def command(*arguments: str) -> list[str]:
@@ -39,7 +39,7 @@ def environment(**extra: str) -> dict[str, str]:
 def simulator(*arguments: str, **extra: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """Run it on a free port; give the process and the port."""
     process = subprocess.Popen(
-        command("--port", "0", *(arguments if "--noise" in arguments else EXACT + arguments)),
+        command("--port", "0", *(arguments if "--boot" in arguments else READY + arguments)),
         env=environment(**extra),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -143,8 +143,8 @@ def test_a_pymavlink_client_arms_drives_and_stops_a_rover(body: str, tmp_path: P
             c.forward(1.0)
         for _ in range(3):
             c.forward(0.0)
-        c.wait("LOCAL_POSITION_NED", lambda p: abs(p.vx) < 0.01)
-        assert abs(now.y - start.y) < 0.05
+        c.wait("LOCAL_POSITION_NED", lambda p: abs(p.vx) < 0.05)  # noise of its estimate
+        assert abs(now.y - start.y) < 0.1
         assert c.ask(176, 1, 4) == 0
         assert c.ask(400, 0) == 0
         process.send_signal(signal.SIGTERM)
@@ -161,7 +161,7 @@ def test_a_pymavlink_client_arms_drives_and_stops_a_rover(body: str, tmp_path: P
 
 
 def test_px4_answers_the_first_that_it_heard_and_nobody_else() -> None:
-    px4 = ("--body", "kinematic", "--persona", "px4", "--noise", "on")
+    px4 = ("--body", "kinematic", "--persona", "px4", "--boot", "short")
     with simulator(*px4) as (_, port), client(port) as first:
         first.wait("HEARTBEAT")
         with client(port) as second:

@@ -122,13 +122,19 @@ def way_out(world: "World") -> Iterator[str]:
     """However a story ends, a person can clear, set HOLD, arm and resume, and a task completes."""
     _quiet(world)
     person = world.client = world.listened(world.add_client("rescuer", system_id=100))
-    for number in range(1, len(world.rovers) + 1):
+
+    def clear(number: int) -> None:
         person.command(CLEAR, 1, target=(number, 191), repeats=(0.0, 1.0, 2.0))
+
+    for number in range(1, len(world.rovers) + 1):
+        clear(number)
     world.run(4)
     for number, rover in enumerate(world.rovers, 1):
         if rover.autopilot.mode is not Mode.HOLD:
             world.person_turns(number, Mode.HOLD)
             world.run(3)
+        clear(number)  # a task whose rover drove on by itself was held, not cancelled
+        world.run(3)
         world.person_arms(number, armed=True)
         world.run(1.2)
         for _ in range(2):

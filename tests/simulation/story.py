@@ -48,7 +48,6 @@ class Cast:
 
     make: str
     frame: Frame
-    is_real: bool  # the rover is as imperfect as a real one
     rovers: int
     habits: tuple[str, ...]  # of the clients, by number; the first's link is the server's first
     on_restart: str
@@ -56,7 +55,7 @@ class Cast:
     preemption_gap: int
 
     def __str__(self) -> str:
-        kind = f"{'real' if self.is_real else 'exact'} {self.make} ({self.frame.value})"
+        kind = f"{self.make} ({self.frame.value})"
         return f"{self.rovers} {kind}, {', '.join(self.habits)}, on_restart={self.on_restart}"
 
 
@@ -94,7 +93,6 @@ class _Teller:
         self._cast = Cast(
             make=(make := random.choice(MAKES)),
             frame=random.choice(FRAMES) if make != "generic" else Frame.SKID,
-            is_real=random.random() < 0.8,
             rovers=random.choice((1, 1, 1, 2, 3)),
             habits=tuple(random.choice(tuple(HABITS)) for _ in range(count)),
             on_restart=random.choice(("pause", "continue")),

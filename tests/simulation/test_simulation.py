@@ -106,7 +106,7 @@ def test_a_story_is_shrunk_to_the_moves_that_matter(monkeypatch: pytest.MonkeyPa
 
 # every rule is able to fail
 
-CAST = Cast("ardupilot", Frame.SKID, False, 1, ("MAVSDK", "script"), "pause", "pause", 0)
+CAST = Cast("ardupilot", Frame.SKID, 1, ("MAVSDK", "script"), "pause", "pause", 0)
 
 
 @pytest.fixture

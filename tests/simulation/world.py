@@ -19,7 +19,6 @@ from mav_tasks.tasks.goal import Drive, Move, Rotate
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import Mode, Persona
-from rover_sim.realism import EXACT
 from tests.kit.bounds import Violation
 from tests.kit.client import ACCEPTED, ACK, SET_MODE, TASK_STATUS, FakeClient, Message, TaskStatus
 from tests.kit.halts import Halts
@@ -92,7 +91,6 @@ class SimulatedWorld(World):
             rovers=cast.rovers,
             persona=persona,
             body=lambda start: kinematic_body(cast.frame, start=start, slip=slip, seed=None),
-            realism=persona.realism if cast.is_real else EXACT,
             more_links=(SECOND_LINK,),
         )
         self.leave(self.client)  # the clients of the story take its place
@@ -102,8 +100,8 @@ class SimulatedWorld(World):
         self.is_away = False  # the server: dead or frozen
         self.disturbed_at = self.started_at = -inf  # the present server: since when it runs
         self.words = WordLog(self.observers[0].ways)
-        rolls = cast.is_real and not cast.frame.turns_on_the_spot
-        stops = invariants.CAR_STOPS_WITHIN if rolls else invariants.STOPS_WITHIN
+        is_car = not cast.frame.turns_on_the_spot
+        stops = invariants.CAR_STOPS_WITHIN if is_car else invariants.STOPS_WITHIN
         pairs = list(zip(self.rovers, self.observers, strict=True))
         self.halts = [Halts(v, o.system_id, stops_within=stops) for v, o in pairs]
         self.stillness = [Stillness(v, o, stops_within=stops) for v, o in pairs]
@@ -126,7 +124,7 @@ class SimulatedWorld(World):
         self.on_death: Callable[[], object] = lambda: None
         for observer in self.observers:
             observer.expects_gaps = observer.batches = observer.expects_late_modes = True
-            observer.brakes_first = not cast.frame.turns_on_the_spot
+            observer.brakes_first = is_car
         self.watched.loses = self._passes_by
         self.watched.on_read = self._server_reads
         self.watched.on_arrival = self._rover_hears

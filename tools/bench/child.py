@@ -54,7 +54,7 @@ def child(
 @contextmanager
 def simulated_rovers(count: int, port: int) -> Iterator[None]:
     """Run kinematic rovers on a UDP port for a ``with`` block."""
-    command = [sys.executable, "-m", "rover_sim", "--body", "kinematic", "--noise", "off"]
+    command = [sys.executable, "-m", "rover_sim", "--body", "kinematic", "--boot", "none"]
     command += ["--count", str(count), "--port", str(port)]
     simulator = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     try:

@@ -120,7 +120,7 @@ class _Server:
         self._log = folder / f"{number}.log"
         self._rovers = range(1 + number * rovers, 1 + (number + 1) * rovers)
         vehicles, port = free_port(), free_port()
-        simulator = [sys.executable, "-m", "rover_sim", "--body", "kinematic", "--noise", "off"]
+        simulator = [sys.executable, "-m", "rover_sim", "--body", "kinematic", "--boot", "none"]
         simulator += ["--count", str(rovers), "--system-id", str(self._rovers[0])]
         command = [sys.executable, "-m", "mav_tasks.cli", "serve", "--config", "", "--no-push"]
         command += ["--client", f"udpin:127.0.0.1:{port}", "--store", store]

@@ -11,7 +11,6 @@ from rover_sim.body import Pose
 from rover_sim.bullet import PHYSICS_RATE, BulletBody
 from rover_sim.errors import MissingExtra
 from rover_sim.motion import CONTROL_PERIOD
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 
 from .table import Row
@@ -72,7 +71,7 @@ def _plain() -> float:
 def _with_mavlink() -> float:
     """Return simulated seconds per second of a whole vehicle, with telemetry and setpoints."""
     body = BulletBody(start=Pose())
-    vehicle = make_vehicle(body, system_id=1, now=0.0, realism=EXACT)
+    vehicle = make_vehicle(body, system_id=1, now=0.0)
     try:
         driver = _Driver(vehicle)
         driver.take_control()

@@ -104,7 +104,8 @@ class Authority:
             mode == self._asked_mode == self._persona.control_mode
             and now - self._asked_at <= BY_CLIENT
         )
-        self._asked_mode = -1
+        if mode == self._asked_mode or not by_us:  # a HOLD of ours may show before it does
+            self._asked_mode = -1
         self._mode_is_ours = (by_us or by_client) and not is_late
         return self._mode_is_ours
 

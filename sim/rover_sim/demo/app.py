@@ -57,7 +57,7 @@ def main() -> int:
             if options.fleet:
                 from rover_sim.demo import fleet  # noqa: PLC0415  # needs more packages
 
-                return _judge(console, fleet.drive(screen, body=body, noise=options.noise))
+                return _judge(console, fleet.drive(screen, body=body))
             party, track = _drive(screen, options, body)
     except (DemoError, MissingExtra, RecordError) as error:
         _say(console, f"demo: {error}")
@@ -73,14 +73,12 @@ def _drive(
         return fast.drive(
             screen,
             body=body,
-            noise=options.noise,
             seed=options.seed,
             record=options.record,
         )
     return real.drive(
         screen,
         body=body,
-        noise=options.noise,
         gui=options.gui,
         seed=options.seed,
         record=options.record,
@@ -116,9 +114,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="mav-tasks demo", description=__doc__.partition("\n")[0])
     add = parser.add_argument
     add("--fast", action="store_true", help="one process, virtual time, no sockets")
-    add(
-        "--noise", choices=("on", "off"), default="on", help="off: no errors of the simulated rover"
-    )
     add("--gui", action="store_true", help="show pybullet's window instead of writing a picture")
     add("--web", action="store_true", help="serve the web page, too, until Ctrl-C")
     add(

@@ -11,7 +11,6 @@ from rover_sim.bullet import BulletBody
 from rover_sim.demo.screen import Screen
 from rover_sim.demo.third_party import Place, ThirdParty
 from rover_sim.kinematic import KinematicBody
-from rover_sim.realism import EXACT
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import RoverParty, VirtualWorld
 
@@ -20,9 +19,7 @@ TRACK_INTERVAL = 0.1  # virtual s
 START = Pose()
 
 
-def drive(
-    screen: Screen, *, body: str, noise: str, seed: int, record: str
-) -> tuple[ThirdParty, list[Place]]:
+def drive(screen: Screen, *, body: str, seed: int, record: str) -> tuple[ThirdParty, list[Place]]:
     """Run server, rover and third party; return the third party and the true track.
 
     ``record`` is the folder for a record of the server's decisions, "" for none.
@@ -30,8 +27,7 @@ def drive(
     settings = Settings()
     recorders = observers(Recording(decisions=record), settings, None, now=0.0)
     net = MemoryNet()
-    realism = EXACT if noise == "off" else None
-    vehicle = make_vehicle(_body(body, seed), system_id=1, now=0.0, realism=realism, seed=seed)
+    vehicle = make_vehicle(_body(body, seed), system_id=1, now=0.0, seed=seed)
     world = VirtualWorld(net)
     member = _Member(net.link("third party"), vehicle, screen)
     rover = RoverParty(vehicle, net.link("rover"))

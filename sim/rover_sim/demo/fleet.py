@@ -30,18 +30,18 @@ LIMIT = 60.0  # s, for each part
 LOOK = 0.1  # s
 
 
-def drive(screen: Screen, *, body: str, noise: str) -> int:
+def drive(screen: Screen, *, body: str) -> int:
     """Show it; return how much went wrong. Raise DemoError if it cannot be run."""
     try:
         with ExitStack() as ends:
-            return _drive(screen, ends, body=body, noise=noise)
+            return _drive(screen, ends, body=body)
     except ModuleNotFoundError as error:
         raise DemoError(f"--fleet needs a PostgreSQL: {error}") from error
     except (OSError, MavTasksError) as error:
         raise DemoError(str(error)) from error
 
 
-def _drive(screen: Screen, ends: ExitStack, *, body: str, noise: str) -> int:
+def _drive(screen: Screen, ends: ExitStack, *, body: str) -> int:
     folder = Path(ends.enter_context(tempfile.TemporaryDirectory(prefix="mav-tasks-demo-")))
     database = ends.enter_context(closing(PostgresServer(installed())))
     database.start()
@@ -49,7 +49,7 @@ def _drive(screen: Screen, ends: ExitStack, *, body: str, noise: str) -> int:
     screen.say(f"PostgreSQL: {url}")
     rover_port, *ports = free_ports(1 + len(GATEWAYS))
     rovers = [sys.executable, "-m", "rover_sim", "--port", str(rover_port), "--body", body]
-    rovers += ["--count", str(ROVERS), "--noise", noise]
+    rovers += ["--count", str(ROVERS)]
     ends.enter_context(process(rovers, folder / "rovers.log"))
     gateways = []
     for name, port in zip(GATEWAYS, ports, strict=True):

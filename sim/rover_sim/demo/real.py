@@ -22,7 +22,7 @@ REFRESH = 0.2  # s
 
 
 def drive(
-    screen: Screen, *, body: str, noise: str, gui: bool, seed: int, record: str, web: bool
+    screen: Screen, *, body: str, gui: bool, seed: int, record: str, web: bool
 ) -> tuple[ThirdParty, list[Place]]:
     """Run server, rover and third party; return the third party and the true track.
 
@@ -32,7 +32,7 @@ def drive(
         truth_file = Path(folder) / "truth.csv"
         rover_port, client_port = free_ports(2)
         rover = [sys.executable, "-m", "rover_sim", "--port", str(rover_port), "--body", body]
-        rover += ["--truth", str(truth_file), "--noise", noise]
+        rover += ["--truth", str(truth_file)]
         rover += ["--seed", str(seed), "--friction-variation", "0.3"] if seed else []
         rover += ["--gui"] if gui else []
         server = [sys.executable, "-m", "mav_tasks.cli", "serve", "--config", ""]

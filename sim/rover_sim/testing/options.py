@@ -9,7 +9,6 @@ from rover_sim.frames import Frame
 from rover_sim.personas import PERSONAS, Persona
 
 BODIES = ("kinematic", "bullet")
-NOISES = ("on", "off")
 MOST_ROVERS = 250  # system ids
 
 
@@ -29,7 +28,6 @@ class RoverOptions:
     seed: int | None = None  # None: from the command line, or from the test's name
     body: str = "kinematic"  # or "bullet": real physics, a third of the speed
     frame: str = ""  # "skid", "differential" or "ackermann"; "": the persona's
-    noise: str = "on"  # realistic; "off": exact, for tests of exact arithmetic
     limit: float = 3600.0  # virtual s, for one wait
     real_limit: float = 60.0  # s, for one wait
 
@@ -43,7 +41,6 @@ class RoverOptions:
         """Raise MarkerError for an invalid value."""
         _one_of("persona", self.persona, tuple(PERSONAS))
         _one_of("body", self.body, BODIES)
-        _one_of("noise", self.noise, NOISES)
         _one_of("frame", self.frame, FRAMES)
         if type(self.count) is not int or not 1 <= self.count <= MOST_ROVERS:
             raise MarkerError(f"count must be 1 to {MOST_ROVERS}, not {self.count!r}")

@@ -57,10 +57,10 @@ def pytest_configure(config: pytest.Config) -> None:
     """Register the marker."""
     config.addinivalue_line(
         "markers",
-        f'{MARKER}(persona="ardupilot", count=1, seed=None, body="kinematic", frame="", noise="on",'
+        f'{MARKER}(persona="ardupilot", count=1, seed=None, body="kinematic", frame="",'
         " limit=3600, real_limit=60): what the fixture rover_world simulates; persona also px4 or"
-        ' generic, body also bullet, noise "off" for exact arithmetic, limits in seconds of'
-        " virtual and of real time",
+        " generic, body also bullet, limits in seconds of virtual"
+        " and of real time",
     )
 
 

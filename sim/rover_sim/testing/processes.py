@@ -85,7 +85,7 @@ class RealTime:
         """Start the rovers; return their URL."""
         options = self._options
         what = ["--body", options.body, "--persona", options.persona]
-        what += ["--noise", options.noise, "--frame", options.make.frame.value]
+        what += ["--frame", options.make.frame.value]
         how = ["--count", str(options.count), "--seed", str(self._seed)]
         rovers = self._start("rover_sim", "--port", "0", *what, *how)
         port = rovers.wait_for(r"on udp 127\.0\.0\.1:(\d+)")[1]

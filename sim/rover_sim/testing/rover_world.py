@@ -21,7 +21,6 @@ from rover_sim.bullet import BulletBody
 from rover_sim.errors import NotInVirtualTime, Stalled
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.manual_control import BodyByHand
-from rover_sim.realism import EXACT
 from rover_sim.testing.lossy import LossyLink, LossyNet, Text
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.simulated_rover import SimulatedRover
@@ -163,7 +162,6 @@ class RoverWorld:
             system_id=number,
             now=0.0,
             persona=persona,
-            realism=EXACT if self.options.noise == "off" else None,
             seed=self.seed + number,
         )
         if "COM_OBL_RC_ACT" in vehicle.autopilot.parameters:

@@ -13,7 +13,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Persona
 from tests.kit.cases import for_each
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.world import MEASURED, PROMPT, World
+from tests.kit.world import MEASURED, OFF, PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
 DAY = 86_400.0  # s
@@ -56,7 +56,7 @@ def test_a_clock_that_overflows_while_it_drives_interrupts_nothing(
     drives(world)
     world.until_state(1, S.COMPLETED, within=30)
     assert {S.HELD, S.PAUSED}.isdisjoint(state for state, _ in world.history(1))
-    assert world.truth.north == pytest.approx(4.0, abs=0.03)
+    assert world.truth.north == pytest.approx(4.0, abs=OFF)
 
 
 @for_each("times", [1, 5])

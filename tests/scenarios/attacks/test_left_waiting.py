@@ -28,7 +28,7 @@ from tests.kit.client import (
 from tests.kit.mission import Item
 from tests.kit.px4 import HOLD as PX4_HOLD
 from tests.kit.px4 import MISSION, PROMPT_PX4, ask_mode
-from tests.kit.world import World, at, put_home
+from tests.kit.world import World, at, near_pose, put_home
 from tests.scenarios.conftest import MakeWorld
 
 WAYPOINT, OPTIONS, START, RETURN, STANDARD_MODE = 16, 54014, 300, 20, 262
@@ -53,11 +53,12 @@ HALTS: dict[str, Callable[[World, FakeClient], object]] = {
 
 
 def stays(world: World, seconds: float) -> bool:
-    """Return whether the rover does not move for so long."""
+    """Return whether the rover stands soon, and then does not move for so long."""
+    world.until(world.stands, within=2)
     before = world.pose()
     for _ in range(int(seconds / 0.2)):
         world.run(0.2)
-        if world.pose() != pytest.approx(before, abs=0.01):
+        if not near_pose(world.pose(), before, metres=0.03):
             return False
     return True
 

@@ -1,14 +1,14 @@
 """The driver of simulated rovers in virtual time: MAVLink bytes in, bytes and true pose out.
 
-``Rig`` is a rover with a client on its link, ``record`` drives it as the recordings of real
-autopilots were driven, and ``VirtualWire`` is a link for check_vehicle on which things go wrong.
+``Rig`` is a rover with a client on its link, and ``VirtualWire`` is a link for check_vehicle on
+which things go wrong.
 """
 
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from math import cos, degrees, hypot, nan, sin
+from math import nan
 from typing import Any, TypeVar
 
 from mav_tasks.mavlink import messages as m
@@ -17,26 +17,21 @@ from mav_tasks.mavlink.codec import Decoder, Encoder
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.mavlink.packet import split_datagram
-from rover_sim.body import BodyState, Pose, wrap_angle
+from rover_sim.body import BodyState, Pose
 from rover_sim.check_vehicle.context import Options
 from rover_sim.check_vehicle.contract import GROUPS, check_vehicle
 from rover_sim.check_vehicle.report import Line, Report
-from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import ARDUPILOT, PX4, Persona
-from rover_sim.realism import EXACT, Drive, Realism
+from rover_sim.realism import NO_BOOT, Realism
 from rover_sim.vehicle import make_vehicle
 
-#: shows each change at once, so that a test need not wait for the next second
-PROMPT = replace(ARDUPILOT, announces_changes=True)
-REAL_DRIVE = replace(EXACT, drive=Drive.REAL)  # an exact estimate: the drive train alone
 CLIENT = Address(250, 191)
 ROVER = Address(1, 1)
 ORIGIN = Pose()
 PEER = "client"
 START = 1000.0  # s
 VELOCITY = 0x0DC7  # type masks: velocity only
-VELOCITY_AND_RATE = 0x05C7
 POSITION = 0x0DF8
 LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED = 1, 7, 8
 MANUAL, HOLD, AUTO, RTL, GUIDED, INITIALISING = 0, 4, 10, 11, 15, 16
@@ -52,23 +47,29 @@ def command_long(command: int, *params: float) -> m.CommandLong:
     return m.CommandLong(1, 1, command, 0, *params, *(0.0,) * (7 - len(params)))
 
 
+def calm(persona: Persona) -> Realism:
+    """Return the realism of a rover that knows its place, is ready at once and answers at once."""
+    timing = replace(persona.realism.timing, first_answer=0.0, last_answer=0.0, in_pairs=False)
+    return replace(persona.realism, estimator=None, timing=timing, boot=NO_BOOT)
+
+
 class Rig:
     """One rover with system id 1, and what its client hears."""
 
     def __init__(
         self,
-        persona: Persona = PROMPT,
+        persona: Persona = ARDUPILOT,
         *,
         start: Pose = ORIGIN,
         slip: float = 0.3,
         wait: float = READY,
-        realism: Realism | None = EXACT,
+        realism_of: Callable[[Persona], Realism] = calm,
         seed: int = 0,
     ) -> None:
-        """``realism``: None for that of its make."""
         self.now = START
         self.speaks_px4 = persona.name != "ardupilot"
         body = kinematic_body(persona.frame, start=start, slip=slip, seed=None)
+        realism = realism_of(persona)
         self.vehicle = make_vehicle(
             body, system_id=1, persona=persona, now=self.now, realism=realism, seed=seed
         )
@@ -189,7 +190,7 @@ class Rig:
 #: one that speaks as PX4 does
 Px4Rig = partial(Rig, PX4)
 #: one as unkind as its make
-RealRig = partial(Rig, realism=None, seed=1, wait=0.0)
+RealRig = partial(Rig, realism_of=lambda persona: persona.realism, seed=1, wait=0.0)
 
 
 def heartbeat() -> m.Heartbeat:
@@ -202,11 +203,10 @@ def local_target(
     frame: int = LOCAL_NED,
     position: tuple[float, float] = (0.0, 0.0),
     velocity: tuple[float, float] = (0.0, 0.0),
-    yaw_rate: float = 0.0,
     target: Address = ROVER,
 ) -> m.SetPositionTargetLocalNed:
     return m.SetPositionTargetLocalNed(
-        0, *target, frame, mask, *position, 0.0, *velocity, 0.0, 0.0, 0.0, 0.0, 0.0, yaw_rate
+        0, *target, frame, mask, *position, 0.0, *velocity, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     )
 
 
@@ -214,102 +214,16 @@ def velocity(north: float, east: float = 0.0) -> m.SetPositionTargetLocalNed:
     return local_target(VELOCITY, velocity=(north, east))
 
 
-def body_velocity(forward: float, yaw_rate: float = 0.0) -> m.SetPositionTargetLocalNed:
-    return local_target(
-        VELOCITY_AND_RATE, frame=BODY_NED, velocity=(forward, 0.0), yaw_rate=yaw_rate
-    )
-
-
-# the manoeuvres of the recordings
-
-LOOK = 0.02  # s between two looks at the truth
-
-
-def driver(persona: Persona, frame: Frame, realism: Realism = REAL_DRIVE) -> Rig:
-    """Return a rover that points north, armed and ready for set-points."""
-    rig = Rig(persona.on(frame), realism=realism)
-    rig.ready_to_drive()
-    return rig
-
-
-ardupilot = partial(driver, PROMPT)
-px4 = partial(driver, PX4)
-
-
-def ahead(rig: Rig, speed: float) -> Message:
-    """Return the setpoint of the recordings: the speed along its heading."""
-    if rig.speaks_px4:
-        yaw = rig.truth.yaw
-        return velocity(speed * cos(yaw), speed * sin(yaw))
-    return body_velocity(speed)
-
-
-@dataclass
-class Run:
-    """What the truth was from the beginning of a manoeuvre, every 0.02 s."""
-
-    times: list[float]
-    states: list[BodyState]
-
-    @property
-    def speeds(self) -> list[float]:
-        return [state.forward_speed for state in self.states]
-
-    @property
-    def peak(self) -> float:
-        return max(self.speeds, key=abs)
-
-    def steady(self, part: float = 0.4) -> float:
-        """Return the mean speed of the last part of the run."""
-        last = self.speeds[-int(part * len(self.speeds)) :]
-        return sum(last) / len(last)
-
-    @property
-    def way(self) -> float:
-        """Return how many metres it drove."""
-        pairs = zip(self.states, self.states[1:], strict=False)
-        return sum(hypot(b.north - a.north, b.east - a.east) for a, b in pairs)
-
-    @property
-    def turned(self) -> float:
-        """Return by how many degrees it turned, clockwise, whole turns counted."""
-        pairs = zip(self.states, self.states[1:], strict=False)
-        return degrees(sum(wrap_angle(b.yaw - a.yaw) for a, b in pairs))
-
-    @property
-    def peak_rate(self) -> float:
-        """Return its fastest turn, deg/s."""
-        return degrees(max((state.yaw_rate for state in self.states), key=abs))
-
-
-def record(rig: Rig, seconds: float, stream: Message | None = None) -> Run:
-    """Let time pass and look at the truth all the while."""
-    run = Run([0.0], [rig.truth])
-    next_send = next_heartbeat = 0.0
-    while run.times[-1] < seconds:
-        if run.times[-1] >= next_heartbeat:
-            rig.send(heartbeat())
-            next_heartbeat += 1.0
-        if stream is not None and run.times[-1] >= next_send - 1e-9:
-            rig.send(stream)
-            next_send += 0.05
-        rig.run(LOOK)
-        run.times.append(run.times[-1] + LOOK)
-        run.states.append(rig.truth)
-    return run
-
-
 # a wire for check_vehicle
 
 Says = Callable[[Message], Iterable[Message]]
 Hears = Callable[[Message], Message | None]
-Packets = Callable[[bytes], Iterable[bytes]]
 
 
 class VirtualWire:
     """Implements check_vehicle's ``Wire``. A rover says, hears and sends what the hooks make of it.
 
-    ``unsafe`` collects each setpoint that could have moved a rover that did not say it was armed.
+    No setpoint may move a rover that does not say that it is armed.
     """
 
     def __init__(
@@ -318,17 +232,15 @@ class VirtualWire:
         *,
         says: Says = lambda message: [message],
         hears: Hears = lambda message: message,
-        packets: Packets = lambda data: [data],
         at: Callable[["VirtualWire"], None] = lambda _: None,
     ) -> None:
         body = kinematic_body(persona.frame, start=Pose(yaw=1.0), slip=0.3, seed=None)
-        self.vehicle = make_vehicle(body, system_id=1, persona=persona, now=START, realism=EXACT)
+        self.vehicle = make_vehicle(body, system_id=1, persona=persona, now=START)
         self.setpoints: list[m.SetPositionTargetLocalNed] = []
-        self.unsafe: list[m.SetPositionTargetLocalNed] = []
         self.asked: list[Message] = []
         self._shown_armed = False
         self._now = START
-        self._says, self._hears, self._packets, self._at = says, hears, packets, at
+        self._says, self._hears, self._at = says, hears, at
         self._inbox: deque[bytes] = deque()
         self._decoder, self._encoder = Decoder(), Encoder(ROVER)
 
@@ -363,14 +275,13 @@ class VirtualWire:
             for said in self._says(message):
                 if isinstance(said, m.Heartbeat):
                     self._shown_armed = bool(said.base_mode & ARMED)
-                self._inbox.extend(self._packets(self._encoder.encode(said)))
+                self._inbox.append(self._encoder.encode(said))
 
     def _watch(self, message: m.SetPositionTargetLocalNed) -> None:
         self.setpoints.append(message)
-        moves = (message.vx, message.vy, message.yaw_rate) != (0.0, 0.0, 0.0)
-        moves = moves or not message.type_mask & 0x0007  # position ignored
-        if moves and not self._shown_armed:
-            self.unsafe.append(message)
+        is_zero = (message.vx, message.vy, message.yaw_rate) == (0.0, 0.0, 0.0)
+        ignores_position = message.type_mask & 0x0007
+        assert self._shown_armed or (is_zero and ignores_position), "moves a disarmed rover"
 
 
 def run(wire: VirtualWire, options: Options, groups: tuple[str, ...] = GROUPS) -> Report:
@@ -378,5 +289,4 @@ def run(wire: VirtualWire, options: Options, groups: tuple[str, ...] = GROUPS) -
     lines: list[Line] = []
     report = check_vehicle(wire, options, system_id=None, show=lines.append, groups=groups)
     assert lines == report.lines
-    assert wire.unsafe == []
     return report

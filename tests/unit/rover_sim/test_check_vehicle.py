@@ -5,8 +5,7 @@ In virtual time over the whole contract, with everything that it may do to a rov
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from itertools import count
+from dataclasses import dataclass
 
 import pytest
 
@@ -16,7 +15,7 @@ from rover_sim.check_vehicle.context import Options
 from rover_sim.check_vehicle.report import Outcome
 from rover_sim.faults import Faults
 from rover_sim.modes import Mode
-from rover_sim.personas import ARDUPILOT, PERSONAS, PX4, Persona
+from rover_sim.personas import ARDUPILOT, PERSONAS, PX4
 from tests.unit.rover_sim.rig import VirtualWire, run
 
 ALL = Options(arm=True, drive=True, write=True)
@@ -64,9 +63,6 @@ class Fault:
     lines: frozenset[str]
     says: Callable[[Message], Iterable[Message]] = lambda message: [message]
     hears: Callable[[Message], Message | None] = lambda message: message
-    packets: Callable[[], Callable[[bytes], Iterable[bytes]]] = lambda: lambda data: [data]
-    persona: Persona = ARDUPILOT
-    faults: Faults = Faults()  # noqa: RUF009 - frozen
     options: Options = NOTHING
 
 
@@ -90,20 +86,9 @@ def twice(message: Message) -> list[Message]:
     return [message, message] if isinstance(message, m.CommandAck) else [message]
 
 
-def every_tenth_lost() -> Callable[[bytes], Iterable[bytes]]:
-    numbers = count(1)
-    return lambda data: [] if next(numbers) % 10 == 0 else [data]
-
-
 def takes_commands_of_others(message: Message) -> Message:
     if isinstance(message, m.CommandLong):
         message.target_system = 1
-    return message
-
-
-def streams_each_second_only(message: Message) -> Message:
-    if isinstance(message, m.CommandLong) and message.command == SET_MESSAGE_INTERVAL:
-        message.param2 = 1e6
     return message
 
 
@@ -119,7 +104,6 @@ def a_parameter_missing(message: Message) -> list[Message]:
 IDENTITY, TELEMETRY, COMMANDS = ("identity",), ("identity", "telemetry"), ("identity", "commands")
 PARAMETERS, PLANS, MODES = ("parameters",), ("identity", "plans"), ("modes",)
 FAULTS: dict[str, Fault] = {
-    "a copter": Fault(IDENTITY, frozenset({"type"}), says=with_fields(m.Heartbeat, type=2)),
     "silence instead of a refusal": Fault(
         COMMANDS,
         frozenset(
@@ -127,7 +111,6 @@ FAULTS: dict[str, Fault] = {
                 "PROTOCOL_VERSION on request",
                 "COMPONENT_METADATA on request",
                 "COMPONENT_INFORMATION on request",
-                "GIMBAL_MANAGER_INFORMATION on request",
                 "an unknown message",
                 "an unknown command",
                 "an unknown COMMAND_INT",
@@ -140,54 +123,18 @@ FAULTS: dict[str, Fault] = {
     "obeys what is for others": Fault(
         COMMANDS, frozenset({"a command for another system"}), hears=takes_commands_of_others
     ),
-    "a message withheld": Fault(
-        TELEMETRY, frozenset({"HOME_POSITION"}), faults=Faults(withheld=frozenset({242}))
-    ),
     "degrees for radians": Fault(
         TELEMETRY,
         frozenset({"ATTITUDE", "one heading"}),
         says=with_fields(m.Attitude, yaw=math.degrees),
     ),
-    "boot times in seconds": Fault(
-        TELEMETRY,
-        frozenset({"boot times"}),
-        says=lambda message: with_fields(type(message), time_boot_ms=lambda t: t // 1000)(message)
-        if hasattr(message, "time_boot_ms")
-        else [message],
-    ),
-    "one rate for all": Fault(
-        ("rates",),
-        frozenset({"ATTITUDE at 5 Hz", "ATTITUDE at 20 Hz", "GET_MESSAGE_INTERVAL"}),
-        hears=streams_each_second_only,
-    ),
     "a parameter that never comes": Fault(
         PARAMETERS, frozenset({"indices"}), says=a_parameter_missing
-    ),
-    "a parameter that QGroundControl needs": Fault(
-        PARAMETERS,
-        frozenset({"parameters for QGroundControl"}),
-        persona=replace(
-            ARDUPILOT,
-            parameters=tuple(e for e in ARDUPILOT.parameters if e.name != "FRAME_CLASS"),
-        ),
-    ),
-    "other items than were uploaded": Fault(
-        PLANS,
-        frozenset({"mission: comes back"}),
-        says=with_fields(m.MissionItemInt, command=lambda number: 17 if number == 16 else number),
-        persona=PX4,
-        options=Options(write=True),
     ),
     "a mode that is not shown": Fault(
         MODES,
         frozenset({"enter HOLD", "enter the control mode", "SET_MODE message"}),
         says=with_fields(m.Heartbeat, custom_mode=0),
-    ),
-    "arming refused": Fault(
-        ("arming",),
-        frozenset({"arm"}),
-        faults=Faults(refuse_arm=True),
-        options=Options(arm=True),
     ),
     "no frame of its own": Fault(
         ("driving",),
@@ -195,17 +142,12 @@ FAULTS: dict[str, Fault] = {
         hears=no_body_frame,
         options=ALL,
     ),
-    "packets lost": Fault(
-        ("identity", "packets"), frozenset({"sequence numbers"}), packets=every_tenth_lost
-    ),
 }  # fmt: skip
 
 
 def test_what_is_wrong_is_named_and_nothing_else() -> None:
     for name, fault in FAULTS.items():
-        packets = fault.packets()
-        wire = VirtualWire(fault.persona, says=fault.says, hears=fault.hears, packets=packets)
-        wire.vehicle.autopilot.set_faults(fault.faults)
+        wire = VirtualWire(ARDUPILOT, says=fault.says, hears=fault.hears)
         report = run(wire, fault.options, fault.groups)
         assert {line.name for line in report.failed} == fault.lines, name
         for line in report.failed:
@@ -227,24 +169,19 @@ def while_driving(do: Callable[[VirtualWire], None]) -> Callable[[VirtualWire], 
     return at
 
 
-def interrupt(_wire: VirtualWire) -> None:
-    raise KeyboardInterrupt
-
-
 def break_down(_wire: VirtualWire) -> None:
     raise RuntimeError("a fault of our own")
 
 
 def test_it_ends_with_zeros_hold_and_disarmed() -> None:
     for name in PERSONAS:
-        for accident, error in [(interrupt, KeyboardInterrupt), (break_down, RuntimeError)]:
-            wire = VirtualWire(PERSONAS[name], at=while_driving(accident))
-            with pytest.raises(error):
-                run(wire, ALL, ("driving",))
-            last = wire.setpoints[-1]
-            assert (last.vx, last.vy, last.yaw_rate) == (0.0, 0.0, 0.0)
-            assert wire.vehicle.autopilot.mode is Mode.HOLD
-            assert not wire.vehicle.autopilot.armed
+        wire = VirtualWire(PERSONAS[name], at=while_driving(break_down))
+        with pytest.raises(RuntimeError):
+            run(wire, ALL, ("driving",))
+        last = wire.setpoints[-1]
+        assert (last.vx, last.vy, last.yaw_rate) == (0.0, 0.0, 0.0)
+        assert wire.vehicle.autopilot.mode is Mode.HOLD
+        assert not wire.vehicle.autopilot.armed
 
 
 def test_a_rover_that_somebody_else_takes_gets_no_other_motion() -> None:
@@ -273,27 +210,18 @@ def test_it_does_not_drive_blind() -> None:
 # -- what genuine ones do, and what is no fault
 
 
-def tells_of_a_change(name: str, kind: int) -> Callable[[Message], list[Message]]:
+def tells_of_a_change(message: Message) -> list[Message]:
     """A PARAM_VALUE without an index, as a genuine one sends unasked, before each of the list."""
-
-    def change(message: Message) -> list[Message]:
-        if not isinstance(message, m.ParamValue) or message.param_index == 65535:
-            return [message]
-        unasked = m.ParamValue(name.encode(), 0.0, kind, message.param_count, 65535)
-        return [unasked, message]
-
-    return change
-
-
-GENUINE = {
-    "an ArduPilot's landed_state": (ARDUPILOT, with_fields(m.ExtendedSysState, landed_state=0)),
-    "an ArduPilot that tells of a parameter": (ARDUPILOT, tells_of_a_change("STAT_RUNTIME", 6)),
-    "a PX4's airspeed, of which it has none": (PX4, with_fields(m.VfrHud, airspeed=math.nan)),
-    "a PX4's _HASH_CHECK in its list": (PX4, tells_of_a_change("_HASH_CHECK", 5)),
-}
+    if not isinstance(message, m.ParamValue) or message.param_index == 65535:
+        return [message]
+    return [m.ParamValue(b"_HASH_CHECK", 0.0, 5, message.param_count, 65535), message]
 
 
 def test_what_genuine_ones_do_is_no_fault() -> None:
-    for persona, says in GENUINE.values():
+    for persona, says in [
+        (ARDUPILOT, with_fields(m.ExtendedSysState, landed_state=0)),
+        (PX4, with_fields(m.VfrHud, airspeed=math.nan)),  # it has no sensor of it
+        (PX4, tells_of_a_change),
+    ]:
         report = run(VirtualWire(persona, says=says), NOTHING)
         assert [str(line) for line in report.failed] == []

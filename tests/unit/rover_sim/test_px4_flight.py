@@ -7,8 +7,9 @@ import pytest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from rover_sim.body import Pose
+from rover_sim.frames import Frame
 from rover_sim.geo import DEFAULT_ORIGIN
-from rover_sim.personas import Mode
+from rover_sim.personas import PX4, Mode
 from tests.unit.rover_sim.rig import (
     PX4_HOLD,
     PX4_OFFBOARD,
@@ -31,10 +32,6 @@ def pause(rig: Rig) -> MavResult:
     return rig.command(MavCmd.DO_REPOSITION, -1, 1, 0, *[math.nan] * 4)
 
 
-def distance_from(rig: Rig, north: float, east: float) -> float:
-    return math.dist((north, east), (rig.truth.north, rig.truth.east))
-
-
 def test_offboard_needs_a_stream() -> None:
     for rate, seconds, result in [
         (20.0, 0.3, MavResult.ACCEPTED),
@@ -48,38 +45,18 @@ def test_offboard_needs_a_stream() -> None:
         assert rig.set_mode(PX4_OFFBOARD) == result
 
 
-def driving(action: int, *, timeout: float = 1.0) -> Rig:
-    """Driving at 1 m/s in OFFBOARD, with that action for a lost stream."""
+def driving() -> Rig:
+    """Driving at 1 m/s in OFFBOARD; it holds when the stream is lost."""
     rig = Px4Rig()
-    rig.autopilot.parameters["COM_OBL_RC_ACT"] = action
-    rig.autopilot.parameters["COM_OF_LOSS_T"] = timeout
+    rig.autopilot.parameters["COM_OBL_RC_ACT"] = 5
     rig.ready_to_drive()
     rig.run(3.0, velocity(1.0))
     assert rig.truth.forward_speed == pytest.approx(1.0, abs=0.02)
     return rig
 
 
-def test_a_lost_stream_acts_by_the_parameter() -> None:
-    for action, mode, armed in [
-        (0, PX4_HOLD, True),  # position, altitude and manual need sticks
-        (1, PX4_HOLD, True),
-        (2, PX4_HOLD, True),
-        (3, PX4_RTL, True),
-        (4, PX4_HOLD, True),
-        (5, PX4_HOLD, True),
-        (6, PX4_OFFBOARD, False),
-        (7, PX4_OFFBOARD, False),
-    ]:
-        rig = driving(action)
-        rig.run(0.9)
-        assert (rig.mode(), rig.autopilot.armed) == (PX4_OFFBOARD, True)
-        rig.run(0.2)
-        assert (rig.mode(), rig.autopilot.armed) == (mode, armed)
-        assert rig.texts()[-1 if armed else -2].startswith("Failsafe: no offboard signal, ")
-
-
 def test_a_stream_that_returns_brings_offboard_back_unasked() -> None:
-    rig = driving(5)
+    rig = driving()
     rig.run(3.0)
     assert rig.mode() == PX4_HOLD
     rig.run(2.0, velocity(1.0))
@@ -90,7 +67,7 @@ def test_a_stream_that_returns_brings_offboard_back_unasked() -> None:
 
 def test_but_not_after_somebody_had_another_wish() -> None:
     for how in ["asked for hold", "disarmed", "the operator's switch"]:
-        rig = driving(5)
+        rig = driving()
         rig.run(3.0)
         match how:
             case "asked for hold":
@@ -114,7 +91,7 @@ def test_reposition_drives_there_in_hold_from_any_mode() -> None:
     shown = rig.last(m.PositionTargetGlobalInt)
     assert (shown.lat_int, shown.lon_int) == pytest.approx((x, y), abs=1)
     rig.run(12.0)
-    assert distance_from(rig, 4.0, 2.0) < 0.4
+    assert (rig.truth.north, rig.truth.east) == pytest.approx((4.0, 2.0), abs=0.5)
     assert rig.truth.forward_speed == 0.0
     assert rig.take(m.MissionItemReached) == []
 
@@ -132,18 +109,68 @@ def test_hold_asked_for_again_does_not_stop_it_but_a_pause_does() -> None:
     assert rig.truth.forward_speed == 0.0
 
 
-def test_rtl_drives_to_where_it_was_armed() -> None:
-    rig = Px4Rig(start=Pose(north=5.0, east=-3.0))
+# as it was recorded and tried
+
+
+def test_zero_velocity_turns_a_differential_rover_to_north_or_south() -> None:
+    for heading, zeros, course in [
+        (90, velocity(0.0, 0.0), 0),
+        (-180, velocity(0.0, 0.0), 0),
+        (90, velocity(-0.0, 0.0), 180),  # 0.0 * cos of a heading beyond 90 degrees
+        (-90, velocity(-0.0, -0.0), 180),
+    ]:
+        yaw = math.radians(heading)
+        rig = Rig(PX4.on(Frame.DIFFERENTIAL), start=Pose(yaw=yaw))
+        assert rig.arm() == MavResult.ACCEPTED
+        rig.run(1.0, velocity(1e-3 * math.cos(yaw), 1e-3 * math.sin(yaw)))  # as it points
+        assert rig.set_mode(PX4_OFFBOARD) == MavResult.ACCEPTED
+        rig.run(4.0, zeros)
+        assert abs(math.cos(rig.truth.yaw) - math.cos(math.radians(course))) < 1e-3
+        assert math.hypot(rig.truth.north, rig.truth.east) < 0.001
+
+
+def lost() -> Rig:
+    """Return a rover that has been driven away from where it was armed; its setpoints end."""
+    rig = Rig(PX4.on(Frame.DIFFERENTIAL))
     rig.ready_to_drive()
-    rig.run(6.0, velocity(1.0, 1.0))
-    rig.set_mode(PX4_HOLD)
-    rig.run(3.0)
-    rig.command(MavCmd.COMPONENT_ARM_DISARM, 0)
-    there = rig.truth
-    rig.ready_to_drive()
-    rig.run(6.0, velocity(1.0, 0.0))
-    rig.set_mode(PX4_RTL)
+    rig.run(15.0, velocity(1.0))
+    rig.take(m.Statustext)
+    return rig
+
+
+def test_by_default_lost_setpoints_are_a_drive_home_where_it_disarms_itself() -> None:
+    rig = lost()
+    rig.run(1.1)
+    assert rig.mode() == PX4_RTL
+    rig.run(5.0)
+    assert rig.truth.forward_speed == pytest.approx(1.8, abs=0.05)
     rig.run(20.0)
-    assert distance_from(rig, there.north, there.east) < 0.4
-    home = rig.last(m.HomePosition)
-    assert (home.x, home.y) == pytest.approx((there.north, there.east), abs=0.01)
+    assert (rig.truth.north, rig.truth.east) == pytest.approx((0.0, 0.0), abs=0.6)
+    assert rig.texts() == [
+        "Failsafe activated",
+        "RTL: land at destination",
+        "RTL: start return at 644 m (60 m above destination",
+        ")",
+        "Landing detected",
+        "Disarmed by landing",
+    ]
+    assert (rig.mode(), rig.autopilot.armed) == (PX4_OFFBOARD, False)
+
+
+def test_parameters_choose_what_a_lost_stream_is_answered_with() -> None:
+    for offboard_loss, stick_loss, mode, armed in [
+        (5, 2, Mode.HOLD, True),
+        (3, 1, Mode.RTL, True),
+        (4, 2, Mode.LAND, True),
+        (6, 2, Mode.GUIDED, False),
+        (7, 2, Mode.GUIDED, False),
+        (0, 1, Mode.HOLD, True),
+        (1, 3, Mode.LAND, True),
+        (2, 6, Mode.GUIDED, False),
+        (0, 0, Mode.GUIDED, True),  # no action: it drives on
+    ]:
+        rig = lost()
+        rig.autopilot.parameters["COM_OBL_RC_ACT"] = offboard_loss
+        rig.autopilot.parameters["NAV_RCL_ACT"] = stick_loss
+        rig.run(1.3)
+        assert (rig.autopilot.mode, rig.autopilot.armed) == (mode, armed)

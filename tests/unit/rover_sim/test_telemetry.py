@@ -2,64 +2,46 @@
 
 from collections import Counter
 
-import pytest
-
 from mav_tasks.mavlink import messages as m
-from rover_sim.faults import Faults
-from tests.unit.rover_sim.rig import GUIDED, Rig, body_velocity
+from mav_tasks.mavlink.messages import Message
+from rover_sim.personas import ARDUPILOT, PERSONAS
+from tests.unit.rover_sim.rig import RealRig, Rig
 
-STREAMED = {
-    m.Heartbeat,
-    m.SysStatus,
-    m.ExtendedSysState,
-    m.HomePosition,
-    m.Attitude,
-    m.LocalPositionNed,
-    m.GlobalPositionInt,
-    m.GpsRawInt,
-    m.VfrHud,
-    m.BatteryStatus,
-    m.SystemTime,
-    m.MissionCurrent,
+ONCE = (m.Heartbeat, m.SystemTime, m.MissionCurrent)
+#: messages a second, by what sends them unasked
+RATES: dict[str, dict[type[Message], float]] = {
+    "ardupilot": {
+        **dict.fromkeys(ONCE, 1),
+        **dict.fromkeys((m.SysStatus, m.ExtendedSysState, m.HomePosition, m.Attitude), 1),
+        **dict.fromkeys((m.LocalPositionNed, m.GlobalPositionInt, m.GpsRawInt, m.VfrHud), 1),
+        **dict.fromkeys((m.BatteryStatus, m.RcChannels), 1),
+    },
+    "px4": {
+        **dict.fromkeys(ONCE, 1),
+        **dict.fromkeys((m.HomePosition, m.BatteryStatus, m.CurrentMode), 0.5),
+        **dict.fromkeys((m.GpsRawInt, m.SysStatus, m.ExtendedSysState), 5),
+        **dict.fromkeys((m.GlobalPositionInt, m.VfrHud), 10),
+        m.LocalPositionNed: 20,
+        m.Attitude: 40,
+    },
 }
 
 
-def test_everything_streams_at_1_hz_unasked() -> None:
-    rig = Rig(wait=2.01)
-    rig.heard.clear()
-    rig.run(5.0)
-    assert Counter(type(message) for message in rig.heard) == dict.fromkeys(STREAMED, 5)
+def test_what_each_make_streams_unasked() -> None:
+    for name, rates in RATES.items():
+        rig = Rig(PERSONAS[name], wait=2.01)
+        rig.heard.clear()
+        rig.run(4.0)
+        counts = Counter(type(message) for message in rig.heard)
+        assert counts == {kind: rate * 4 for kind, rate in rates.items()}
 
 
-def test_faults_of_the_estimate_show_in_position_only() -> None:
-    rig = Rig()
-    rig.ready_to_drive()
-    rig.run(2.0, body_velocity(1.0))
-    rig.autopilot.set_faults(Faults(position_frozen=True))
-    rig.run(1.1, body_velocity(1.0, yaw_rate=0.3))
-    frozen = rig.last(m.LocalPositionNed)
-    rig.run(2.0, body_velocity(1.0, yaw_rate=0.3))
-    after = rig.last(m.LocalPositionNed)
-    assert (after.x, after.y, after.vx) == (frozen.x, frozen.y, frozen.vx)
-    assert after.time_boot_ms > frozen.time_boot_ms
-    assert rig.last(m.Attitude).yawspeed == pytest.approx(0.3, abs=0.02)
-    rig.autopilot.set_faults(Faults(position_jump=(10.0, -5.0)))
-    rig.run(1.1)
-    jumped = rig.last(m.LocalPositionNed)
-    assert jumped.x == pytest.approx(rig.truth.north + 10.0, abs=1.5)
-
-
-def test_telemetry_can_be_withheld_or_silenced_altogether() -> None:
-    rig = Rig()
-    rig.autopilot.set_faults(Faults(withheld=frozenset({m.BatteryStatus.id})))
-    rig.heard.clear()
-    rig.run(2.0)
-    assert rig.heard
-    assert rig.take(m.BatteryStatus) == []
-    rig.autopilot.set_faults(Faults(silent=True))
-    rig.send(m.CommandLong(1, 1, 176, 0, 1, GUIDED, 0, 0, 0, 0, 0))
-    rig.run(2.0)
-    assert rig.heard == []
-    rig.autopilot.set_faults(Faults())
-    rig.run(1.1)
-    assert rig.last(m.Heartbeat).custom_mode == GUIDED  # it had heard, and obeyed
+def test_ardupilot_sends_a_parameter_unasked_that_has_no_number() -> None:
+    rig = RealRig(ARDUPILOT)
+    rig.run(61.0)
+    values = [(v.param_id, v.param_value, v.param_index) for v in rig.take(m.ParamValue)]
+    assert values == [("STAT_RUNTIME", seconds, 65535) for seconds in (30.0, 60.0)]
+    rig.send(m.ParamRequestList(1, 1))
+    listed = rig.take(m.ParamValue)
+    assert [v.param_index for v in listed] == list(range(listed[0].param_count))
+    assert listed[-1].param_id == "STAT_RUNTIME"

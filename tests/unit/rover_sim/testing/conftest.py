@@ -18,7 +18,6 @@ def make_world() -> Iterator[MakeWorld]:
     worlds: list[RoverWorld] = []
 
     def make(*, seed: int = 1, settings: Settings | None = None, **options: Any) -> RoverWorld:
-        options = {"noise": "off", **options}  # these tests were written for exact arithmetic
         world = RoverWorld(RoverOptions(**options), seed=seed, settings=settings or Settings())
         worlds.append(world)
         return world

@@ -14,7 +14,7 @@ assert rover_sim.testing.rover_world
 
 pytest_plugins = ["pytester"]
 
-TAKES = "takes persona=, count=, seed=, body=, frame=, noise=, limit=, real_limit=, by name only"
+TAKES = "takes persona=, count=, seed=, body=, frame=, limit=, real_limit=, by name only"
 PLUGIN = ("-p", "rover_sim.testing.plugin")
 
 
@@ -40,7 +40,6 @@ def test_the_example_passes_in_a_process_of_its_own(pytester: pytest.Pytester) -
 
 def test_the_example_is_able_to_fail(pytester: pytest.Pytester) -> None:
     broken = EXAMPLE.replace("(2.0, abs", "(3.0, abs").replace("rover.block_wheels()", "pass")
-    broken += '\npytestmark = pytest.mark.simulated_rover(noise="off")\n'  # exact: never stuck
     result = run(pytester, broken)
     result.assert_outcomes(failed=2)
     result.stdout.fnmatch_lines(
@@ -97,7 +96,6 @@ def test_the_marker_says_what_is_simulated(pytester: pytest.Pytester) -> None:
 def test_what_there_is_not_is_said_in_one_line(pytester: pytest.Pytester) -> None:
     for arguments, said in [
         ('persona="arduplane"', "persona must be one of ardupilot, px4, generic, not 'arduplane'"),
-        ('noise="loud"', "noise must be one of on, off, not 'loud'"),
         ('body="lego"', "body must be one of kinematic, bullet, not 'lego'"),
         ("count=0", "count must be 1 to 250, not 0"),
         ("seed='x'", "seed must be a whole number, not 'x'"),
@@ -232,7 +230,7 @@ def test_a_test_that_waits_for_ever_ends_and_says_for_what(pytester: pytest.Pyte
                 await tasks.pause()
                 await task.done()
 
-        @pytest.mark.simulated_rover(limit=30, noise="off")  # its task starts at once
+        @pytest.mark.simulated_rover(limit=30)
         @pytest.mark.usefixtures("task_server")
         def test_it(rover_world):
             rover_world.run(patrol(rover_world.client()))
@@ -245,7 +243,7 @@ def test_a_test_that_waits_for_ever_ends_and_says_for_what(pytester: pytest.Pyte
             "E * not over within 30 s of virtual time; at *",
             "E *test_patrol.py:9 patrol: await task.done()",
             "tasks:",
-            "     1 of rover 1: move 1 m: paused (operator)",
+            "     1 of rover 1: move 1 m: queued",
         ]
     )
     result.stdout.no_fnmatch_line("*_run_once*")

@@ -4,18 +4,8 @@ from math import pi
 
 import pytest
 
-from rover_sim.testing.rover_world import RoverWorld
 from rover_sim.testing.simulated_rover import SimulatedRover
 from tests.unit.rover_sim.testing.conftest import MakeWorld
-
-
-def drive_by_hand(world: RoverWorld, *, forward: float = 1.0, yaw_rate: float = 0.0) -> None:
-    """Have somebody with a remote control drive the first rover."""
-    rover = world.rovers[0]
-    world.until(lambda: rover.mode != "initialising")
-    rover.set_mode("manual")
-    rover.arm()
-    rover.hold_sticks(forward=forward, yaw_rate=yaw_rate)
 
 
 def pose(rover: SimulatedRover) -> tuple[float, ...]:
@@ -26,7 +16,10 @@ def pose(rover: SimulatedRover) -> tuple[float, ...]:
 def test_carried_elsewhere_it_drives_on_from_there(make_world: MakeWorld, body: str) -> None:
     world = make_world(body=body)
     (rover,) = world.rovers
-    drive_by_hand(world, yaw_rate=0.2)
+    world.until(lambda: rover.mode != "initialising")
+    rover.set_mode("manual")
+    rover.arm()
+    rover.hold_sticks(forward=1.0, yaw_rate=0.2)
     world.sleep(2)
     rover.place(north=100.0, east=-50.0, yaw=pi / 2)
     assert pose(rover) == pytest.approx((100.0, -50.0, 90.0))
