@@ -99,11 +99,11 @@ def test_a_step_of_the_clock_changes_no_motion_no_delay_and_no_deadline(
 
 def test_a_deadline_ends_what_has_not_begun(world: World) -> None:
     submit(world, 3)
-    task, dependent = submit(world), submit(world, after=2)
+    task, *dependents = submit(world), submit(world, after=2), submit(world, after=3)
     world.client.command(MODIFY, task, DEADLINE, 2)
     world.run(2.2)
     assert world.state(task) == (S.EXPIRED, R.DEADLINE)
-    assert world.state(dependent) == (S.FAILED, R.DEPENDENCY_FAILED)
+    assert [world.state(each) for each in dependents] == [(S.FAILED, R.DEPENDENCY_FAILED)] * 2
     assert world.paused() is R.NONE
 
 

@@ -45,6 +45,19 @@ def test_tasks_are_taken_after_as_many_as_there_may_ever_be(world: World, count:
     world.until_state(second.task_id, S.COMPLETED)
 
 
+def test_an_id_that_a_task_still_has_is_left_out(world: World) -> None:
+    world.client.pause()
+    waits = world.client.move(0.3)
+    world.run(0.3)
+    restored = Restored(tasks=(world.task(waits.task_id),), next_id=MAX_TASK_ID)
+    world.end_server()
+    world.start_server(MemoryStore(), restored)
+    world.run(5.0)
+    tasks = [world.client.move(0.2, nonce=number) for number in (2, 3)]
+    world.run(0.3)
+    assert [each.task_id for each in tasks] == [MAX_TASK_ID, waits.task_id + 1]
+
+
 def test_an_id_above_what_a_float32_counts_is_named_by_its_bits(world: World) -> None:
     after_so_many(world, LAST_EXACT + 1)
     world.client.pause()
