@@ -70,6 +70,7 @@ def test_the_commands_of_the_guide_do_what_it_says(server: str, tmp_path: Path) 
         assert (done.status, done.error) == (0, ""), line
         return done
 
+    run("submit wait 1h")  # so that the patrol does not end before it is cancelled
     patrol, mission = (
         run(line).output.strip().rpartition(" ")[2]
         for line in (
@@ -80,3 +81,4 @@ def test_the_commands_of_the_guide_do_what_it_says(server: str, tmp_path: Path) 
     assert run("modify 12 --every never", mission).lines == [f"rover 1: task {mission} changed"]
     ended = run("cancel --series 12", patrol)
     assert ended.lines == [f"rover 1: task {patrol} cancelled, and its series"]
+    run("cancel")
