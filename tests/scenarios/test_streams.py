@@ -1,5 +1,6 @@
 """Links whose bytes are cut anywhere, with peers that come and go: in virtual time."""
 
+from collections import Counter
 from itertools import pairwise
 from random import Random
 
@@ -15,7 +16,7 @@ from mav_tasks.engine.inputs import (
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import anew
-from tests.kit.client import ACCEPTED, GUIDED, REQUEST, FakeClient, setpoint
+from tests.kit.client import ACCEPTED, GUIDED, REQUEST, SET_INTERVAL, FakeClient, setpoint
 from tests.kit.mission import Item, Upload
 from tests.kit.world import COMMAND_ID, MODE_COMMAND, Outputs, World, at, near_pose
 from tests.scenarios.conftest import MakeWorld
@@ -146,6 +147,20 @@ def test_a_congested_client_gets_answers_and_no_telemetry_and_the_other_all(
     attitudes = sum(p.at > at_last for p in world.client.of_id(ATTITUDE))
     assert attitudes == pytest.approx(50, abs=3)
     assert gaps(world.client, since) == 0
+
+
+def test_wishes_for_everything_are_stretched_by_what_the_line_takes(streams: World) -> None:
+    """Twenty times, less as time goes by, and each stream by a little more or less than others."""
+    world = streams
+    for message_id in (ATTITUDE, POSITION):
+        world.client.command(SET_INTERVAL, message_id, 1, target=(1, 1))
+    world.run(2)
+    for is_congested in (True, False) * 10:
+        tell(world, Congestion(CLIENT_LINK, "client", is_congested=is_congested))
+    since = world.now
+    world.run(10)
+    came = Counter(p.message_id for p in world.client.received if p.at > since)
+    assert [came[ATTITUDE], came[POSITION]] == pytest.approx([32, 29], abs=1)
 
 
 def test_noise_on_a_line_costs_no_more_than_what_it_hit(streams: World) -> None:
