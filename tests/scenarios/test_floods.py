@@ -4,6 +4,7 @@ from itertools import count
 
 from pymavlink.dialects.v20 import common
 
+from mav_tasks.engine.inputs import SettingsChanged
 from mav_tasks.links.memory import MemoryLink
 from mav_tasks.settings import Clients, Limits, Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -49,9 +50,11 @@ def packed(message: object, *, system: int = 77) -> bytes:
 
 
 def test_of_a_client_s_flood_so_much_is_looked_at_and_stop_always(make_world: MakeWorld) -> None:
-    world = make_world(settings=Settings(clients=Clients(packet_rate=100.0)))
+    world = make_world()
     other = world.add_client("other", system_id=9)
     world.run(1.5)
+    limited = Settings(clients=Clients(packet_rate=100.0))
+    world.server.pump.handle(SettingsChanged(limited), now=world.now)
     for _ in range(FLOOD):
         world.client.send_raw(b"noise")
     late = world.client.move(1.0)
