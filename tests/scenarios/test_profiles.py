@@ -7,11 +7,12 @@ from mav_tasks.settings import Settings, VehicleProfile
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.personas import Persona
 from tests.kit.bodies import WeakBrakes
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.world import World, near_pose
+from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_fence import YARD, fenced
 
@@ -87,6 +88,19 @@ def test_a_profile_of_something_else_is_told_and_not_used(
     world = make_world(persona=TURNING, settings=known(profile))
     assert reverse(world) == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
     assert noted(world) == [words]
+
+
+@for_each(
+    "persona, profile, answer",
+    [
+        (TURNING, PX4_PROFILE, (ACCEPTED, 1)),
+        (PROMPT, replace(ARDUPILOT_PROFILE, yaw_rate="ignored"), (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)),
+    ],
+)
+def test_what_was_measured_of_turning_decides_who_reverses(
+    make_world: MakeWorld, persona: Persona, profile: VehicleProfile, answer: tuple[int, int]
+) -> None:
+    assert reverse(make_world(persona=persona, settings=known(profile))) == answer
 
 
 def test_a_rover_that_was_seen_not_to_stop_by_itself_is_not_driven(make_world: MakeWorld) -> None:
