@@ -153,3 +153,15 @@ def test_a_download_goes_on_with_the_plan_with_which_it_began() -> None:
     mav = common.MAVLink(None, 1, 1)
     assert [payload(message, mav) for message in download.items] == payloads(before)
     assert downloaded(world) == payloads(after)
+
+
+def test_what_another_client_calls_off_goes_on() -> None:
+    world = QuietWorld(seed=1)
+    other = world.add_client("other")
+    plan = survey(Random(1), 20)
+    upload = Upload(world.client, plan)
+    world.until(lambda: len(upload.requests) > 5, within=1)
+    other.send(common.MAVLink_mission_ack_message(*AUTOPILOT, 15, 0))
+    world.until(lambda: upload.result is not None, within=5)
+    assert upload.result == 0
+    assert downloaded(world) == payloads(plan)
