@@ -3,12 +3,15 @@
 The last HEARTBEAT may be a second old, so what it shows can be from before our last request.
 """
 
+from itertools import pairwise
+
 from mav_tasks.tasks.events import QueuePaused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import ARDUPILOT, PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
 from tests.kit.client import HOLD
+from tests.kit.observer import GAP
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -29,6 +32,19 @@ def test_a_task_right_after_the_last_is_no_takeover(world: World, pause: float) 
     world.until_idle(tasks=2)
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 2
     assert world.events(QueuePaused) == []
+
+
+def test_a_rover_that_is_handed_back_is_kept_standing_for_the_next_task(
+    make_world: MakeWorld,
+) -> None:
+    world = make_world(persona=PX4, shows_on_request=False)
+    world.client.move(0.3)
+    world.until_state(1, S.COMPLETED)
+    begun = world.now
+    world.client.move(0.3)
+    world.until(lambda: world.control() == "ASKING_HOLD", within=1.2)
+    zeros = [at for at, _ in world.observer.driven if at > begun]
+    assert max(later - at for at, later in pairwise([begun, *zeros, world.now])) < GAP
 
 
 @for_each("after", [0.1, 0.3, 0.5, 1.3])
