@@ -48,6 +48,19 @@ def test_a_client_that_arms_while_the_server_disarms_has_the_last_word(
     assert world.is_armed
 
 
+def test_what_a_client_disarms_and_a_person_arms_again_stays_armed(world: World) -> None:
+    world.client.move(0.5)
+    world.until_state(1, S.EXECUTING)
+    world.client.arm(False)
+    world.run(6)
+    world.operator_arm(True)
+    world.run(2)
+    world.client.proceed()
+    world.until_state(1, S.COMPLETED)
+    world.run(HANDED_BACK)
+    assert world.is_armed
+
+
 def armed_by_client(make_world: MakeWorld, persona: Persona) -> World:
     world = make_world(persona=persona)
     if persona is ARDUPILOT:
