@@ -11,7 +11,7 @@ from rover_sim.body import Pose
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED
-from tests.kit.fleet import Fleet, Layout
+from tests.kit.fleet import Fleet, Layout, packed
 from tests.kit.world import near_pose, twin_of
 from tests.scenarios.conftest import MakeFleet
 
@@ -123,6 +123,19 @@ def test_a_stranger_with_the_id_is_never_driven_whatever_it_says(
     assert twin.truth.north == 0.5
     assert {data[7] for _, data in fleet.watched.towards["b"]} <= {0, 76, 111}
     assert notes(fleet)[0] == ("shares its id with a rover at b: ignored. Give that one another id")
+
+
+def test_a_stranger_with_the_id_that_says_nothing_of_itself_is_not_followed(
+    make_fleet: MakeFleet,
+) -> None:
+    fleet = make_fleet(TWO_LINKS)
+    beat = common.MAVLink_heartbeat_message(10, 3, 1, 4, 4, 3)
+    for second in range(12):
+        if second == 4:
+            silence(fleet, "a")
+        fleet.net.send("b", fleet.links["two"].name, packed(beat, 1, 1))
+        fleet.run(1)
+    assert not [e.text for e in fleet.events(VehicleSeen) if "is now at" in e.text]
 
 
 def test_an_echo_of_the_servers_own_packets_stops_nothing_and_is_told(
