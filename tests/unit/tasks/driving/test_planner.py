@@ -2,16 +2,28 @@
 
 from math import cos, hypot, pi, sin
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
+from mav_tasks.tasks.driving.follow import bend_speed, steer_along
 from mav_tasks.tasks.driving.guidance import wrap
-from mav_tasks.tasks.driving.path import Path, beside, nearest, path_length, pose_on, runs_of
+from mav_tasks.tasks.driving.path import (
+    Follow,
+    Path,
+    beside,
+    nearest,
+    path_length,
+    pose_on,
+    runs_of,
+)
 from mav_tasks.tasks.driving.planner import SPARE, Steering, is_allowed, way_to, way_to_pose
 from mav_tasks.tasks.frames import to_global
 from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
-from mav_tasks.tasks.task import Pose
+from mav_tasks.tasks.task import Bend, Pose
+from tests.unit.tasks.samples import motion
 
 RADIUS = 1.5
 FORWARD_ONLY = Steering(RADIUS, reverses=False)
@@ -104,3 +116,23 @@ def test_a_vehicle_beside_its_path_is_found_on_it(
     there = pose_on(pose, way, found)
     assert hypot(there.north - seen.north, there.east - seen.east) <= abs(right) + 1e-9
     assert abs(beside(pose, way, seen, found)) <= abs(right) + 1e-9
+
+
+def test_a_bend_slows_it_down_and_a_straight_before_it_does_not() -> None:
+    driving, path = Driving(), (Bend(0.0, 9.0), Bend(0.5, 9.0))
+    speeds = []
+    for along in (1.0, 12.0):
+        seen = motion(pose_on(HERE, path, along), at=1.0, forward=0.5)
+        speeds.append(
+            steer_along(
+                Follow(path, 1.5),
+                HERE,
+                seen,
+                along=along,
+                remaining=18.0 - along,
+                driving=driving,
+                radius=RADIUS,
+                settles=False,
+            ).forward
+        )
+    assert speeds == [1.5, pytest.approx(bend_speed(0.5, driving))]
