@@ -3,9 +3,10 @@
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.guidance import ZERO, Velocity
+from mav_tasks.tasks.driving.legs import WAY
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering
-from mav_tasks.tasks.goal import Move
+from mav_tasks.tasks.goal import GoTo, LocalPlace, Move
 from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN, motion
 
@@ -35,3 +36,11 @@ def test_a_car_that_cannot_come_back_has_one_try_and_others_correct_their_end() 
                 )
             found.append(is_end)
         assert found == ends, (car, off)
+
+
+def test_who_stands_beside_its_place_drives_there_again_and_who_circles_it_does_not() -> None:
+    place = LocalPlace(0.0, 3.0)
+    for goal, misses in ((GoTo(place), 1), (GoTo(place, radius=3.0, turns=1.0), 0)):
+        course = PathFollower(goal, Progress(anchor=ORIGIN, leg=WAY, target=place))
+        course.advance(motion(at=100.0))
+        assert course.misses == misses, goal
