@@ -94,7 +94,11 @@ def test_a_profile_of_something_else_is_told_and_not_used(
     "persona, profile, answer",
     [
         (TURNING, PX4_PROFILE, (ACCEPTED, 1)),
-        (PROMPT, replace(ARDUPILOT_PROFILE, yaw_rate="ignored"), (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)),
+        (
+            PROMPT,
+            replace(ARDUPILOT_PROFILE, yaw_rate="ignored"),
+            (DENIED, R.NOT_SUPPORTED_BY_VEHICLE),
+        ),
     ],
 )
 def test_what_was_measured_of_turning_decides_who_reverses(
