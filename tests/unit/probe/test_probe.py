@@ -171,7 +171,7 @@ def test_all_is_measured_inside_its_area_and_the_rover_is_left_at_rest(persona: 
     assert driven.reverse == ("yes" if turns else "no")
     assert driven.speed == pytest.approx(0.3, abs=0.02)
     assert driven.stopping_distance is not None
-    assert 0.04 < driven.stopping_distance < 0.15
+    assert 0.02 < driven.stopping_distance < 0.15  # a PX4 brakes at once
     assert driven.loss_stop == "yes"
     assert driven.setpoint_timeout == pytest.approx(3.1 if turns else 1.1, abs=0.2)
     assert 0.1 < driven.farthest < BOX
@@ -291,7 +291,8 @@ def test_disarming_or_setpoints_of_somebody_else_end_it() -> None:
         else:
             world.somebody_sends(SETPOINT, Address(245, 190))
         world.finish()
-        assert (world.driven.ended, world.rests()) == (words, True)
+        assert world.driven.ended == words
+        assert world.run_until(world.rests, within=3.0)  # disarmed, it rolls on for a moment
 
 
 def test_a_machine_that_stood_still_does_not_drive_on_what_it_finds_then() -> None:
