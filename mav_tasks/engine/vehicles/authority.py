@@ -174,6 +174,7 @@ class Authority:
         """
         self._granted.clear()
         self._by_client = (None, -inf)
+        self._asked_mode = -1
 
     def forget(self, client: Hashable) -> bool:
         """Forget a client that is gone. Return whether it had a grant. A successor must ask."""

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
 from tests.kit.client import (
@@ -119,6 +120,25 @@ def test_a_person_at_the_rover_has_it_all_the_same(world: World) -> None:
     world.operator_mode(Mode.MANUAL)
     world.run(3)
     assert world.mode() is Mode.MANUAL
+
+
+def test_a_mode_asked_for_before_a_halt_is_no_clients_after_it(world: World) -> None:
+    """It was lost on the way; the same mode, from the rover, is a person's."""
+    person = world.add_client("person")
+    away_from_home(world)
+    world.watched.loses = lambda _source, target, _data: target == "rover1"
+    world.client.send(set_mode(GUIDED))
+    world.run(0.2)
+    world.watched.loses = lambda *_: False
+    person.pause()
+    world.run(0.2)
+    person.proceed()
+    world.run(0.2)
+    world.operator_mode(Mode.GUIDED)
+    world.run(1)
+    person.move(1)
+    world.run(2)
+    assert world.state(2)[0] is S.QUEUED, "a person has the rover"
 
 
 @anew
