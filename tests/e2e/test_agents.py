@@ -260,7 +260,7 @@ async def accepted(request: Callable[[], Awaitable[None]]) -> None:
 async def test_a_held_task_requires_input(running: Stand, tmp_path: Path) -> None:
     tasks = Tasks()
     async with agent(running, tmp_path, extensions=[tasks]) as it:
-        move = {"kind": "move", "distance": 1.5}
+        move = {"kind": "move", "distance": 3}  # it runs on for 3 s when the server stands still
         await it.client.call_tool("submit", {"goals": [move], "idempotency_key": "late"})
         task_id = tasks.created[0].task_id
         number = int(task_id.split("-")[1])
