@@ -77,13 +77,15 @@ def test_strangers_drive_nobody_out_and_their_stop_counts(make_world: MakeWorld)
     others = [world.add_client(f"other {n}", system_id=20 + n) for n in range(4)]
     world.run(2.0)
     task = world.client.move(20.0)
+    crowd: list[MemoryLink] = []
     for _ in range(20):
-        strangers(world, 20, packed(heartbeat()))
+        crowd += strangers(world, 20, packed(heartbeat()))
         world.run(0.5)
     sent = [client.request_status(task.task_id) for client in (world.client, *others)]
     world.run(0.2)
     assert [each.result for each in sent] == [ACCEPTED] * 5
     assert len(list(world.server.engine.snapshot(now=world.now).clients)) <= 8
+    assert 30 not in {data[7] for link in crowd for _, data in link.receive(100)}, "no telemetry"
     (link,) = strangers(world, 1, packed(command_long(STOP)))
     world.until_state(task.task_id, S.KILLED, within=1.0)
     world.run(0.1)
