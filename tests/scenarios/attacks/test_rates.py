@@ -14,7 +14,7 @@ from mav_tasks.links.memory import Radio
 from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import REQUEST, SET_INTERVAL, FakeClient, command_long
-from tests.kit.world import World
+from tests.kit.world import MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
 
 OBSERVER = 9  # system ids
@@ -28,6 +28,7 @@ OWN = 3_300.0  # bytes/s, that the server asks for by itself, and heartbeats
 #: all that ArduPilot streams
 STREAMED = (1, 24, 26, 27, 29, 30, 32, 33, 36, 62, 65, 74, 116, 125, 129, 147, 152, 163, 178, 193)
 FASTEST = 20_000  # µs
+ABSENT = 400  # no message of ArduPilot
 
 
 class Meter:
@@ -123,6 +124,15 @@ def test_telemetry_over_a_radio_with_a_buffer_stays_fresh(make_world: MakeWorld)
     world.until_state(task.task_id, S.COMPLETED)
     assert max(buffer.delays) < 0.2
     assert abs(world.truth.north - 8.0) < 0.1
+
+
+def test_what_the_rover_has_not_got_is_asked_for_once(make_world: MakeWorld) -> None:
+    world = make_world()
+    went = Meter(world).went
+    world.client.command(SET_INTERVAL, ABSENT, FASTEST, target=(1, 1))
+    world.run(20.0)
+    asked = [data for data in went if data[7] == MODE_COMMAND]
+    assert len(asked) == 1
 
 
 def test_when_it_has_left_everything_is_as_before(make_world: MakeWorld) -> None:
