@@ -6,6 +6,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
+from tests.kit.client import HOLD
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -122,3 +123,10 @@ def test_mode_zero_arm_zeros_motion(world: World) -> None:
     assert order[:5] == ["GUIDED", "zero", "arm", "zero", "move"]
     assert order[-3:] == ["zero", "HOLD", "disarm"]
     assert set(order[5:-3]) <= {"move", "zero"}  # corrections of its end
+
+
+def test_a_lost_answer_to_hold_delays_no_task(world: World) -> None:
+    world.lose_acks()
+    world.client.mode(HOLD)
+    world.client.move(0.3)
+    world.until(lambda: world.is_armed, within=1.0)
