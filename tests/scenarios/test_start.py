@@ -13,14 +13,6 @@ from tests.scenarios.conftest import MakeWorld
 POSITION = 32
 
 
-@for_each("arming", ["auto", "server"])
-def test_the_server_arms_where_it_may(make_world: MakeWorld, arming: str) -> None:
-    world = make_world(settings=Settings(arming=arming))
-    world.client.move(0.3)
-    world.until_idle(tasks=1)
-    assert world.observer.sent_since(0)[-1] == "disarm"
-
-
 def test_with_arming_by_the_operator_a_task_waits_for_it(make_world: MakeWorld) -> None:
     world = make_world(settings=Settings(arming="operator"))
     world.client.move(0.3)
