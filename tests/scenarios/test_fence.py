@@ -9,7 +9,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, DRIVE, RTL
-from tests.kit.mission import Download, Item, currents
+from tests.kit.mission import Download, Item, Upload, currents
 from tests.kit.world import World, at, is_at
 from tests.scenarios.conftest import MakeWorld
 
@@ -30,7 +30,7 @@ def box(command: int, south: float, west: float, north: float, east: float) -> l
 
 YARD = box(INCLUSION, -3, -3, 3, 3)
 SILENT_AT = 1.0  # m north, where it still drives fast
-LOCAL_POSITION_NED = 32
+LOCAL_POSITION_NED, MISSION_COUNT = 32, 44
 POND = box(EXCLUSION, 1, -1, 2, 1)
 
 
@@ -198,3 +198,15 @@ def test_the_rover_itself_keeps_it_too(make_world: MakeWorld, loss: float, tries
         world.client.send(common.MAVLink_mission_clear_all_message(1, 1, 255))
         world.run(1)
     assert on_board(world) == []
+
+
+def test_an_acceptance_that_comes_late_is_none_of_a_fence_that_never_reached_the_rover(
+    world: World,
+) -> None:
+    world.watched.loses = lambda _, to, data: (to, data[7]) == ("rover1", MISSION_COUNT)
+    upload = Upload(world.client, YARD, kind=FENCE)
+    world.run(0.1)
+    late = common.MAVLink_mission_ack_message(250, 191, 0, FENCE)
+    world.from_vehicle_side(late.pack(common.MAVLink(None, 1, 1)), peer="rover1")
+    world.until(lambda: upload.result is not None, within=5)
+    assert (upload.result, on_board(world)) == (1, [])

@@ -17,6 +17,7 @@ PAUSES: dict[str, Callable[[World], object]] = {
     "DO_PAUSE_CONTINUE to component 1": lambda w: w.client.pause(target=(1, 1)),
     "DO_SET_MODE": lambda w: w.client.mode(HOLD),
     "SET_MODE": lambda w: w.client.send(set_mode(HOLD)),
+    "disarm": lambda w: w.client.arm(False),
 }
 
 
@@ -33,7 +34,7 @@ def test_zeros_leave_at_once_and_the_rover_stands_in_hold(world: World, way: str
     world.run(4)
     assert world.stands()
     assert world.mode() is Mode.HOLD
-    assert world.is_armed
+    assert world.is_armed is (way != "disarm")
     assert (world.control(), world.paused()) == ("IDLE", R.OPERATOR)
     assert [world.state(k) for k in (1, 2)] == [(S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE)]
 

@@ -46,11 +46,12 @@ def proceed(world: World) -> Sent:
 
 
 @for_each("persona", MAKES)
-def test_it_is_told_what_to_do(driving: World) -> None:
-    world = driving
+def test_it_is_told_what_to_do_and_positions_come_as_before(driving: World) -> None:
+    world, at = driving, driving.now
     restart(world)
     assert world.state(1) == (S.HELD, R.FRAME_RESET)
     assert world.paused() is R.RESTARTED, "nobody took it over"
+    assert sum(1.5 < p.at - at < 2.5 for p in world.client.of_id(POSITION)) >= 10
     texts = world.client.texts()
     assert "Queue paused: after a restart. Press Continue" in texts
     assert (

@@ -6,18 +6,11 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
+from tests.kit.client import HOLD
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 POSITION = 32
-
-
-@for_each("arming", ["auto", "server"])
-def test_the_server_arms_where_it_may(make_world: MakeWorld, arming: str) -> None:
-    world = make_world(settings=Settings(arming=arming))
-    world.client.move(0.3)
-    world.until_idle(tasks=1)
-    assert world.observer.sent_since(0)[-1] == "disarm"
 
 
 def test_with_arming_by_the_operator_a_task_waits_for_it(make_world: MakeWorld) -> None:
@@ -122,3 +115,10 @@ def test_mode_zero_arm_zeros_motion(world: World) -> None:
     assert order[:5] == ["GUIDED", "zero", "arm", "zero", "move"]
     assert order[-3:] == ["zero", "HOLD", "disarm"]
     assert set(order[5:-3]) <= {"move", "zero"}  # corrections of its end
+
+
+def test_a_lost_answer_to_hold_delays_no_task(world: World) -> None:
+    world.lose_acks()
+    world.client.mode(HOLD)
+    world.client.move(0.3)
+    world.until(lambda: world.is_armed, within=1.0)

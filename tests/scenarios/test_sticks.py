@@ -12,7 +12,7 @@ from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 
 CANCEL = 54010
-FORWARD, CENTRE = 1750, 1500  # µs: 1.9 m/s by itself, on a rover of 4 m/s
+FORWARD, CENTRE, BACK = 1750, 1500, 1250  # µs: 1.9 m/s by itself, on a rover of 4 m/s
 STANDS = 0.03  # m/s
 
 
@@ -32,15 +32,17 @@ def body_of(frame: Frame, start: object) -> object:
 
 
 def stands_after(world: World) -> float:
-    """Return the seconds after which it stands for good."""
+    """Return the seconds after which it stands for good; it does not drive back."""
     began, moved = world.now, world.now
     while world.now < began + 12.0:
         world.run(0.05)
+        assert world.truth.forward_speed > -0.05
         if abs(world.truth.forward_speed) > STANDS:
             moved = world.now
     return moved - began
 
 
+@for_each("held", [FORWARD, BACK])
 @for_each(
     "frame, when, within",
     [
@@ -52,15 +54,15 @@ def stands_after(world: World) -> float:
         (Frame.ACKERMANN, "cancelled", 2.5),
     ],
 )
-def test_a_stick_held_forward_ends_in_hold(
-    make_world: MakeWorld, frame: Frame, when: str, within: float
+def test_a_stick_held_ends_in_hold(
+    make_world: MakeWorld, frame: Frame, when: str, within: float, held: int
 ) -> None:
     world = with_transmitter(make_world, frame)
     world.client.move(10.0)
     world.run(0.1 if when == "starting" else 4.0)
     if when == "cancelled":
         world.client.command(CANCEL, 1)
-    world.rover.autopilot.operator_pulses(FORWARD, CENTRE)
+    world.rover.autopilot.operator_pulses(held, CENTRE)
     assert stands_after(world) <= within
     assert world.paused() is R.TAKEOVER
     assert world.state(1)[0] is (S.CANCELLED if when == "cancelled" else S.PAUSED)

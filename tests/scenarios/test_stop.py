@@ -60,9 +60,14 @@ def stands_in_hold(world: World) -> bool:
 @for_each("component", [0, 1, 191, 154])
 def test_a_driving_rover_is_stopped_and_its_task_killed(world: World, component: int) -> None:
     drive(world)
+    figures = world.server.engine.figures
+    assert not figures.is_still(1, now=world.now)
     stop = world.client.stop(target=(1, component))
     world.until(lambda: stop.ack, within=0.1)
     world.until(lambda: stands_in_hold(world), within=BRAKING)
+    shown = figures.of(1, now=world.now)
+    assert shown is not None
+    assert shown.position_age < 0.3
 
     assert stop.answer == (ACCEPTED, 1)
     assert world.history(1)[-1] == (S.KILLED, R.STOP)

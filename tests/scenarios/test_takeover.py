@@ -108,17 +108,6 @@ def test_continue_does_not_take_the_rover_out_of_anothers_hands(driving: World, 
     world.until_idle(tasks=2)
 
 
-def test_a_client_that_disarms_pauses_as_by_hold(driving: World) -> None:
-    world, at = driving, driving.now
-    world.client.arm(False)
-    world.run(5)
-    assert (world.state(1), world.state(2)) == ((S.PAUSED, R.OPERATOR), (S.QUEUED, R.NONE))
-    assert world.paused() is R.OPERATOR
-    assert world.observer.sent_since(at)[:2] == ["zero", "HOLD"]
-    assert "arm" not in world.observer.sent_since(at)
-    assert world.mode() is Mode.HOLD
-
-
 def test_sticks_at_rest_are_no_takeover(driving: World) -> None:
     world = driving
     world.client.stream(sticks(0, 0, 0, 0), rate=10)

@@ -14,7 +14,7 @@ from mav_tasks.links.memory import Radio
 from mav_tasks.settings import Roles, Settings
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.client import REQUEST, SET_INTERVAL, FakeClient, command_long
-from tests.kit.world import World
+from tests.kit.world import MODE_COMMAND, World
 from tests.scenarios.conftest import MakeWorld
 
 OBSERVER = 9  # system ids
@@ -28,6 +28,7 @@ OWN = 3_300.0  # bytes/s, that the server asks for by itself, and heartbeats
 #: all that ArduPilot streams
 STREAMED = (1, 24, 26, 27, 29, 30, 32, 33, 36, 62, 65, 74, 116, 125, 129, 147, 152, 163, 178, 193)
 FASTEST = 20_000  # µs
+ABSENT = 400  # no message of ArduPilot
 
 
 class Meter:
@@ -102,14 +103,6 @@ def leave(client: FakeClient) -> None:
     client.heartbeats = False
 
 
-def test_an_observer_does_not_fill_a_radio(make_world: MakeWorld) -> None:
-    world = radio(make_world(settings=SETTINGS))
-    meter = Meter(world)
-    assert meter.rate(10.0) < OWN
-    wish_for_all(world, join(world, OBSERVER))
-    assert meter.rate(10.0) < BUDGET
-
-
 def test_telemetry_over_a_radio_with_a_buffer_stays_fresh(make_world: MakeWorld) -> None:
     world = radio(make_world(settings=SETTINGS))
     observer = join(world, OBSERVER)
@@ -125,6 +118,15 @@ def test_telemetry_over_a_radio_with_a_buffer_stays_fresh(make_world: MakeWorld)
     assert abs(world.truth.north - 8.0) < 0.1
 
 
+def test_what_the_rover_has_not_got_is_asked_for_once(make_world: MakeWorld) -> None:
+    world = make_world()
+    went = Meter(world).went
+    world.client.command(SET_INTERVAL, ABSENT, FASTEST, target=(1, 1))
+    world.run(20.0)
+    asked = [data for data in went if data[7] == MODE_COMMAND]
+    assert len(asked) == 1
+
+
 def test_when_it_has_left_everything_is_as_before(make_world: MakeWorld) -> None:
     world = make_world(settings=SETTINGS)
     meter = Meter(world)
@@ -138,14 +140,18 @@ def test_when_it_has_left_everything_is_as_before(make_world: MakeWorld) -> None
     assert after == pytest.approx(before, rel=0.02)
 
 
-def test_questions_of_an_observer_do_not_fill_a_radio(make_world: MakeWorld) -> None:
+def test_an_observer_does_not_fill_a_radio(make_world: MakeWorld) -> None:
     world = radio(make_world(settings=SETTINGS))
     observer = join(world, OBSERVER)
     meter = Meter(world)
     before = meter.rate(10.0)
+    assert before < OWN
     observer.stream(command_long(REQUEST, 148, target=(1, 1)), rate=60)
     observer.stream(common.MAVLink_ping_message(0, 1, 1, 1), rate=60)
     observer.stream(common.MAVLink_param_request_read_message(1, 1, b"CRUISE_SPEED", -1), rate=60)
     world.run(10.0)
     assert meter.rate(10.0) < before + 0.1 * CAPACITY
     assert sum(map(len, meter.went)) / 10 < 0.1 * CAPACITY
+    observer.end_streams()
+    wish_for_all(world, observer)
+    assert meter.rate(10.0) < BUDGET
