@@ -10,9 +10,10 @@ Stored times are UTC seconds: encoding adds ``offset``, UTC minus monotonic seco
 named in MONOTONIC, and decoding subtracts it. NaN and infinity are refused.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import cache
 from json import JSONEncoder, loads
 from operator import attrgetter, itemgetter
 from types import NoneType, UnionType
@@ -55,7 +56,7 @@ def format_of(*kinds: type) -> dict[str, tuple[str, ...]]:
     while waiting:
         kind = waiting.pop()
         if kind.__name__ not in found:
-            leaves = dict(_leaves(kind))
+            leaves = _leaves(kind)
             found[kind.__name__] = tuple(leaves)
             waiting += [inner for hint in leaves.values() for inner in _records(hint)]
     return dict(sorted(found.items()))
@@ -79,11 +80,11 @@ class Encoder:
         return encode(value, offset)
 
     def _encoder_of(self, kind: type) -> Callable[[Any, float], list[Any]]:
-        leaves = list(_leaves(kind))
-        get = _getter(tuple(path for path, _ in leaves))
+        leaves = _leaves(kind)
+        get = _getter(tuple(leaves))
         special = [
             (index, convert)
-            for index, (path, hint) in enumerate(leaves)
+            for index, (path, hint) in enumerate(leaves.items())
             if (convert := self._converter(path, hint)) is not None
         ]
 
@@ -150,7 +151,7 @@ class Decoder:
         places = {path: index for index, path in enumerate(self._written[kind.__name__])}
         special = [
             (places[path], convert)
-            for path, hint in _leaves(kind)
+            for path, hint in _leaves(kind).items()
             if path in places and (convert := self._converter(path, hint)) is not None
         ]
         build = _builder(kind, places, shares=self._shares)
@@ -208,7 +209,7 @@ def _builder(
     kind: type, places: Mapping[str, int], prefix: str = "", *, shares: bool
 ) -> Callable[[list[Sequence[Any]]], list[Any]]:
     """Return a function from columns to dataclasses; fields not in ``places`` get defaults."""
-    hints = get_type_hints(kind)
+    hints = _hints(kind)
     sources: dict[str, Callable[[list[Sequence[Any]]], Sequence[Any]]] = {}
     for field in fields(kind):
         path = prefix + field.name
@@ -242,19 +243,27 @@ def _maker(kind: type, names: tuple[str, ...]) -> Callable[..., Any]:
     return lambda *values: kind(**dict(zip(names, values, strict=True)))
 
 
-def _leaves(kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield path and annotation of each column of a class's row."""
-    hints = get_type_hints(kind)
+@cache  # the annotations of a class are slow to read, and each opening of a store asks for them
+def _leaves(kind: type) -> Mapping[str, Any]:
+    """Return the annotation of each column of a class's row, by path."""
+    hints, leaves = _hints(kind), dict[str, Any]()
     for field in fields(kind):
         hint = _real(hints[field.name])
         if is_dataclass(hint):
             assert isinstance(hint, type)
-            yield from _leaves(hint, f"{prefix}{field.name}.")
+            leaves |= {f"{field.name}.{path}": leaf for path, leaf in _leaves(hint).items()}
         else:
-            yield prefix + field.name, hint
+            leaves[field.name] = hint
+    return leaves
 
 
-def _records(hint: Any) -> list[type]:
+@cache
+def _hints(kind: type) -> Mapping[str, Any]:
+    return get_type_hints(kind)
+
+
+@cache
+def _records(hint: Any) -> Sequence[type]:
     """Return the dataclasses in an annotation; raise TypeError if it allows an unsupported type."""
     hint = _real(hint)
     if get_origin(hint) in (Union, UnionType):
