@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CORE = ("engine", "services", "tasks")
 #: tests that only compute: tools/test runs the others beside them
 LEFT_OUT = (
-    *("browser", "e2e", "interop", "test_documents.py", "sim", "unit/fleet_io", "unit/key_ring"),
+    *("browser", "e2e", "interop", "test_documents.py", "sim", "unit/fleet_io"),
     *("unit/links", "unit/recording", "unit/store", "unit/rover_sim", "unit/tools"),
     "test_forbidden.py",
 )
@@ -165,13 +165,18 @@ def sample(count: int, seed: int) -> list[Mutant]:
 
 
 def survivors(figures: Path) -> list[Mutant]:
-    """Return the mutants that no test killed in an earlier run on the same source."""
+    """Return the mutants that no test killed in an earlier run, unless the source has changed."""
     fields = Mutant.__dataclass_fields__
-    return [
+    found = [
         Mutant(**{name: result[name] for name in fields})
         for result in json.loads(figures.read_text(encoding="utf-8"))
         if not result["killed by"] and not result.get("unmeasured")
     ]
+    present = {each for path in {it.path for it in found} for each in mutants_of(ROOT / path)}
+    for mutant in found:
+        if mutant not in present:
+            print(f"left out, its module has changed: {mutant}", flush=True)
+    return [mutant for mutant in found if mutant in present]
 
 
 def mutated(mutant: Mutant) -> ast.Module:
@@ -369,8 +374,8 @@ class Loop:
                 if file.exists():
                     found = json.loads(file.read_text(encoding="utf-8"))
                     file.unlink()
-                else:  # it died
-                    found = {"number": number, "killed by": "the end of the process"}
+                else:  # it died, of whatever
+                    found = {"number": number, "killed by": None, "unmeasured": True}
                 results.append(found)
                 if isinstance(found, dict):
                     print(len(results), json.dumps(found), flush=True)
@@ -382,12 +387,14 @@ class Loop:
         nothing = os.open(os.devnull, os.O_RDWR)
         os.dup2(nothing, 1)
         os.dup2(nothing, 2)
-        with tempfile.TemporaryDirectory() as folder:
-            factory = session.config._tmp_path_factory
-            factory._basetemp, factory._given_basetemp = None, Path(folder, "base")
-            found = function(session, *arguments)
-            file.write_text(json.dumps(found), encoding="utf-8")
-        os._exit(0)
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                factory = session.config._tmp_path_factory
+                factory._basetemp, factory._given_basetemp = None, Path(folder, "base")
+                found = function(session, *arguments)
+                file.write_text(json.dumps(found), encoding="utf-8")
+        finally:
+            os._exit(0)  # whatever was raised: what the parent has to clean up is not the child's
 
 
 def main() -> int:
