@@ -426,8 +426,13 @@ class OffboardControl:
                 self._end_disarming()
 
     def _end_disarming(self) -> None:
-        """Believe it when it is shown, by a heartbeat that is no older than the request."""
-        if self._news.is_settled and not self._news.armed:
+        """Believe it when it is shown, by a heartbeat that is no older than the request.
+
+        One that is shown armed although it has accepted that was armed by somebody since.
+        """
+        component, command = self._target.component_id, MavCmd.COMPONENT_ARM_DISARM
+        is_answered = not self._sender.is_pending(component, command)
+        if self._news.is_settled and (is_answered or not self._news.armed):
             self.phase = Phase.IDLE
             self.we_armed = False
 

@@ -48,6 +48,21 @@ def test_a_client_that_arms_while_the_server_disarms_has_the_last_word(
     assert world.is_armed
 
 
+@BOTH
+def test_a_person_who_arms_while_the_server_disarms_has_the_last_word(
+    make_world: MakeWorld, persona: Persona
+) -> None:
+    world = make_world(persona=persona)
+    world.client.move(0.5)
+    world.until_state(1, S.COMPLETED)
+    world.until(lambda: not world.rover.autopilot.armed, within=20)
+    world.operator_arm(True)
+    world.client.move(0.5)
+    world.until_state(2, S.COMPLETED, within=20)
+    world.run(HANDED_BACK)
+    assert world.is_armed
+
+
 def test_what_a_client_disarms_and_a_person_arms_again_stays_armed(world: World) -> None:
     world.client.move(0.5)
     world.until_state(1, S.EXECUTING)
