@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from tests.kit.processes import Stand, stand, wait_until
-from tests.kit.web import Web, has_rover, web
+from tests.kit.processes import Stand
+from tests.kit.web import Web, served
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is missing")
 
@@ -38,29 +38,15 @@ def chromium() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stand, Web]]:
     """One server, rover and web process for all tests of a file."""
-    folder = tmp_path_factory.mktemp("browser")
-    store = str(folder / "tasks.sqlite3")
-    with (
-        stand(folder, serve_store=store) as it,
-        web(folder, it, "--store", store) as page,
-    ):
-        has_rover(page)
-        yield it, page
+    with served(tmp_path_factory.mktemp("browser")) as it:
+        yield it
 
 
 @pytest.fixture
 def it(both: tuple[Stand, Web]) -> Iterator[Web]:
     """The web process; afterwards nothing waits and nothing is paused."""
-    running = both[1]
-    yield running
-    running.post("/stop", {"clear": True})
-
-    def is_empty() -> bool:
-        queue = running.get("/vehicles/1/queue")
-        return not queue["running"] and not queue["waiting_count"]
-
-    wait_until(is_empty, within=15, what="an empty queue")
-    running.resume()
+    yield both[1]
+    both[1].empty()
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mav_tasks import Move, NoAnswer, Refused, SyncClient, TaskReason, TaskState
+from mav_tasks import Move, NoAnswer, Refused, SyncClient, TaskState
 from tests.kit.commands import mav_tasks
 from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, free_udp_ports, process, wait_until
@@ -150,26 +150,6 @@ def test_a_stop_at_another_gateway_counts_while_the_database_hangs_and_one_that_
     assert fleet.holder() == "b"
     (record,) = (tmp_path / "records").iterdir()
     assert "same: " in mav_tasks("replay", str(record)).output
-
-
-def test_a_client_at_another_gateway_drives_and_stops_the_rover(fleet: Fleet) -> None:
-    fleet.start("a")
-    assert fleet.holder() == "a"
-    fleet.start("b")
-    b = fleet.client("b")
-    assert [rover.id for rover in b.vehicles()] == [1]
-    done = b.submit(Move(0.5), nonce=5).done()
-    assert done.state is S.COMPLETED
-    assert fleet.client("a").submit(Move(0.5), nonce=5).id == done.id
-    task = b.submit(Move(8.0))
-    fleet.until_state(task.id, S.EXECUTING)
-    b.stop()
-    fleet.until_state(task.id, S.KILLED)
-    wait_until(lambda: speed(fleet.truth) < 0.01, within=5)
-    fleet.processes["a"].end(signal.SIGKILL)
-    fleet.processes["b"].wait_for("rover 1: found")
-    queue = b.queue()
-    assert queue.paused is TaskReason.STOPPED
 
 
 def speed(truth: Path) -> float:

@@ -57,9 +57,6 @@ def port_of(url: str) -> int:
     return int(url.split(":")[2].partition("/")[0])
 
 
-# a TCP link
-
-
 # the page
 
 
@@ -168,15 +165,15 @@ FOR_AGENTS = {"accept": "application/json, text/event-stream"}
 class OldAgent:
     """An agent of a version of the protocol that has sessions."""
 
-    def __init__(self, url: str) -> None:
-        self._url, self._headers = url, dict(FOR_AGENTS)
+    def __init__(self, url: str, http: httpx.Client) -> None:
+        self._url, self._http, self._headers = url, http, dict(FOR_AGENTS)
         opened = self.post({"id": 1, "method": "initialize", "params": OPENING})
         assert opened.status_code == 200, opened.text
         self._headers["mcp-session-id"] = opened.headers["mcp-session-id"]
 
     def post(self, message: dict[str, Any]) -> httpx.Response:
         sent = {"jsonrpc": "2.0"} | message
-        return httpx.post(self._url, json=sent, headers=self._headers, timeout=30)
+        return self._http.post(self._url, json=sent, headers=self._headers)
 
     def stop(self) -> httpx.Response:
         params = {"name": "stop", "arguments": {}}
@@ -189,18 +186,22 @@ def test_an_agent_stops_a_rover_whoever_opens_connections_and_sessions(
     pytest.importorskip("mcp", reason="the MCP SDK is missing: pip install 'mav-tasks[mcp]'")
     server = f"udpout:{HOST}:{running.client_port}"
     options = "mcp", "--http", f"{HOST}:0", "--server", server
-    with process("-m", "mav_tasks.cli", *options, folder=tmp_path, name="mcp") as it:
+    with (
+        process("-m", "mav_tasks.cli", *options, folder=tmp_path, name="mcp") as it,
+        httpx.Client(timeout=30) as http,
+        httpx.Client(timeout=30) as later,
+    ):
         url = it.wait_for(r"agents can use (http://\S+)")[1]
         port = port_of(url)
-        agent = OldAgent(url)
+        agent = OldAgent(url, http)
         agent.post({"method": "notifications/initialized"})
         assert "STOP is in force" in agent.stop().text
         before = memory_of(it)
         with connections(port, 1100):
             for _ in range(150):
-                OldAgent(url)
+                OldAgent(url, http)
             began = time.monotonic()
-            late = OldAgent(url)
+            late = OldAgent(url, later)
             assert "STOP is in force" in late.stop().text
             assert "STOP is in force" in agent.stop().text  # its session is in use: it is kept
             assert time.monotonic() - began < 5.0

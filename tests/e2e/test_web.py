@@ -13,8 +13,8 @@ import pytest
 from aiopenapi3 import OpenAPI
 
 from tests.kit.awaited import awaited
-from tests.kit.processes import Stand, stand, wait_until
-from tests.kit.web import Web, add_key, has_rover, web
+from tests.kit.processes import Stand
+from tests.kit.web import Web, add_key, served, web
 
 pytestmark = pytest.mark.slow
 
@@ -22,29 +22,15 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stand, Web]]:
     """One server, rover and web process for all of them; each leaves the queue empty."""
-    folder = tmp_path_factory.mktemp("web")
-    store = str(folder / "tasks.sqlite3")
-    with (
-        stand(folder, serve_store=store) as it,
-        web(folder, it, "--store", store) as page,
-    ):
-        has_rover(page)
-        yield it, page
+    with served(tmp_path_factory.mktemp("web")) as it:
+        yield it
 
 
 @pytest.fixture
 def page(both: tuple[Stand, Web]) -> Iterator[Web]:
     """The web process; afterwards nothing waits and nothing is paused."""
-    it = both[1]
-    yield it
-    it.post("/stop", {"clear": True})
-    wait_until(lambda: not _active(it), within=15, what="an empty queue")
-    it.resume()
-
-
-def _active(it: Web) -> Any:
-    queue = it.get("/vehicles/1/queue")
-    return queue["running"] or queue["waiting_count"]
+    yield both[1]
+    both[1].empty()
 
 
 def move(it: Web, metres: float, **more: Any) -> Any:

@@ -7,8 +7,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.kit.processes import Stand, process, stand, wait_until
-from tests.kit.web import Web, add_key, has_rover, web
+from tests.kit.processes import Stand, process, wait_until
+from tests.kit.web import Web, add_key, served, web
 
 pytestmark = pytest.mark.slow
 
@@ -19,10 +19,8 @@ HUGE = "1" + "0" * 400  # a whole number that no float holds
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Stand, Web]]:
     """One server, rover and web process for all of them."""
-    folder = tmp_path_factory.mktemp("hostile")
-    with stand(folder) as it, web(folder, it) as page:
-        has_rover(page)
-        yield it, page
+    with served(tmp_path_factory.mktemp("hostile")) as it:
+        yield it
 
 
 @pytest.fixture

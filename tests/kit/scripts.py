@@ -26,9 +26,7 @@ TRIES = 8
 some_cases = pytest.mark.parametrize(
     ("persona", "loss"), some([("ardupilot", 0.0), ("ardupilot", LOSS), ("px4", 0.0)], 1, 2)
 )
-some_makes = pytest.mark.parametrize(
-    ("persona", "loss"), [("ardupilot", 0.0), ("px4", 0.0), ("generic", LOSS)]
-)
+some_makes = pytest.mark.parametrize(("persona", "loss"), [("ardupilot", 0.0), ("px4", LOSS)])
 a_net = pytest.mark.parametrize("loss", some([*NETS], -1), ids=NETS.get)
 
 

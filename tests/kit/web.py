@@ -12,7 +12,7 @@ import httpx
 
 from mav_tasks import Key
 from tests.kit.commands import called
-from tests.kit.processes import Process, Stand, process, wait_until
+from tests.kit.processes import Process, Stand, process, stand, wait_until
 
 
 @dataclass
@@ -52,6 +52,17 @@ class Web:
             if answer.is_success or answer.json()["reason"] != "stale":
                 break
         assert answer.is_success, answer.text
+
+    def empty(self) -> None:
+        """Cancel the tasks of rover 1, and let it run new ones."""
+        self.post("/stop", {"clear": True})
+
+        def is_empty() -> bool:
+            queue = self.get("/vehicles/1/queue")
+            return not queue["running"] and not queue["waiting_count"]
+
+        wait_until(is_empty, within=15, what="an empty queue")
+        self.resume()
 
     def task(self, task_id: int) -> Any:
         """Return a task."""
@@ -98,6 +109,18 @@ def web(
         url = running.wait_for(r"web page: (http://\S+)/\n")[1]
         with httpx.Client(base_url=url, timeout=15) as client:
             yield Web(running, url, client)
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[tuple[Stand, Web]]:
+    """Run a server, a rover and a web process that shows it, with one store, for a block."""
+    store = str(folder / "tasks.sqlite3")
+    with (
+        stand(folder, serve_store=store) as it,
+        web(folder, it, "--store", store) as page,
+    ):
+        has_rover(page)
+        yield it, page
 
 
 def add_key(folder: Path, name: str, role: str) -> str:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import pytest
 
 from mav_tasks.settings import Settings
+from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.testing.options import RoverOptions
 from rover_sim.testing.rover_world import RoverWorld
 from tests.kit.cases import anew
@@ -40,6 +41,17 @@ def make_world() -> Iterator[MakeWorld]:
 def world(make_world: MakeWorld) -> World:
     """Return a world in which nothing is unusual."""
     return make_world()
+
+
+@anew
+def driving(world: World) -> World:
+    """Return a world in which a task drives and another waits."""
+    world.client.move(4)
+    world.until_state(1, S.EXECUTING)
+    world.client.rotate(90)
+    world.run(2)
+    assert world.truth.forward_speed > 0.3
+    return world
 
 
 @anew

@@ -11,24 +11,13 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.cases import anew, for_each
+from tests.kit.cases import for_each
 from tests.kit.world import Outputs, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 HEARTBEAT, ATTITUDE, POSITION = 0, 30, 32
 SETPOINT, COMMAND = 84, 76
 ARM_DISARM, SET_MODE = common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_DO_SET_MODE
-
-
-@anew
-def driving(world: World) -> World:
-    """A world in which a task drives and another waits."""
-    world.client.move(4)
-    world.until_state(1, S.EXECUTING)
-    world.client.rotate(90)
-    world.run(2)
-    assert world.truth.forward_speed > 0.3
-    return world
 
 
 LOSSES = {
@@ -67,7 +56,7 @@ def test_the_rover_stops_and_resumes_by_itself_after_2_s_of_good_data(
     assert near_pose(world.pose(), (4.0, 0.0, 90.0))
 
 
-@for_each("what", LOSSES)
+@for_each("what", ["heartbeats", "all but heartbeats", "frozen position"])
 def test_after_30_s_it_fails_and_the_queue_pauses(driving: World, what: str) -> None:
     world = driving
     faults, _, within = LOSSES[what]

@@ -13,6 +13,7 @@ from tests.kit.client import MOVE, ROTATE
 from tests.kit.volume import tries
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_waiting import MODIFY, PREEMPTIBLE, PREEMPTIVE, START_DELAY, submit
 
 GAP = Settings(queueing=Queueing(preemption_gap=3, preemption_rest=0.3))
 
@@ -43,6 +44,49 @@ def test_a_task_that_outranks_enough_interrupts_and_the_other_resumes(
     assert ended == [3, 2, 1]
     assert [t.state for t in world.tasks()] == [S.COMPLETED] * 3
     assert near_pose(world.pose(), (3.0, 0.0, 0.0))
+
+
+MARK, KEEP = (PREEMPTIVE, 1), (PREEMPTIBLE, 0)
+
+
+@for_each(
+    "running, waiting, priority, interrupts",
+    [
+        (None, None, 8, True),
+        (None, None, 7, False),
+        (KEEP, None, 9, False),
+        (KEEP, MARK, 9, False),
+        (None, MARK, 1, True),
+        (MARK, MARK, 5, False),
+        (MARK, MARK, 6, True),
+        (MARK, None, 8, True),
+    ],
+)
+def test_who_interrupts_whom(
+    make_world: MakeWorld,
+    running: tuple[int, int] | None,
+    waiting: tuple[int, int] | None,
+    priority: int,
+    interrupts: bool,
+) -> None:
+    """By priorities, three apart, and by what each was modified to; not by an inherited rank."""
+    world = make_world(settings=GAP)
+    world.client.pause()
+    world.run(0.1)
+    for task, (distance, own, mark) in enumerate(((3.0, 5, running), (0.2, priority, waiting)), 1):
+        world.client.move(distance, priority=own)
+        world.run(0.05)
+        if task == 2:
+            world.client.command(MODIFY, task, START_DELAY, 4.0)
+        if mark is not None:
+            world.client.command(MODIFY, task, *mark)
+        world.run(0.1)
+    submit(world, after=2, priority=10)
+    world.client.proceed()
+    world.run(3)
+    assert world.state(1)[0] is S.EXECUTING
+    world.run(2)
+    assert world.state(1) == ((S.PAUSED, R.PREEMPTED) if interrupts else (S.EXECUTING, R.NONE))
 
 
 @for_each("goal", ["move", "back", "rotate", "turns"])

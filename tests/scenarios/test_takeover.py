@@ -8,7 +8,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
-from tests.kit.cases import anew, for_each
+from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     AUTO,
@@ -45,17 +45,6 @@ WAYS: dict[str, Callable[[World], object]] = {
         packed(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), 250, 191)
     ),
 }
-
-
-@anew
-def driving(world: World) -> World:
-    """A world in which a task drives and another waits."""
-    world.client.move(4)
-    world.until_state(1, S.EXECUTING)
-    world.client.rotate(90)
-    world.run(2)
-    assert world.truth.north > 0.3
-    return world
 
 
 @for_each("way", WAYS)

@@ -13,7 +13,7 @@ from tests.kit.client import ACCEPTED, DENIED, MOVE
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
-MODIFY = 54012
+CANCEL, MODIFY = 54010, 54012
 PRIORITY, START_DELAY, DEADLINE, RUN_AFTER, PREEMPTIBLE, PREEMPTIVE, START_UTC = range(1, 8)
 UTC = 1_800_000_000.0  # s, at the beginning of these worlds
 DAY = 86_400.0
@@ -116,6 +116,46 @@ def test_tasks_run_after_each_other_across_rovers(make_world: MakeWorld) -> None
     assert world.task(second).terms.after == first
     world.until_idle(tasks=3)
     assert order_of_start(world) == [first, second, third]
+
+
+def change(world: World, task: int, prop: int, value: float) -> None:
+    sent = world.client.command(MODIFY, task, prop, value)
+    world.run(0.1)
+    assert sent.answer == (ACCEPTED, task)
+
+
+def test_a_task_goes_ahead_with_the_rank_of_the_most_urgent_that_waits_for_it(world: World) -> None:
+    world.client.pause()
+    low, other = submit(world, priority=2), submit(world, 0.3)
+    middle = submit(world, after=low, priority=1)
+    urgent = submit(world, 0.1, after=middle, priority=8)
+    for prop, value, order in (
+        (PRIORITY, 8, [low, other]),
+        (PRIORITY, 4, [other, low]),
+        (PRIORITY, 8, [low, other]),
+        (RUN_AFTER, other, [other, low]),
+        (RUN_AFTER, middle, [low, other]),
+    ):
+        change(world, urgent, prop, value)
+        assert in_order(world, low, other) == order, (prop, value)
+    world.client.command(CANCEL, urgent)
+    world.run(0.1)
+    assert in_order(world, low, other) == [other, low]
+    world.client.proceed()
+    world.until_idle(tasks=4)
+    assert order_of_start(world) == [other, low, middle]
+
+
+def test_what_is_scheduled_comes_when_its_time_comes(world: World) -> None:
+    world.client.pause()
+    early, usual = submit(world, delay=3), submit(world, 0.3)
+    world.run(2)
+    late = submit(world, 0.4)
+    world.run(2)
+    assert in_order(world, early, usual, late) == [usual, late, early]
+    world.client.proceed()
+    world.until_idle(tasks=3)
+    assert order_of_start(world) == [usual, late, early]
 
 
 @for_each(

@@ -38,7 +38,7 @@ PX4 = Persona(
     real=("COM_OF_LOSS_T", 1.5),
     integer=("COM_FLTMODE1", -7),
 )
-PERSONAS: Mapping[str, Persona] = {"ardupilot": ARDUPILOT, "px4": PX4, "generic": PX4}
+PERSONAS: Mapping[str, Persona] = {"ardupilot": ARDUPILOT, "px4": PX4}
 
 
 def command_long(component: int, command: int, **params: float) -> dict[str, Any]:
