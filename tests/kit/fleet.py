@@ -97,13 +97,13 @@ class FleetNet(ObservedNet):
         for observer in self._meant(link.name, data):
             observer.arrived(self.now, data)
         if link.name.startswith("server:"):
-            self._unread.append((link.name, source, data))
+            self._unread.append((link.name, source, data, self.now))
         MemoryNet.arrive(self, link, source, data)
 
     def deliver(self) -> None:
         """Deliver packets, and show what the server has received."""
         MemoryNet.deliver(self)
-        for link, source, data in self._unread:
+        for link, source, data, _ in self._unread:
             if link == CLIENT_LINK:
                 for observer in self._all_observers():
                     observer.asked(self.now, data, peer=source)

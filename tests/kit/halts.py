@@ -27,11 +27,15 @@ MOVED, TURNED = 0.1, 0.2  # m, rad, after standstill
 UNHEARD = 6.0  # s after a fault on the way to the rover
 LATE = 1.0  # s in transit
 FLIGHT = 0.1  # s, longer than the net's delay: requests of two clients may cross within it
+OLD = 0.6  # s; a go request that a stalled server did not read for so long releases nothing
+UNDONE = 3.0  # s after standstill, until a mode or an arming that came late is undone
 MODE_TAKES = 0.5  # s from a mode request's arrival until the rover is in the mode
+LED = frozenset({Mode.GUIDED, Mode.AUTO, Mode.RTL})  # a manual mode is left to the person there
 BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL})
 REMEMBERED = 50  # go requests
 WEIGHTS = {Kind.WISH: 1, Kind.MOTION: 2, Kind.GO: 3}
 CONTINUE, CANCEL, STOP, HOLD = "continue", "cancel", "STOP", "HOLD"
+SWITCHED = "HOLD at the rover"  # by a person
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +103,13 @@ class Halts:
         self._vehicle = vehicle
         self._halt: _Halt | None = None
         self._suspended: _Halt | None = None  # a request that may still be refused ended it
-        self._asked: dict[tuple[str, int], tuple[Word, float]] = {}
+        #: unanswered requests of one step; None: one that is too late
+        self._asked: dict[tuple[str, int], deque[tuple[Word | None, float]]] = {}
         self._gos: deque[_Go] = deque(maxlen=REMEMBERED)  # the latest go requests
         self._disturbed_at = -1e9
         self._mode = vehicle.autopilot.mode
         self._mode_sent_at = -1e9  # when a mode request of the server reached the rover
+        self._server_began_at = -1e9
         self._passed: dict[int, float] = {}  # when clients' commands reached the rover
         self._pauses = True  # of the last halt
         self._wished_at = -1e9  # when the server read the latest submission
@@ -128,10 +134,17 @@ class Halts:
         self._disturbed_at = max(self._disturbed_at, until)
 
     def person(self, name: str, *, drives: bool, now: float) -> None:
-        """Note that a person at the rover turned its switch, or armed or disarmed it."""
+        """Note that a person at the rover turned its switch, or armed or disarmed it.
+
+        With a mode request of the server under way, nobody can tell who has set HOLD.
+        """
         self._halt = self._suspended = None
-        if not drives:
+        if not drives and (name != SWITCHED or now - self._mode_sent_at > MODE_TAKES):
             self._begin(name, None, read_at=now, now=now)
+
+    def server_began(self, *, now: float) -> None:
+        """Note that another server runs: it does not know what clients asked for before."""
+        self._server_began_at = now
 
     def pushed(self) -> None:
         """Note that another station sent the rover somewhere, bypassing the server."""
@@ -140,30 +153,39 @@ class Halts:
     def mode_arrived(self, *, now: float) -> None:
         """Note that a mode request of the server reached the rover."""
         self._mode_sent_at = now
+        if self.in_force == SWITCHED and self._halt and now - self._halt.at <= MODE_TAKES:
+            self._halt = None
 
     def passed(self, command: int, *, now: float) -> None:
         """Note that a client's command reached the rover; it counts even if its answer is lost."""
         self._passed[command] = now
+        halt = self._halt
+        if halt is not None and any(
+            go.word.command == command and self._ends(go.word, halt) for go in self._gos
+        ):
+            self._halt = None
 
     def began_task(self) -> None:
         """Note that another task starts; a previous cancel does not apply to it."""
         if self._halt is not None and self._halt.name == CANCEL:
             self._halt = None
 
-    def read(self, word: Word, *, running: int | None, now: float, has_tasks: bool = True) -> None:
+    def read(
+        self, word: Word, *, running: int | None, has_tasks: bool, waited: float, now: float
+    ) -> None:
         """Note that the server reads a client's request; ``running`` is the id of the active task.
 
-        ``has_tasks``: some task of the rover is not over.
+        ``has_tasks``: some task of the rover is not over. ``waited``: s since the packet's arrival.
         """
         if word.system_id not in (0, self.system_id):
             return
         if word.kind is Kind.HALT:
             of_what_runs = running is not None and word.param1 in (0.0, float(running))
             if word.name != CANCEL or of_what_runs:
-                self._asked[word.peer, word.command] = word, now
+                self._await(word, word, now=now)
                 self._pauses = word.name != HOLD or has_tasks
         elif word.kind in (Kind.GO, Kind.MOTION):
-            self._read_go(word, now=now)
+            self._read_go(word, is_late=waited > OLD, now=now)
         elif word.kind is Kind.WISH:
             self._wished_at = now
             self._read_wish(word)
@@ -172,7 +194,13 @@ class Halts:
         """Note the server's answer to a client."""
         key = peer, command
         is_granted = result in (ACCEPTED, IN_PROGRESS)
-        word, read_at = self._asked.pop(key, (None, 0.0))
+        asked = self._asked.get(key)
+        if not asked:
+            return
+        # a halt is answered when it is kept, later than a refusal of what was read with it
+        answered = min(asked, key=lambda each: not is_granted and _is_halt(each[0]))
+        asked.remove(answered)
+        word, read_at = answered
         if word is None:
             return
         if word.kind is Kind.HALT:
@@ -194,12 +222,15 @@ class Halts:
         if halt is None:
             return
         truth = self._vehicle.truth
-        if self._is_excused(now):
+        is_unheard = self._is_unheard(now)
+        if is_unheard or self._is_by_itself:
             halt.pose = truth
-            return
         moved = hypot(truth.north - halt.pose.north, truth.east - halt.pose.east)
         turned = abs(remainder(truth.yaw - halt.pose.yaw, tau))
-        if now - halt.at <= self._stops_within:
+        settled = self._stops_within + UNDONE
+        if not is_unheard and now - halt.at > settled and (shown := self._is_undone(halt)):
+            far, halt.since = True, shown
+        elif now - halt.at <= self._stops_within:
             speed = hypot(halt.pose.forward_speed, halt.pose.lateral_speed)
             far = moved > speed * self._stops_within + SLACK
             far |= turned > abs(halt.pose.yaw_rate) * self._stops_within + SLACK_ANGLE
@@ -233,14 +264,22 @@ class Halts:
             halt.fresh.update((go.word.peer, go.word.command) for go in newer)
             self._suspended = halt
 
-    def _read_go(self, word: Word, *, now: float) -> None:
+    def _await(self, word: Word, judged: Word | None, *, now: float) -> None:
+        """Expect an answer; those to requests that are read together come in their order."""
+        asked = self._asked.setdefault((word.peer, word.command), deque())
+        if asked and asked[-1][1] < now:
+            asked.clear()
+        asked.append((judged, now))
+
+    def _read_go(self, word: Word, *, is_late: bool, now: float) -> None:
         if word.command:
-            self._asked[word.peer, word.command] = word, now
+            self._await(word, None if is_late else word, now=now)
+        if word.command and not is_late:
             self._gos.append(_Go(word, now))
         halt = self._halt or self._suspended
         if halt is None or (halt.is_stop and word.name != CONTINUE):
             return
-        if not self._ends(word, halt):
+        if is_late or not self._ends(word, halt):
             halt.note_older(word, now=now)
             return
         self.in_flight += _passed(word, halt)
@@ -279,6 +318,15 @@ class Halts:
             return word.order > halt.word.order
         return _passed(word, halt)
 
+    def _is_undone(self, halt: _Halt) -> str:
+        """Return what the rover shows that a client's halt had ended, "" for nothing."""
+        autopilot = self._vehicle.autopilot
+        if halt.word is None or halt.at < self._server_began_at or not autopilot.armed:
+            return ""
+        if halt.name in (HOLD, STOP) and autopilot.mode in LED and not self._is_by_itself:
+            return f"it shows {autopilot.mode.name}"
+        return "it is armed" if halt.name == "disarm" else ""
+
     def _look_at_mode(self, now: float) -> None:
         mode = self._vehicle.autopilot.mode
         if mode is not self._mode:
@@ -286,11 +334,15 @@ class Halts:
             by_server = now - self._mode_sent_at <= MODE_TAKES
             self._is_by_itself = mode in BY_ITSELF and not by_server
 
-    def _is_excused(self, now: float) -> bool:
+    def _is_unheard(self, now: float) -> bool:
         faults = self._vehicle.autopilot.faults
         if faults.deaf or faults.refuse_mode:
             self._disturbed_at = max(self._disturbed_at, now)
-        return self._is_by_itself or now - self._disturbed_at <= UNHEARD
+        return now - self._disturbed_at <= UNHEARD
+
+
+def _is_halt(word: Word | None) -> bool:
+    return word is not None and word.kind is Kind.HALT
 
 
 def _passed(word: Word, halt: _Halt) -> bool:

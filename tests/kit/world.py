@@ -520,7 +520,7 @@ class ObservedNet(MemoryNet):
         self.is_server_away = False
         #: the links of the server, or of all gateways
         self.to_vehicles, self.to_clients = {VEHICLE_LINK}, {CLIENT_LINK}
-        self._unread: list[tuple[str, str, bytes]] = []
+        self._unread: list[tuple[str, str, bytes, float]] = []
         self._sent_at: dict[bytes, float] = {}  # rovers' motion reports, newest last
         #: whether rovers receive heartbeat requests; else they send heartbeats at 1 Hz only
         self.shows_on_request = True
@@ -532,8 +532,8 @@ class ObservedNet(MemoryNet):
         self.loses: Callable[[str, str, bytes], bool] = lambda *_: False
         #: returns the pieces in which a datagram arrives at a link
         self.cut_up: Callable[[str, bytes], Iterable[bytes]] = lambda _, data: [data]
-        #: called with (client, datagram) when the server reads it
-        self.on_read: Callable[[str, bytes], None] = lambda *_: None
+        #: called with (client, datagram, seconds since its arrival) when the server reads it
+        self.on_read: Callable[[str, bytes, float], None] = lambda *_: None
         #: called with (rover, source, datagram) on its arrival
         self.on_arrival: Callable[[str, str, bytes], None] = lambda *_: None
 
@@ -563,14 +563,14 @@ class ObservedNet(MemoryNet):
             self.unread_links[link.name].append((link, source, data, self.now))
             return
         elif link.name in self.to_vehicles or link.name in self.to_clients:
-            self._unread.append((link.name, source, data))
+            self._unread.append((link.name, source, data, self.now))
         for piece in self.cut_up(link.name, data):
             super().arrive(link, source, piece)
 
     def read_again(self, name: str) -> None:
         """Let the server read a link again, with the times at which its packets arrived."""
         for link, source, data, at in self.unread_links.pop(name, []):
-            self._unread.append((name, source, data))
+            self._unread.append((name, source, data, at))
             link.arrived.append((source, data))
             link.times.append(at)
 
@@ -584,9 +584,9 @@ class ObservedNet(MemoryNet):
         super().deliver()
         if self.is_server_away:
             return
-        for link, source, data in self._unread:
+        for link, source, data, arrived in self._unread:
             if link in self.to_clients:
-                self.on_read(source, data)
+                self.on_read(source, data, self.now - arrived)
             for name, observer in self.observers.items():
                 if link in self.to_clients:
                     observer.asked(self.now, data, peer=source)

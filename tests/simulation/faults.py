@@ -2,6 +2,11 @@
 
 Each is a line of the product and what stood there, or might as well have. ``tools/simulate --fault
 NAME --seeds 24`` plays stories until one finds it.
+
+Found, by the number of seeds from 0 that it took: nonces 1, D1 3, an end told too early 12. Not
+found in so many seeds: a late arming 12 (a rover that is armed and stands breaks no rule); C1, D2,
+D3, D4 and D10 7 each. C5 was not found in 17, with fewer disarmings than now. C4 is found by a
+story that moves a start to earlier times. The others were not tried with these stories.
 """
 
 import shutil
@@ -64,10 +69,10 @@ FAULTS: dict[str, tuple[str, str, str]] = {
         "_row(_E.LATE_ARMING, _F.TELL, _F.DISARM, work=Work.NONE)",
         "_row(_E.LATE_ARMING, _F.TELL, work=Work.NONE)",
     ),
-    "STOP lets set-points pass": (
+    "STOP lets sticks pass": (
         f"{COMMANDS}/motion_gate.py",
-        "    if parts.tasks.is_stopped:\n        return STOP",
-        "    if False:\n        return STOP",
+        "    if not row.passes_under_stop and vehicle.tasks.is_stopped:\n        return",
+        "    if False:\n        return",
     ),
     "nonces are not looked at": ("tasks/deduplicator.py", "if draft.marks.nonce:", "if False:"),
     "an end is told too early": (

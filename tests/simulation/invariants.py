@@ -34,6 +34,7 @@ BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL, Mode.LAN
 ANSWERED = 12.0  # s, until every command has its answer
 TOLERANCE, SHARE = 0.25, 0.05  # m or rad, and of the goal: what a completed task may lack
 CLEAR = 54011
+STALL = "stall"  # of the server, which holds what drove
 COMPLETES = 90.0  # s, for a metre on the way out
 
 
@@ -48,7 +49,7 @@ def halted(world: "World") -> Iterator[str]:
     """A halted rover stands until a newer request releases it."""
     for halts in world.halts:
         for broken in halts.look(world.now):
-            yield f"rover {halts.system_id} moves after {broken.kind}"
+            yield f"rover {halts.system_id} is let go after {broken.kind}"
 
 
 def undriven(world: "World") -> Iterator[str]:
@@ -114,7 +115,7 @@ def not_driven(world: "World", task_id: int) -> Iterator[str]:
 def taken_from_halted(world: "World", task_id: int, rover: int) -> Iterator[str]:
     """What a person has halted keeps its tasks."""
     for halts in world.halts:
-        if halts.system_id == rover and halts.in_force:
+        if halts.system_id == rover and halts.in_force not in ("", STALL):
             yield f"task {task_id} is taken from rover {rover} after {halts.in_force}"
 
 

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -110,6 +110,7 @@ class _Player:
             for name, value in FOLLOWS if "RO_SPEED_P" in vehicle.autopilot.parameters else ():
                 vehicle.autopilot.parameters[name] = value
         self.world.net.conditions = NETS[0]
+        self.world.later = self._later
         self.world.on_death = lambda: self._later(self._away, self.world.start)
         self._modes = {mode.name: number for mode, number in persona.modes.numbers.items()}
         self._is_px4 = self.world.observers[0].ways.sub_modes
@@ -127,13 +128,14 @@ class _Player:
             act: Callable[[], object] = partial(self._do, move)
             heapq.heappush(self._due, (begins + move.at, move.number, act))
         end = begins + (story.seconds if until is None else until)
-        while self._due and self._due[0][0] <= end:
-            when, _, act = heapq.heappop(self._due)
-            world.run(max(0.0, when - world.now))
-            act()
-        world.run(max(0.0, end - world.now))
+        while world.step(end=max(world.now, min(end, self._next()))) or self._next() <= end:
+            while self._next() <= world.now:
+                heapq.heappop(self._due)[2]()
         if until is None:
             self._end()
+
+    def _next(self) -> float:
+        return self._due[0][0] if self._due else inf
 
     def _end(self) -> None:
         """Let whatever was begun come to its end, and judge what must hold then."""
@@ -144,6 +146,7 @@ class _Player:
                 world.run(max(0.0, when - world.now))
                 act()
         world.disk_store.dies_in = 0
+        world.delayed.clear()
         world.net.conditions = NETS[0]
         world.net.buffers.clear()
         world.disturb(0)
@@ -214,7 +217,7 @@ class _Player:
                 say(MODIFY, self._task(args[1]), args[2], args[3])
             case "moves a start often":
                 for number in range(OFTEN):
-                    later = partial_modify(client, self._task(0), rover, 100 + number)
+                    later = partial_modify(client, self._task(-1), rover, 400 - number)
                     self._later(number * 0.02, later)
             case "go-to":
                 if self._is_px4:  # as MAVSDK does
@@ -264,6 +267,7 @@ class _Player:
             return  # a server knows no copies of what only an earlier one has heard
         is_command = said.message.get_type() in ("COMMAND_LONG", "COMMAND_INT")
         is_old = world.now - said.first.at > REPEATED or self._is_over(said)
+        is_old &= not (said.name == "submission" and said.message.param4)  # that has a nonce
         if how == "the same packet" or not is_command or (how == "with a new number" and is_old):
             world.net.send(said.client.name, said.client.server, said.data)
         elif how == "confirmed higher" and said.message.get_type() == "COMMAND_LONG":
@@ -312,6 +316,8 @@ class _Player:
             case "net loses and delays":
                 world.net.conditions = NETS[args[0]]
                 world.disturb(0)
+            case "net delays a command to the rover":
+                world.delayed[f"rover{args[0]}"] = args[1]
             case "net radio" | "net no radio":
                 self._radio(is_there=not move.what.startswith("no"))
             case "net link down":

@@ -13,7 +13,7 @@ from rover_sim.frames import Frame
 
 SERVER, ROVER, ANY = 191, 1, 250  # components; ANY is the server's system
 MODES = ("MANUAL", "HOLD", "AUTO", "RTL", "GUIDED")
-MAKES = ("ardupilot", "ardupilot", "px4", "px4", "generic")
+MAKES = ("ardupilot", "px4", "generic")
 FRAMES = (Frame.SKID, Frame.SKID, Frame.ACKERMANN)
 #: name: heartbeats, and when it sends an unanswered command again, s
 HABITS: dict[str, tuple[bool, tuple[float, ...]]] = {
@@ -21,10 +21,12 @@ HABITS: dict[str, tuple[bool, tuple[float, ...]]] = {
     "MAVSDK": (True, (0.0, 0.5, 1.0)),
     "script": (False, (0.0,)),
 }
-PAUSES = (0.01, 0.1, 0.5, 2.0)  # s, between two moves
+THEMES = 11  # each story has one, and they meet each make in turn
+PAUSES = (0.01, 0.5, 3.0, 6.0)  # s, between two plots
 AFTER = (0.3, 1.0, 3.0, 8.0)  # s, between the moves of a plot
 NETS = 4  # see moves.py
 DRIVES_AFTER = 3.0  # s, until a task moves a rover
+SHOWN_AFTER = 5.0  # s, until it is seen that a rover does not stand
 REMEMBERED = 20.0  # s, the oldest request that the net brings once more
 
 
@@ -91,9 +93,9 @@ class _Teller:
         self._random = random = Random(seed)
         count = random.choice((2, 3, 4))
         self._cast = Cast(
-            make=(make := random.choice(MAKES)),
+            make=(make := MAKES[seed // THEMES % len(MAKES)]),
             frame=random.choice(FRAMES) if make != "generic" else Frame.SKID,
-            rovers=random.choice((1, 1, 1, 2, 3)),
+            rovers=random.choice((2, 3) if seed % THEMES == 0 else (1, 1, 1, 2, 3)),
             habits=tuple(random.choice(tuple(HABITS)) for _ in range(count)),
             on_restart=random.choice(("pause", "continue")),
             on_failure=random.choice(("pause", "continue")),
@@ -103,7 +105,7 @@ class _Teller:
         self._at = 0.0
 
     def story(self, seconds: float) -> Story:
-        plots = [plot for plot, weight in self._plots() for _ in range(weight)]
+        plots = self._chosen()
         while self._at < seconds:
             at = self._at
             for after, who, what, args in self._random.choice(plots)():
@@ -113,26 +115,19 @@ class _Teller:
             self._at = (at if self._random.random() < 0.75 else self._at) + self._pick(*PAUSES)
         return Story(self._seed, self._cast, seconds, tuple(sorted(self._moves)))
 
-    def _plots(self) -> list[tuple[Callable[[], Plan], int]]:
-        return [
-            (self._drive_all, 6),
-            (self._request, 24),
-            (self._person, 6),
-            (self._rover_fails, 6),
-            (self._net_changes, 5),
-            (self._server_fails, 4),
-            (self._disk_fails, 4),
-            (self._halt_then_copy, 6),
-            (self._overtaken, 3),
-            (self._read_later, 3),
-            (self._frozen, 3),
-            (self._halt_and_end, 4),
-            (self._any_rover, 3 if self._cast.rovers > 1 else 0),
-            (self._parked, 2),
-            (self._halted_while_waiting, 4),
-            (self._copy, 8),
-            (self._moved_start, 1),
+    def _chosen(self) -> list[Callable[[], Plan]]:
+        """Return what happens in this story: mostly one kind of trouble, so that it goes deep."""
+        themes = [
+            *(self._any_rover, self._halt_then_copy, self._overtaken, self._comes_late),
+            *(self._read_later, self._frozen, self._halt_and_end, self._parked, self._stopped),
+            *(self._moved_start, self._halted_while_waiting),
         ]
+        others = [
+            *(self._drive_all, self._person, self._rover_fails, self._net_changes),
+            *(self._server_fails, self._disk_fails, self._copy, self._pick(*themes)),
+        ]
+        theme = themes[self._seed % THEMES]
+        return [self._works, self._request, *self._random.sample(others, 3), *[theme] * 4]
 
     # parts of moves
 
@@ -169,9 +164,9 @@ class _Teller:
         )
 
     def _go(self, rover: int) -> tuple[str, tuple[Any, ...]]:
+        if self._random.random() < 0.5:
+            return "continue", (rover, SERVER)
         return self._one_of(
-            ("continue", (rover, SERVER)),
-            ("continue", (rover, SERVER)),
             ("continue", (rover, ROVER)),
             ("release", (rover, self._random.randrange(3))),
             ("start of the mission", (rover,)),
@@ -181,6 +176,9 @@ class _Teller:
 
     def _places(self) -> tuple[Any, ...]:
         return tuple(round(self._random.uniform(-4, 4), 2) for _ in range(2))
+
+    def _wait(self, seconds: float = SHOWN_AFTER) -> tuple[float, str, str, tuple[Any, ...]]:
+        return seconds, "nobody", "waits", ()
 
     # plots
 
@@ -193,13 +191,26 @@ class _Teller:
             yield 0.05, client, "continue", (rover, SERVER)
             yield 0.05, client, *self._task(rover)
 
-    def _set_off(self, rover: int, client: str) -> Plan:
-        """Somebody lets a rover go, and it drives."""
-        if self._random.random() < 0.4:
+    def _free(self, rover: int, client: str) -> Plan:
+        """Nothing holds a rover any more: it waits for work."""
+        if self._random.random() < 0.8:
+            yield 0.0, client, "clear", (rover, 1)
+            yield 0.1, f"person at rover {rover}", "switch", ("HOLD",)
+            yield 0.1, f"person at rover {rover}", "arms", (True,)
+            yield 1.5, client, "continue", (rover, SERVER)
+        elif self._random.random() < 0.5:
             yield 0.0, client, "mode", (rover, "HOLD")
         yield 0.1, client, "continue", (rover, SERVER)
+
+    def _set_off(self, rover: int, client: str) -> Plan:
+        """Somebody lets a rover go, and it drives."""
+        yield from self._free(rover, client)
         yield 0.0, client, "move", (rover, SERVER, 8.0, self._nonce(), 5)
-        yield DRIVES_AFTER, "nobody", "waits", ()
+        yield self._wait(DRIVES_AFTER)
+
+    def _works(self) -> Plan:
+        """A rover has work, and whatever comes next meets it driving."""
+        yield from self._set_off(self._rover(), self._client())
 
     def _request(self) -> Plan:
         rover, pick, random = self._rover(), self._pick, self._random
@@ -295,31 +306,35 @@ class _Teller:
         yield 0.0, client, *self._go(rover)
         yield self._pick(*AFTER), self._client(), *self._halt(rover)
         yield self._brought(client, first)
+        yield self._wait()
 
     def _overtaken(self) -> Plan:
         """Two requests of one client; the second arrives first."""
         client, rover = self._client(), self._rover()
-        yield from self._set_off(rover, client)
+        yield from self._set_off(rover, self._client())  # the server knows a copy of what it said
         yield 0.0, client, "the net swaps its next two", ()
-        yield 0.0, client, *self._go(rover)
-        yield self._pick(0.005, 0.02, 0.2), client, *self._halt(rover)
+        yield 0.0, client, *self._one_of(("continue", (rover, SERVER)), self._go(rover))
+        halt = self._one_of(("pause", (rover, SERVER)), self._halt(rover))
+        yield self._pick(0.005, 0.02, 0.2), client, *halt
+        yield self._wait()
 
     def _read_later(self) -> Plan:
-        """A go request waits on a link that is read after another link's halt."""
-        rover, late = self._rover(), self._pick(0.2, 0.5, 1.0)
+        """A go request waits on a link that is read late, perhaps after another link's halt."""
+        rover, late = self._rover(), self._pick(0.3, 1.0, 1.0)
         yield from self._set_off(rover, "client 1")
-        yield 0.0, self._client(), *self._halt(rover)
+        yield 0.0, self._client(), *self._one_of(("pause", (rover, SERVER)), self._halt(rover))
         yield self._pick(0.5, 3.0), "server", "reads late", (1, late)
-        yield 0.01, "client 1", *self._go(rover)
-        yield late - 0.05, "client 0", *self._halt(rover)
+        yield 0.01, "client 1", "continue", (rover, SERVER)
+        if self._random.random() < 0.5:
+            yield late - 0.05, "client 0", *self._halt(rover)
+        yield self._wait()
 
     def _frozen(self) -> Plan:
         """The server's process or machine stands still, and everybody goes on."""
-        seconds, rover = self._pick(0.6, 0.6, 2.0, 5.0, 20.0), self._rover()
-        if self._random.random() < 0.7:
-            yield from self._set_off(rover, self._client())
+        seconds, rover = self._pick(0.6, 1.0, 1.5, 2.0, 5.0, 20.0), self._rover()
+        yield from self._set_off(rover, self._client())
         yield 0.0, "server", "stands still", (seconds,)
-        for _ in range(self._random.randrange(1, 4)):
+        for _ in range(self._pick(0, 0, 1, 2)):
             after = self._random.uniform(0.05, seconds / 3)
             yield (
                 after,
@@ -332,27 +347,37 @@ class _Teller:
                     ("setpoint", (rover, 0.3)),
                 ),
             )
+        yield self._wait(seconds + SHOWN_AFTER)
 
     def _halt_and_end(self) -> Plan:
         """Somebody halts a rover, and the server ends at once, perhaps on a full or slow disk."""
         rover = self._rover()
         yield from self._set_off(rover, self._client())
-        disk = self._pick(("is full for", (5.0,)), ("takes", (0.3,)), ("keeps halts after", (0.2,)))
+        halt, late = self._halt(rover), ("keeps halts after", (0.2,))
+        end, disk = self._pick(
+            *((halt, late), (halt, late), (halt, ("is full for", (5.0,)))),
+            *((("cancel", (rover, 0, 0)), ("takes", (0.3,))), (("clear", (rover, 1)), late)),
+        )
         yield 0.0, "disk", *disk
-        yield 0.2, self._client(), *self._halt(rover)
+        yield 0.2, self._client(), *end
         how = self._pick("SIGKILL", "SIGKILL", "SIGTERM")
-        yield self._pick(0.01, 0.05, 0.3, 1.0), "server", how, (self._pick(0.5, 8.0),)
+        yield self._pick(0.02, 0.05, 0.1, 0.3), "server", how, (self._pick(0.5, 8.0),)
         yield 0.0, "disk", "takes", (0.0,)
 
     def _any_rover(self) -> Plan:
         """Tasks for any rover wait; a rover is halted and falls silent."""
-        is_later = self._random.random() < 0.5
+        if self._cast.rovers == 1:
+            yield from self._works()
+            return
+        is_later = self._random.random() < 0.8
+        for rover in range(1, self._cast.rovers + 1):
+            yield from self._free(rover, self._client())
         for _ in range(self._cast.rovers + 1):
             task = ("later task", (ANY, 15.0)) if is_later else self._task(ANY)
             yield 0.1, self._client(), *task
-        rover = self._rover()
-        if self._random.random() < 0.6:
-            yield self._pick(*AFTER), self._client(), *self._halt(rover)
+        rover = self._pick(1, self._rover())  # the first has most of them
+        if self._random.random() < 0.8:
+            yield 1.0, self._client(), *self._one_of(("disarm", (rover,)), self._halt(rover))
         else:
             yield 1.0, f"person at rover {rover}", "arms", (False,)
         yield 1.0, f"rover {rover}", "fails", (2,)
@@ -363,18 +388,47 @@ class _Teller:
     def _moved_start(self) -> Plan:
         """Somebody moves the start of a task again and again."""
         rover, client = self._rover(), self._client()
-        yield 0.0, client, "later task", (rover, 30.0)
+        yield from self._free(rover, client)
+        yield 0.5, client, "later task", (rover, 30.0)
         yield 1.0, client, "moves a start often", (rover,)
+        yield self._wait(7.0)
 
     def _parked(self) -> Plan:
         """A person drives while a task waits, and parks."""
         rover = self._rover()
-        if self._random.random() < 0.5:
-            yield from self._set_off(rover, self._client())
-        yield 0.0, f"person at rover {rover}", "switch", ("MANUAL",)
+        yield from self._pick(self._free, self._free, self._set_off)(rover, self._client())
+        yield 1.0, f"person at rover {rover}", "switch", ("MANUAL",)
         yield 0.5, f"person at rover {rover}", "arms", (True,)
         yield 0.5, self._client(), *self._task(rover)
         yield self._pick(*AFTER), f"person at rover {rover}", "switch", ("HOLD",)
+        yield self._wait()
+
+    def _stopped(self) -> Plan:
+        """Whatever is asked after a STOP, the rover stands until somebody continues."""
+        rover = self._rover()
+        yield from self._set_off(rover, self._client())
+        yield 0.0, self._client(), "STOP", (rover, SERVER, self._pick(0, 1))
+        for _ in range(3):
+            what = self._one_of(
+                ("sticks", (rover, 300)), ("setpoint", (rover, 0.3)), self._go(rover)
+            )
+            yield self._pick(*AFTER), self._client(), *what
+
+    def _comes_late(self) -> Plan:
+        """A command, or a copy of it, reaches a rover after a halt that came later."""
+        rover, client = self._rover(), self._client()
+        yield from self._free(rover, client)
+        led = ("mode", (rover, "GUIDED")), ("mode", (rover, "HOLD"))
+        armed = ("arm", (rover,)), ("disarm", (rover,))
+        go, halt = self._pick(armed, led, led, (self._go(rover), self._halt(rover)))
+        late, after = self._pick((0.5, 0.2), (2.5, 2.0))  # in the second case, a copy came sooner
+        if go[0] == "arm":
+            yield 0.5, client, "disarm", (rover,)
+            late, after = 2.5, 2.0
+        yield 1.0, "net", "delays a command to the rover", (rover, late)
+        yield 0.0, client, *go
+        yield after, self._client(), *halt
+        yield self._wait(7.0)
 
     def _halted_while_waiting(self) -> Plan:
         """Something waits for its time or for an arming; somebody halts the rover first."""

@@ -34,13 +34,13 @@ from tests.simulation.story import Cast, Move, tell
 from tests.simulation.world import Asked, Driven, SimulatedWorld
 
 SIMULATE = Path(__file__).resolve().parents[2] / "tools/simulate"
-SECONDS, STORIES = 60.0, 6  # of a story, and stories of a test
-FOUND_SOON = "C6 halts are answered at once", 20  # a fault, and a seed that finds it in 15 s
+SECONDS, STORIES = 60.0, 11  # of a story, and stories of a test
+FOUND_SOON = "D1 an older go is obeyed", 1  # a fault, and a seed that finds it in 20 s
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("first", range(0, STORIES * tries(4, long=100), STORIES))
+@pytest.mark.parametrize("first", range(0, STORIES * tries(3, long=100), STORIES))
 def test_whatever_happens_no_rule_is_broken(first: int) -> None:
     for seed in range(first, first + STORIES):
         story = tell(seed, SECONDS)
@@ -73,7 +73,7 @@ def test_the_same_seed_is_the_same_story_whatever_the_hashes() -> None:
 def test_a_fault_is_found_and_told_as_a_short_story() -> None:
     fault, seed = FOUND_SOON
     ended = subprocess.run(
-        [SIMULATE, "--fault", fault, "--seed", f"{seed}", "--seconds", "15"],
+        [SIMULATE, "--fault", fault, "--seed", f"{seed}", "--seconds", "20"],
         capture_output=True,
         text=True,
         check=False,
@@ -83,8 +83,8 @@ def test_a_fault_is_found_and_told_as_a_short_story() -> None:
     first, *moves, last = [line for line in ended.stdout.splitlines() if line]
     assert first.startswith(f"seed {seed}: ")
     assert len(moves) < 8, ended.stdout
-    assert any("STOP" in line for line in moves)
-    assert last == f"repeat it: tools/simulate --seed {seed} --seconds 15"
+    assert any("once more" in line for line in moves)
+    assert last == f"repeat it: tools/simulate --seed {seed} --seconds 20"
 
 
 def test_a_story_is_shrunk_to_the_moves_that_matter(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,7 +229,7 @@ def remembers_everything(_world: SimulatedWorld) -> None:
 
 BREAKS: dict[Callable[[SimulatedWorld], None], str] = {
     sends_no_number: "packets to rovers: rover 1: .*setpoint not finite",
-    drives_a_paused_rover: "halted rovers stand: rover 1 moves after pause",
+    drives_a_paused_rover: "halted rovers stand: rover 1 is let go after pause",
     moves_by_itself: "rover 1 moves, and nobody drives it",
     forgets_a_task: "tasks are kept: task 99 was accepted, and is lost",
     leaves_a_command: "commands are answered: command 400 of client 0 is not answered",

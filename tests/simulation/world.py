@@ -13,6 +13,7 @@ from zlib import crc32
 
 from mav_tasks.engine.inputs import WallClock
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.links.memory import MemoryNet
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import Event, TaskAssigned, TaskChanged, TaskSubmitted, TaskWithdrawn
 from mav_tasks.tasks.goal import Drive, Move, Rotate
@@ -20,11 +21,20 @@ from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import Mode, Persona
 from tests.kit.bounds import Violation
-from tests.kit.client import ACCEPTED, ACK, SET_MODE, TASK_STATUS, FakeClient, Message, TaskStatus
-from tests.kit.halts import Halts
+from tests.kit.client import (
+    ACCEPTED,
+    ACK,
+    ARM,
+    SET_MODE,
+    TASK_STATUS,
+    FakeClient,
+    Message,
+    TaskStatus,
+)
+from tests.kit.halts import SWITCHED, UNHEARD, Halts
 from tests.kit.mission import MISSION_ACK, Ack
 from tests.kit.words import Kind, Said, Word, WordLog
-from tests.kit.world import MODE_COMMAND, World
+from tests.kit.world import World
 from tests.simulation import invariants
 from tests.simulation.disk import Crash, Disk, UncertainStore
 from tests.simulation.invariants import Stillness
@@ -43,7 +53,11 @@ RESULT_OF_ACK = 12
 COMMAND_ID = slice(10 + 28, 10 + 30)  # of a COMMAND_LONG
 SET_MODE_MESSAGE = 11
 COMMANDS = (75, 76)  # COMMAND_INT, COMMAND_LONG
+LATE = (SET_MODE, ARM)  # what a net may bring to a rover after a halt
 SERVER = 250  # system
+STALL = 0.8  # s of a stall, after which what drove is held
+LOOP = 20.0  # s, in which a PX4 car drives a loop to where it was put into HOLD
+SHOWN = 3.0  # s, until the server has seen and undone what came late
 ENDS_WITHIN = 2.0  # s, for an orderly end of the server
 
 
@@ -120,6 +134,9 @@ class SimulatedWorld(World):
         self._read: dict[str, int] = {}
         self._look_at = self._forget_at = 0.0
         self._death: tuple[float, bool] | None = None  # when it ended, and whether in order
+        self.delayed: dict[str, float] = {}  # s, of the next command to a rover
+        self.stalled: tuple[float, list[int]] = 0.0, []  # since when, and who drove a task then
+        self.later: Callable[[float, Callable[[], object]], None] = lambda *_: None
         #: called when the server dies at a write
         self.on_death: Callable[[], object] = lambda: None
         for observer in self.observers:
@@ -198,6 +215,8 @@ class SimulatedWorld(World):
         self.disk_store.clock = lambda: self.now
         self._followed, self.is_away, self.started_at = 0, False, self.now
         self.start_server(self.disk_store, restored)
+        for halts in self.halts:
+            halts.server_began(now=self.now)
         for observer in self.observers:
             paused = restored.paused.get(observer.system_id)
             observer.stopped = paused is TaskReason.STOPPED
@@ -208,6 +227,9 @@ class SimulatedWorld(World):
         """Stop the server's process; what is sent to it waits. Return whether it ran."""
         if self.is_away:
             return False
+        found = self.server.engine.snapshot(now=self.now).vehicles
+        driven = [v.system_id for v in found if v.active and v.active.state is TaskState.EXECUTING]
+        self.stalled = self.now, driven
         self.leave(self.server)
         self.watched.is_server_away = self.is_away = True
         return True
@@ -216,6 +238,10 @@ class SimulatedWorld(World):
         """Let the server's process run again."""
         self.watched.is_server_away = self.is_away = False
         self.join(self.server)
+        since, driven = self.stalled
+        for halts in self.halts if self.now - since > STALL else ():
+            if halts.system_id in driven and not halts.in_force:
+                halts.person(invariants.STALL, drives=False, now=self.now)
 
     def step_wall_clock(self, seconds: float) -> None:
         """Make the wall clock of the server's machine jump."""
@@ -273,8 +299,8 @@ class SimulatedWorld(World):
         was_mode = autopilot.mode
         autopilot.operator_mode(mode, now=self.now)
         if autopilot.mode is not was_mode:
-            drives = mode is not Mode.HOLD
-            self.halts[number - 1].person("HOLD at the rover", drives=drives, now=self.now)
+            drives = mode is not Mode.HOLD or self.is_away  # a server that is away saw nobody
+            self.halts[number - 1].person(SWITCHED, drives=drives, now=self.now)
 
     def person_arms(self, number: int, *, armed: bool) -> None:
         """Let a person arm or disarm a rover; it counts only if the arming changes."""
@@ -283,6 +309,9 @@ class SimulatedWorld(World):
         autopilot.operator_arm(armed, now=self.now)
         if autopilot.armed is not was_armed:
             self.halts[number - 1].person("disarmed at the rover", drives=armed, now=self.now)
+            observer = self.observers[number - 1]
+            if armed and observer.brakes_first and observer.ways.arms_in_hold:
+                observer.may_move_until = self.now + LOOP
 
     # the net
 
@@ -307,10 +336,18 @@ class SimulatedWorld(World):
         self.counts["packets"] += 1
         if source in self.watched.to_clients and data[7:10] == ACK.to_bytes(3, "little"):
             self._server_answers(target, data)
+        if target in self.delayed and source == VEHICLE_LINK and _command_in(data) in LATE:
+            self.later(self.delayed.pop(target), partial(self._comes_late, target, data))
+            return True
         if source in self._held:
             return self._is_overtaken(source, target, data)
         rover = target if source == VEHICLE_LINK else source
         return self._down_until.get(rover, -inf) > self.now
+
+    def _comes_late(self, rover: str, data: bytes) -> None:
+        number = int(rover.removeprefix("rover"))
+        self.disturb(number, SHOWN - UNHEARD)
+        MemoryNet.send(self.net, VEHICLE_LINK, rover, data)  # it left before
 
     def _is_overtaken(self, source: str, target: str, data: bytes) -> bool:
         first = self._held[source]
@@ -322,7 +359,7 @@ class SimulatedWorld(World):
             self.net.send(source, target, first)
         return True
 
-    def _server_reads(self, peer: str, data: bytes) -> None:
+    def _server_reads(self, peer: str, data: bytes, waited: float) -> None:
         word = self.words.word(peer, data)
         if word is None:
             return
@@ -333,7 +370,7 @@ class SimulatedWorld(World):
             active = None if vehicle is None else vehicle.active
             running = None if active is None else int(active.id)
             has_tasks = active is not None or (vehicle is not None and bool(vehicle.waiting))
-            halts.read(word, running=running, has_tasks=has_tasks, now=self.now)
+            halts.read(word, running=running, has_tasks=has_tasks, waited=waited, now=self.now)
 
     def _note_asked(self, word: Word, *, is_known: bool) -> None:
         if not word.command:
@@ -364,11 +401,9 @@ class SimulatedWorld(World):
         halts = self.halts[int(rover.removeprefix("rover")) - 1]
         if source != VEHICLE_LINK:
             halts.pushed()
-        elif data[5] != SERVER and data[7] in COMMANDS:
-            halts.passed(int.from_bytes(data[COMMAND_ID], "little"), now=self.now)
-        elif data[7] == SET_MODE_MESSAGE or (
-            data[7] == MODE_COMMAND and data[COMMAND_ID] == SET_MODE.to_bytes(2, "little")
-        ):
+        elif data[5] != SERVER:
+            halts.passed(_command_in(data), now=self.now)
+        if data[7] == SET_MODE_MESSAGE or _command_in(data) == SET_MODE:
             halts.mode_arrived(now=self.now)
 
     # judging
@@ -464,3 +499,8 @@ class SimulatedWorld(World):
         for observer in self.observers:
             observer.driven.clear()
             observer.reached.clear()
+
+
+def _command_in(data: bytes) -> int:
+    """Return the number of the command in a packet, 0 if it holds none."""
+    return int.from_bytes(data[COMMAND_ID], "little") if data[7] in COMMANDS else 0
