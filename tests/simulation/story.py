@@ -320,12 +320,13 @@ class _Teller:
 
     def _read_later(self) -> Plan:
         """A go request waits on a link that is read late, perhaps after another link's halt."""
-        rover, late = self._rover(), self._pick(0.3, 1.0, 1.0)
-        yield from self._set_off(rover, "client 1")
-        yield 0.0, self._client(), *self._one_of(("pause", (rover, SERVER)), self._halt(rover))
-        yield self._pick(0.5, 3.0), "server", "reads late", (1, late)
+        rover, is_halted = self._rover(), self._random.random() < 0.5
+        late = self._pick(0.3, 1.0) if is_halted else 1.0
+        yield from self._set_off(rover, self._pick("client 0", "client 1"))
+        yield 0.0, "client 0", *self._one_of(("pause", (rover, SERVER)), self._halt(rover))
+        yield 3.0, "server", "reads late", (1, late)
         yield 0.01, "client 1", "continue", (rover, SERVER)
-        if self._random.random() < 0.5:
+        if is_halted:
             yield late - 0.05, "client 0", *self._halt(rover)
         yield self._wait()
 

@@ -95,7 +95,7 @@ def test_a_story_is_shrunk_to_the_moves_that_matter(monkeypatch: pytest.MonkeyPa
             yield "somebody has switched to MANUAL"
 
     monkeypatch.setitem(INVARIANTS, "no MANUAL", (0.0, no_manual))
-    story = tell(1, 8.0)
+    story = tell(12, 8.0)  # of PX4s, which boot in HOLD
     switch = Move(6.0, 999, "person at rover 1", "switch", ("MANUAL",))
     story = replace(story, moves=tuple(sorted((*story.moves, switch))))
     found = play(story)
