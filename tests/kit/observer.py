@@ -419,8 +419,8 @@ class Observer:
             is_pause = now == self._pause_at or self._is_held_since_stick
             if moves:
                 self._violation(now, "moving setpoint after a takeover")
-            elif now == self._disarmed_at or is_held or (self.batches and now == self._mode_at):
-                pass  # the last: it left in the step of the news, and perhaps before it
+            elif now == self._disarmed_at or is_held:
+                pass
             elif self.mode < 0:
                 pass  # a new gateway brakes it, and knows its last heartbeat only
             elif is_pause or self._zeros_left == 0:
