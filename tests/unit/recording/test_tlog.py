@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterable
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -175,11 +176,17 @@ def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) ->
     folder = tmp_path / "logs"
     tlog = started(folder)
     assert folder.stat().st_mode & 0o777 == 0o700
-    for number in range(2):
+    numbers = count()
+
+    def is_logged() -> bool:
+        """Log one more packet: the one before may have been written as the folder went."""
+        number = next(numbers)
         data = packet(attitude(number), ROVER, number)
         tlog.on_input(Packets("rovers", [("rover", data)]), now=1.0)
-        wait_until(lambda: any(folder.glob("*")), within=10)
-        if not number:
-            shutil.rmtree(folder)
+        return any(folder.glob("*"))
+
+    wait_until(is_logged, within=10)
+    shutil.rmtree(folder)
+    wait_until(is_logged, within=10)
     tlog.close()
-    assert [seq for *_, seq in told(folder)] == [1]
+    assert [seq for *_, seq in told(folder)][-1] == next(numbers) - 1
