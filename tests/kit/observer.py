@@ -371,6 +371,8 @@ class Observer:
             by_us |= self.batches and mode == self.ways.hold and now == self._hold_wished_at
             # it restarted before it was driven: the starting task starts again
             by_us |= mode == INITIALISING and not self._moved_last
+            # a person ends what the server only brakes, after an earlier one; no task is taken
+            by_us |= mode == self.ways.hold and self._is_met
             if self.mode == self.ways.ours and not by_us:
                 self._take_over(now, zeros=0)
         self.armed, self.mode = armed, mode

@@ -526,6 +526,8 @@ class ObservedNet(MemoryNet):
         self.shows_on_request = True
         #: links that a busy server does not read now, with what has arrived there
         self.unread_links: dict[str, list[tuple[MemoryLink, str, bytes, float]]] = {}
+        #: returns whether the server of a link serves a rover: of two gateways, one does
+        self.serves: Callable[[str, str], bool] = lambda *_: True
         #: pairs of links between which nothing passes, in either direction
         self.cut: set[frozenset[str]] = set()
         #: returns whether to lose (source, target, datagram)
@@ -588,6 +590,8 @@ class ObservedNet(MemoryNet):
             if link in self.to_clients:
                 self.on_read(source, data, self.now - arrived)
             for name, observer in self.observers.items():
+                if not self.serves(link, name):
+                    continue
                 if link in self.to_clients:
                     observer.asked(self.now, data, peer=source)
                 elif source == name or source not in self.observers:

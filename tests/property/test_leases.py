@@ -1,4 +1,4 @@
-"""Leases of gateways: never two that move a vehicle. ``test_gateways`` has faults at random."""
+"""Leases of gateways: never two that move a vehicle. The simulation has them at random."""
 
 from mav_tasks.fleet.lease import Terms
 from mav_tasks.fleet.member import Member

@@ -74,7 +74,6 @@ def test_a_stop_for_all_stops_a_rover_that_is_taken_later_and_no_other_again(
     assert [world.holder(rover).name for rover in (1, 2)] == ["server", "b"]
     world.run(4.0)
     world.mend("server", 2)
-    world.watched.to_clients.clear()
     world.run(1.5)
     stopped = world.client.stop(target=(0, 191))
     world.run(0.1)
@@ -123,7 +122,6 @@ def test_one_that_no_rover_here_can_drive_goes_to_another_gateway(fleet: Fleet, 
 
 
 def test_one_that_no_rover_of_the_fleet_can_drive_is_refused(fleet: Fleet) -> None:
-    fleet.watched.to_clients.clear()  # the STOP takes its time to the other gateway
     fleet.here.stop(target=(0, 191))
     fleet.run(0.5)
     sent = fleet.submit(fleet.here)

@@ -130,7 +130,6 @@ def test_stop_at_any_gateway_stops_the_rover(fleet: Fleet, *, everybody: bool) -
     task = fleet.submit(5.0)
     fleet.drives(task)
     far = fleet.clients[fleet.other.name]
-    fleet.watched.to_clients.clear()  # the observer expects a STOP that was read in force
     began = fleet.now
     sent = far.stop(target=(0 if everybody else 1, 191))
     fleet.until(lambda: fleet.task(task).state is S.KILLED, within=1)
@@ -154,7 +153,6 @@ def test_a_stop_while_nobody_has_the_rover_is_in_force_as_soon_as_somebody_has(
     fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"), names=("server", "b", "c"))
     task = fleet.submit(5.0)
     fleet.drives(task)
-    fleet.watched.to_clients.clear()  # the observer expects a STOP that was read in force
     others = [it.name for it in fleet.gateways.values() if it is not fleet.first]
     far = fleet.add_client("far", system_id=253, server=f"{others[0]}:clients")
     fleet.run(2.0)
@@ -220,7 +218,6 @@ def test_a_stop_at_another_gateway_while_the_database_hangs_is_in_force_before_a
 ) -> None:
     task = fleet.submit(5.0)
     fleet.drives(task)
-    fleet.watched.to_clients.clear()  # the observer expects a STOP that was read in force
     reach(fleet, is_reached=False)
     fleet.run(after)
     far = fleet.clients[fleet.other.name]
@@ -245,7 +242,6 @@ def test_a_stop_that_no_gateway_could_obey_is_in_force_when_its_gateway_is_back(
 ) -> None:
     """Nobody else hears the rover: the same gateway gets it again, in another life."""
     fleet = Fleet(tmp_path, settings=Settings(on_takeover="resume"))
-    fleet.watched.to_clients.clear()
     fleet.cut(fleet.other.name)
     fleet.run(6.0)
     task = fleet.submit(5.0)

@@ -18,10 +18,11 @@ from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
 from tests.kit.bounds import too_large
 from tests.kit.client import DRIVE, MOVE, ROTATE
+from tests.kit.halts import Halts
 from tests.kit.observer import Observer
 
 if TYPE_CHECKING:
-    from tests.simulation.world import SimulatedWorld as World
+    from tests.simulation.judged import JudgedWorld as World
 
 TASKS = (MOVE, ROTATE, DRIVE)
 STANDS = 0.03  # m/s and rad/s
@@ -61,7 +62,7 @@ def undriven(world: "World") -> Iterator[str]:
 def kept(world: "World") -> Iterator[str]:
     """The server has every task that it acknowledged, in the state that its events say."""
     if not world.is_away:
-        yield from world.ledger.compare(world.server.engine.snapshot(now=world.now).tasks)
+        yield from world.ledger.compare(world.tasks())
 
 
 def answered(world: "World") -> Iterator[str]:
@@ -73,7 +74,8 @@ def answered(world: "World") -> Iterator[str]:
 
 def bounded(world: "World") -> Iterator[str]:
     """The server's memory is bounded: no container is larger than its bound."""
-    yield from too_large(world.server.engine)
+    for engine in world.engines():
+        yield from too_large(engine)
 
 
 #: name: seconds between two looks, and what is asked
@@ -90,16 +92,16 @@ INVARIANTS: dict[str, tuple[float, Callable[["World"], Iterator[str]]]] = {
 # asked where a server starts, or an event says that something has happened
 
 
-def lost_halts(world: "World", restored: Restored) -> Iterator[str]:
+def lost_halts(halts: Halts, restored: Restored) -> Iterator[str]:
     """A halt that was acknowledged outlives its server."""
-    for halts in world.halts:
-        name, paused = halts.in_force, restored.paused.get(halts.system_id, TaskReason.NONE)
-        if name == "STOP" and paused is not TaskReason.STOPPED:
-            yield f"STOP of rover {halts.system_id} was acknowledged, and is lost by the restart"
-        elif name == "pause" and paused is TaskReason.NONE:
-            yield f"a pause of rover {halts.system_id} was acknowledged, and is lost by the restart"
-        elif name == "disarm" and halts.system_id not in restored.disarmed:
-            yield f"disarming rover {halts.system_id} was acknowledged, and is lost by the restart"
+    rover, name = halts.system_id, halts.in_force
+    paused = restored.paused.get(rover, TaskReason.NONE)
+    if name == "STOP" and paused is not TaskReason.STOPPED:
+        yield f"STOP of rover {rover} was acknowledged, and is lost by the restart"
+    elif name == "pause" and paused is TaskReason.NONE:
+        yield f"a pause of rover {rover} was acknowledged, and is lost by the restart"
+    elif name == "disarm" and rover not in restored.disarmed:
+        yield f"disarming rover {rover} was acknowledged, and is lost by the restart"
 
 
 def not_driven(world: "World", task_id: int) -> Iterator[str]:
@@ -170,7 +172,6 @@ def _quiet(world: "World") -> None:
         rover.autopilot.set_faults(Faults())
     for client in world.clients:
         client.end_streams()
-    world.disk_store.delay = world.disk_store.halts_delay = world.disk_store.full_until = 0.0
     world.run(8)
 
 

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import count
 from math import inf, nan
 from pathlib import Path
 from random import Random
@@ -35,7 +36,9 @@ from tests.kit.packets.mutants import Mutants
 from tests.kit.words import Kind, Said
 from tests.kit.world import at
 from tests.simulation import invariants
-from tests.simulation.story import HABITS, ROVER, SERVER, Move, Story
+from tests.simulation.fleet import SimulatedFleet
+from tests.simulation.judged import JudgedWorld
+from tests.simulation.story import HABITS, ROVER, SERVER, Move, Story, drawn_from
 from tests.simulation.world import SimulatedWorld
 
 ROTATE, DRIVE, CANCEL, CLEAR, MODIFY, RELEASE = 54001, 54002, 54010, 54011, 54012, 54013
@@ -81,7 +84,7 @@ def play(story: Story, *, until: float | None = None) -> Found:
             text = "\n".join([f"{error}", *getattr(error, "__notes__", ())])
             rule = f"{type(error).__name__}: {error}".partition("\n")[0]
         finally:
-            world.disk.close()
+            world.close()
         return Found(rule, text, world.now - player.begins, world.digest, world.counts)
 
 
@@ -102,8 +105,9 @@ class _Player:
             if cast.frame.value != "skid"
             else PERSONAS[cast.make]
         )
-        self.world = SimulatedWorld(
-            folder, cast, seed=story.seed, persona=persona, settings=settings
+        make = SimulatedFleet if cast.gateways else SimulatedWorld
+        self.world: JudgedWorld = make(
+            folder, cast, seed=drawn_from(story.seed), persona=persona, settings=settings
         )
         for vehicle in self.world.rovers:
             vehicle.autopilot.parameters[persona.speed_parameter] = 0.8
@@ -111,12 +115,11 @@ class _Player:
                 vehicle.autopilot.parameters[name] = value
         self.world.net.conditions = NETS[0]
         self.world.later = self._later
-        self.world.on_death = lambda: self._later(self._away, self.world.start)
         self._modes = {mode.name: number for mode, number in persona.modes.numbers.items()}
         self._is_px4 = self.world.observers[0].ways.sub_modes
         self.begins = 0.0  # s, when the story begins, by the world's clock
-        self._away = 1.0  # s, until a server that died is started again
-        self._due: list[tuple[float, int, Callable[[], object]]] = []
+        self._due: list[tuple[float, int, int, Callable[[], object]]] = []
+        self._count = count()
         self._said: dict[int, Said] = {}  # by the number of the move
         self._other = self.world.net.link("another station")
 
@@ -126,11 +129,11 @@ class _Player:
         begins = self.begins = world.now
         for move in story.moves:
             act: Callable[[], object] = partial(self._do, move)
-            heapq.heappush(self._due, (begins + move.at, move.number, act))
+            heapq.heappush(self._due, (begins + move.at, move.number, next(self._count), act))
         end = begins + (story.seconds if until is None else until)
         while world.step(end=max(world.now, min(end, self._next()))) or self._next() <= end:
             while self._next() <= world.now:
-                heapq.heappop(self._due)[2]()
+                heapq.heappop(self._due)[3]()
         if until is None:
             self._end()
 
@@ -141,11 +144,11 @@ class _Player:
         """Let whatever was begun come to its end, and judge what must hold then."""
         world = self.world
         while self._due:
-            when, number, act = heapq.heappop(self._due)
+            when, number, _, act = heapq.heappop(self._due)
             if number < 0:  # no move: the end of one
                 world.run(max(0.0, when - world.now))
                 act()
-        world.disk_store.dies_in = 0
+        world.calm()
         world.delayed.clear()
         world.net.conditions = NETS[0]
         world.net.buffers.clear()
@@ -156,7 +159,8 @@ class _Player:
         world.judge(world.now, everything=True)
 
     def _later(self, seconds: float, act: Callable[[], object]) -> None:
-        heapq.heappush(self._due, (self.world.now + seconds, -len(self._due) - 1, act))
+        when, number = self.world.now + seconds, -len(self._due) - 1
+        heapq.heappush(self._due, (when, number, next(self._count), act))
 
     def _do(self, move: Move) -> None:
         words, before = self.world.words, len(self.world.words.recent)
@@ -171,8 +175,10 @@ class _Player:
                 self._person(int(move.who[-1]), move)
             case "rover":
                 self._rover(int(number), move)
+            case "net" | "another":
+                self._net(move)
             case _:
-                self._surroundings(move)
+                self.world.fails(move)
         if words.recent and words.recent[-1] is not latest:
             self._said[move.number] = words.recent[-1]
 
@@ -309,9 +315,8 @@ class _Player:
             case _:
                 autopilot.reboot(now=world.now)
 
-    def _surroundings(self, move: Move) -> None:
+    def _net(self, move: Move) -> None:
         world, args = self.world, move.args
-        store = world.disk_store
         match f"{move.who} {move.what}":
             case "net loses and delays":
                 world.net.conditions = NETS[args[0]]
@@ -330,28 +335,6 @@ class _Player:
                     *(args[0], 1, 6, REPOSITION, 0, 0, -1, 1, 0, nan), *place.values(), 0
                 )
                 self._other.send(f"rover{args[0]}", go_to.pack(common.MAVLink(None, 255, 190)))
-            case "server SIGKILL":
-                world.kill()
-                self._later(args[0], world.start)
-            case "server SIGTERM":
-                world.end_in_order()
-                self._later(args[0], world.start)
-            case "server dies at a write":
-                self._away = args[0]
-                world.dies_at_write(args[1], before=args[2] == "before")
-            case "server stands still":
-                if world.freeze():
-                    self._later(args[0], world.thaw)
-            case "server reads late":
-                self._later(args[1], world.read_late(args[1]))
-            case "clock jumps":
-                world.step_wall_clock(args[0])
-            case "disk is full for":
-                store.fill(args[0])
-            case "disk takes":
-                store.delay, store.halts_delay = args[0], 0.0
-            case "disk keeps halts after":
-                store.delay = store.halts_delay = args[0]
             case _:
                 raise ValueError(move)
 

@@ -21,7 +21,8 @@ HABITS: dict[str, tuple[bool, tuple[float, ...]]] = {
     "MAVSDK": (True, (0.0, 0.5, 1.0)),
     "script": (False, (0.0,)),
 }
-THEMES = 11  # each story has one, and they meet each make in turn
+THEMES = 11  # each story has one, and they meet each make in turn; then comes one with gateways
+GATEWAYS = ("server", "b", "c")
 PAUSES = (0.01, 0.5, 3.0, 6.0)  # s, between two plots
 AFTER = (0.3, 1.0, 3.0, 8.0)  # s, between the moves of a plot
 NETS = 4  # see moves.py
@@ -55,10 +56,13 @@ class Cast:
     on_restart: str
     on_failure: str
     preemption_gap: int
+    gateways: int = 0  # 0: one server with its own disk
 
     def __str__(self) -> str:
         kind = f"{self.make} ({self.frame.value})"
-        return f"{self.rovers} {kind}, {', '.join(self.habits)}, on_restart={self.on_restart}"
+        servers = f", {self.gateways} gateways" if self.gateways else ""
+        habits = ", ".join(self.habits)
+        return f"{self.rovers} {kind}{servers}, {habits}, on_restart={self.on_restart}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,23 +87,30 @@ def tell(seed: int, seconds: float) -> Story:
     return _Teller(seed).story(seconds)
 
 
+def drawn_from(seed: int) -> int:
+    """Return the seed of all chance in a story: stories with gateways do not count."""
+    return seed - seed // (THEMES + 1)
+
+
 #: what a plot yields: seconds after the plot's move before, who, what, its arguments
 Plan = Iterator[tuple[float, str, str, tuple[Any, ...]]]
 
 
 class _Teller:
     def __init__(self, seed: int) -> None:
-        self._seed = seed
-        self._random = random = Random(seed)
+        self._seed, self._number = seed, (number := drawn_from(seed))
+        self._random = random = Random(number)
+        self._has_gateways = seed % (THEMES + 1) == THEMES
         count = random.choice((2, 3, 4))
         self._cast = Cast(
-            make=(make := MAKES[seed // THEMES % len(MAKES)]),
+            make=(make := MAKES[number // THEMES % len(MAKES)]),
             frame=random.choice(FRAMES) if make != "generic" else Frame.SKID,
-            rovers=random.choice((2, 3) if seed % THEMES == 0 else (1, 1, 1, 2, 3)),
+            rovers=random.choice((2, 3) if number % THEMES == 0 else (1, 1, 1, 2, 3)),
             habits=tuple(random.choice(tuple(HABITS)) for _ in range(count)),
             on_restart=random.choice(("pause", "continue")),
             on_failure=random.choice(("pause", "continue")),
             preemption_gap=random.choice((0, 3)),
+            gateways=random.choice((2, 3)) if self._has_gateways else 0,
         )
         self._moves: list[Move] = []
         self._at = 0.0
@@ -126,7 +137,12 @@ class _Teller:
             *(self._drive_all, self._person, self._rover_fails, self._net_changes),
             *(self._server_fails, self._disk_fails, self._copy, self._pick(*themes)),
         ]
-        theme = themes[self._seed % THEMES]
+        if self._has_gateways:
+            more = self._person, self._rover_fails, self._net_changes, self._copy
+            of_clients = self._halt_then_copy, self._overtaken, self._stopped, self._parked
+            others = [self._drive_all, self._pick(*more), self._pick(*of_clients)]
+            return [self._request, *others, *[self._gateway_fails] * 6]
+        theme = themes[self._number % THEMES]
         return [self._works, self._request, *self._random.sample(others, 3), *[theme] * 4]
 
     # parts of moves
@@ -276,6 +292,18 @@ class _Teller:
         yield 0.0, "server", how, (self._pick(0.5, 3.0, 8.0), *details)
         if self._random.random() < 0.3:
             yield 0.0, "clock", "jumps", (self._pick(-3600.0, -1.0, 1.0, 86_400.0),)
+
+    def _gateway_fails(self) -> Plan:
+        """A gateway, or its way to the database or to the rovers, fails under a driving rover."""
+        if self._random.random() < 0.8:
+            yield from self._works()
+        name = self._pick(*GATEWAYS[: self._cast.gateways])
+        what = self._pick(
+            *("SIGKILL", "SIGTERM", "stands still", "does not reach the database"),
+            *("does not reach the rovers", "loses its session", "hears no answers"),
+            *("is not pinged", "loses its database"),
+        )
+        yield 0.0, f"gateway {name}", what, (self._pick(0.3, 1.5, 4.0),)
 
     def _disk_fails(self) -> Plan:
         what, value = self._pick(

@@ -28,13 +28,14 @@ from tests.kit.volume import tries
 from tests.simulation import invariants
 from tests.simulation.faults import FAULTS
 from tests.simulation.invariants import INVARIANTS, Stillness
+from tests.simulation.judged import Asked, Driven
 from tests.simulation.moves import Found, play
 from tests.simulation.shrink import shrink
 from tests.simulation.story import Cast, Move, tell
-from tests.simulation.world import Asked, Driven, SimulatedWorld
+from tests.simulation.world import SimulatedWorld
 
 SIMULATE = Path(__file__).resolve().parents[2] / "tools/simulate"
-SECONDS, STORIES = 60.0, 11  # of a story, and stories of a test
+SECONDS, STORIES = 60.0, 12  # of a story, and stories of a test
 FOUND_SOON = "D1 an older go is obeyed", 1  # a fault, and a seed that finds it in 20 s
 
 
@@ -95,7 +96,7 @@ def test_a_story_is_shrunk_to_the_moves_that_matter(monkeypatch: pytest.MonkeyPa
             yield "somebody has switched to MANUAL"
 
     monkeypatch.setitem(INVARIANTS, "no MANUAL", (0.0, no_manual))
-    story = tell(12, 8.0)  # of PX4s, which boot in HOLD
+    story = tell(13, 8.0)  # of PX4s, which boot in HOLD
     switch = Move(6.0, 999, "person at rover 1", "switch", ("MANUAL",))
     story = replace(story, moves=tuple(sorted((*story.moves, switch))))
     found = play(story)

@@ -141,6 +141,8 @@ class FleetLink(MemoryLink):
             self.send(peer, data)
         while self.under_way and self.under_way[0][0] <= now:
             _, peer, data, arrived = self.under_way.popleft()
+            if peer[0] != BACK:  # type: ignore[index]
+                self._world.passes_on(self._gateway, data, arrived)
             self.arrived.append((peer, data))
             self.times.append(arrived)
 
@@ -157,6 +159,7 @@ class SharedStore:
         self.offset = 0.0
         self.store = PromptSqliteStore(path, wall_offset=lambda: self.offset)
         self._next_id = 1
+        self._read: tuple[int, tuple[Task, ...]] = 0, ()  # events, and the tasks by them
         #: called when something was stored that other gateways are notified of
         self.notify: Callable[[], None] = lambda: None
         self.leads: dict[int, float] = {}
@@ -209,8 +212,11 @@ class SharedStore:
 
     def tasks(self) -> tuple[Task, ...]:
         """Return all stored tasks."""
-        self.offset = 0.0
-        return self.store.load().tasks
+        stored = len(self.store.events)
+        if stored != self._read[0]:
+            self.offset = 0.0
+            self._read = stored, self.store.load().tasks
+        return self._read[1]
 
 
 def _is_news(event: Event) -> bool:
@@ -337,6 +343,11 @@ class Gateway:
         )
         self.store.grant_ids()
 
+    def _drop(self) -> None:
+        """Begin anew, without what was asked for and not answered."""
+        self._begin()
+        self.world.dropped(self.name)
+
     def __repr__(self) -> str:
         return f"Gateway({self.name}, {self.member.lease})"
 
@@ -385,7 +396,7 @@ class Gateway:
         self.mail.deliver(now)
         self.server.turn(now=now)
         if self.pump.is_evicted:
-            self._begin()
+            self._drop()
         self._watch_tasks(now)
 
     def notified(self) -> None:
@@ -461,15 +472,15 @@ class Gateway:
         lease = self.member.lease
         self.effects += change.effects
         if Effect.DROP in change.effects:
-            self._begin()
+            self._drop()
         is_holder = lease.standing in (Standing.HOLDER, Standing.STOPPING)
         move_until = lease.trusted_until if is_holder else -1.0
         stop_until = lease.permit().term_end if is_holder else -1.0
         self.server.take_in(LeaseChanged(move_until, stop_until), now=now)
         if change.got:
             self.got += [(now, vehicle) for vehicle in sorted(change.got)]
-            for vehicle in change.got:  # as after a restart of the server
-                self.world.observers[vehicle - self.world.first_id].server_restarted()
+            for vehicle in change.got:
+                self.world.taken(vehicle)
             self.store.load_vehicles(change.got)
         if change.lets_go:
             asked = [vehicle for vehicle, _ in change.lets_go]
@@ -508,10 +519,35 @@ class FleetWorld(World):
         rovers = range(self.first_id, self.first_id + kw.get("rovers", 1))
         self.rover_names = tuple(f"rover{number}" for number in rovers)
         super().__init__(seed=seed, **kw)
+        self.watched.serves = self._is_of_holder
         for name in names[1:]:
             self.watched.to_vehicles.add(VEHICLE_LINK.replace("server", name))
             self.watched.to_clients.add(CLIENT_LINK.replace("server", name))
             self.start(name)
+
+    def _is_of_holder(self, link: str, rover: str) -> bool:
+        return self.database.holder(int(rover.removeprefix("rover"))) == link.partition(":")[0]
+
+    def dropped(self, gateway: str) -> None:
+        """Note that a gateway has lost its lease, and begins anew, without its vehicles."""
+        for vehicle, observer in enumerate(self.observers, self.first_id):
+            if self.database.holder(vehicle) == gateway:
+                observer.server_restarted()
+
+    def taken(self, vehicle: int) -> None:
+        """Note that a gateway has got a vehicle, as after a restart of the server."""
+        observer = self.observers[vehicle - self.first_id]
+        mode = observer.mode
+        observer.server_restarted()
+        if observer.stopped:  # it is found, and stopped, by the last heartbeat that came before
+            observer.mode = mode
+
+    def passes_on(self, gateway: str, data: bytes, arrived: float) -> None:
+        """Note that a client's packet reaches the gateway that has the rover by way of another."""
+        lease = self.gateways[gateway].member.lease
+        for vehicle, observer in enumerate(self.observers, self.first_id):
+            if lease.may_stop(vehicle, self.now):  # else nothing may leave now
+                observer.asked(self.now, data, peer=f"{data[5]}")
 
     def policies_of(self, name: str) -> dict[str, LinkPolicy] | None:
         """Return the policies of a gateway's links: with a key, its rovers take only that."""
