@@ -85,7 +85,7 @@ INVARIANTS: dict[str, tuple[float, Callable[["World"], Iterator[str]]]] = {
     "undriven rovers stand": (0.025, undriven),
     "tasks are kept": (1.0, kept),
     "commands are answered": (1.0, answered),
-    "memory is bounded": (5.0, bounded),
+    "memory is bounded": (20.0, bounded),
 }
 
 

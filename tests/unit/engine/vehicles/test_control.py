@@ -63,6 +63,11 @@ def all_effects(event: Event, state: State) -> Iterator[Effect]:
     yield from flat(effects_of(event, state), state)
 
 
+def told(graph: Graph, event: Event, state: State, there: State) -> str:
+    """Return what went wrong, in words."""
+    return f"{event.name} in {state} after {graph.paths[state]}: {there}"
+
+
 def flat(steps: Iterable[Step], state: State) -> Iterator[Effect]:
     for step in steps:
         if isinstance(step, Event):
@@ -89,13 +94,12 @@ def after_a_word_that_lets_it_stand_nothing_moves_or_arms_it(graph: Graph) -> No
                     there = there._replace(armed=False)  # as the vehicle does
                 if event is E.CLEAR and there.work is Work.WAITS:
                     there = there._replace(work=Work.NONE)
-                told = f"{event.name} in {state} after {graph.paths[state]}: {there}"
-                assert there not in led or there.driver is Driver.CLIENT, told
+                stands = there not in led or there.driver is Driver.CLIENT
                 if event is E.CLEAR:
-                    assert there not in emptied or there.armed, told
+                    stands &= there not in emptied or there.armed
                 else:
-                    assert there not in driven, told
-                    assert there not in armed or there.armed, told
+                    stands &= there not in driven and (there not in armed or there.armed)
+                assert stands, told(graph, event, state, there)
 
 
 @rule
@@ -107,8 +111,7 @@ def after_what_is_seen_no_task_that_had_it_goes_on(graph: Graph) -> None:
                 continue  # it is nothing to us as long as we do not drive
             for there in ways.get(event.name, ()):
                 is_over = there.work in (Work.NONE, Work.WAITS)  # what was being cancelled
-                told = f"{event.name} in {state} after {graph.paths[state]}: {there}"
-                assert there not in driven or is_over, told
+                assert there not in driven or is_over, told(graph, event, state, there)
 
 
 @rule
