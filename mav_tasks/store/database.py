@@ -37,6 +37,7 @@ OVERWRITTEN = (
     "another file was copied over it while it was in use: this server can store nothing any more;"
     " end it, and remove the files -wal and -shm beside the store, which do not belong to the copy"
 )
+READ_AGAIN, READ_AFTER = 5, 0.02  # times and s, of a file that is being written
 MOST_ROWS = 128  # in one INSERT: with seven columns below SQLite's oldest limit, 999 values
 
 _PRAGMAS = (
@@ -300,14 +301,16 @@ class Database:
 def holder_of(path: Path) -> Holder | None:
     """Return the server that another process has a file for, as far as the file says it.
 
-    It is read without the WAL, which may be beside another name, and without locks.
+    It is read without the WAL, which may be beside another name, and without locks: again if its
+    server has just written to it.
     """
-    try:
-        with closing(sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)) as connection:
-            row = connection.execute("SELECT epoch, host, pid, since FROM writer").fetchone()
-    except sqlite3.Error:
-        return None
-    return None if row is None else Holder(*row)
+    for _ in range(READ_AGAIN):
+        with suppress(sqlite3.Error):
+            with closing(sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)) as connection:
+                row = connection.execute("SELECT epoch, host, pid, since FROM writer").fetchone()
+            return None if row is None else Holder(*row)
+        time.sleep(READ_AFTER)
+    return None
 
 
 def _sync_folder(path: Path) -> None:

@@ -27,6 +27,7 @@ from tests.kit.processes import (
 
 MOVE, ROTATE = 54000, 54001
 OVER = 60  # s
+STOOD_STILL = r"a setpoint was [\d.]+ s late|no position for [\d.]+ s"
 
 
 @contextmanager
@@ -70,16 +71,19 @@ def is_moving(folder: Path) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(240)
 def test_a_rover_that_was_probed_is_driven_as_it_was_found_to_be(tmp_path: Path) -> None:
     """A PX4 that turns at a yaw rate: by course without its profile, with it at that rate."""
     known = tmp_path / "known"
     known.mkdir()
     with rover(tmp_path, "--persona", "px4", "--honours-yaw-rate") as port:
         file = str(tmp_path / "found.toml")
-        with probe(tmp_path, port, "--drive", "--yes", "--output", file) as popen:
-            out, error = popen.communicate(timeout=OVER)
-        assert popen.returncode == 0, error
+        for _ in range(3):
+            with probe(tmp_path, port, "--drive", "--yes", "--output", file) as popen:
+                out, error = popen.communicate(timeout=OVER)
+            if not re.search(STOOD_STILL, out):
+                break  # else the machine stood still, which ends a drive: one tries again
+        assert popen.returncode == 0, out + error
         assert re.search(
             r"^yaw rate +honoured \(\d\d% of the turn, on the spot\)$", out, re.MULTILINE
         ), out
