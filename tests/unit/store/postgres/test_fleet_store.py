@@ -200,7 +200,7 @@ def test_a_stop_of_a_vehicle_that_another_gateway_has_now_stays_local(
             a.store.append(stop(1))
             a.store.close()
         b.evict(a)
-        b.leases.execute(Take(Renew("b", b.epoch), frozenset({1})))
+        b.asks(Take(Renew("b", b.epoch), frozenset({1})))
         a.join()
         a.store.load_vehicles(frozenset({1}))
         assert a.next(VehiclesLoaded).restored.paused == {}

@@ -90,7 +90,7 @@ def test_another_gateway_has_all_that_a_killed_one_had_kept(url: str, life: int)
 def test_a_clock_that_is_set_changes_neither_idle_times_nor_leads(url: str, wrong: float) -> None:
     """Queues of a fleet that was at work just now go on; the fence at the vehicle stays one."""
     with gateways(url, "a") as (a,):
-        a.leases.execute(Take(Renew("a", a.epoch), frozenset({1})))
+        a.asks(Take(Renew("a", a.epoch), frozenset({1})))
         a.store.append([of_vehicle(1, 1)])
         a.kept(1)
         a.store.load_vehicles(frozenset({1}))
