@@ -20,16 +20,13 @@ from mav_tasks import (
     Wait,
 )
 from mav_tasks.errors import ClientError, MavTasksError
-from mav_tasks.plan_files import parse_plan
+from mav_tasks.plan_files import GeoPoint, PlanFile
 from rover_sim.testing.rover_world import RoverWorld
 from tests.kit.cases import anew
 from tests.scenarios.conftest import MakeRoverWorld
 
 S = TaskState
-RALLY = parse_plan(
-    """{"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": []},
-"rallyPoints": {"version": 2, "points": [[-35.3632, 149.1652, 0]]}}"""
-)
+RALLY = PlanFile((), None, (), (GeoPoint(-353_632_000, 1_491_652_000, 0.0),))
 EVER = 400.0  # s, in which a handle must have learned how its task ended
 
 
@@ -207,7 +204,7 @@ def test_a_resume_undoes_no_halt_that_came_since_what_was_seen(world: RoverWorld
 def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
     world: RoverWorld,
 ) -> None:
-    goals = [Move(0.3), Wait(2.0)]
+    goals: Any = [Move(0.3), Wait(2.0)]
 
     async def script() -> None:
         async with world.client() as client, world.client() as other:
@@ -257,7 +254,12 @@ def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
             await asyncio.sleep(5.0)
             assert (await client.queue()).waiting_count == 6, "one was on its way"
             texts = client.texts()
-            waiting = [task.done(), anext(aiter(task.updates())), client.found(), anext(texts)]
+            waiting: list[Any] = [
+                task.done(),
+                anext(aiter(task.updates())),
+                client.found(),
+                anext(texts),
+            ]
             waiting += [client.queue(), client.mission(), task.refresh()]
             running = [asyncio.ensure_future(each) for each in waiting]
             await asyncio.sleep(0.0)
