@@ -61,9 +61,8 @@ async def test_the_pages_say_what_is_ready_and_what_was_counted() -> None:
         clock=lambda: world.now,
     )
     server = HttpServer(listening(f"127.0.0.1:{port}", what="metrics"))
-    for address in (f"127.0.0.1:{port}", "no.such.host.invalid:1"):
-        with pytest.raises(UsageError, match=r"metrics: .* cannot be opened"):
-            listening(address, what="metrics")
+    with pytest.raises(UsageError, match="cannot be opened: Address already in use"):
+        listening(f"127.0.0.1:{port}", what="metrics")
     ended = asyncio.new_event_loop()
     ended.close()
     pages: dict[str, Page] = {"/broken": broken}
