@@ -308,6 +308,37 @@ def test_a_rover_is_paused_stopped_and_goes_on(server: str, client: SyncClient) 
     assert client.queue().paused is None
 
 
+#: commands, each tried until it has printed what follows
+SESSION = """ready => ready: the server hears rover 1
+ready --json => "ready": true
+doctor => heard, and its queue runs
+submit wait 500 --every 600 --label round => task
+queue => executing
+submit move 0.1 --json --vehicle 1 => "id"
+clear => stays (executing); to cancel it: mav-tasks clear --all
+clear --all --yes => all tasks cancelled
+submit wait 500 --every 600 --label round => task
+queue => executing
+status 1 --json => "id": 1
+stop => STOP has ended the series
+doctor => queue paused (
+submit move 3 => waits: the queue is paused
+queue => queue paused (STOP); to let it run
+resume => resumed
+cancel => cancelled
+history --vehicle 1 => the last"""
+
+
+def test_what_a_session_prints(server: str) -> None:
+    def prints(line: str) -> bool:
+        asked, _, words = line.partition(" => ")
+        done = called(*asked.split(), server=server)
+        return words in done.output + done.error
+
+    for line in SESSION.splitlines():
+        wait_until(lambda: prints(line), within=10, what=line)  # noqa: B023
+
+
 def test_rovers_are_shown(server: str) -> None:
     (rover,) = called("vehicles", "--json", server=server).objects
     assert (rover["vehicle"], rover["kind"], rover["heard"]) == (1, "ardupilot", True)

@@ -122,6 +122,8 @@ def test_why_a_task_waits_and_what_helps(page: Web, check: Check) -> None:
     }
     rover = page.get("/vehicles/1")
     assert rover["control"] == "paused"
+    text = page.client.get("/metrics").text
+    assert 'mav_tasks_tasks{vehicle="1",state="queued",reason="queue_paused"} 1' in text
     page.resume()
     page.wait_for(task["id"], "completed")
 
@@ -218,6 +220,7 @@ def test_the_fence_is_set_shown_and_removed(page: Web) -> None:
         ("GET", "/vehicles/1/queue?limit=x", None, 422, "limit 'x': expected a number"),
         ("POST", "/stop", [], 422, "expected a JSON object"),
         ("POST", "/stop", {"vehicle": 0}, 422, "vehicle 0: expected at least 1"),
+        ("GET", "/records", None, 404, "--records"),
     ],
 )
 def test_a_wrong_request_is_a_problem_that_names_what_was_wrong(
