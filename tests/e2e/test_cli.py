@@ -13,7 +13,7 @@ import pytest
 
 from mav_tasks import Move, Refused, SyncClient, Wait, read_plan
 from mav_tasks.plan_files import PlanFile, parse_plan
-from tests.kit.commands import Done, called, mav_tasks, surroundings
+from tests.kit.commands import Done, called, mav_tasks, session, surroundings
 from tests.kit.processes import Stand, stand, wait_until
 
 NOBODY = "udpout:127.0.0.1:9"
@@ -290,26 +290,15 @@ def read_way() -> PlanFile:
     return parse_plan(WAY)
 
 
-def test_a_rover_is_paused_stopped_and_goes_on(server: str, client: SyncClient) -> None:
-    assert called("pause", server=server).lines == ["rover 1: paused. To resume: mav-tasks resume"]
-    (queue,) = called("queue", "--json", server=server).objects
-    assert queue["paused"] == "operator"
-    assert called("resume", server=server).lines == ["rover 1: resumed"]
-    stopped = called("stop", "--clear", server=server)
-    assert stopped.status == 0
-    (line,) = stopped.lines
-    assert line.startswith("STOP is in force for every rover")
-    assert "mav-tasks resume" in line
-    assert client.queue().paused is not None
-    assert called("stop", "--vehicle", "1", "--json", server=server).objects == [
-        {"done": "stop", "vehicle": 1, "cleared": False, "ended_series": []}
-    ]
-    assert called("resume", "--json", server=server).objects == [{"done": "resume", "vehicle": 1}]
-    assert client.queue().paused is None
-
-
-#: commands, each tried until it has printed what follows
-SESSION = """ready => ready: the server hears rover 1
+SESSION = """pause => 0 rover 1: paused. To resume: mav-tasks resume
+queue --json => "paused": "operator"
+resume => 0 rover 1: resumed
+stop --clear => 0 STOP is in force for every rover … mav-tasks resume
+queue --json => "paused": "stopped"
+stop --vehicle 1 --json => {"done": "stop", "vehicle": 1, "cleared": false, "ended_series": []}
+resume --json => {"done": "resume", "vehicle": 1}
+queue --json => "paused": null
+ready => ready: the server hears rover 1
 ready --json => "ready": true
 doctor => heard, and its queue runs
 submit wait 500 --every 600 --label round => task
@@ -319,7 +308,8 @@ clear => stays (executing); to cancel it: mav-tasks clear --all
 clear --all --yes => all tasks cancelled
 submit wait 500 --every 600 --label round => task
 queue => executing
-status 1 --json => "id": 1
+status 1 --vehicle 1 --json => "id": 1
+release 1 again => 1 mav-tasks:
 stop => STOP has ended the series
 doctor => queue paused (
 submit move 3 => waits: the queue is paused
@@ -330,13 +320,7 @@ history --vehicle 1 => the last"""
 
 
 def test_what_a_session_prints(server: str) -> None:
-    def prints(line: str) -> bool:
-        asked, _, words = line.partition(" => ")
-        done = called(*asked.split(), server=server)
-        return words in done.output + done.error
-
-    for line in SESSION.splitlines():
-        wait_until(lambda: prints(line), within=10, what=line)  # noqa: B023
+    session(server, SESSION)
 
 
 def test_rovers_are_shown(server: str) -> None:
