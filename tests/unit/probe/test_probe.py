@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import nan
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ from mav_tasks.probe.findings import Drive, Findings, Rate
 from mav_tasks.probe.probe import Interrupted, Options
 from mav_tasks.probe.profile import profile_of, why_none
 from mav_tasks.probe.report import Mark, as_json, lines_of
+from rover_sim.actuators import Actuator
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
 from rover_sim.parameters import INT16, Parameter
@@ -126,6 +128,38 @@ def test_the_rates_that_it_asked_for_are_given_back_if_it_ends_before_its_time()
     world.probe.interrupt("ended", now=world.now)
     world.finish()
     assert attitudes(world) == pytest.approx(before, abs=4)
+
+
+def test_what_a_rover_does_not_tell_is_unknown() -> None:
+    quiet: dict[Any, tuple[str, str]] = {
+        m.AutopilotVersion: ("firmware", "unknown"),
+        m.MissionCount: ("mission on board", "unknown"),
+        m.CommandAck: ("rates restored", "as before"),
+        m.SysStatus: ("arming checks", "unknown"),
+        m.MessageInterval: ("rates restored", "to the default, because the rover did not report"),
+        m.ParamValue: ("without setpoints", "does not report whether it stops"),
+    }
+    for kind, (topic, words) in quiet.items():
+        world = ProbeWorld(persona=PX4)
+        world.fault(Faults(withheld=frozenset({kind.id})))
+        world.run(1.0)
+        world.somebody_sends(STATION, Address(255, 190))
+        world.somebody_sends(m.Heartbeat(30, 8, 0, 0, 4, 3), Address(1, 154))  # a camera
+        assert world.finish().error is None
+        assert marks_of(world)[topic][1].startswith(words), kind
+        assert marks_of(world)["also connected"][1] == "ground station 255/190"
+    world = ProbeWorld(persona=PX4, options=Options(set_failsafe=True))
+    world.fault(Faults(withheld=frozenset({m.ParamValue.id})))
+    assert "does not report what it does" in str(world.finish().error)
+    for fault, words in (
+        (Faults(outputs_frozen=frozenset(Actuator)), "the rover does not follow BODY_NED"),
+        (Faults(heading_frozen=True), "the rover does not reach 0.30 m/s"),
+    ):
+        world = ProbeWorld(drive=True)
+        world.fault(fault)
+        world.finish()
+        assert world.driven.ended.startswith(words)
+        assert world.rests()
 
 
 #: findings -> lines of the report: mark, topic and words
