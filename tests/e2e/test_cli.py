@@ -14,7 +14,7 @@ import pytest
 from mav_tasks import Move, Refused, SyncClient, Wait, read_plan
 from mav_tasks.plan_files import PlanFile, parse_plan
 from tests.kit.commands import Done, called, mav_tasks, session, surroundings
-from tests.kit.processes import Stand, stand, wait_until
+from tests.kit.processes import Stand, frozen, stand, wait_until
 
 NOBODY = "udpout:127.0.0.1:9"
 WAY = """QGC WPL 110
@@ -321,6 +321,36 @@ history --vehicle 1 => the last"""
 
 def test_what_a_session_prints(server: str) -> None:
     session(server, SESSION)
+
+
+HELD = """queue => held
+submit move 1 => 0 rover 1: task … waits: task … is held (
+queue => held … release
+doctor => WRONG … release
+pause => 0
+queue --json => "paused": "operator"
+resume => 0 rover 1: resumed, but blocked by task … held
+submit move 1 --json => "state": "queued"
+release skip => 0
+queue => executing
+clear --all --yes => 0"""
+SILENT = """queue => silent for
+ready => 1 mav-tasks: the server answers, but does not hear rover 1 (silent for
+doctor => WRONG  rover 1 … silent for
+vehicles => ago"""
+
+
+def test_a_held_task_and_a_silent_rover_are_told_with_the_way_on(
+    there: Stand, server: str, client: SyncClient
+) -> None:
+    client.submit(Move(3.0))
+    wait_until(lambda: there.speed() > 0.3, within=15, what="the rover at speed")
+    with frozen(there.server):
+        wait_until(lambda: there.speed() < 0.01, within=15, what="the rover to stop")
+    session(server, HELD)
+    with frozen(there.rover):
+        session(server, SILENT)
+    session(server, "queue => no task runs")
 
 
 def test_rovers_are_shown(server: str) -> None:
