@@ -315,6 +315,7 @@ doctor => queue paused (
 submit move 3 => waits: the queue is paused
 queue => queue paused (STOP); to let it run
 resume => resumed
+queue => executing
 cancel => cancelled
 history --vehicle 1 => the last"""
 
