@@ -303,6 +303,7 @@ def test_events_are_as_the_document_says(page: Web, check: Check) -> None:
 def test_a_session_is_a_cookie_that_scripts_cannot_read(
     tmp_path: Path, both: tuple[Stand, Web]
 ) -> None:
+    (tmp_path / "x.tlog").write_bytes(b"nonsense")
     token = add_key(tmp_path, "anna", "submitter")
     shown = ("--tiles", "https://{s}.tiles.example/{z}/{x}/{y}", "--records", str(tmp_path))
     with web(tmp_path, both[0], *shown, name="session") as it:
@@ -316,7 +317,9 @@ def test_a_session_is_a_cookie_that_scripts_cannot_read(
         assert "HttpOnly" in cookie
         assert "SameSite=strict" in cookie
         assert it.get("/session")["name"] == "anna"
-        assert it.get("/records")["records"] == []
+        assert it.get("/records")["records"][0]["name"] == "x"
+        for name, status in (("x", 422), ("y", 404)):
+            assert it.send("GET", f"/records/{name}", None).status_code == status
         assert it.send("GET", "/journal", None).status_code == 404
         assert it.send("DELETE", "/session", None).status_code == 204
         assert it.send("GET", "/session", None).status_code == 401
