@@ -244,6 +244,12 @@ def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
                 await client.stage_mission(goals)
             assert len({each.id for each in tasks}) == 3
             assert (await task.refresh()).label == "a long label of a task"
+            with world.lossy_link(loss=0.2, jitter=0.9, duplication=0.5):
+                for number in range(4):
+                    label = f"a long label of task {number:02}"
+                    with suppress(ClientError):
+                        await task.modify(label=label)
+                        assert world.server.task(task.id).terms.label == label
             with world.lossy_link(loss=0.35):
                 assert len(await client.mission()) == 3, "with home"
                 assert await client.set_rally_points(RALLY) == 1
