@@ -334,7 +334,8 @@ resume => 0 rover 1: resumed, but blocked by task … held
 submit move 1 --json => "state": "queued"
 release skip => 0
 queue => executing
-clear --all --yes => 0"""
+clear --all --yes => 0
+queue => no task runs"""
 SILENT = """queue => silent for
 ready => 1 mav-tasks: the server answers, but does not hear rover 1 (silent for
 doctor => WRONG  rover 1 … silent for

@@ -15,7 +15,7 @@ import pytest
 from aiopenapi3 import OpenAPI
 
 from tests.kit.awaited import awaited
-from tests.kit.processes import Stand
+from tests.kit.processes import Stand, wait_until
 from tests.kit.web import Web, add_key, served, web
 
 pytestmark = pytest.mark.slow
@@ -124,8 +124,8 @@ def test_why_a_task_waits_and_what_helps(page: Web, check: Check) -> None:
     }
     rover = page.get("/vehicles/1")
     assert rover["control"] == "paused"
-    text = page.client.get("/metrics").text
-    assert 'mav_tasks_tasks{vehicle="1",state="queued",reason="queue_paused"} 1' in text
+    line = 'mav_tasks_tasks{vehicle="1",state="queued",reason="queue_paused"} 1'
+    wait_until(lambda: line in page.client.get("/metrics").text, within=10, what=line)
     page.resume()
     page.wait_for(task["id"], "completed")
 
