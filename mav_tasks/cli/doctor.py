@@ -92,13 +92,13 @@ def _show(finding: Finding, *, as_json: bool) -> None:
 
 def _keys(links: Links) -> Finding:
     path = path_of_ring(links.keys)
-    if not links.keys and not os.path.lexists(path):
-        return Finding("keys", "no key ring: programs of this machine need no key")
     try:
-        ring = load(path).ring
+        ring = load(path).ring if links.keys or os.path.lexists(path) else None
         check_keys(links, ring, where=str(path))
     except UsageError as error:
         return Finding("keys", str(error), "mav-tasks keys list")
+    if ring is None:
+        return Finding("keys", "no key ring: programs of this machine need no key")
     names = [each.name for each in ring.entries if each.is_usable]
     return Finding("keys", f"{path}: {', '.join(names) or 'no usable key'}")
 

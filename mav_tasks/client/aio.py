@@ -713,7 +713,8 @@ class Client:
         """Send a text of a task, piece after piece.
 
         The acks of two pieces look the same. So look at the task afterwards, and if its text is
-        another one, send them again with a rest after each, in which late acks run out.
+        another one, send them again with a rest after each, in which late acks run out. Raise
+        NoAnswer if it is another one even then.
         """
         size = float(len(text)) if name is TaskProperty.REPEAT else nan
         for is_told_apart in (True, False):
@@ -731,6 +732,9 @@ class Client:
             else:
                 if shown(await self.status(task_id, vehicle=vehicle)) == text:
                     return
+        raise NoAnswer(
+            f"task {task_id}: its {name.name.lower()} did not arrive whole: set it again"
+        )
 
     async def _modify_exactly(
         self,

@@ -13,8 +13,8 @@ import pytest
 
 from mav_tasks import Move, Refused, SyncClient, Wait, read_plan
 from mav_tasks.plan_files import PlanFile, parse_plan
-from tests.kit.commands import Done, called, mav_tasks, surroundings
-from tests.kit.processes import Stand, stand, wait_until
+from tests.kit.commands import Done, called, mav_tasks, session, surroundings
+from tests.kit.processes import Stand, frozen, stand, wait_until
 
 NOBODY = "udpout:127.0.0.1:9"
 WAY = """QGC WPL 110
@@ -290,22 +290,69 @@ def read_way() -> PlanFile:
     return parse_plan(WAY)
 
 
-def test_a_rover_is_paused_stopped_and_goes_on(server: str, client: SyncClient) -> None:
-    assert called("pause", server=server).lines == ["rover 1: paused. To resume: mav-tasks resume"]
-    (queue,) = called("queue", "--json", server=server).objects
-    assert queue["paused"] == "operator"
-    assert called("resume", server=server).lines == ["rover 1: resumed"]
-    stopped = called("stop", "--clear", server=server)
-    assert stopped.status == 0
-    (line,) = stopped.lines
-    assert line.startswith("STOP is in force for every rover")
-    assert "mav-tasks resume" in line
-    assert client.queue().paused is not None
-    assert called("stop", "--vehicle", "1", "--json", server=server).objects == [
-        {"done": "stop", "vehicle": 1, "cleared": False, "ended_series": []}
-    ]
-    assert called("resume", "--json", server=server).objects == [{"done": "resume", "vehicle": 1}]
-    assert client.queue().paused is None
+SESSION = """pause => 0 rover 1: paused. To resume: mav-tasks resume
+queue --json => "paused": "operator"
+resume => 0 rover 1: resumed
+stop --clear => 0 STOP is in force for every rover … mav-tasks resume
+queue --json => "paused": "stopped"
+stop --vehicle 1 --json => {"done": "stop", "vehicle": 1, "cleared": false, "ended_series": []}
+resume --json => {"done": "resume", "vehicle": 1}
+queue --json => "paused": null
+ready => ready: the server hears rover 1
+ready --json => "ready": true
+doctor => heard, and its queue runs
+submit wait 500 --every 600 --label round => task
+queue => executing
+submit move 0.1 --json --vehicle 1 => "id"
+clear => stays (executing); to cancel it: mav-tasks clear --all
+clear --all --yes => all tasks cancelled
+submit wait 500 --every 600 --label round => task
+queue => executing
+status 1 --vehicle 1 --json => "id": 1
+release 1 again => 1 mav-tasks:
+stop => STOP has ended the series
+doctor => queue paused (
+submit move 3 => waits: the queue is paused
+queue => queue paused (STOP); to let it run
+resume => resumed
+queue => executing
+cancel => cancelled
+history --vehicle 1 => the last"""
+
+
+def test_what_a_session_prints(server: str) -> None:
+    session(server, SESSION)
+
+
+HELD = """queue => held
+submit move 1 => 0 rover 1: task … waits: task … is held (
+queue => held … release
+doctor => WRONG … release
+pause => 0
+queue --json => "paused": "operator"
+resume => 0 rover 1: resumed, but blocked by task … held
+submit move 1 --json => "state": "queued"
+release skip => 0
+queue => executing
+clear --all --yes => 0
+queue => no task runs"""
+SILENT = """queue => silent for
+ready => 1 mav-tasks: the server answers, but does not hear rover 1 (silent for
+doctor => WRONG  rover 1 … silent for
+vehicles => ago"""
+
+
+def test_a_held_task_and_a_silent_rover_are_told_with_the_way_on(
+    there: Stand, server: str, client: SyncClient
+) -> None:
+    client.submit(Move(3.0))
+    wait_until(lambda: there.speed() > 0.3, within=15, what="the rover at speed")
+    with frozen(there.server):
+        wait_until(lambda: there.speed() < 0.01, within=15, what="the rover to stop")
+    session(server, HELD)
+    with frozen(there.rover):
+        session(server, SILENT)
+    session(server, "queue => no task runs")
 
 
 def test_rovers_are_shown(server: str) -> None:

@@ -1,6 +1,5 @@
 """Metrics of a real server: the figures against what happened, probes, hung and many scrapers."""
 
-import http.client
 import json
 import re
 import socket
@@ -20,20 +19,10 @@ from tests.kit.processes import (
     wait_for,
     wait_until,
 )
-from tests.kit.scraped import Figures, check_with_promtool, figure, figures_of
+from tests.kit.scraped import Figures, asked, check_with_promtool, figure, figures_of
 
 MOVE, STOP = 54000, 54003
 LIMIT = 30.0  # s
-
-
-def asked(port: int, path: str, **headers: str) -> tuple[int, str]:
-    """Return the status and the text of an answer."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=LIMIT)
-    connection.request("GET", path, headers=headers)
-    answer = connection.getresponse()
-    text = answer.read().decode()
-    connection.close()
-    return answer.status, text
 
 
 def scraped(port: int) -> Figures:

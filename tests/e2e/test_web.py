@@ -1,9 +1,11 @@
 """The HTTP API of a real web process, beside a real server and rover."""
 
 import json
+import re
 import shlex
 import subprocess
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ import pytest
 from aiopenapi3 import OpenAPI
 
 from tests.kit.awaited import awaited
-from tests.kit.processes import Stand
+from tests.kit.processes import Stand, wait_until
 from tests.kit.web import Web, add_key, served, web
 
 pytestmark = pytest.mark.slow
@@ -122,6 +124,8 @@ def test_why_a_task_waits_and_what_helps(page: Web, check: Check) -> None:
     }
     rover = page.get("/vehicles/1")
     assert rover["control"] == "paused"
+    line = 'mav_tasks_tasks{vehicle="1",state="queued",reason="queue_paused"} 1'
+    wait_until(lambda: line in page.client.get("/metrics").text, within=10, what=line)
     page.resume()
     page.wait_for(task["id"], "completed")
 
@@ -145,6 +149,9 @@ def test_a_stop_says_what_came_of_it(page: Web, check: Check) -> None:
     assert phases[:2] == ["sent", "acknowledged"]
     assert seen[-1]["tasks"] == [task["id"]]
     assert 0 < seen[-1]["standing_after"] < 30
+    with ThreadPoolExecutor(20) as pool:  # somebody presses STOP again and again
+        stops = list(pool.map(lambda _: page.post("/stop", {}), range(60)))
+    assert {each["phase"] for each in stops} <= {"acknowledged", "standing"}
     assert page.task(task["id"])["state"] == "killed"
 
 
@@ -204,30 +211,48 @@ def test_the_fence_is_set_shown_and_removed(page: Web) -> None:
     assert both.status_code == 422
 
 
-@pytest.mark.parametrize(
-    ("method", "path", "body", "status", "words"),
-    [
-        ("POST", "/vehicles/1/tasks", {"goals": []}, 422, "goals []: expected at least 1"),
-        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "fly"}]}, 422, "goals[0].kind 'fly'"),
-        ("POST", "/vehicles/1/tasks", {}, 422, "goals: missing"),
-        ("POST", "/vehicles/9/pause", {}, 404, "no rover 9; the server has: 1"),
-        ("POST", "/vehicles/1/resume", {}, 422, "epoch: missing"),
-        ("GET", "/tasks/99999", None, 404, "no task 99999"),
-        ("GET", "/nothing", None, 404, "there is nothing at this address"),
-        ("DELETE", "/stop", None, 405, "does not take that method"),
-        ("GET", "/vehicles/1/queue?limit=x", None, 422, "limit 'x': expected a number"),
-        ("POST", "/stop", [], 422, "expected a JSON object"),
-        ("POST", "/stop", {"vehicle": 0}, 422, "vehicle 0: expected at least 1"),
-    ],
-)
-def test_a_wrong_request_is_a_problem_that_names_what_was_wrong(
-    page: Web, check: Check, method: str, path: str, body: Any, status: int, words: str
-) -> None:
-    answer = page.send(method, path, body)
-    assert answer.status_code == status, answer.text
-    assert answer.headers["content-type"] == "application/problem+json"
-    check("Problem", answer.json())
-    assert words in answer.json()["detail"]
+PLAN = r'{"text": "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t0\t0\t0\t1\n%s"}'
+#: method, address, body, and the answer's status and words
+ANSWERS = r"""POST /vehicles/1/tasks {"goals": []} 422 goals []: expected at least 1
+POST /vehicles/1/tasks {"goals": [{"kind": "fly"}]} 422 goals[0].kind 'fly'
+POST /vehicles/1/tasks {"goals": [{"kind": "move", "distance": true}]} 422 expected a number (m)
+POST /vehicles/1/tasks {"goals": [{"kind": "wait", "duration": -1}]} 422 expected at least 0 s
+POST /vehicles/1/tasks {"goals": [{"kind": "face", "heading": 1, "direction": 2}]} 422 at most 1
+POST /vehicles/1/tasks {"goals": [7]} 422 goals[0]: expected an object
+POST /vehicles/1/tasks {} 422 goals: missing
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "delay": true} 422 delay True
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "noon"} 422 expected a time such as
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "2099-01-01T10:00"} 422 a time zone
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "at": "2099-01-01T10:00Z"} 422 start delay
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "every": 60, "cron": "* * * * *"} 422 every and
+POST /vehicles/9/pause {} 404 no rover 9; the server has: 1
+POST /vehicles/1/resume {} 422 epoch: missing
+POST /tasks/1/release {"how": "perhaps", "epoch": 1} 422 expected one of
+PUT /vehicles/1/fence {} 422 expected one of text, circle, polygon
+PUT /vehicles/1/fence {"text": "nonsense"} 422 text
+GET /tasks/99999 null 404 no task 99999
+GET /nothing null 404 there is nothing at this address
+GET /records/x null 404 --records
+DELETE /stop null 405 does not take that method
+OPTIONS /stop null 405 not used here
+GET /vehicles/1/queue?limit=x null 422 limit 'x': expected a number
+POST /stop [] 422 expected a JSON object
+POST /stop {"vehicle": 0} 422 vehicle 0: expected at least 1"""
+PLANS = r"""1\t0\t2\t54000\t1\t0\t0\t0\t0\t0\t0\t1\n 0
+1\t0\t1\t16\t0\t0\t0\t0\t3\t4\t0\t1\n2\t0\t1\t16\t0\t0\t0\t0\t6\t8\t0\t1\n 5.0
+1\t0\t1\t16\t0\t0\t0\t0\t3\t4\t0\t1\n2\t0\t3\t16\t0\t0\t0\t0\t6\t8\t0\t1\n null"""
+
+
+def test_a_wrong_request_is_a_problem_that_names_what_was_wrong(page: Web, check: Check) -> None:
+    for method, path, body, status, words in re.findall(r"(\S+) (\S+) (.*) (\d{3}) (.*)", ANSWERS):
+        answer = page.send(method, path, json.loads(body))
+        assert answer.status_code == int(status), answer.text
+        assert answer.headers["content-type"] == "application/problem+json"
+        check("Problem", answer.json())
+        assert words in answer.json()["detail"]
+    for items, length in re.findall("(.*) (.*)", PLANS):
+        shown = page.post("/plans", json.loads(PLAN % items))
+        assert json.dumps(shown["length"]) == length, items
 
 
 def test_a_body_that_is_no_json_is_named(page: Web) -> None:
@@ -278,15 +303,24 @@ def test_events_are_as_the_document_says(page: Web, check: Check) -> None:
 def test_a_session_is_a_cookie_that_scripts_cannot_read(
     tmp_path: Path, both: tuple[Stand, Web]
 ) -> None:
+    (tmp_path / "x.tlog").write_bytes(b"nonsense")
     token = add_key(tmp_path, "anna", "submitter")
-    with web(tmp_path, both[0], name="session") as it:
-        assert it.send("GET", "/session", None).status_code == 401
+    shown = ("--tiles", "https://{s}.tiles.example/{z}/{x}/{y}", "--records", str(tmp_path))
+    with web(tmp_path, both[0], *shown, name="session") as it:
+        for headers in ({}, {"authorization": "Bearer x"}):
+            assert it.send("GET", "/session", None, **headers).status_code == 401
+        policy = it.client.get("/").headers["content-security-policy"]
+        assert "img-src 'self' https://*.tiles.example " in policy
         login = it.send("POST", "/session", {"token": token})
-        assert login.status_code == 204
+        assert it.send("POST", "/session", {"token": token}).status_code == 204
         cookie = login.headers["set-cookie"]
         assert "HttpOnly" in cookie
         assert "SameSite=strict" in cookie
         assert it.get("/session")["name"] == "anna"
+        assert it.get("/records")["records"][0]["name"] == "x"
+        for name, status in (("x", 422), ("y", 404)):
+            assert it.send("GET", f"/records/{name}", None).status_code == status
+        assert it.send("GET", "/journal", None).status_code == 404
         assert it.send("DELETE", "/session", None).status_code == 204
         assert it.send("GET", "/session", None).status_code == 401
 

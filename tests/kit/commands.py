@@ -7,10 +7,12 @@ import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mav_tasks.cli.app import main
+from tests.kit.processes import wait_until
 
 LIMIT = 40.0  # s
 
@@ -49,6 +51,25 @@ def called(*arguments: str, server: str = "") -> Done:
         texts.append(stream.read())
     assert isinstance(status, int), status
     return Done(status, *texts)
+
+
+def session(server: str, text: str) -> None:
+    """Run commands, one a line, which must tell what stands behind the arrow.
+
+    That are parts of the exit status, output and errors, with … between them. "queue" runs again
+    until it tells that.
+    """
+    said: list[str] = []
+
+    def is_told(line: str) -> bool:
+        asked, _, words = line.partition(" => ")
+        done = called(*asked.split(), server=server)
+        said.append(f"{line}\n{done.status} {done.output}{done.error}")
+        return all(part in said[-1].partition("\n")[2] for part in words.split(" … "))
+
+    for line in text.splitlines():
+        within = 10.0 * line.startswith("queue")
+        wait_until(partial(is_told, line), within=within, what=lambda: said[-1])
 
 
 def mav_tasks(

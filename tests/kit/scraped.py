@@ -1,5 +1,6 @@
-"""Prometheus' own judgement of an exposition text, and figures in it."""
+"""A page of the metrics, Prometheus' own judgement of its text, and figures in it."""
 
+import http.client
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -8,6 +9,19 @@ import pytest
 
 #: by the name of a sample, then by its labels
 Figures = Mapping[str, Mapping[frozenset[tuple[str, str]], float]]
+
+
+LIMIT = 30.0  # s
+
+
+def asked(port: int, path: str, **headers: str) -> tuple[int, str]:
+    """Return the status and the text of an answer."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=LIMIT)
+    connection.request("GET", path, headers=headers)
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, text
 
 
 def figures_of(text: str) -> Figures:

@@ -17,13 +17,16 @@ from mav_tasks import (
     TaskFailed,
     TaskReason,
     TaskState,
+    Wait,
 )
 from mav_tasks.errors import ClientError, MavTasksError
+from mav_tasks.plan_files import GeoPoint, PlanFile
 from rover_sim.testing.rover_world import RoverWorld
 from tests.kit.cases import anew
 from tests.scenarios.conftest import MakeRoverWorld
 
 S = TaskState
+RALLY = PlanFile((), None, (), (GeoPoint(-353_632_000, 1_491_652_000, 0.0),))
 EVER = 400.0  # s, in which a handle must have learned how its task ended
 
 
@@ -194,5 +197,84 @@ def test_a_resume_undoes_no_halt_that_came_since_what_was_seen(world: RoverWorld
             assert (await person.queue()).paused is TaskReason.STOPPED
             await person.resume()
             assert (await person.queue()).paused is None
+
+    world.run(script())
+
+
+def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
+    world: RoverWorld,
+) -> None:
+    goals: Any = [Move(0.3), Wait(2.0)]
+
+    async def script() -> None:
+        async with world.client() as client, world.client() as other:
+            with pytest.raises(MavTasksError, match="open already"):
+                client.open()
+            await client.pause()
+            task = await client.submit(Move(1.0), label="before")
+            with pytest.raises(NoAnswer, match="no parameter TSK_NOTHING"):
+                await client.parameter("TSK_NOTHING")
+            with pytest.raises(Refused, match="no task is running"):
+                await client.cancel()
+            with world.lossy_link(loss=1.0):
+                calls: list[Any] = [
+                    client.queue(),
+                    client.history(),
+                    client.timing(),
+                    client.mission(),
+                    client.parameter("TSK_SPEED"),
+                    client.submit(goals),
+                    client.set_rally_points(RALLY),
+                    client.submit(Move(1.0)),
+                    client.submit(Move(1.0), vehicle="any"),
+                    task.modify(label="after"),
+                    task.refresh(),
+                    client.stop(within=1.0),
+                    client.resume(),
+                ]
+                ends = await asyncio.gather(*calls, return_exceptions=True)
+            for end in ends:
+                assert isinstance(end, NoAnswer)
+                assert "answer" in str(end)
+            # both ends of a long way: plans of one client and of two take turns
+            with world.lossy_link(delay=0.15):
+                asked = (each.submit(goals) for each in (client, client, other))
+                tasks = await asyncio.gather(*asked)
+                await task.modify(label="a long label of a task")
+                await client.stage_mission(goals)
+            assert len({each.id for each in tasks}) == 3
+            assert (await task.refresh()).label == "a long label of a task"
+            with world.lossy_link(loss=0.2, jitter=0.9, duplication=0.5):
+                for number in range(4):
+                    label = f"a long label of task {number:02}"
+                    with suppress(ClientError):
+                        await task.modify(label=label)
+                        assert world.server.task(task.id).terms.label == label
+            with world.lossy_link(loss=0.35):
+                assert len(await client.mission()) == 3, "with home"
+                assert await client.set_rally_points(RALLY) == 1
+                assert len(await client.rally_points()) == 1
+            with world.lossy_link(loss=1.0), pytest.raises(TimeoutError):
+                async with asyncio.timeout(5.0):
+                    await asyncio.gather(client.submit(goals), client.submit(goals))
+            await asyncio.sleep(5.0)
+            assert (await client.queue()).waiting_count == 6, "one was on its way"
+            texts = client.texts()
+            waiting: list[Any] = [
+                task.done(),
+                anext(aiter(task.updates())),
+                client.found(),
+                anext(texts),
+            ]
+            waiting += [client.queue(), client.mission(), task.refresh()]
+            running = [asyncio.ensure_future(each) for each in waiting]
+            await asyncio.sleep(0.0)
+            await client.close()
+            ends = await asyncio.gather(*running, return_exceptions=True)
+            assert [str(end) for end in ends if isinstance(end, ClientError)] == [
+                "the client was closed"
+            ] * 5
+            with pytest.raises(MavTasksError, match="open it first"):
+                await client.queue()
 
     world.run(script())

@@ -1,6 +1,7 @@
 """What a script asks for is what the server understands: goals and terms, through both ends."""
 
 from collections.abc import Iterator
+from datetime import datetime
 from math import inf, nan, pi
 from typing import Any
 
@@ -9,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mav_tasks import Drive, Face, GoTo, LocalPlace, Move, Rotate, SyncClient, Wait
+from mav_tasks.plan_files import GeoPoint, PlanFile
 from mav_tasks.settings import Driving, Settings
 from rover_sim.testing.rover_world import RoverWorld
 from tests.scenarios.conftest import MakeRoverWorld
@@ -107,11 +109,21 @@ def test_what_cannot_be_meant_is_named_before_anything_is_sent(client: SyncClien
         "delay -1.0": {"delay": -1.0},
         "deadline nan": {"deadline": nan},
         "deadline 1e-46 is too small to send": {"deadline": 1e-46},
+        "every True: expected whole seconds": {"every": True},
+        "an expression names the start times": {"every": "0 6 * * *", "delay": 5.0},
+        "a datetime needs a time zone": {"at": datetime(2030, 1, 1)},  # noqa: DTZ001
     }
     cases: list[tuple[str, Any, dict[str, Any]]]
     cases = [(words, [goal], {}) for words, goal in goals.items()]
     cases += [(words, [Move(1.0)], more) for words, more in terms.items()]
+    cases += [("no goals", [], {})]
     for words, asked, more in cases:
         with pytest.raises(ValueError, match=words):
             client.submit(asked, **more)
+    rally = PlanFile((), None, (), (GeoPoint(1, 2, 0.0),))
+    for plan, words in (([], "it has no items"), (rally, "only a fence")):
+        with pytest.raises(ValueError, match=words):
+            client.submit_mission(plan)
+    with pytest.raises(ValueError, match="expected one of again, remainder, skip"):
+        client.release(None, "perhaps")  # type: ignore[arg-type]
     assert client.queue().waiting_count == 0

@@ -1,6 +1,7 @@
 """The command line without a server: what is understood, and how it says what is not."""
 
 import os
+import re
 from pathlib import Path
 
 from tests.kit.commands import called
@@ -33,25 +34,64 @@ PLACES = {
     "0 181 --global": "181",
     "47.3977 8.5456 --global --local": "choose one",
 }
-OTHERS = {
-    ("queue", "-s", "pigeon:1"): "udpout:host:port",
-    ("submit", "move", "1", "--in", "5s", "--at", "14:30"): "--in and --at",
-    ("submit", "wait", "-5"): "DURATION -5",
-    ("modify", "3"): "--priority",
-    ("release", "perhaps"): "again, remainder or skip",
-    ("release", "x", "again"): "id of a task",
-    ("clear", "--all"): "--yes",
-    ("mission", "upload", "no/such/file"): "No such file",
-    ("submit", "move", "1", "--every", "5w"): DURATION,
-}
+#: in FOLDER there is a FILE
+OTHERS = """queue -s pigeon:1: udpout:host:port
+submit move 1 --in 5s --at 14:30: --in and --at
+submit wait -5: DURATION -5
+submit move 1 --every 5w: 30s, 5m or 1h30m
+modify 3: --priority
+release perhaps: again, remainder or skip
+release x again: id of a task
+clear --all: --yes
+cancel --series --kill: leave out --series
+resume --all --epoch 1: --epoch needs one rover
+stop --all --vehicle 1: choose one of them
+queue --keys FILE: --keys needs --sign
+queue --sign anna --keys FILE: --sign: no key
+mission upload no/such/file: No such file
+mission upload FILE --stage --label x: only --wait goes with it
+mission upload FILE --stage --vehicle any: name it with --vehicle N
+export x: choose one of --mcap
+export x --mcap a --tlog b: choose one of --mcap
+export a b --tlog c: one MCAP file, not 2
+export x --mcap FOLDER: not a file
+export FILE --mcap FILE: is also read
+export x --mcap FILE: use --force to overwrite
+export x --mcap FOLDER/no/out: No such file
+export FILE --tlog FOLDER/out: FILE
+probe: the URL of the rover is missing
+probe tcp:127.0.0.1:9 --drive --set-failsafe: use one, then the other
+probe tcp:127.0.0.1:9 --drive: without a terminal, add --yes
+log --json --csv: choose one of them
+log --task -1: not a valid id
+log --until 2h --follow: choose one of them
+log --store=: path or the URL of a store
+qgc-actions --only: give at least one --action
+mcp --max-queued 3: keys add agent --role submitter --quota 3
+mcp --http 127.0.0.1: expected HOST:PORT
+mcp --http 10.0.0.1:80: can be reached from other machines
+mcp --http here:80: can be reached from other machines
+web --listen 8560: expected HOST:PORT
+web --role observer: roles.unsigned=observer
+web --tokens FILE: keys of the key ring now
+web tokens list: keys of the key ring now
+web --name rover.example: who sits elsewhere needs a token
+web --tiles http://x/1: expected a URL with
+web --tiles FOLDER/no: no such file
+web --tiles FILE: not an MBTiles file
+web --records FOLDER/no: no such folder
+web --listen 127.0.0.1:99999: expected HOST:PORT"""
 
 
-def test_each_option_is_understood_or_named_in_one_line() -> None:
+def test_each_option_is_understood_or_named_in_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "keys.toml"
+    file.touch(0o600)
+    others = OTHERS.replace("FILE", str(file)).replace("FOLDER", str(tmp_path))
     cases: dict[tuple[str, ...], str] = {
         **{("submit", "move", "1", "--in", text): words for text, words in DURATIONS.items()},
         **{("submit", "move", "1", "--at", text): words for text, words in MOMENTS.items()},
         **{("submit", "goto", *text.split()): words for text, words in PLACES.items()},
-        **OTHERS,
+        **{tuple(said.split()): words for said, words in re.findall("(.*?): (.*)", others)},
     }
     wrong = []
     for arguments, words in cases.items():
@@ -61,6 +101,28 @@ def test_each_option_is_understood_or_named_in_one_line() -> None:
         if not is_one_line or done.status != (2 if words else 3) or words not in done.error:
             wrong.append((arguments, done.status, done.error))
     assert wrong == []
+
+
+#: a configuration -> what the doctor says
+ILL = """x = 1: serve would not start
+store.path = "x://y": choose another with --store
+store.path = "postgresql:///x": the server looks at it when it starts
+store.path = "FILE": chmod 600
+signing.keys = "/dev/null/x": mav-tasks keys list
+signing.keys = "RING": no usable key
+links.clients = ["udpin:0.0.0.0:14560"]: no client has a signing key
+links.clients = ["udpin:127.0.0.1:9", "udpin:127.0.0.1:9"]: is given twice
+links.vehicles = ["serial:/dev/null:57600"]: end the other program
+links.vehicles = ["udpin:127.0.0.1:14999"]: can be opened"""
+
+
+def test_the_doctor_names_what_is_wrong(tmp_path: Path) -> None:
+    file, ring = tmp_path / "config.toml", tmp_path / "ring"
+    ring.touch(0o600)
+    for text, words in re.findall("(.*): (.*)", ILL):
+        file.write_text(text.replace("FILE", str(file)).replace("RING", str(ring)))
+        done = called("doctor", "--json", "--config", str(file), "--timeout", "0.1", server=NOBODY)
+        assert (done.status, words in done.output) == (1, True), (text, done)
 
 
 DIGITS = "0123456789abcdef" * 4

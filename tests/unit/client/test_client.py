@@ -1,10 +1,20 @@
 """What the client library says before anybody has answered it, and how it ends."""
 
+import asyncio
+import socket
 import threading
+import time
 
 import pytest
 
-from mav_tasks import Client, Key, MavTasksError, SyncClient
+from mav_tasks import Client, Key, MavTasksError, NoAnswer, SyncClient
+from mav_tasks.errors import LinkDown
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.codec import Encoder
+from mav_tasks.mavlink.messages import Heartbeat
+from mav_tasks.mavlink.signing import Signer, timestamp_at
+from tests.kit.awaited import awaited
+from tests.kit.processes import free_udp_ports
 
 NOBODY = "udpout:127.0.0.1:9"
 SOON = 5.0  # s on a very busy machine
@@ -25,6 +35,42 @@ def test_links_of_servers_and_strange_link_ids_are_refused() -> None:
     for link_id in (-1, 256):
         with pytest.raises(ValueError, match=r"link_id .* not in 0\.\.255"):
             Client(NOBODY, key=bytes(range(32)), link_id=link_id)
+
+
+def test_who_is_not_answered_is_told_what_the_link_brought() -> None:
+    key, ours = Key("anna", bytes(range(32))), bytes(range(32))
+    raw = Encoder(Address(1, 191)).encode(Heartbeat(18, 8, 0, 0, 4, 3))
+    now = timestamp_at(time.time())
+    (port,) = free_udp_ports(1)
+    said = Signer(key, link_id=1)
+    for packets, words in (
+        ([], "does the server have key anna"),
+        ([raw], "the received packets are not signed"),
+        ([Signer(Key("ben", ours[::-1]), link_id=1).sign(raw, clock=now)], "signed with another"),
+        ([said.sign(raw, clock=now - 10**8)], "signed for another time"),
+        ([said.sign(raw, clock=now)] * 2, "signed for another time"),
+    ):
+        client = SyncClient(f"udpin:127.0.0.1:{port}", timeout=0.2, key=key)
+        client.open()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for packet in packets:
+                sender.sendto(packet, ("127.0.0.1", port))
+        with pytest.raises(NoAnswer, match=words):
+            client.found()
+        client.close()
+
+
+@awaited
+async def test_a_connection_that_ends_is_named() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        client = Client(f"tcp:127.0.0.1:{listener.getsockname()[1]}", timeout=0.5)
+        client.open()
+        connection, _ = await asyncio.to_thread(listener.accept)
+        await asyncio.sleep(0.2)
+        connection.close()
+    with pytest.raises(LinkDown, match=r"lost: Connection reset"):
+        await client.found()
+    await client.close()
 
 
 def test_a_thread_that_waits_is_told_when_another_one_closes_and_no_thread_is_left() -> None:

@@ -25,6 +25,7 @@ from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.layout import Layout
 from mav_tasks.mcap_export.exporting import Counts, export
 from mav_tasks.mcap_export.restoring import restore
+from tests.kit.commands import session
 from tests.unit.mcap_export.json_schema import check, check_schema
 from tests.unit.recording.odd_packets import SIGNED, UNKNOWN, V1, WRONG_CRC
 
@@ -279,3 +280,20 @@ def test_a_file_cut_off_or_damaged_anywhere_is_one_clear_error(tmp_path: Path) -
             assert len(str(error).splitlines()) == 1  # noqa: PT017
     # of the index, which is not looked at
     assert all(contents == {"log.tlog": FIRST + SECOND} for contents in damaged)
+
+
+#: commands and what they say; a.tlog has a packet that nobody knows, and other bytes
+COMMANDS = """export FOLDER/a.tlog --mcap FOLDER/a.mcap => 0 FOLDER/a.mcap: 4 packets … \
+1 packets could not be decoded … ; 7 bytes belong to no packet
+export FOLDER/a.mcap --tlog FOLDER/c.tlog --json => 0 {"done": "export", "file": "FOLDER/c.tlog"
+export FOLDER/a.tlog FOLDER/b.tlog --mcap FOLDER/b.mcap => 0 FOLDER/b.mcap: 7 packets
+export FOLDER/b.mcap --tlog FOLDER/d.tlog => 2 mav-tasks: FOLDER/b.mcap: has several telemetry logs
+export FOLDER/b.mcap --tlog FOLDER --force => 0 FOLDER/a.tlog: … FOLDER/b.tlog:"""
+
+
+def test_the_command_says_what_it_has_written(tmp_path: Path) -> None:
+    odd = b"".join([*attitudes(3), stamped(UNKNOWN)]) + b"garbage"
+    for name, data in (("a", odd), ("b", b"".join(attitudes(3)))):
+        (tmp_path / f"{name}.tlog").write_bytes(data)
+    session("", COMMANDS.replace("FOLDER", str(tmp_path)))
+    assert (tmp_path / "a.tlog").read_bytes() == odd

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from math import nan
+from typing import Any
 
 import pytest
 
@@ -12,9 +13,11 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavState, MavType
+from mav_tasks.probe.findings import Drive, Findings, Rate
 from mav_tasks.probe.probe import Interrupted, Options
 from mav_tasks.probe.profile import profile_of, why_none
 from mav_tasks.probe.report import Mark, as_json, lines_of
+from rover_sim.actuators import Actuator
 from rover_sim.body import Pose
 from rover_sim.faults import Faults
 from rover_sim.parameters import INT16, Parameter
@@ -125,6 +128,105 @@ def test_the_rates_that_it_asked_for_are_given_back_if_it_ends_before_its_time()
     world.probe.interrupt("ended", now=world.now)
     world.finish()
     assert attitudes(world) == pytest.approx(before, abs=4)
+
+
+def test_what_a_rover_does_not_tell_is_unknown() -> None:
+    quiet: dict[Any, tuple[str, str]] = {
+        m.AutopilotVersion: ("firmware", "unknown"),
+        m.MissionCount: ("mission on board", "unknown"),
+        m.CommandAck: ("rates restored", "as before"),
+        m.SysStatus: ("arming checks", "unknown"),
+        m.MessageInterval: ("rates restored", "to the default, because the rover did not report"),
+        m.ParamValue: ("without setpoints", "does not report whether it stops"),
+    }
+    for kind, (topic, words) in quiet.items():
+        world = ProbeWorld(persona=PX4)
+        world.fault(Faults(withheld=frozenset({kind.id})))
+        world.run(1.0)
+        world.somebody_sends(STATION, Address(255, 190))
+        world.somebody_sends(m.Heartbeat(30, 8, 0, 0, 4, 3), Address(1, 154))  # a camera
+        assert world.finish().error is None
+        assert marks_of(world)[topic][1].startswith(words), kind
+        assert marks_of(world)["also connected"][1] == "ground station 255/190"
+    world = ProbeWorld(persona=PX4, options=Options(set_failsafe=True))
+    world.fault(Faults(withheld=frozenset({m.ParamValue.id})))
+    assert "does not report what it does" in str(world.finish().error)
+    for fault, words in (
+        (Faults(outputs_frozen=frozenset(Actuator)), "the rover does not follow BODY_NED"),
+        (Faults(heading_frozen=True), "the rover does not reach 0.30 m/s"),
+    ):
+        world = ProbeWorld(drive=True)
+        world.fault(fault)
+        world.finish()
+        assert world.driven.ended.startswith(words)
+        assert world.rests()
+
+
+#: findings -> lines of the report: mark, topic and words
+REPORTS = (
+    (
+        Findings(),
+        """!!rover: 0: unsupported autopilot, type 0, not a rover
+        !firmware: unknown
+        arming checks: unknown
+        mission on board: unknown
+        !without setpoints: unknown
+        driving: not tried: needs --drive""",
+    ),
+    (
+        Findings(
+            others=["task server 1/191"],
+            rates=[Rate("ATTITUDE", 25.0, 1.0, "DENIED", 1.0), Rate("SYS_STATUS", 1.0, 1.0)],
+            rates_given_back="no answer",
+            prearm_texts=["PreArm: GPS", "PreArm: compass"],
+            mission_items=3,
+            capabilities=8,
+            failsafe_set="COM_OBL_RC_ACT 0, now 5",
+            turning="steered",
+            turning_radius=1.25,
+            parameters={"SYSID_ENFORCE": 1.0},
+            drive=Drive(loss_stop="no", turned_standing_deg=9.0, speed=None),
+        ),
+        """!also connected: task server 1/191
+        !ATTITUDE: 1.0 Hz of 25.0 requested, 1.0 unasked; answer: DENIED
+        SYS_STATUS: 1.0 Hz unasked
+        !rates restored: no answer
+        !arming checks: PreArm: GPS; PreArm: compass
+        !mission on board: 3 items: its mission mode would drive them, unseen by the server
+        takes COMMAND_INT: yes
+        takes local setpoints: not reported
+        okloss failsafe: COM_OBL_RC_ACT 0, now 5
+        turns: like a car, according to its parameters, minimum radius 1.2 m
+        !SYSID_ENFORCE: 1; the server is 250
+        okdriving: completed
+        !standing: turned by 9 deg in 2 s of zero setpoints
+        !!setpoints stop: does NOT stop by itself; it keeps driving""",
+    ),
+    (
+        Findings(
+            drive=Drive(
+                ended="the rover was disarmed",
+                left="Hold, ARMED",
+                hold="no",
+                refused=["BODY_NED 0x05C7"],
+                loss_stop="yes",
+                loss_distance=0.25,
+                loss_speed=0.3,
+            )
+        ),
+        """!!driving: the rover was disarmed
+        !!left in: Hold, ARMED
+        !!HOLD: NOT seen
+        setpoint: BODY_NED 0x05C7: not followed
+        oksetpoints stop: stops by itself, 0.25 m further, from 0.30 m/s""",
+    ),
+)
+
+
+def test_the_report_marks_what_is_not_as_it_must_be() -> None:
+    for found, expected in REPORTS:
+        lines = [f"{line.mark.value}{line.topic}: {line.words}" for line in lines_of(found)]
+        assert {each.strip() for each in expected.splitlines()} - set(lines) == set(), lines
 
 
 # a loss failsafe is set
