@@ -1,0 +1,311 @@
+"""Requests that make no sense, or come at the wrong time: each gets its answer and its words.
+
+A line of a table is a request, " : ", the result in its ack ("-": it gets none) and words in the
+texts that come with it. A request is a command, a mission message, or a plan with its items.
+"""
+
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
+from mav_tasks.settings import Settings
+from mav_tasks.tasks.events import SubmissionRefused
+from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
+from rover_sim.faults import Faults
+from tests.kit.cases import for_each
+from tests.kit.client import ACCEPTED, DENIED, command_long
+from tests.kit.mission import Download, Item, Upload, acks
+from tests.kit.px4 import PROMPT_PX4
+from tests.kit.store import LateStore
+from tests.kit.world import World, at
+from tests.scenarios.conftest import MakeWorld
+from tests.scenarios.test_car import car_profile
+from tests.scenarios.test_plan_commands import ARDUPILOT_CAR
+
+PLACES = {"autopilot": (1, 1), "server": (1, 191), "any": (250, 191), "other": (250, 5)}
+KINDS = {"plan": 0, "mission": 0, "fence": 1, "rally": 2}
+SHORT = {"GO ": "NAV_WAYPOINT ", "POND ": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION "}
+HOW_IT_TURNS = ("CA_AIRFRAME", "SYS_AUTOSTART")
+UNKNOWN_PX4 = replace(
+    PROMPT_PX4, parameters=tuple(p for p in PROMPT_PX4.parameters if p.name not in HOW_IT_TURNS)
+)
+
+
+def number(word: str) -> Any:
+    if "," in word:
+        return tuple(map(number, word.split(",")))
+    try:
+        return int(word) if word.lstrip("-").isdigit() else float(word)
+    except ValueError:
+        return word.encode()
+
+
+def parsed(text: str) -> tuple[str, list[Any], dict[str, Any]]:
+    """Return the first word, the numbers and the fields after it; ``at`` is a place in metres."""
+    name, *words = text.split()
+    fields: dict[str, Any] = dict(word.split("=") for word in words if "=" in word)
+    place = at(*number(fields.pop("at"))) if "at" in fields else {}
+    fields = {key: PLACES.get(word) or number(word) for key, word in fields.items()}
+    return name, [number(word) for word in words if "=" not in word], fields | place
+
+
+def item(text: str) -> Item:
+    name, params, fields = parsed(text)
+    return Item(number_of(name), 0, 0, *params)._replace(**fields)
+
+
+def ask(world: World, text: str) -> None:
+    """Send a request, or do what else a row begins with."""
+    first, *items = text.split(";")
+    name, numbers, fields = parsed(first)
+    client = world.client
+    is_of_server = name == "plan" or name.isupper()
+    target = fields.pop("to", PLACES["server" if is_of_server else "autopilot"])
+    if name == "wait":
+        world.run(numbers[0])
+    elif name == "fault":
+        world.fault(Faults(**fields))
+    elif name == "lose":
+        world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
+    elif name in KINDS:
+        Upload(client, [item(each) for each in items], kind=KINDS[name], target=target)
+    elif name.startswith("rover:"):
+        message = getattr(common, f"MAVLink_{name[6:]}_message")(*numbers)
+        world.net.send("rover1", VEHICLE_LINK, message.pack(common.MAVLink(None, 1, 1)))
+    elif name.islower():
+        client.send(getattr(common, f"MAVLink_{name}_message")(*target, *numbers))
+    elif fields.keys() & {"x", "frame"}:
+        client.command_int(number_of(name), *numbers, target=target, **fields)
+    else:
+        client.command(number_of(name), *numbers, target=target, **fields)
+
+
+def number_of(name: str) -> int:
+    """Return the number of a command, as in the standard or in our dialect."""
+    return int(getattr(common, f"MAV_CMD_{name}", None) or MavCmd[name])
+
+
+def check(world: World, table: str) -> None:
+    """Send requests one by one, and compare the answers to each."""
+    for short, name in SHORT.items():
+        table = table.replace(short, name)
+    client, wrong = world.client, []
+    for row in table.strip().splitlines():
+        request, _, answer = row.strip().partition(" : ")
+        result, _, words = answer.partition(" ")
+        texts, commands, plans = len(client.texts()), len(client.acks), len(acks(client))
+        for each in request.split(" & "):
+            ask(world, each)
+        world.run(0.4)
+        got = [MavResult(ack.result).name for ack in client.acks[commands:]]
+        got += [MavMissionResult(ack.result).name for ack in acks(client)[plans:]]
+        said = " | ".join(client.texts()[texts:])
+        if " ".join(got) != result.strip("-") or words not in said:
+            wrong.append(f"{request}: {got} {said}, not {answer}")
+    assert not wrong, "\n".join(wrong)
+
+
+@for_each(
+    "kw, table",
+    [
+        (
+            {},
+            """
+SET_MESSAGE_INTERVAL -5 : DENIED param1 -5 is not a message id
+SET_MESSAGE_INTERVAL 30 nan : DENIED param2 interval nan is not finite
+GET_MESSAGE_INTERVAL 70000 : DENIED param1 message id 70000 not in 0..65535
+GET_MESSAGE_INTERVAL 54000 : ACCEPTED
+REQUEST_MESSAGE 54002 77 : DENIED no task 77
+REQUEST_MESSAGE 54002 : DENIED no task runs
+DO_SET_MODE 1 nan to=autopilot : DENIED param2 nan is not a mode number
+DO_CHANGE_SPEED 1 nan : DENIED param2 speed is not given
+DO_CHANGE_SPEED 1 -1 : ACCEPTED
+MISSION_START 0 3 : DENIED param2 last item 3: only the whole plan can run
+MISSION_START : DENIED there is no mission: upload one first
+DO_SET_MISSION_CURRENT 1 : DENIED there is no mission: upload one first
+TASK_ROTATE 0 : DENIED param1 angle is 0: nothing to do
+CONDITION_YAW 0 0 1 1 : DENIED param1 angle is 0: nothing to do
+TASK_MOVE 1 0 0 0 0 60 : ACCEPTED Task 1
+TASK_CANCEL 9 : DENIED no task 9
+TASK_CANCEL 9 confirmation=1 : DENIED just refused; send it again if you mean it
+TASK_CANCEL 8 confirmation=1 : DENIED no task 8
+TASK_RELEASE 1 : DENIED task 1 is not held, it is scheduled
+TASK_MODIFY 1 7 0 0 99 : DENIED START_UTC must be sent as COMMAND_INT
+TASK_MODIFY 1 8 0 0 99 : DENIED LABEL must be sent as COMMAND_INT
+TASK_MODIFY 1 8 3 0 x=-1 y=-1 : DENIED label: byte 3 comes after byte 0
+TASK_MODIFY 1 9 60 : ACCEPTED
+TASK_MODIFY 1 9 60 0 0 0 1 : ACCEPTED
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED Task 2
+TASK_MODIFY 2 9 60 : DENIED task 2 needs a start command: it cannot repeat
+COMPONENT_ARM_DISARM 1 to=autopilot : ACCEPTED
+fault refuse_arm=1 : -
+COMPONENT_ARM_DISARM 0 to=autopilot : ACCEPTED
+COMPONENT_ARM_DISARM 1 to=autopilot : FAILED
+TASK_STOP : ACCEPTED
+NAV_LAND : TEMPORARILY_REJECTED STOP is in force: press Continue first
+""",
+        ),
+        (
+            {"settings": Settings(claim=False)},
+            """
+DO_SET_MODE 1 15 to=autopilot : ACCEPTED
+COMPONENT_ARM_DISARM 1 to=autopilot : ACCEPTED
+NAV_SET_YAW_SPEED 90 nan to=autopilot : DENIED param2 speed is not given
+""",
+        ),
+        (
+            {},
+            """
+mission_request_list 7 : UNSUPPORTED
+mission_clear_all 7 : UNSUPPORTED
+mission_count 1 7 : UNSUPPORTED mission type 7 is not supported
+mission_count 60000 : NO_SPACE items
+mission_request_partial_list 0 2 : UNSUPPORTED
+mission_write_partial_list 0 2 : UNSUPPORTED
+mission_request_int 5 : INVALID_SEQUENCE
+mission_set_current 5 : - there is no mission: upload one first
+mission_item_int 0 3 16 3 1 0 0 0 0 5 5 9 : ACCEPTED
+fence; NAV_FENCE_RETURN_POINT at=1,1 frame=99 : UNSUPPORTED_FRAME frame 99
+fence; NAV_FENCE_RETURN_POINT x=900000001 y=5 : INVALID_PARAM5_X x latitude 90.0000001
+fence; NAV_FENCE_RETURN_POINT x=5 y=1800000001 : INVALID_PARAM6_Y y longitude 180.0000001
+fence; NAV_FENCE_RETURN_POINT 0 1.5 at=1,1 : INVALID_PARAM2 param2 group 1.5 not in 0..255
+fence; NAV_FENCE_RETURN_POINT 0 nan at=1,1 : ACCEPTED
+rally; NAV_WAYPOINT at=1,1 : UNSUPPORTED rally points
+plan; NAV_WAYPOINT at=1,1 frame=99 : UNSUPPORTED_FRAME item 1: frame 99 is unknown
+plan; TASK_MOVE 1 x=9 : INVALID_PARAM5_X param5 run after: not in a plan
+plan; JUMP_TAG 5; DO_JUMP_TAG 5 2 : INVALID a loop without motion
+plan; NAV_WAYPOINT x=2147483647; NAV_LOITER_TURNS 1 0 1 : ACCEPTED Task 1
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED Task 2
+MISSION_START 9 : DENIED param1 first item 9: the plan has 2 items
+mission_set_current 9 : - item 9: the last item is 1
+mission_set_current 1 : -
+mission_count 1 : -
+mission_ack 15 : -
+mission_count 1 : -
+mission_item 0 3 16 0 1 0 0 0 0 1e30 5 5 : INVALID_PARAM5_X
+mission_count 1 : -
+mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
+mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
+lose 47 : -
+fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
+wait 10 : ERROR rover 1 did not answer: not stored
+lose 77 : -
+plan; DO_SET_SERVO 1 1500 : ACCEPTED
+wait 10 : - did not answer command 183 of the plan
+""",
+        ),
+        (
+            {},
+            """
+fence; POND 4 at=1,-1; POND 4 at=2,-1; POND 4 at=2,1; POND 4 at=1,1 : ACCEPTED
+plan; GO at=0.5,0; GO at=0.5,2; GO at=3,2; GO at=3,0; DO_JUMP 1 2 : DENIED a jump to it crosses
+plan to=any; GO at=0.5,0; GO at=2.5,0 : UNSUPPORTED the path crosses the fence
+""",
+        ),
+        (
+            {},
+            """
+rover:mission_current 0 5 0 0 : - has its own mission on board (5 items)
+rover:gps_global_origin 910000000 0 0 : -
+rover:rc_channels 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 : -
+rover:statustext 6 half 7 0 & rover:statustext 6 other 7 0 : - half
+""",
+        ),
+        (
+            {},
+            """
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=0.2,0; NAV_WAYPOINT at=0.3,0 : ACCEPTED Task 1
+MISSION_START 2 : ACCEPTED
+mission : DENIED task 1 has started: cancel it first
+wait 8 : - Task 1 done
+mission_set_current 1 : - The mission will start with item 1
+DO_SET_MISSION_CURRENT 1 : ACCEPTED The mission will start with item 1
+plan; NAV_WAYPOINT 60 x=2147483647 : ACCEPTED Task 2
+MISSION_START : ACCEPTED
+wait 1 : -
+fault position_jump=50,0 : -
+wait 1 : - position
+MISSION_START : ACCEPTED
+""",
+        ),
+        (
+            {"settings": Settings(profiles=(ARDUPILOT_CAR,))},
+            """
+TASK_DRIVE 0 20 1 : DENIED param2 yaw rate: rover 1 steers like a car
+NAV_SET_YAW_SPEED 90 0 : DENIED param2 speed 0: rover 1 steers like a car
+""",
+        ),
+        (
+            {"persona": PROMPT_PX4, "settings": Settings(profiles=(car_profile(PROMPT_PX4),))},
+            """
+TASK_DRIVE 1 20 1 : DENIED is steered by course and cannot follow
+plan; DO_SET_REVERSE 1; NAV_WAYPOINT at=1,0 : INVALID_PARAM1 leave DO_SET_REVERSE out
+""",
+        ),
+        (
+            {"persona": UNKNOWN_PX4},
+            """
+NAV_SET_YAW_SPEED 90 0 : DENIED param2 speed 0: rover 1 can neither turn on
+TASK_ROTATE 90 : DENIED rover 1 can neither turn on the spot nor follow
+""",
+        ),
+        (
+            {"rovers": 2},
+            """
+TASK_MOVE 1 to=other : -
+DO_CHANGE_SPEED 1 1 to=any : -
+TASK_CANCEL 1 to=any : DENIED command 54010 must name one rover
+mission_count 1 1 to=any : UNSUPPORTED belongs to one rover: name it
+fence to=any; NAV_WAYPOINT at=1,0 : UNSUPPORTED belongs to one rover
+""",
+        ),
+    ],
+)
+def test_each_has_its_answer(make_world: MakeWorld, kw: dict[str, Any], table: str) -> None:
+    check(make_world(**kw), table)
+
+
+def test_a_packet_for_any_rover_that_comes_twice_is_one_request(make_world: MakeWorld) -> None:
+    world = make_world(rovers=2)
+    packet = world.client.send(command_long(54_000, 0.2, 0, 0, 9, target=PLACES["any"]))
+    world.run(0.2)
+    world.client.send_raw(packet)
+    world.run(0.2)
+    assert world.client.acks_of(54_000) == [(ACCEPTED, 1)] * 2
+    assert len(world.tasks()) == 1
+
+
+@for_each("kind", ["plan", "mission"])
+def test_a_plan_that_is_not_stored_in_time(make_world: MakeWorld, kind: str) -> None:
+    store = LateStore()
+    world = make_world(store=store)
+    check(world, "mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED")
+    store.delay = inf
+    ask(world, f"{kind}; NAV_WAYPOINT; NAV_WAYPOINT at=2,0")
+    world.run(5)
+    assert world.client.said("not stored in time: not accepted")
+    assert [task.state for task in world.tasks()] == [S.BLOCKED]
+    download = Download(world.client)
+    world.run(1)
+    assert download.items[1].x == at(1, 0)["x"]
+
+
+def test_a_flood_of_refusals_is_answered_and_not_told(world: World) -> None:
+    requests = (
+        "TASK_CANCEL 1 to=any",
+        "TASK_CANCEL 1",
+        "mission_item_int 0 3 21 2 1 0 0 0 0 5 5 9",
+        "mission_set_current 9",
+    )
+    for _ in range(100):
+        for each in requests:
+            ask(world, each)
+        world.run(0.001)
+    world.run(1)
+    assert world.client.acks_of(54_010) == [(DENIED, R.BAD_PARAMETER), (DENIED, R.NOT_FOUND)] * 100
+    assert len(world.events(SubmissionRefused)) < 30
