@@ -6,30 +6,45 @@ texts that come with it. A request is a command, a mission message, or a plan wi
 
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
-from mav_tasks.settings import Settings
+from mav_tasks.settings import Clients, Settings
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, command_long
+from tests.kit.client import ACCEPTED, DENIED, IDS, command_long
 from tests.kit.mission import Download, Item, Upload, acks
 from tests.kit.px4 import PROMPT_PX4
-from tests.kit.store import LateStore
+from tests.kit.restarts import UTC, restart
+from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_car import car_profile
 from tests.scenarios.test_plan_commands import ARDUPILOT_CAR
 
-PLACES = {"autopilot": (1, 1), "server": (1, 191), "any": (250, 191), "other": (250, 5)}
+PLACES = {
+    "autopilot": (1, 1),
+    "server": (1, 191),
+    "any": (250, 191),
+    "other": (250, 5),
+    "second": (2, 191),
+}
 KINDS = {"plan": 0, "mission": 0, "fence": 1, "rally": 2}
-SHORT = {"GO ": "NAV_WAYPOINT ", "POND ": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION "}
+SECOND_CAR = replace(ARDUPILOT_CAR, system_id=2, uid="2")
+SHORT = {
+    "GO ": "NAV_WAYPOINT ",
+    "KEY ": ",".join(["0"] * 32) + " ",
+    "POND ": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION ",
+}
+PAIR = "NAV_WAYPOINT; NAV_WAYPOINT at=2,0"
+NAMES = {number: name for name, number in IDS.items()}
 HOW_IT_TURNS = ("CA_AIRFRAME", "SYS_AUTOSTART")
 UNKNOWN_PX4 = replace(
     PROMPT_PX4, parameters=tuple(p for p in PROMPT_PX4.parameters if p.name not in HOW_IT_TURNS)
@@ -98,15 +113,20 @@ def check(world: World, table: str) -> None:
     for row in table.strip().splitlines():
         request, _, answer = row.strip().partition(" : ")
         result, _, words = answer.partition(" ")
+        packets = len(client.received)
         texts, commands, plans = len(client.texts()), len(client.acks), len(acks(client))
         for each in request.split(" & "):
             ask(world, each)
         world.run(0.4)
         got = [MavResult(ack.result).name for ack in client.acks[commands:]]
         got += [MavMissionResult(ack.result).name for ack in acks(client)[plans:]]
-        said = " | ".join(client.texts()[texts:])
+        ids = {(p.message_id, p.source[1]) for p in client.received[packets:]}
+        named = [
+            f"{common.mavlink_map[n].msgname}@{by}" for n, by in ids if n in common.mavlink_map
+        ]
+        said = " | ".join(client.texts()[texts:] + named)
         if " ".join(got) != result.strip("-") or words not in said:
-            wrong.append(f"{request}: {got} {said}, not {answer}")
+            wrong.append(f"{request}: {got} {client.texts()[texts:]}, not {answer}")
     assert not wrong, "\n".join(wrong)
 
 
@@ -119,7 +139,9 @@ def check(world: World, table: str) -> None:
 SET_MESSAGE_INTERVAL -5 : DENIED param1 -5 is not a message id
 SET_MESSAGE_INTERVAL 30 nan : DENIED param2 interval nan is not finite
 GET_MESSAGE_INTERVAL 70000 : DENIED param1 message id 70000 not in 0..65535
-GET_MESSAGE_INTERVAL 54000 : ACCEPTED
+GET_MESSAGE_INTERVAL 54000 : ACCEPTED MESSAGE_INTERVAL@191
+param_request_read to=server _HASH_CHECK -1 : - PARAM_VALUE@191
+setup_signing to=other KEY 0 : -
 REQUEST_MESSAGE 54002 77 : DENIED no task 77
 REQUEST_MESSAGE 54002 : DENIED no task runs
 DO_SET_MODE 1 nan to=autopilot : DENIED param2 nan is not a mode number
@@ -180,9 +202,11 @@ plan; NAV_WAYPOINT at=1,1 frame=99 : UNSUPPORTED_FRAME item 1: frame 99 is unkno
 plan; TASK_MOVE 1 x=9 : INVALID_PARAM5_X param5 run after: not in a plan
 plan; JUMP_TAG 5; DO_JUMP_TAG 5 2 : INVALID a loop without motion
 plan; NAV_WAYPOINT x=2147483647; NAV_LOITER_TURNS 1 0 1 : ACCEPTED Task 1
-mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED Task 2
-MISSION_START 9 : DENIED param1 first item 9: the plan has 2 items
-mission_set_current 9 : - item 9: the last item is 1
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0; DO_SET_SERVO 1 frame=2 : ACCEPTED Task 2
+mission_request_list 0 : - MISSION_COUNT@1
+mission_request 2 : - MISSION_ITEM@1
+MISSION_START 9 : DENIED param1 first item 9: the plan has 3 items
+mission_set_current 9 : - item 9: the last item is 2
 mission_set_current 1 : -
 mission_count 1 : -
 mission_ack 15 : -
@@ -191,6 +215,9 @@ mission_item 0 3 16 0 1 0 0 0 0 1e30 5 5 : INVALID_PARAM5_X
 mission_count 1 : -
 mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
 mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
+lose 40 : -
+fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
+rover:mission_ack 250 191 1 1 : DENIED rover 1 refused it: ERROR
 lose 47 : -
 fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
 wait 10 : ERROR rover 1 did not answer: not stored
@@ -229,8 +256,14 @@ plan; NAV_WAYPOINT 60 x=2147483647 : ACCEPTED Task 2
 MISSION_START : ACCEPTED
 wait 1 : -
 fault position_jump=50,0 : -
-wait 1 : - position
+wait 1 : -
 MISSION_START : ACCEPTED
+fault : -
+wait 1 : -
+TASK_RELEASE 2 2 : ACCEPTED
+TASK_RELEASE 2 2 : ACCEPTED task 2: already skipped
+DO_SET_MODE 1 11 to=autopilot : ACCEPTED Task 3
+DO_SET_MODE 1 11 to=autopilot : ACCEPTED
 """,
         ),
         (
@@ -262,6 +295,26 @@ DO_CHANGE_SPEED 1 1 to=any : -
 TASK_CANCEL 1 to=any : DENIED command 54010 must name one rover
 mission_count 1 1 to=any : UNSUPPORTED belongs to one rover: name it
 fence to=any; NAV_WAYPOINT at=1,0 : UNSUPPORTED belongs to one rover
+TASK_MOVE 1 0 0 0 0 60 to=any : ACCEPTED Rover 1 chosen: free
+fault battery=12 : -
+wait 6 : - battery 12%
+""",
+        ),
+        (
+            {"rovers": 2, "settings": Settings(profiles=(SECOND_CAR,))},
+            """
+NAV_WAYPOINT 0 0 0 90 to=any at=0,1 frame=0 : ACCEPTED Rover 1 chosen: free
+fault battery=12 : -
+wait 6 : -
+""",
+        ),
+        (
+            {"persona": PROMPT_PX4},
+            """
+mission; GO at=1,0 : ACCEPTED
+DO_SET_MODE 1 4 4 to=autopilot : ACCEPTED The mission starts when the rover is armed
+mission; GO at=2,0 : ACCEPTED
+COMPONENT_ARM_DISARM 1 to=autopilot : ACCEPTED
 """,
         ),
     ],
@@ -280,13 +333,15 @@ def test_a_packet_for_any_rover_that_comes_twice_is_one_request(make_world: Make
     assert len(world.tasks()) == 1
 
 
-@for_each("kind", ["plan", "mission"])
-def test_a_plan_that_is_not_stored_in_time(make_world: MakeWorld, kind: str) -> None:
+@for_each("request", [f"plan; {PAIR}", f"mission; {PAIR}", "DO_SET_MODE 1 11 to=autopilot"])
+def test_a_plan_that_is_not_stored_in_time(make_world: MakeWorld, request: str) -> None:
     store = LateStore()
     world = make_world(store=store)
     check(world, "mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED")
     store.delay = inf
-    ask(world, f"{kind}; NAV_WAYPOINT; NAV_WAYPOINT at=2,0")
+    ask(world, request)
+    world.run(0.4)
+    ask(world, "mission_count 2")
     world.run(5)
     assert world.client.said("not stored in time: not accepted")
     assert [task.state for task in world.tasks()] == [S.BLOCKED]
@@ -309,3 +364,26 @@ def test_a_flood_of_refusals_is_answered_and_not_told(world: World) -> None:
     world.run(1)
     assert world.client.acks_of(54_010) == [(DENIED, R.BAD_PARAMETER), (DENIED, R.NOT_FOUND)] * 100
     assert len(world.events(SubmissionRefused)) < 30
+
+
+def test_requests_about_a_rover_that_is_not_heard_yet(make_world: MakeWorld, path: Path) -> None:
+    world = make_world(rovers=2, store=PromptSqliteStore(path, wall_offset=UTC))
+    check(world, "TASK_MOVE 1 0 0 7 0 600 to=any : ACCEPTED Rover 1 chosen")
+    world.fault(Faults(silent=True))
+    restart(world, path)
+    check(
+        world,
+        """
+REQUEST_MESSAGE 242 : -
+REQUEST_MESSAGE 54000 1 to=any : ACCEPTED
+REQUEST_MESSAGE 54002 1 to=second : ACCEPTED
+TASK_MOVE 1 0 0 7 0 600 to=any : ACCEPTED
+""",
+    )
+
+
+def test_a_client_has_the_priority_of_its_address(make_world: MakeWorld) -> None:
+    clients = Clients(priorities={"255/190": 7})
+    world = make_world(settings=Settings(clients=clients))
+    check(world, "NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED")
+    assert world.task(1).priority == 7
