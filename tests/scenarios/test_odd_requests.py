@@ -11,9 +11,10 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.in_memory import VEHICLE_LINK
+from mav_tasks.engine.inputs import PeerChanged
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
-from mav_tasks.settings import Clients, Settings
+from mav_tasks.settings import Clients, Roles, Settings
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -41,6 +42,9 @@ SECOND_CAR = replace(ARDUPILOT_CAR, system_id=2, uid="2")
 SHORT = {
     "GO ": "NAV_WAYPOINT ",
     "KEY ": ",".join(["0"] * 32) + " ",
+    "ZEROS ": ",".join(["0"] * 247) + " ",
+    "ARM ": "COMPONENT_ARM_DISARM to=autopilot ",
+    "BUSY": "TEMPORARILY_REJECTED",
     "POND ": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION ",
 }
 PAIR = "NAV_WAYPOINT; NAV_WAYPOINT at=2,0"
@@ -89,9 +93,13 @@ def ask(world: World, text: str) -> None:
         world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
     elif name in KINDS:
         Upload(client, [item(each) for each in items], kind=KINDS[name], target=target)
-    elif name.startswith("rover:"):
-        message = getattr(common, f"MAVLink_{name[6:]}_message")(*numbers)
-        world.net.send("rover1", VEHICLE_LINK, message.pack(common.MAVLink(None, 1, 1)))
+    elif ":" in name:
+        who, _, name = name.partition(":")
+        message = getattr(common, f"MAVLink_{name}_message")(*numbers)
+        if who == "rover":
+            world.net.send("rover1", VEHICLE_LINK, message.pack(common.MAVLink(None, 1, 1)))
+        else:
+            client.send(message)
     elif name.islower():
         client.send(getattr(common, f"MAVLink_{name}_message")(*target, *numbers))
     elif fields.keys() & {"x", "frame"}:
@@ -125,7 +133,7 @@ def check(world: World, table: str) -> None:
             f"{common.mavlink_map[n].msgname}@{by}" for n, by in ids if n in common.mavlink_map
         ]
         said = " | ".join(client.texts()[texts:] + named)
-        if " ".join(got) != result.strip("-") or words not in said:
+        if "+".join(got) != result.strip("-") or words not in said:
             wrong.append(f"{request}: {got} {client.texts()[texts:]}, not {answer}")
     assert not wrong, "\n".join(wrong)
 
@@ -142,6 +150,7 @@ GET_MESSAGE_INTERVAL 70000 : DENIED param1 message id 70000 not in 0..65535
 GET_MESSAGE_INTERVAL 54000 : ACCEPTED MESSAGE_INTERVAL@191
 param_request_read to=server _HASH_CHECK -1 : - PARAM_VALUE@191
 setup_signing to=other KEY 0 : -
+client:file_transfer_protocol 0 1 191 0,0,0,128,ZEROS : -
 REQUEST_MESSAGE 54002 77 : DENIED no task 77
 REQUEST_MESSAGE 54002 : DENIED no task runs
 DO_SET_MODE 1 nan to=autopilot : DENIED param2 nan is not a mode number
@@ -164,19 +173,24 @@ TASK_MODIFY 1 9 60 : ACCEPTED
 TASK_MODIFY 1 9 60 0 0 0 1 : ACCEPTED
 mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0 : ACCEPTED Task 2
 TASK_MODIFY 2 9 60 : DENIED task 2 needs a start command: it cannot repeat
-COMPONENT_ARM_DISARM 1 to=autopilot : ACCEPTED
+ARM 1 : ACCEPTED
 fault refuse_arm=1 : -
-COMPONENT_ARM_DISARM 0 to=autopilot : ACCEPTED
-COMPONENT_ARM_DISARM 1 to=autopilot : FAILED
+ARM 0 : ACCEPTED
+ARM 1 : FAILED
+fault : -
+lose 77 : -
+ARM 1 & ARM 1 21196 : -
+ARM 0 21196 & ARM 0 21196 : BUSY+BUSY is busy, try again
+wait 5 : BUSY+BUSY no answer
 TASK_STOP : ACCEPTED
-NAV_LAND : TEMPORARILY_REJECTED STOP is in force: press Continue first
+NAV_LAND : BUSY STOP is in force: press Continue first
 """,
         ),
         (
             {"settings": Settings(claim=False)},
             """
 DO_SET_MODE 1 15 to=autopilot : ACCEPTED
-COMPONENT_ARM_DISARM 1 to=autopilot : ACCEPTED
+ARM 1 : ACCEPTED
 NAV_SET_YAW_SPEED 90 nan to=autopilot : DENIED param2 speed is not given
 """,
         ),
@@ -217,6 +231,7 @@ mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
 mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
 lose 40 : -
 fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
+rover:mission_request 250 191 0 2 : -
 rover:mission_ack 250 191 1 1 : DENIED rover 1 refused it: ERROR
 lose 47 : -
 fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
@@ -309,12 +324,44 @@ wait 6 : -
 """,
         ),
         (
+            {},
+            """
+TASK_MOVE 1 0 0 0 0 60 to=any : ACCEPTED Rover 1 chosen: free
+fault battery=12 : -
+wait 6 : -
+""",
+        ),
+        (
+            {"settings": Settings(roles=Roles("observer"))},
+            """
+mission_item_int 0 3 16 0 1 0 0 0 0 5 5 9 : -
+mission_count 1 : DENIED role observer may not
+""",
+        ),
+        (
+            {"settings": Settings(roles=Roles("submitter"))},
+            """
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+DO_REPOSITION -1 1 0 nan at=1,0 frame=0 : ACCEPTED Task 1 waits, press Continue
+""",
+        ),
+        (
+            {"persona": PROMPT_PX4},
+            """
+mission; GO at=1,0 : ACCEPTED
+DO_SET_MODE 1 4 4 to=autopilot : ACCEPTED The mission starts when the rover is armed
+TASK_STOP : ACCEPTED
+DO_PAUSE_CONTINUE 1 : ACCEPTED
+ARM 1 : ACCEPTED
+""",
+        ),
+        (
             {"persona": PROMPT_PX4},
             """
 mission; GO at=1,0 : ACCEPTED
 DO_SET_MODE 1 4 4 to=autopilot : ACCEPTED The mission starts when the rover is armed
 mission; GO at=2,0 : ACCEPTED
-COMPONENT_ARM_DISARM 1 to=autopilot : ACCEPTED
+ARM 1 : ACCEPTED
 """,
         ),
     ],
@@ -387,3 +434,35 @@ def test_a_client_has_the_priority_of_its_address(make_world: MakeWorld) -> None
     world = make_world(settings=Settings(clients=clients))
     check(world, "NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED")
     assert world.task(1).priority == 7
+
+
+@for_each("delay", [0.3, inf])
+def test_a_client_that_is_gone_is_not_answered(make_world: MakeWorld, delay: float) -> None:
+    store = LateStore()
+    world = make_world(store=store)
+    check(world, "SET_MESSAGE_INTERVAL 54000 500000 : ACCEPTED\nlose 77 : -")
+    store.delay = delay
+    for each in (f"plan; {PAIR}", f"mission; {PAIR}", "COMPONENT_ARM_DISARM 1 to=autopilot"):
+        ask(world, each)
+    world.client.heartbeats = False
+    world.run(0.2)
+    world.server.engine.handle(PeerChanged(CLIENT_LINK, "client", up=False), now=world.now)
+    world.run(0.1)
+    received = len(world.client.received)
+    world.run(4)
+    assert len(world.client.received) == received
+    assert len(world.tasks()) == (0 if delay == inf else 2)
+
+
+def test_more_places_than_a_link_has_room_for(world: World) -> None:
+    for number in range(300):
+        change = PeerChanged(VEHICLE_LINK, f"peer {number}", up=True)
+        world.server.engine.handle(change, now=world.now)
+    world.fault(Faults(silent=True))
+    world.run(5)
+    beat = common.MAVLink_heartbeat_message(10, 3, 1, 0, 4, 3)
+    for system in (1, 2):
+        world.from_vehicle_side(beat.pack(common.MAVLink(None, system, 1)))
+    world.run(1)
+    known = world.server.engine.snapshot(now=world.now).vehicles
+    assert [vehicle.system_id for vehicle in known] == [1]
