@@ -159,8 +159,6 @@ DO_CHANGE_SPEED 1 -1 : ACCEPTED
 MISSION_START 0 3 : DENIED param2 last item 3: only the whole plan can run
 MISSION_START : DENIED there is no mission: upload one first
 DO_SET_MISSION_CURRENT 1 : DENIED there is no mission: upload one first
-TASK_ROTATE 0 : DENIED param1 angle is 0: nothing to do
-CONDITION_YAW 0 0 1 1 : DENIED param1 angle is 0: nothing to do
 TASK_MOVE 1 0 0 0 0 60 : ACCEPTED Task 1
 TASK_CANCEL 9 : DENIED no task 9
 TASK_CANCEL 9 confirmation=1 : DENIED just refused; send it again if you mean it
