@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import PeerChanged
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
-from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
+from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavMissionResult, MavResult
 from mav_tasks.settings import Clients, Roles, Settings
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
@@ -291,6 +291,15 @@ NAV_SET_YAW_SPEED 90 0 : DENIED param2 speed 0: rover 1 steers like a car
             """
 TASK_DRIVE 1 20 1 : DENIED is steered by course and cannot follow
 plan; DO_SET_REVERSE 1; NAV_WAYPOINT at=1,0 : INVALID_PARAM1 leave DO_SET_REVERSE out
+""",
+        ),
+        (
+            {"persona": replace(PROMPT_PX4, autopilot=MavAutopilot.GENERIC)},
+            """
+TASK_MOVE 4 : ACCEPTED Task 1
+wait 3 : -
+fault refuse_mode=1 & TASK_STOP : ACCEPTED
+wait 4 : - Disarmed
 """,
         ),
         (
