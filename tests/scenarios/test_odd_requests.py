@@ -11,7 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.engine.inputs import PeerChanged
+from mav_tasks.engine.inputs import Congestion, Packets, PeerChanged
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavMissionResult, MavResult
 from mav_tasks.settings import Clients, Roles, Settings
@@ -44,6 +44,7 @@ SHORT = {
     "KEY ": ",".join(["0"] * 32) + " ",
     "ZEROS ": ",".join(["0"] * 247) + " ",
     "ARM ": "COMPONENT_ARM_DISARM to=autopilot ",
+    "EIGHT": "0,0,0,0,0,0,0,0",
     "BUSY": "TEMPORARILY_REJECTED",
     "POND ": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION ",
 }
@@ -91,6 +92,10 @@ def ask(world: World, text: str) -> None:
         world.fault(Faults(**fields))
     elif name == "lose":
         world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
+    elif name == "unread":
+        world.watched.unread_links[CLIENT_LINK] = []
+    elif name == "read":
+        world.watched.read_again(CLIENT_LINK)
     elif name in KINDS:
         Upload(client, [item(each) for each in items], kind=KINDS[name], target=target)
     elif ":" in name:
@@ -185,6 +190,20 @@ NAV_LAND : BUSY STOP is in force: press Continue first
 """,
         ),
         (
+            {},
+            """
+TASK_MOVE 0.2 : ACCEPTED
+wait 4 : - Task 1 done
+TASK_CANCEL 99 : DENIED no task 99
+TASK_CANCEL 0 : DENIED no task is running
+TASK_CANCEL -1 : DENIED param1 task -1
+TASK_CANCEL 1.5 : DENIED param1 task 1.5
+TASK_CANCEL nan : DENIED param1 task
+TASK_CANCEL 1 2 : DENIED param2 kill
+TASK_CANCEL 1 : DENIED task 1 has ended (completed)
+""",
+        ),
+        (
             {"settings": Settings(claim=False)},
             """
 DO_SET_MODE 1 15 to=autopilot : ACCEPTED
@@ -229,7 +248,7 @@ mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
 mission_item_int 0 2 178 0 1 0 0.5 0 0 0 0 0 : ACCEPTED
 lose 40 : -
 fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
-rover:mission_request 250 191 0 2 : -
+rover:mission_request_int 250 191 0 2 : -
 rover:mission_ack 250 191 1 1 : DENIED rover 1 refused it: ERROR
 lose 47 : -
 fence; NAV_FENCE_CIRCLE_INCLUSION 9 at=1,1 : -
@@ -253,6 +272,10 @@ plan to=any; GO at=0.5,0; GO at=2.5,0 : UNSUPPORTED the path crosses the fence
 rover:mission_current 0 5 0 0 : - has its own mission on board (5 items)
 rover:gps_global_origin 910000000 0 0 : -
 rover:rc_channels 1 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 : -
+rover:param_value SERVO1_FUNCTION nan 9 1 1 : -
+rover:autopilot_version 0 0 0 0 0 EIGHT EIGHT EIGHT 0 0 1 : -
+TASK_MOVE 0.2 : ACCEPTED Task 1
+wait 4 : - Task 1 done
 rover:statustext 6 half 7 0 & rover:statustext 6 other 7 0 : - half
 """,
         ),
@@ -294,6 +317,28 @@ plan; DO_SET_REVERSE 1; NAV_WAYPOINT at=1,0 : INVALID_PARAM1 leave DO_SET_REVERS
 """,
         ),
         (
+            {},
+            """
+lose 77 & SET_MESSAGE_INTERVAL 24 100000 : ACCEPTED
+SET_MESSAGE_INTERVAL 24 1000000 : ACCEPTED
+wait 4 : - GPS_RAW_INT@1
+unread & TASK_MOVE 1 to=any & wait 4 & read : BUSY delayed by the server: send it again
+mission; NAV_WAYPOINT; NAV_WAYPOINT at=9,0 : ACCEPTED
+MISSION_START : ACCEPTED
+wait 3 & fault position_jump=50,0 & wait 1 : -
+unread & mission_clear_all 0 & wait 2 & read : DENIED clear: delayed by the server
+""",
+        ),
+        (
+            {},
+            """
+fault deaf=1 & SET_MESSAGE_INTERVAL 24 100000 : ACCEPTED
+rover:command_ack 511 2 0 0 250 191 : -
+fault : -
+wait 2 : - GPS_RAW_INT@1
+""",
+        ),
+        (
             {"persona": replace(PROMPT_PX4, autopilot=MavAutopilot.GENERIC)},
             """
 TASK_MOVE 4 : ACCEPTED Task 1
@@ -325,14 +370,16 @@ wait 6 : - battery 12%
         (
             {"rovers": 2, "settings": Settings(profiles=(SECOND_CAR,))},
             """
-NAV_WAYPOINT 0 0 0 90 to=any at=0,1 frame=0 : ACCEPTED Rover 1 chosen: free
+TASK_MOVE 3 & TASK_MOVE 9 to=second : ACCEPTED+ACCEPTED
+NAV_WAYPOINT 0 0 0 90 to=any at=0,1 frame=0 : ACCEPTED Rover 1 chosen
 fault battery=12 : -
 wait 6 : -
 """,
         ),
         (
-            {},
+            {"rovers": 2},
             """
+TASK_STOP to=second : ACCEPTED
 TASK_MOVE 1 0 0 0 0 60 to=any : ACCEPTED Rover 1 chosen: free
 fault battery=12 : -
 wait 6 : -
@@ -473,3 +520,15 @@ def test_more_places_than_a_link_has_room_for(world: World) -> None:
     world.run(1)
     known = world.server.engine.snapshot(now=world.now).vehicles
     assert [vehicle.system_id for vehicle in known] == [1]
+
+
+def test_what_comes_from_a_link_that_is_not_there_is_not_heard(world: World) -> None:
+    packet = world.client.packed(command_long(54_000, 1))
+    for item in (
+        Packets("nowhere", [("peer", packet)]),
+        PeerChanged("nowhere", "peer", up=True),
+        Congestion("nowhere", "peer", is_congested=True),
+    ):
+        world.server.engine.handle(item, now=world.now)
+    assert not world.server.engine.has_heard("nowhere", "peer")
+    assert world.tasks() == ()
