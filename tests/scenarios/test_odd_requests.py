@@ -25,7 +25,7 @@ from tests.kit.mission import Download, Item, Upload, acks
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.restarts import UTC, restart
 from tests.kit.store import LateStore, PromptSqliteStore
-from tests.kit.world import World, at
+from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_car import car_profile
 from tests.scenarios.test_plan_commands import ARDUPILOT_CAR
@@ -303,10 +303,12 @@ DO_SET_MODE 1 11 to=autopilot : ACCEPTED
 """,
         ),
         (
-            {"settings": Settings(profiles=(ARDUPILOT_CAR,))},
+            {"settings": Settings(profiles=(replace(ARDUPILOT_CAR, speed=0.5),))},
             """
 TASK_DRIVE 0 20 1 : DENIED param2 yaw rate: rover 1 steers like a car
 NAV_SET_YAW_SPEED 90 0 : DENIED param2 speed 0: rover 1 steers like a car
+TASK_MOVE 0.3 : ACCEPTED Task 1
+wait 5 : - Task 1 done
 """,
         ),
         (
@@ -386,6 +388,15 @@ wait 6 : -
 """,
         ),
         (
+            {"realism": replace(PROMPT.realism, tells_origin=False)},
+            """
+rover:gps_global_origin -353632620 1491652370 0 : -
+NAV_WAYPOINT at=0.3,0 frame=0 : ACCEPTED Task 1
+wait 3 : -
+wait 4 : - Task 1 done
+""",
+        ),
+        (
             {"settings": Settings(roles=Roles("observer"))},
             """
 mission_item_int 0 3 16 0 1 0 0 0 0 5 5 9 : -
@@ -396,6 +407,7 @@ mission_count 1 : DENIED role observer may not
             {"settings": Settings(roles=Roles("submitter"))},
             """
 DO_PAUSE_CONTINUE 0 : ACCEPTED
+wait 4 : -
 DO_REPOSITION -1 1 0 nan at=1,0 frame=0 : ACCEPTED Task 1 waits, press Continue
 """,
         ),
