@@ -18,8 +18,8 @@ from mav_tasks.tasks.goal import (
 )
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from tests.kit.client import DRIVE, MOVE, ROTATE, FakeClient, Sent
+from tests.kit.rows import check
 from tests.kit.world import World, at
-from tests.scenarios.test_odd_requests import check
 
 WAYPOINT, LOITER, RETURN, DELAY, YAW, REPOSITION, HEAD = 16, 19, 20, 93, 115, 192, 213
 XY = at(3.0, 4.0)

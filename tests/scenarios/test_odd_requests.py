@@ -1,8 +1,4 @@
-"""Requests that make no sense, or come at the wrong time: each gets its answer and its words.
-
-A line of a table is a request, " : ", the result in its ack ("-": it gets none) and words in the
-texts that come with it. A request is a command, a mission message, or a plan with its items.
-"""
+"""Requests that make no sense, or come at the wrong time: each gets its answer and its words."""
 
 from dataclasses import replace
 from math import inf
@@ -13,134 +9,30 @@ from pymavlink.dialects.v20 import common
 
 from mav_tasks.engine.inputs import Congestion, Packets, PeerChanged
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
-from mav_tasks.mavlink.enums import MavAutopilot, MavCmd, MavMissionResult, MavResult
+from mav_tasks.mavlink.enums import MavAutopilot
 from mav_tasks.settings import Clients, Roles, Settings
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, IDS, command_long
-from tests.kit.mission import Download, Item, Upload, acks
+from tests.kit.client import ACCEPTED, DENIED, command_long
+from tests.kit.mission import Download
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import PLACES, ask, check
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_car import car_profile
 from tests.scenarios.test_plan_commands import ARDUPILOT_CAR
 
-PLACES = {
-    "autopilot": (1, 1),
-    "server": (1, 191),
-    "any": (250, 191),
-    "other": (250, 5),
-    "second": (2, 191),
-}
-KINDS = {"plan": 0, "mission": 0, "fence": 1, "rally": 2}
 SECOND_CAR = replace(ARDUPILOT_CAR, system_id=2, uid="2")
-SHORT = {
-    "GO ": "NAV_WAYPOINT ",
-    "KEY ": ",".join(["0"] * 32) + " ",
-    "ZEROS ": ",".join(["0"] * 247) + " ",
-    "ARM ": "COMPONENT_ARM_DISARM to=autopilot ",
-    "EIGHT": "0,0,0,0,0,0,0,0",
-    "BUSY": "TEMPORARILY_REJECTED",
-    "POND ": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION ",
-}
 PAIR = "NAV_WAYPOINT; NAV_WAYPOINT at=2,0"
-NAMES = {number: name for name, number in IDS.items()}
 HOW_IT_TURNS = ("CA_AIRFRAME", "SYS_AUTOSTART")
 UNKNOWN_PX4 = replace(
     PROMPT_PX4, parameters=tuple(p for p in PROMPT_PX4.parameters if p.name not in HOW_IT_TURNS)
 )
-
-
-def number(word: str) -> Any:
-    if "," in word:
-        return tuple(map(number, word.split(",")))
-    try:
-        return int(word) if word.lstrip("-").isdigit() else float(word)
-    except ValueError:
-        return word.encode()
-
-
-def parsed(text: str) -> tuple[str, list[Any], dict[str, Any]]:
-    """Return the first word, the numbers and the fields after it; ``at`` is a place in metres."""
-    name, *words = text.split()
-    fields: dict[str, Any] = dict(word.split("=") for word in words if "=" in word)
-    place = at(*number(fields.pop("at"))) if "at" in fields else {}
-    fields = {key: PLACES.get(word) or number(word) for key, word in fields.items()}
-    return name, [number(word) for word in words if "=" not in word], fields | place
-
-
-def item(text: str) -> Item:
-    name, params, fields = parsed(text)
-    return Item(number_of(name), 0, 0, *params)._replace(**fields)
-
-
-def ask(world: World, text: str) -> None:
-    """Send a request, or do what else a row begins with."""
-    first, *items = text.split(";")
-    name, numbers, fields = parsed(first)
-    client = world.client
-    is_of_server = name == "plan" or name.isupper()
-    target = fields.pop("to", PLACES["server" if is_of_server else "autopilot"])
-    if name == "wait":
-        world.run(numbers[0])
-    elif name == "fault":
-        world.fault(Faults(**fields))
-    elif name == "lose":
-        world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
-    elif name == "unread":
-        world.watched.unread_links[CLIENT_LINK] = []
-    elif name == "read":
-        world.watched.read_again(CLIENT_LINK)
-    elif name in KINDS:
-        Upload(client, [item(each) for each in items], kind=KINDS[name], target=target)
-    elif ":" in name:
-        who, _, name = name.partition(":")
-        message = getattr(common, f"MAVLink_{name}_message")(*numbers)
-        if who == "rover":
-            world.net.send("rover1", VEHICLE_LINK, message.pack(common.MAVLink(None, 1, 1)))
-        else:
-            client.send(message)
-    elif name.islower():
-        client.send(getattr(common, f"MAVLink_{name}_message")(*target, *numbers))
-    elif fields.keys() & {"x", "frame"}:
-        client.command_int(number_of(name), *numbers, target=target, **fields)
-    else:
-        client.command(number_of(name), *numbers, target=target, **fields)
-
-
-def number_of(name: str) -> int:
-    """Return the number of a command, as in the standard or in our dialect."""
-    return int(getattr(common, f"MAV_CMD_{name}", None) or MavCmd[name])
-
-
-def check(world: World, table: str) -> None:
-    """Send requests one by one, and compare the answers to each."""
-    for short, name in SHORT.items():
-        table = table.replace(short, name)
-    client, wrong = world.client, []
-    for row in table.strip().splitlines():
-        request, _, answer = row.strip().partition(" : ")
-        result, _, words = answer.partition(" ")
-        packets = len(client.received)
-        texts, commands, plans = len(client.texts()), len(client.acks), len(acks(client))
-        for each in request.split(" & "):
-            ask(world, each)
-        world.run(0.4)
-        got = [MavResult(ack.result).name for ack in client.acks[commands:]]
-        got += [MavMissionResult(ack.result).name for ack in acks(client)[plans:]]
-        ids = {(p.message_id, p.source[1]) for p in client.received[packets:]}
-        named = [
-            f"{common.mavlink_map[n].msgname}@{by}" for n, by in ids if n in common.mavlink_map
-        ]
-        said = " | ".join(client.texts()[texts:] + named)
-        if "+".join(got) != result.strip("-") or words not in said:
-            wrong.append(f"{request}: {got} {client.texts()[texts:]}, not {answer}")
-    assert not wrong, "\n".join(wrong)
 
 
 @for_each(
@@ -276,7 +168,7 @@ rover:param_value SERVO1_FUNCTION nan 9 1 1 : -
 rover:autopilot_version 0 0 0 0 0 EIGHT EIGHT EIGHT 0 0 1 : -
 TASK_MOVE 0.2 : ACCEPTED Task 1
 wait 4 : - Task 1 done
-rover:statustext 6 half 7 0 & rover:statustext 6 other 7 0 : - half
+MANY_TEXTS : - 0000000041
 """,
         ),
         (
@@ -321,9 +213,10 @@ plan; DO_SET_REVERSE 1; NAV_WAYPOINT at=1,0 : INVALID_PARAM1 leave DO_SET_REVERS
         (
             {},
             """
-lose 77 & SET_MESSAGE_INTERVAL 24 100000 : ACCEPTED
-SET_MESSAGE_INTERVAL 24 1000000 : ACCEPTED
-wait 4 : - GPS_RAW_INT@1
+SET_MESSAGE_INTERVAL 24 100000 : ACCEPTED
+wait 2 : - GPS_RAW_INT@1
+lose 77 & SET_MESSAGE_INTERVAL 24 0 : ACCEPTED
+wait 5 : - GPS_RAW_INT@1
 unread & TASK_MOVE 1 to=any & wait 4 & read : BUSY delayed by the server: send it again
 mission; NAV_WAYPOINT; NAV_WAYPOINT at=9,0 : ACCEPTED
 MISSION_START : ACCEPTED
@@ -334,8 +227,10 @@ unread & mission_clear_all 0 & wait 2 & read : DENIED clear: delayed by the serv
         (
             {},
             """
-fault deaf=1 & SET_MESSAGE_INTERVAL 24 100000 : ACCEPTED
-rover:command_ack 511 2 0 0 250 191 : -
+fault deaf=1 & SET_MESSAGE_INTERVAL 24 100000 & SET_MESSAGE_INTERVAL 230 100000 : ACCEPTED+ACCEPTED
+wait 1 & rover:command_ack 511 2 0 0 250 191 : -
+wait 1 & rover:command_ack 511 2 0 0 250 191 : -
+wait 1 & rover:command_ack 511 2 0 0 250 191 : -
 fault : -
 wait 2 : - GPS_RAW_INT@1
 """,

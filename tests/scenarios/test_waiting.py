@@ -8,9 +8,9 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, DENIED, MOVE
+from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
-from tests.scenarios.test_odd_requests import check
 
 CANCEL, MODIFY = 54010, 54012
 PRIORITY, START_DELAY, DEADLINE, RUN_AFTER, PREEMPTIBLE, PREEMPTIVE, START_UTC = range(1, 8)

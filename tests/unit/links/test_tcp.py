@@ -251,10 +251,9 @@ def test_so_many_wait_without_a_word_and_get_a_place_that_is_free(stack: ExitSta
     assert [is_open(each) for each in waiting] == [False] * 36 + [True] * 64
     first[0].close()
     waiting[40].sendall(bytes(300))
-    reset(waiting[41])
-    watched.until(lambda: watched.is_up(waiting[36]) and link.refused == 38)
+    watched.until(lambda: watched.is_up(waiting[36]))
     ends = [change.words.rpartition(": ")[2] for change in watched.changes if change.words]
-    assert {"bytes without a packet", "Connection reset by peer"} <= set(ends)
+    assert "bytes without a packet" in ends
 
 
 @pytest.mark.parametrize("signed", [True, False])
