@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
 from rover_sim.faults import Faults
+from rover_sim.personas import Mode
 from tests.kit.client import IDS
 from tests.kit.mission import Item, Upload, acks
 from tests.kit.world import World, at
@@ -74,6 +75,8 @@ def ask(world: World, text: str) -> None:
         world.fault(Faults(**fields))
     elif name == "lose":
         world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
+    elif name == "operator":
+        world.operator_mode(Mode(numbers[0].decode()))
     elif name == "unread":
         world.watched.unread_links[CLIENT_LINK] = []
     elif name == "read":

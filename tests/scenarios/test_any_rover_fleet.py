@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import common
 
+from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
@@ -66,6 +68,16 @@ def test_a_nonce_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:
     assert other.answer == (DENIED, R.NONCE_REUSED)
     new = fleet.submit(fleet.there, 0.5, nonce=8)
     assert fleet.stored()[new.task_id].vehicle == 2
+
+
+def test_heartbeats_of_gateways_and_of_what_nobody_drives_are_of_no_rover(fleet: Fleet) -> None:
+    for system, component, autopilot in ((250, 191, 8), (9, 1, 5)):
+        beat = common.MAVLink_heartbeat_message(10, autopilot, 0, 0, 4, 3)
+        packet = beat.pack(common.MAVLink(None, system, component))
+        fleet.net.send("stranger", VEHICLE_LINK, packet)
+    fleet.run(1.0)
+    known = fleet.gateways["server"].engine.snapshot(now=fleet.now).vehicles
+    assert [vehicle.system_id for vehicle in known] == [1]
 
 
 def test_a_plan_with_a_nonce_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:

@@ -283,6 +283,19 @@ wait 6 : -
 """,
         ),
         (
+            {},
+            """
+lose 77 & TASK_MOVE 0.5 : ACCEPTED Task 1
+wait 8 : - Task 1 done
+lose 200 & TASK_MOVE 0.5 : ACCEPTED Task 2
+wait 2 & fault refuse_mode=1 & wait 8 : - Task 2 done
+fault : -
+TASK_MOVE 9 : ACCEPTED Task 3
+wait 2 & operator rtl & wait 1 : - Task 3
+rover:statustext 4 Failsafe 0 0 : - was taken over by its failsafe: Failsafe
+""",
+        ),
+        (
             {"realism": replace(PROMPT.realism, tells_origin=False)},
             """
 rover:gps_global_origin -353632620 1491652370 0 : -
