@@ -4,14 +4,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import common
 
+from mav_tasks.in_memory import VEHICLE_LINK
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
 from tests.kit.client import ACCEPTED, DENIED, MOVE, FakeClient, Sent
 from tests.kit.gateways.engines import FleetWorld
+from tests.kit.mission import Item, Upload
+from tests.kit.world import at
 
 ANY = (250, 191)
+WAYPOINT, OPTIONS, DENIED_PLAN = 16, 54014, 14
 
 
 class Fleet(FleetWorld):
@@ -63,6 +68,30 @@ def test_a_nonce_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:
     assert other.answer == (DENIED, R.NONCE_REUSED)
     new = fleet.submit(fleet.there, 0.5, nonce=8)
     assert fleet.stored()[new.task_id].vehicle == 2
+
+
+def test_heartbeats_of_gateways_and_of_what_nobody_drives_are_of_no_rover(fleet: Fleet) -> None:
+    for system, component, autopilot in ((250, 191, 8), (9, 1, 5)):
+        beat = common.MAVLink_heartbeat_message(10, autopilot, 0, 0, 4, 3)
+        packet = beat.pack(common.MAVLink(None, system, component))
+        fleet.net.send("stranger", VEHICLE_LINK, packet)
+    fleet.run(1.0)
+    known = fleet.gateways["server"].engine.snapshot(now=fleet.now).vehicles
+    assert [vehicle.system_id for vehicle in known] == [1]
+
+
+def test_a_plan_with_a_nonce_that_another_gateway_has_had_is_its_task(fleet: Fleet) -> None:
+    def upload(client: FakeClient, metres: float) -> Upload:
+        items = [Item(WAYPOINT, **at(metres, 0)), Item(OPTIONS, 7, param4=0.0, frame=2)]
+        sent = Upload(client, items, target=ANY)
+        fleet.run(0.5)
+        return sent
+
+    first = upload(fleet.here, 1.0)
+    again = upload(fleet.there, 1.0)
+    assert (first.result, again.result, again.opaque_id) == (0, 0, first.opaque_id)
+    assert upload(fleet.there, 2.0).result == DENIED_PLAN
+    assert list(fleet.stored()) == [first.opaque_id]
 
 
 def test_a_stop_for_all_stops_a_rover_that_is_taken_later_and_no_other_again(

@@ -1,7 +1,5 @@
 """Tasks are called off: promptly, visibly, and the rover stands before anything else begins."""
 
-from math import nan
-
 from pymavlink.dialects.v20 import common
 
 from mav_tasks.mavlink import messages as m
@@ -13,7 +11,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
+from tests.kit.client import ACCEPTED, MOVE, TEMPORARILY_REJECTED
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -107,28 +105,6 @@ def test_clear_takes_what_waits_or_everything(world: World, scope: int) -> None:
     assert [world.state(i) for i in (2, 3)] == [(S.CANCELLED, R.CLEARED)] * 2
     world.until_idle(tasks=3)
     assert world.state(1)[0] is (S.CANCELLED if scope else S.COMPLETED)
-
-
-@for_each(
-    "params, answer",
-    [
-        ((99, 0), (DENIED, R.NOT_FOUND)),
-        ((0, 0), (DENIED, R.NOT_FOUND)),
-        ((-1, 0), (DENIED, R.BAD_PARAMETER)),
-        ((1.5, 0), (DENIED, R.BAD_PARAMETER)),
-        ((nan, 0), (DENIED, R.BAD_PARAMETER)),
-        ((1, 2), (DENIED, R.BAD_PARAMETER)),
-        ((1, 0), (DENIED, R.WRONG_STATE)),
-    ],
-)
-def test_what_cannot_be_cancelled_is_said(
-    world: World, params: tuple[float, float], answer: tuple[int, int]
-) -> None:
-    world.client.move(0.2)
-    world.until_idle(tasks=1)
-    sent = world.client.command(CANCEL, *params)
-    world.run(0.1)
-    assert sent.answer == answer
 
 
 def test_command_cancel_takes_the_askers_latest_of_that_command(world: World) -> None:

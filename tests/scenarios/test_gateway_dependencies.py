@@ -10,6 +10,8 @@ from mav_tasks.tasks.task import Task
 from tests.kit.client import ACCEPTED, Sent
 from tests.kit.gateways.engines import FleetWorld
 from tests.kit.gateways.order import early_starts
+from tests.kit.mission import Item, Upload
+from tests.kit.world import at
 
 WITHIN = 1.0  # s for the answer of the database
 
@@ -67,6 +69,21 @@ def test_without_an_answer_of_the_database_it_is_refused_in_time(pair: Pair) -> 
     assert pair.now - began < WITHIN + 0.1
     pair.b.is_looking = True
     pair.submit(B, after=first)
+
+
+def test_a_task_for_any_rover_and_a_plan_wait_for_the_answer(pair: Pair) -> None:
+    first, second = pair.submit(A, 3.0), pair.submit(A)
+    near = pair.clients["b"]
+    pair.b.is_looking = False
+    sent = near.command(MOVE, 1.0, 0, 0, 0, first, target=(250, 191))
+    items = [Item(16, **at(1, 3)), Item(54014, param4=second, frame=2)]
+    plan = Upload(near, items, target=(B, 191))
+    pair.run(0.2)
+    assert (sent.result, plan.result) == (None, None)
+    pair.b.is_looking = True
+    pair.b.notified()
+    pair.run(0.5)
+    assert (sent.result, plan.result) == (ACCEPTED, 0)
 
 
 def test_a_halt_that_comes_before_the_answer_of_the_database_counts(pair: Pair) -> None:

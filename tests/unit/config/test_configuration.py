@@ -109,3 +109,8 @@ def test_the_sample_with_every_key_taken_in_is_the_defaults() -> None:
     assert layer.faults == []
     assert layer.given.keys() == KEYS.keys()
     assert configuration.merged([layer]).settings == ServerSettings()
+
+
+def test_an_endpoint_that_is_none_is_a_fault() -> None:
+    (fault,) = faults("", {"MAV_TASKS_METRICS_LISTEN": "x"})
+    assert fault.startswith("MAV_TASKS_METRICS_LISTEN: ")

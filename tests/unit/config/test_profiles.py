@@ -29,6 +29,8 @@ FULL = VehicleProfile(
 )
 LEAST = VehicleProfile(system_id=1, autopilot="px4", firmware="1.0.0", probed="2026-11-21")
 
+TOO_LONG = f"/{300 * 'x'}"
+
 
 @pytest.fixture
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -98,3 +100,27 @@ def test_the_server_has_them_with_its_settings(tmp_path: Path, home: Path) -> No
     assert Sources("", named).load().settings.engine.profiles == (LEAST,)
     named = {"MAV_TASKS_VEHICLES_PROFILES": "none"}
     assert Sources(None, named).load().settings.engine.profiles == ()
+
+
+def test_what_cannot_be_read_or_written_says_why(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bad.toml").write_text("system_id = 1", encoding="utf-8")
+    home.mkdir(parents=True)
+    for number in range(1001):
+        (home / f"{number}.toml").touch()
+    for place, words in [
+        (TOO_LONG, "File name too long"),
+        (str(tmp_path), "bad.toml: autopilot is missing"),
+        ("~nobody-at-all/p", "home directory"),
+        ("", "more than 1000 files"),
+    ]:
+        with pytest.raises(ConfigError, match=words):
+            profiles.read(place)
+    monkeypatch.setenv("XDG_CONFIG_HOME", TOO_LONG)
+    assert profiles.read("") == ()
+    for output in (TOO_LONG, None):
+        with pytest.raises(ConfigError, match="File name too long"):
+            profiles.write(LEAST, output)
+    with pytest.raises(ConfigError, match="File name too long"):
+        Sources(None, {}).load()

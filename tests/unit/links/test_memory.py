@@ -47,3 +47,8 @@ def test_what_queues_is_in_order_at_the_rate_of_a_radio_or_by_a_delay_that_shrin
     queue = Queue(lambda now: max(0.0, 1.0 - 2 * now))
     came = arrivals(Conditions(delay=0.0), SENT[:4], every=0.4, buffer=queue)
     assert [at for at, _ in came] == [1.0, 1.0, 1.0, 1.2]
+
+
+def test_a_radio_drops_what_its_buffer_has_no_room_for() -> None:
+    came = arrivals(Conditions(), SENT[:5], buffer=Radio(bytes_per_second=10.0, buffer=2))
+    assert [data for _, data in came] == SENT[:2]

@@ -27,6 +27,7 @@ def test_each_has_a_name_that_fits_and_takes_what_lies_within_its_range() -> Non
         for end in (parameter.low, parameter.high):
             new = parameter.with_value(Settings(), as_sent(single(end)))
             assert single(parameter.value(new)) == single(end), name
+    assert as_sent(1e39) == 1e39
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf, -1.0, 1e30])

@@ -1,0 +1,127 @@
+"""Requests as the rows of a text, each with its answer.
+
+A row is a request, " : ", the result in its ack ("-": it gets none) and words in the texts that
+come with it. A request is a command, a mission message, or a plan with its items; " & " joins some.
+"""
+
+import re
+from typing import Any
+
+from pymavlink.dialects.v20 import common
+
+from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
+from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
+from rover_sim.faults import Faults
+from rover_sim.personas import Mode
+from tests.kit.client import IDS
+from tests.kit.mission import Item, Upload, acks
+from tests.kit.world import World, at
+
+PLACES = {
+    "autopilot": (1, 1),
+    "server": (1, 191),
+    "any": (250, 191),
+    "other": (250, 5),
+    "second": (2, 191),
+}
+KINDS = {"plan": 0, "mission": 0, "fence": 1, "rally": 2}
+SHORT = {
+    "GO": "NAV_WAYPOINT",
+    "KEY": ",".join(["0"] * 32),
+    "ZEROS": ",".join(["0"] * 247),
+    "ARM": "COMPONENT_ARM_DISARM to=autopilot",
+    "MANY_TEXTS": " & ".join(f"rover:statustext 6 x{n:049} {n % 40 + 1} 0" for n in range(80)),
+    "EIGHT": "0,0,0,0,0,0,0,0",
+    "BUSY": "TEMPORARILY_REJECTED",
+    "IN": "NAV_FENCE_POLYGON_VERTEX_INCLUSION",
+    "POND": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION",
+}
+NAMES = {number: name for name, number in IDS.items()}
+
+
+def number(word: str) -> Any:
+    if "," in word:
+        return tuple(map(number, word.split(",")))
+    try:
+        return int(word) if word.lstrip("-").isdigit() else float(word)
+    except ValueError:
+        return word.encode()
+
+
+def parsed(text: str) -> tuple[str, list[Any], dict[str, Any]]:
+    """Return the first word, the numbers and the fields after it; ``at`` is a place in metres."""
+    name, *words = text.split()
+    fields: dict[str, Any] = dict(word.split("=") for word in words if "=" in word)
+    place = at(*number(fields.pop("at"))) if "at" in fields else {}
+    fields = {key: PLACES.get(word) or number(word) for key, word in fields.items()}
+    return name, [number(word) for word in words if "=" not in word], fields | place
+
+
+def item(text: str) -> Item:
+    name, params, fields = parsed(text)
+    return Item(number_of(name), 0, 0, *params)._replace(**fields)
+
+
+def ask(world: World, text: str) -> None:
+    """Send a request, or do what else a row begins with."""
+    first, *items = text.split(";")
+    name, numbers, fields = parsed(first)
+    client = world.client
+    is_of_server = name == "plan" or name.isupper()
+    target = fields.pop("to", PLACES["server" if is_of_server else "autopilot"])
+    if name == "wait":
+        world.run(numbers[0])
+    elif name == "fault":
+        world.fault(Faults(**fields))
+    elif name == "lose":
+        world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
+    elif name == "operator":
+        world.operator_mode(Mode(numbers[0].decode()))
+    elif name == "unread":
+        world.watched.unread_links[CLIENT_LINK] = []
+    elif name == "read":
+        world.watched.read_again(CLIENT_LINK)
+    elif name in KINDS:
+        Upload(client, [item(each) for each in items], kind=KINDS[name], target=target)
+    elif ":" in name:
+        who, _, name = name.partition(":")
+        message = getattr(common, f"MAVLink_{name}_message")(*numbers)
+        if who == "rover":
+            world.net.send("rover1", VEHICLE_LINK, message.pack(common.MAVLink(None, 1, 1)))
+        else:
+            client.send(message)
+    elif name.islower():
+        client.send(getattr(common, f"MAVLink_{name}_message")(*target, *numbers))
+    elif fields.keys() & {"x", "frame"}:
+        client.command_int(number_of(name), *numbers, target=target, **fields)
+    else:
+        client.command(number_of(name), *numbers, target=target, **fields)
+
+
+def number_of(name: str) -> int:
+    """Return the number of a command, as in the standard or in our dialect."""
+    return int(getattr(common, f"MAV_CMD_{name}", None) or MavCmd[name])
+
+
+def check(world: World, table: str) -> None:
+    """Send requests one by one, and compare the answers to each."""
+    table = re.sub(r"\w+", lambda word: SHORT.get(word[0], word[0]), table)
+    client, wrong = world.client, []
+    for row in table.strip().splitlines():
+        request, _, answer = row.strip().partition(" : ")
+        result, _, words = answer.partition(" ")
+        packets = len(client.received)
+        texts, commands, plans = len(client.texts()), len(client.acks), len(acks(client))
+        for each in request.split(" & "):
+            ask(world, each)
+        world.run(0.4)
+        got = [MavResult(ack.result).name for ack in client.acks[commands:]]
+        got += [MavMissionResult(ack.result).name for ack in acks(client)[plans:]]
+        ids = {(p.message_id, p.source[1]) for p in client.received[packets:]}
+        named = [
+            f"{common.mavlink_map[n].msgname}@{by}" for n, by in ids if n in common.mavlink_map
+        ]
+        said = " | ".join(client.texts()[texts:] + named)
+        if "+".join(got) != result.strip("-") or words not in said:
+            wrong.append(f"{request}: {got} {client.texts()[texts:]}, not {answer}")
+    assert not wrong, "\n".join(wrong)
