@@ -23,6 +23,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.layout import Layout
+from mav_tasks.mcap_export.convention import RAW
 from mav_tasks.mcap_export.exporting import Counts, export
 from mav_tasks.mcap_export.restoring import restore
 from tests.unit.mcap_export.json_schema import check, check_schema
@@ -250,7 +251,25 @@ def test_a_copy_that_was_changed_is_named(tmp_path: Path) -> None:
             Restored(rewritten(path, change))
 
 
+def otherwise(found: list[Any]) -> list[Any]:
+    """Let raw bytes be of another encoding."""
+    for _, channel, _ in found:
+        channel.message_encoding = "ros1"
+    return found
+
+
 def test_another_file_is_named(tmp_path: Path) -> None:
+    path, _ = exported(tmp_path, log=FIRST)
+    for change, words in ((without(RAW), "has no telemetry log"), (otherwise, "encoding 'ros1'")):
+        with pytest.raises(RecordError, match=words):
+            Restored(rewritten(path, change))
+    with path.open("wb") as file:
+        writer: Any = Writer(file)
+        writer.start()
+        writer.finish()
+    for name, words in (("out.mcap", "not made by mav-tasks export"), ("none", "No such file")):
+        with pytest.raises(RecordError, match=words):
+            Restored(tmp_path / name)
     path = tmp_path / "file"
     text = b"just some text, and not little of it" * 10
     for data in (b"", b"\x89MCAP", FIRST, text):

@@ -1,5 +1,6 @@
 """Decision records come back bit for bit; what is wrong with one is told in one clear line."""
 
+import errno
 import gzip
 import os
 import re
@@ -21,9 +22,13 @@ from mav_tasks.engine import inputs as i
 from mav_tasks.engine.inputs import Input, LinkSide, Packets, Shutdown, WallClock
 from mav_tasks.errors import RecordError
 from mav_tasks.in_memory import InMemoryServer
+from mav_tasks.key_ring import ring_file
+from mav_tasks.key_ring.ring import Entry, KeyRing
 from mav_tasks.links.memory import MemoryNet
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
+from mav_tasks.recording.decisions import Decisions
 from mav_tasks.recording.reading import read
 from mav_tasks.settings import Clients, Recording, Retention, Settings
 from mav_tasks.tasks.goal import Move
@@ -52,15 +57,22 @@ def only_file(folder: Path) -> Path:
     return path
 
 
-def recorded(folder: Path, *, seconds: float = 2.5, **options: Any) -> Path:
+def recorded(
+    folder: Path,
+    first: Input | None = None,
+    record: EngineObserver | None = None,
+    *,
+    seconds: float = 2.5,
+    **options: Any,
+) -> Path:
     """A record of a server that finds a rover and ends."""
-    record = begun(folder, Settings(), **options)
+    record = record or begun(folder, Settings(), **options)
     net = MemoryNet()
     world = VirtualWorld(net)
     body = KinematicBody(start=RoverPose(), slip=0.0, seed=None)
     rover = make_vehicle(body, system_id=1, now=0.0)
     server = InMemoryServer(net, vehicles=("rover",), observers=[record])
-    server.pump.handle(WallClock(UTC), now=0.0)
+    server.pump.handle(first or WallClock(UTC), now=0.0)
     world.join(RoverParty(rover, net.link("rover")), server)
     world.run(seconds)
     server.pump.handle(Shutdown(), now=world.now)
@@ -256,6 +268,11 @@ BAD_LINES: dict[str, Callable[[list[Any]], list[Any]]] = {
     "recorded by version 0.0.1, whose events have another format": lambda lines: [
         {**lines[0], "rows": {}, "version": "0.0.1"}
     ],
+    "line 2 is not a task": lambda lines: [with_tasks(lines[0]), ["deadline", 1.0]],
+    "line 2 is unreadable": lambda lines: [lines[0], ["link", "now"]],
+    "not a record of decisions": lambda lines: [[1, 2, 3]],
+    "no peer": lambda lines: [*lines[:2], ["peer", 1.0, "x", 0.5, True]],
+    "line 2 is unreadable: not": lambda lines: [lines[0], ["out", 1.0]],
     "unreadable tasks": lambda lines: [with_tasks(lines[0]), ["task", [1]]],
     "ends before the run began": lambda lines: [with_tasks(lines[0])],
     "unreadable header: no words": lambda lines: [{**lines[0], "version": "\x1b[31m1"}],
@@ -321,3 +338,53 @@ def test_a_record_ends_before_it_is_too_long(
     assert caplog.messages == [
         f"record of decisions {path} ends: the record has reached its size limit"
     ]
+
+
+def test_a_record_of_signed_runs_is_replayed_with_the_key_ring_only(tmp_path: Path) -> None:
+    anna = Key("anna", bytes(range(32)), "operator")
+    ring = tmp_path / "keys.toml"
+    ring_file.change(ring, lambda _: KeyRing((Entry("anna", "operator", anna),)))
+    path = recorded(tmp_path / "made", i.KeysChanged((anna, replace(anna, name="b", secret=b""))))
+    with pytest.raises(RecordError, match=r"key anna \(\w+\): its secret is missing; use --keys"):
+        list(CliRunner().invoke(app, ["replay", str(path)], catch_exceptions=False).output)
+    code, words = said(path, "--keys", str(ring))
+    assert code == 0
+    assert re.match(r" +0\.\d+ s rover 1: found", words), "it has no clock"
+    events = said(path, "--keys", str(ring), "--json")[1].splitlines()
+    assert loads(events[0])["time"] is None
+
+
+def test_a_record_that_ends_where_its_engine_failed_shows_that(whole: Path) -> None:
+    bad: list[Any] = [["wall clock", 1.0, None], ["deadline", 9.0]]
+    for end, code, told in ((1, 0, "same: "), (2, 1, "recorded: the run continued")):
+        path = changed(whole, lambda lines, end=end: [*lines[:6], *bad[:end]])  # type: ignore[misc]
+        got, words = said(path)
+        assert (got, told in words, "the engine failed" in words) == (code, True, True), words
+    older = changed(whole, lambda lines: [{**lines[0], "version": "0.0.7"}, *lines[1:6]])
+    assert said(older)[1].startswith("recorded by version 0.0.7; this is ")
+
+
+def test_a_record_ends_when_the_disk_fails_or_too_much_waits(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(RecordError, match=r"cannot write records to .*none: No such file"):
+        Decisions(tmp_path / "none", SETTINGS, None, now=0.0, size=1)
+    for number, most in enumerate((150, 300, 10_000)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        record = Decisions(folder, Settings(), None, now=0.0, size=10**7, most_waiting=most)
+        assert "the disk was too slow" in said(recorded(folder, record=record))[1]
+    write, left = os.write, [30_000]
+
+    def written(number: int, data: Any) -> int:
+        left[0] -= len(data)
+        if left[0] < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(number, data)
+
+    caplog.clear()
+    monkeypatch.setattr(os, "write", written)
+    path = recorded(tmp_path / "disk", seconds=60)
+    assert len(caplog.messages) == 1
+    assert "the disk failed: No space left" in caplog.text
+    assert said(path)[0] in (0, 2)

@@ -1,5 +1,6 @@
 """What stands in a telemetry log, read back by pymavlink."""
 
+import errno
 import os
 import shutil
 from collections.abc import Iterable
@@ -14,6 +15,7 @@ os.environ.setdefault("MAVLINK20", "1")
 from pymavlink import mavutil
 
 from mav_tasks.engine.inputs import (
+    AtOnce,
     Input,
     LinkChanged,
     LinkSide,
@@ -28,6 +30,7 @@ from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
+from mav_tasks.recording.tlog import Tlog
 from mav_tasks.settings import Recording, Settings
 from tests.kit.processes import wait_until
 
@@ -190,3 +193,26 @@ def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) ->
     wait_until(is_logged, within=10)
     tlog.close()
     assert [seq for *_, seq in told(folder)][-1] == next(numbers) - 1
+
+
+def test_what_a_slow_or_full_disk_loses_is_counted_and_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    data = Packets("rovers", [("rover", packet(attitude(1), ROVER))])
+    sent = [Outgoing("rovers", "rover", packet(heartbeat(), OUR_OWN))]
+    for most, words in ((100, "the disk is too slow"), (10_000, "No space left on device")):
+        options: Any = {"size": 10_000, "count": 3, "component_id": 191, "write": full}
+        tlog = Tlog(tmp_path, most_waiting=most, **options)
+        tlog.on_input(AtOnce((data, data)), now=1.0)
+        tlog.on_output(sent, [], now=1.0)
+        tlog.close()
+        assert tlog.lost == 3
+        name = f"telemetry log in {tmp_path}: "
+        assert f"{name}packets are being lost: {words}" in caplog.messages
+        assert caplog.messages[-1] in (
+            f"{name}ends; 3 packets lost",
+            f"{name}writing again; 3 packets lost",
+        )
