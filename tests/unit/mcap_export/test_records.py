@@ -28,7 +28,7 @@ STARTS = e.TaskChanged(
     *(TaskId(3), 2, 4, TaskState.QUEUED, TaskState.STARTING, TaskReason.NONE, "server", 1.0),
     Progress(),
 )
-EVENTS = [
+EVENTS: list[e.Event] = [
     e.TaskSubmitted(TASK, 0.0),
     e.TaskModified(TaskId(3), 1, 2, replace(TERMS, label="home"), "255/190", 1.0, TERMS),
     e.TaskAssigned(TaskId(3), 2, 3, 1, "rover 1: silent; free", 1.0),
@@ -53,20 +53,22 @@ def made(folder: Path, *, with_clock: bool = True) -> Path:
 
 
 def test_tasks_and_packets_of_a_record_are_told(tmp_path: Path) -> None:
-    path = made(tmp_path / "made")
-    out, counts = made_of(tmp_path, path)
+    out, counts = made_of(tmp_path, made(tmp_path / "made"))
     found = json_of(out)
-    names = ("event", "task", "rover", "state", "label", "version")
-    assert [tuple(each[name] for name in names) for each in found["/tasks/changes"]] == [
-        ("restored", 2, 1, "held", "patrol", 1),
-        ("submitted", 3, 1, "queued", "patrol", 1),
-        ("modified", 3, 1, "queued", "home", 2),
-        ("assigned", 3, 2, "queued", "home", 3),
-        ("changed", 3, 2, "starting", "home", 4),
-        ("withdrawn", 3, 2, "starting", "home", 4),
-        ("changed", 9, 2, "cancelled", "", 4),
+    told = (
+        "{event} {task} {rover} {state} {label} {version}".format_map(each)
+        for each in found["/tasks/changes"]
+    )
+    assert list(told) == [
+        "restored 2 1 held patrol 1",
+        "submitted 3 1 queued patrol 1",
+        "modified 3 1 queued home 2",
+        "assigned 3 2 queued home 3",
+        "changed 3 2 starting home 4",
+        "withdrawn 3 2 starting home 4",
+        "changed 9 2 cancelled  4",
     ]
-    assert len(found["/tasks/log"]) == len(EVENTS) - 1
+    assert len(found["/tasks/log"]) == len(EVENTS) - 1, "progress is in TASK_STATUS"
     assert (counts.packets, len(found["/mavlink/1/1/ATTITUDE"])) == (3, 3)
     log = tmp_path / "a.tlog"
     log.write_bytes(FIRST)

@@ -1,6 +1,5 @@
 """Decision records come back bit for bit; what is wrong with one is told in one clear line."""
 
-import errno
 import gzip
 import os
 import re
@@ -345,13 +344,11 @@ def test_a_record_of_signed_runs_is_replayed_with_the_key_ring_only(tmp_path: Pa
     ring = tmp_path / "keys.toml"
     ring_file.change(ring, lambda _: KeyRing((Entry("anna", "operator", anna),)))
     path = recorded(tmp_path / "made", i.KeysChanged((anna, replace(anna, name="b", secret=b""))))
-    with pytest.raises(RecordError, match=r"key anna \(\w+\): its secret is missing; use --keys"):
-        list(CliRunner().invoke(app, ["replay", str(path)], catch_exceptions=False).output)
-    code, words = said(path, "--keys", str(ring))
-    assert code == 0
-    assert re.match(r" +0\.\d+ s rover 1: found", words), "it has no clock"
-    events = said(path, "--keys", str(ring), "--json")[1].splitlines()
-    assert loads(events[0])["time"] is None
+    result = CliRunner().invoke(app, ["replay", str(path)])
+    assert "its secret is missing; use --keys FILE" in str(result.exception)
+    for options, beginning in (([], "      0."), (["--json"], '{"now": 0.')):
+        code, words = said(path, "--keys", str(ring), *options)
+        assert (code, words.startswith(beginning)) == (0, True), words
 
 
 def test_a_record_that_ends_where_its_engine_failed_shows_that(whole: Path) -> None:
@@ -364,27 +361,9 @@ def test_a_record_that_ends_where_its_engine_failed_shows_that(whole: Path) -> N
     assert said(older)[1].startswith("recorded by version 0.0.7; this is ")
 
 
-def test_a_record_ends_when_the_disk_fails_or_too_much_waits(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_record_ends_when_too_much_waits(tmp_path: Path) -> None:
+    made: dict[str, Any] = {"now": 0.0, "size": 10**7, "most_waiting": 300}
     with pytest.raises(RecordError, match=r"cannot write records to .*none: No such file"):
-        Decisions(tmp_path / "none", SETTINGS, None, now=0.0, size=1)
-    for number, most in enumerate((150, 300, 10_000)):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        record = Decisions(folder, Settings(), None, now=0.0, size=10**7, most_waiting=most)
-        assert "the disk was too slow" in said(recorded(folder, record=record))[1]
-    write, left = os.write, [30_000]
-
-    def written(number: int, data: Any) -> int:
-        left[0] -= len(data)
-        if left[0] < 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return write(number, data)
-
-    caplog.clear()
-    monkeypatch.setattr(os, "write", written)
-    path = recorded(tmp_path / "disk", seconds=60)
-    assert len(caplog.messages) == 1
-    assert "the disk failed: No space left" in caplog.text
-    assert said(path)[0] in (0, 2)
+        Decisions(tmp_path / "none", Settings(), None, **made)
+    path = recorded(tmp_path, record=Decisions(tmp_path, Settings(), None, **made))
+    assert "ends before the run did: the disk was too slow" in said(path)[1]
