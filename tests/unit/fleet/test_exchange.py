@@ -1,6 +1,5 @@
 """What gateways say to each other: authenticated, in order, with ages; no STOP is lost."""
 
-from contextlib import closing
 from math import inf
 
 import pytest
@@ -10,9 +9,6 @@ from mav_tasks.fleet.lease import Lease, Terms
 from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
 from mav_tasks.fleet.outbox import ALL, LIMIT, Outbox, Waiting
 from mav_tasks.fleet.standing import Standing
-from mav_tasks.fleet_io.inbox import LIMIT as MOST_UNREAD
-from mav_tasks.fleet_io.inbox import Inbox
-from mav_tasks.fleet_io.keeper import Trouble
 
 SEAL = Seal(b"secret of the fleet", "fleet 1")
 AHEAD = {"a": 0.0, "b": 5_000.0}  # s, of their monotonic clocks
@@ -186,15 +182,3 @@ def test_a_lease_takes_no_answer_of_another_time_and_no_terms_without_a_margin()
     assert lease.standing is Standing.HOLDER
     lease.renewed(2, sent=0.1, now=0.95)
     assert lease.next_deadline() == 1.1, "it came too late"
-
-
-def test_too_many_that_are_not_read_or_read_late_are_dropped_but_no_stop_and_no_trouble() -> None:
-    with closing(Inbox()) as inbox:
-        for until in (11.0, *[inf] * MOST_UNREAD):
-            inbox.put(Arrived("a", session(1), b"x", 10.0, 0.5, first=False, until=until))
-        inbox.put(Arrived("a", session(1), b"stop", 10.0, 0.5, first=True, until=0.0))
-        inbox.put(Trouble("away"))
-        first, *_ = inbox.take(2, now=12.0)
-        assert isinstance(first, Arrived)
-        assert (first.payload, first.waited, inbox.unread, inbox.late) == (b"stop", 2.5, 1, 1)
-        assert inbox.take(now=12.0)[-1] == Trouble("away")

@@ -300,7 +300,11 @@ def test_a_file_that_is_none_is_said_so(whole: Path, tmp_path: Path) -> None:
             read(path)
     other = tmp_path / "other"
     beginning = [whole.read_bytes()[:cut] for cut in (0, 1, 40)]
-    packed = [gzip.compress(b"x" * 70_000), gzip.compress(b"[" * 10**6)]
+    packed = [
+        gzip.compress(b"x" * 70_000),
+        gzip.compress(b"[" * 10**6),
+        changed(whole, lambda lines: lines[:-1]).read_bytes() + b"more",
+    ]
     for data in (b"\x00" * 100, b"text", *packed, *beginning):
         other.write_bytes(data)
         with pytest.raises(RecordError):
