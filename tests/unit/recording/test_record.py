@@ -27,7 +27,6 @@ from mav_tasks.links.memory import MemoryNet
 from mav_tasks.mavlink.signing import Key
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
-from mav_tasks.recording.decisions import Decisions
 from mav_tasks.recording.reading import read
 from mav_tasks.settings import Clients, Recording, Retention, Settings
 from mav_tasks.tasks.goal import Move
@@ -59,13 +58,12 @@ def only_file(folder: Path) -> Path:
 def recorded(
     folder: Path,
     first: Input | None = None,
-    record: EngineObserver | None = None,
     *,
     seconds: float = 2.5,
     **options: Any,
 ) -> Path:
     """A record of a server that finds a rover and ends."""
-    record = record or begun(folder, Settings(), **options)
+    record = begun(folder, Settings(), **options)
     net = MemoryNet()
     world = VirtualWorld(net)
     body = KinematicBody(start=RoverPose(), slip=0.0, seed=None)
@@ -363,11 +361,3 @@ def test_a_record_that_ends_where_its_engine_failed_shows_that(whole: Path) -> N
         assert (got, told in words, "the engine failed" in words) == (code, True, True), words
     older = changed(whole, lambda lines: [{**lines[0], "version": "0.0.7"}, *lines[1:6]])
     assert said(older)[1].startswith("recorded by version 0.0.7; this is ")
-
-
-def test_a_record_ends_when_too_much_waits(tmp_path: Path) -> None:
-    made: dict[str, Any] = {"now": 0.0, "size": 10**7, "most_waiting": 300}
-    with pytest.raises(RecordError, match=r"cannot write records to .*none: No such file"):
-        Decisions(tmp_path / "none", Settings(), None, **made)
-    path = recorded(tmp_path, record=Decisions(tmp_path, Settings(), None, **made))
-    assert "ends before the run did: the disk was too slow" in said(path)[1]

@@ -1,6 +1,5 @@
 """What stands in a telemetry log, read back by pymavlink."""
 
-import errno
 import os
 import shutil
 from collections.abc import Iterable
@@ -195,18 +194,13 @@ def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) ->
     assert [seq for *_, seq in told(folder)][-1] == next(numbers) - 1
 
 
-def test_what_a_slow_or_full_disk_loses_is_counted_and_told(
+def test_what_a_slow_disk_loses_is_counted_and_told(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
+    tlog = Tlog(tmp_path, size=10_000, count=3, component_id=191, most_waiting=100)
     data = Packets("rovers", [("rover", packet(attitude(1), ROVER))])
-    options: Any = {"size": 10_000, "count": 3, "component_id": 191, "write": full}
-    for most, words in ((100, "the disk is too slow"), (10_000, "No space left on device")):
-        tlog = Tlog(tmp_path, most_waiting=most, **options)
-        tlog.on_input(AtOnce((data, data)), now=1.0)
-        tlog.on_output([Outgoing("rovers", "rover", b"\xfd" * 12)], [], now=1.0)
-        tlog.close()
-        assert f"telemetry log in {tmp_path}: packets are being lost: {words}" in caplog.messages
-        assert f"{tlog.lost} packets lost" in caplog.messages[-1]
+    tlog.on_input(AtOnce((data, data)), now=1.0)
+    tlog.on_output([to_client(b"")], [], now=1.0)
+    tlog.close()
+    lost = "packets are being lost: the disk is too slow", "writing again; 3 packets lost"
+    assert caplog.messages == [f"telemetry log in {tmp_path}: {words}" for words in lost]
