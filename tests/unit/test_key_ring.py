@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.errors import KeyRingError
-from mav_tasks.key_ring.derivation import from_passphrase
 from mav_tasks.key_ring.ring_file import change, load, path_of_ring
 from mav_tasks.key_ring.toml_form import ring_of, text_of
 from mav_tasks.key_ring.watch import changes
@@ -49,15 +48,12 @@ def test_a_ring_is_read_as_it_was_written_and_says_how_it_changed() -> None:
     ]
     with pytest.raises(KeyRingError, match="key anna is in use: revoke it first"):
         before.with_forgotten("anna")
-    assert from_passphrase("correct horse", "pbkdf2") != from_passphrase("correct horse", "sha256")
 
 
 def test_what_is_no_ring_of_ones_own_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ring, loop = tmp_path / "keys.toml", tmp_path / "loop"
-    change(ring, lambda ring: ring)
-    loop.symlink_to(loop)
+    change(tmp_path / "keys.toml", lambda ring: ring)
     for path, words in (
         (".", "not a file"),
         ("keys.toml/a", "Not a dir"),
@@ -66,7 +62,5 @@ def test_what_is_no_ring_of_ones_own_is_told(
         with pytest.raises(KeyRingError, match=words):
             load(tmp_path / path)
         monkeypatch.setattr(os, "geteuid", lambda: 12345)
-    with pytest.raises(KeyRingError, match="loop: "):
-        change(loop, lambda ring: ring)
     with pytest.raises(KeyRingError, match="~nobody-here/k: "):
         path_of_ring("~nobody-here/k")
