@@ -142,8 +142,7 @@ def test_a_recorded_world_decides_the_same_again(
         assert (done.returncode, verdict["verdict"], done.stderr) == (0, "same", "")
         assert verdict["why_it_ends"] == "the run is over"
         assert verdict["events"] == len(events) > 0
-        out, counts = made_of(tmp_path, path)
-        told_in_mcap = [each["message"] for each in json_of(out)["/tasks/log"]]
-        of_progress = [event for event in events if event["event"] == "TaskProgressed"]
-        assert len(told_in_mcap) + len(of_progress) == counts.events == len(events)
+        out, _ = made_of(tmp_path, path)
+        texts = [each["message"] for each in json_of(out)["/tasks/log"]]
+        assert texts == [e["message"] for e in events if e["event"] != "TaskProgressed"]
     assert [event["message"] for event in events] == told

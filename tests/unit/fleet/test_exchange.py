@@ -8,7 +8,6 @@ from mav_tasks.fleet.exchange import BEAT, SILENCE, Arrived, Exchange
 from mav_tasks.fleet.lease import Lease, Terms
 from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
 from mav_tasks.fleet.outbox import ALL, LIMIT, Outbox, Waiting
-from mav_tasks.fleet.standing import Standing
 
 SEAL = Seal(b"secret of the fleet", "fleet 1")
 AHEAD = {"a": 0.0, "b": 5_000.0}  # s, of their monotonic clocks
@@ -179,6 +178,5 @@ def test_a_lease_takes_no_answer_of_another_time_and_no_terms_without_a_margin()
     lease = Lease(Terms())
     lease.joined(2, sent=0.0, now=0.0)
     assert lease.refused(1, now=0.1) == lease.renewed(1, sent=0.1, now=0.1) == []
-    assert lease.standing is Standing.HOLDER
     lease.renewed(2, sent=0.1, now=0.95)
     assert lease.next_deadline() == 1.1, "it came too late"
