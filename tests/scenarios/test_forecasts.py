@@ -35,7 +35,7 @@ def test_each_kind_begins_and_ends_when_it_was_foreseen(world: World) -> None:
         submit(world, HEAD, 180, 0.5, 1),
     ]
     # behind another, and more urgent than all
-    later = submit(world, MOVE, 0.5, 0, 0, 0, driven[2], 0, 9)
+    later = submit(world, MOVE, 0.5, 0, 0, 0, driven[2], 3, 9)
     foreseen = {task: (world.shown(task), world.now) for task in (*driven[1:], later)}
     world.until_idle(tasks=len(driven) + 1, within=200)
     came = {(int(e.task_id), e.new): e.at for e in world.events(TaskChanged)}

@@ -39,6 +39,7 @@ def test_a_task_that_outranks_enough_interrupts_and_the_other_resumes(
     world.until_state(1, S.PAUSED)
     assert world.state(1) == (S.PAUSED, R.PREEMPTED)
     assert world.paused() is R.NONE
+    assert 0 < world.shown(2).time_to_finish < world.shown(1).time_to_finish
     world.until_idle(tasks=3)
     ended = [e.task_id for e in world.events(TaskChanged) if e.new is S.COMPLETED]
     assert ended == [3, 2, 1]

@@ -21,9 +21,11 @@ from tests.kit.restarts import UTC, restart
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World, at
 from tests.scenarios.conftest import MakeWorld
+from tests.unit.mcap_export.test_round_trip import json_of, made_of
 
 HASHES = "12345"  # PYTHONHASHSEED of the other process; this one's is random
 RELEASE, AGAIN = 54013, 0
+MODIFY, PRIORITY = 54012, 1
 
 
 def one_rover(make_world: MakeWorld, folder: Path) -> World:
@@ -33,6 +35,7 @@ def one_rover(make_world: MakeWorld, folder: Path) -> World:
     for number, priority in enumerate((3, 8, 5), 1):
         world.client.move(0.3 * number, priority=priority, nonce=number, repeats=(0.0, 0.5, 1.0))
         world.run(0.1)
+    world.client.command(MODIFY, 3, PRIORITY, 6)
     world.until(lambda: all(t.state is S.COMPLETED for t in world.tasks()), within=60)
     return world
 
@@ -139,4 +142,7 @@ def test_a_recorded_world_decides_the_same_again(
         assert (done.returncode, verdict["verdict"], done.stderr) == (0, "same", "")
         assert verdict["why_it_ends"] == "the run is over"
         assert verdict["events"] == len(events) > 0
+        out, _ = made_of(tmp_path, path)
+        texts = [each["message"] for each in json_of(out)["/tasks/log"]]
+        assert texts == [e["message"] for e in events if e["event"] != "TaskProgressed"]
     assert [event["message"] for event in events] == told

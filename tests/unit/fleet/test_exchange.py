@@ -2,9 +2,12 @@
 
 from math import inf
 
+import pytest
+
 from mav_tasks.fleet.exchange import BEAT, SILENCE, Arrived, Exchange
+from mav_tasks.fleet.lease import Lease, Terms
 from mav_tasks.fleet.notification import SESSION, Datagram, Kind, Packet, Seal
-from mav_tasks.fleet.outbox import LIMIT, Outbox, Waiting
+from mav_tasks.fleet.outbox import ALL, LIMIT, Outbox, Waiting
 
 SEAL = Seal(b"secret of the fleet", "fleet 1")
 AHEAD = {"a": 0.0, "b": 5_000.0}  # s, of their monotonic clocks
@@ -148,3 +151,32 @@ def test_too_many_that_wait_are_dropped_the_oldest_first_but_no_stop() -> None:
     taken = box.take("b", 10**6, each=6, now=0.0)
     assert [each.payload for each in taken[:2]] == [b"stop", b"10"]
     assert (len(taken), box.dropped) == (LIMIT + 1, 10)
+
+
+def test_what_is_first_for_all_reaches_each_that_is_met_once_and_what_is_late_nobody() -> None:
+    box, b = Outbox(), frozenset("b")
+    for number in range(LIMIT + 3):  # of one long ago too many wait, of those just now none
+        box.put(ALL, Waiting(b"%d" % number, 2.0 * (number > 2), 9.0, first=True))
+    box.put(ALL, Waiting(b"to nobody", 2.0, 9.0))
+    box.put("b", Waiting(b"late", 2.0, 2.5))
+    box.meet(b, now=2.0)
+    box.put(ALL, Waiting(b"last", 2.0, 9.0))
+    box.meet(frozenset(), now=2.0)
+    box.meet(b, now=3.0)
+    assert [each.payload for each in box.take("b", 17, each=7, now=3.0)] == [b"3", b"4"]
+    found = [each.payload for each in box.take("b", 99_999, each=6, now=3.0)]
+    assert (len(found), found[-1], box.expired) == (LIMIT - 1, b"last", 1)
+    box.put("b", Waiting(b"late", 3.0, 3.5))
+    assert box.take("b", 99, each=6, now=4.0) == []
+    box.meet(frozenset("bc"), now=99.0)
+    assert box.take("c", 99, each=6, now=99.0) == []
+
+
+def test_a_lease_takes_no_answer_of_another_time_and_no_terms_without_a_margin() -> None:
+    with pytest.raises(ValueError, match="renewal < term - margin < term"):
+        Terms(margin=0.9)
+    lease = Lease(Terms())
+    lease.joined(2, sent=0.0, now=0.0)
+    assert lease.refused(1, now=0.1) == lease.renewed(1, sent=0.1, now=0.1) == []
+    lease.renewed(2, sent=0.1, now=0.95)
+    assert lease.next_deadline() == 1.1, "it came too late"

@@ -18,11 +18,12 @@ from mcap import stream_reader
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.writer import CompressionType, Writer
 
-from mav_tasks.errors import RecordError
+from mav_tasks.errors import RecordError, UsageError
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.layout import Layout
+from mav_tasks.mcap_export.convention import RAW
 from mav_tasks.mcap_export.exporting import Counts, export
 from mav_tasks.mcap_export.restoring import restore
 from tests.kit.commands import session
@@ -252,6 +253,16 @@ def test_a_copy_that_was_changed_is_named(tmp_path: Path) -> None:
 
 
 def test_another_file_is_named(tmp_path: Path) -> None:
+    path, _ = exported(tmp_path, log=FIRST)
+    with pytest.raises(RecordError, match="has no telemetry log"):
+        Restored(rewritten(path, without(RAW)))
+    with pytest.raises(RecordError, match="No such file"):
+        Restored(tmp_path / "none")
+    for name, words in (("none", "No such file"), (".", "not a file")):
+        with pytest.raises(RecordError, match=words):
+            made_of(tmp_path, tmp_path / name)
+    with pytest.raises(UsageError, match="two recordings are named"):
+        made_of(tmp_path, path, path)
     path = tmp_path / "file"
     text = b"just some text, and not little of it" * 10
     for data in (b"", b"\x89MCAP", FIRST, text):

@@ -21,7 +21,10 @@ from mav_tasks.engine import inputs as i
 from mav_tasks.engine.inputs import Input, LinkSide, Packets, Shutdown, WallClock
 from mav_tasks.errors import RecordError
 from mav_tasks.in_memory import InMemoryServer
+from mav_tasks.key_ring import ring_file
+from mav_tasks.key_ring.ring import Entry, KeyRing
 from mav_tasks.links.memory import MemoryNet
+from mav_tasks.mavlink.signing import Key
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
 from mav_tasks.recording.reading import read
@@ -52,7 +55,13 @@ def only_file(folder: Path) -> Path:
     return path
 
 
-def recorded(folder: Path, *, seconds: float = 2.5, **options: Any) -> Path:
+def recorded(
+    folder: Path,
+    first: Input | None = None,
+    *,
+    seconds: float = 2.5,
+    **options: Any,
+) -> Path:
     """A record of a server that finds a rover and ends."""
     record = begun(folder, Settings(), **options)
     net = MemoryNet()
@@ -60,7 +69,7 @@ def recorded(folder: Path, *, seconds: float = 2.5, **options: Any) -> Path:
     body = KinematicBody(start=RoverPose(), slip=0.0, seed=None)
     rover = make_vehicle(body, system_id=1, now=0.0)
     server = InMemoryServer(net, vehicles=("rover",), observers=[record])
-    server.pump.handle(WallClock(UTC), now=0.0)
+    server.pump.handle(first or WallClock(UTC), now=0.0)
     world.join(RoverParty(rover, net.link("rover")), server)
     world.run(seconds)
     server.pump.handle(Shutdown(), now=world.now)
@@ -195,7 +204,7 @@ def test_a_whole_record_is_replayed_and_its_events_are_shown(whole: Path) -> Non
         "text": "found (ardupilot)",
     }
     assert events[-1]["verdict"] == "same"
-    assert (events[-1]["why_it_ends"], events[-1]["difference"]) == ("the run is over", None)
+    assert events[-1]["difference"] is None
     quiet = said(whole, "--json", "--quiet")[1]
     assert [loads(line) for line in quiet.splitlines()] == events[-1:]
 
@@ -256,6 +265,11 @@ BAD_LINES: dict[str, Callable[[list[Any]], list[Any]]] = {
     "recorded by version 0.0.1, whose events have another format": lambda lines: [
         {**lines[0], "rows": {}, "version": "0.0.1"}
     ],
+    "line 2 is not a task": lambda lines: [with_tasks(lines[0]), ["deadline", 1.0]],
+    "line 2 is unreadable": lambda lines: [lines[0], ["link", "now"]],
+    "not a record of decisions": lambda lines: [[1, 2, 3]],
+    "no peer": lambda lines: [*lines[:2], ["peer", 1.0, "x", 0.5, True]],
+    "line 2 is unreadable: not": lambda lines: [lines[0], ["out", 1.0]],
     "unreadable tasks": lambda lines: [with_tasks(lines[0]), ["task", [1]]],
     "ends before the run began": lambda lines: [with_tasks(lines[0])],
     "unreadable header: no words": lambda lines: [{**lines[0], "version": "\x1b[31m1"}],
@@ -284,7 +298,11 @@ def test_a_file_that_is_none_is_said_so(whole: Path, tmp_path: Path) -> None:
             read(path)
     other = tmp_path / "other"
     beginning = [whole.read_bytes()[:cut] for cut in (0, 1, 40)]
-    packed = [gzip.compress(b"x" * 70_000), gzip.compress(b"[" * 10**6)]
+    packed = [
+        gzip.compress(b"x" * 70_000),
+        gzip.compress(b"[" * 10**6),
+        changed(whole, lambda lines: lines[:-1]).read_bytes() + b"more",
+    ]
     for data in (b"\x00" * 100, b"text", *packed, *beginning):
         other.write_bytes(data)
         with pytest.raises(RecordError):
@@ -321,3 +339,25 @@ def test_a_record_ends_before_it_is_too_long(
     assert caplog.messages == [
         f"record of decisions {path} ends: the record has reached its size limit"
     ]
+
+
+def test_a_record_of_signed_runs_is_replayed_with_the_key_ring_only(tmp_path: Path) -> None:
+    anna = Key("anna", bytes(range(32)), "operator")
+    ring = tmp_path / "keys.toml"
+    ring_file.change(ring, lambda _: KeyRing((Entry("anna", "operator", anna),)))
+    path = recorded(tmp_path / "made", i.KeysChanged((anna, replace(anna, name="b", secret=b""))))
+    result = CliRunner().invoke(app, ["replay", str(path)])
+    assert "its secret is missing; use --keys FILE" in str(result.exception)
+    for options, beginning in (([], "      0."), (["--json"], '{"now": 0.')):
+        code, words = said(path, "--keys", str(ring), *options)
+        assert (code, words.startswith(beginning)) == (0, True), words
+
+
+def test_a_record_that_ends_where_its_engine_failed_shows_that(whole: Path) -> None:
+    bad: list[Any] = [["wall clock", 1.0, None], ["deadline", 9.0]]
+    for end, code, told in ((1, 0, "same: "), (2, 1, "recorded: the run continued")):
+        path = changed(whole, lambda lines, end=end: [*lines[:6], *bad[:end]])  # type: ignore[misc]
+        got, words = said(path)
+        assert (got, told in words, "the engine failed" in words) == (code, True, True), words
+    older = changed(whole, lambda lines: [{**lines[0], "version": "0.0.7"}, *lines[1:6]])
+    assert said(older)[1].startswith("recorded by version 0.0.7; this is ")

@@ -14,6 +14,7 @@ os.environ.setdefault("MAVLINK20", "1")
 from pymavlink import mavutil
 
 from mav_tasks.engine.inputs import (
+    AtOnce,
     Input,
     LinkChanged,
     LinkSide,
@@ -28,6 +29,7 @@ from mav_tasks.mavlink.codec import Encoder
 from mav_tasks.mavlink.messages import Message
 from mav_tasks.observer import EngineObserver
 from mav_tasks.recording import observers
+from mav_tasks.recording.tlog import Tlog
 from mav_tasks.settings import Recording, Settings
 from tests.kit.processes import wait_until
 
@@ -190,3 +192,15 @@ def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) ->
     wait_until(is_logged, within=10)
     tlog.close()
     assert [seq for *_, seq in told(folder)][-1] == next(numbers) - 1
+
+
+def test_what_a_slow_disk_loses_is_counted_and_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    tlog = Tlog(tmp_path, size=10_000, count=3, component_id=191, most_waiting=100)
+    data = Packets("rovers", [("rover", packet(attitude(1), ROVER))])
+    tlog.on_input(AtOnce((data, data)), now=1.0)
+    tlog.on_output([to_client(b"")], [], now=1.0)
+    tlog.close()
+    lost = "packets are being lost: the disk is too slow", "writing again; 3 packets lost"
+    assert caplog.messages == [f"telemetry log in {tmp_path}: {words}" for words in lost]

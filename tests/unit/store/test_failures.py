@@ -17,6 +17,7 @@ from tests.kit.databases import foreign, newer, tables
 from tests.kit.volume import some
 from tests.unit.store.samples import (
     PATIENCE,
+    keep,
     loaded,
     opened,
     submitted,
@@ -157,12 +158,6 @@ def filled(path: Path) -> None:
         store.append([submitted(number) for number in range(1, 3001)])
 
 
-def spoilt(path: Path) -> None:
-    filled(path)
-    with tables(str(path)) as other:
-        other.execute("UPDATE tasks SET submitted = '[1, 2]' WHERE id = 2")
-
-
 def of_a_newer_version(path: Path) -> None:
     filled(path)
     newer(str(path))
@@ -183,7 +178,13 @@ def another_file(path: Path) -> None:
         (no_database, "not a database"),
         (truncated, "damaged"),
         (damaged, "damaged"),
-        (spoilt, "its contents are invalid"),
+        ("UPDATE tasks SET submitted = '[1, 2]'", "its contents are invalid"),
+        ("UPDATE tasks SET submitted = 'x'", "it is damaged (expecting value"),
+        ("UPDATE tasks SET submitted = replace(submitted, 'Move', 'Dance')", "'dance'"),
+        ("UPDATE formats SET names = '{}'", "has another format"),
+        ("INSERT INTO vehicles (vehicle, paused) VALUES (1, 999)", "it is damaged (999"),
+        ("DROP TABLE plans", "no such table: plans"),
+        ("DROP TABLE writer", "a table has lost its row"),
         (of_a_newer_version, "newer version"),
         (of_another_program, "another program"),
         (Path.mkdir, "directory"),
@@ -191,16 +192,22 @@ def another_file(path: Path) -> None:
     ],
 )
 def test_what_is_no_store_is_refused_in_one_line_and_left_alone(
-    tmp_path: Path, spoil: Callable[[Path], None], words: str
+    tmp_path: Path, spoil: Callable[[Path], None] | str, words: str
 ) -> None:
     path = tmp_path / "folder" / "tasks.sqlite3"
     path.parent.mkdir()
-    spoil(path)
+    if not isinstance(spoil, str):
+        spoil(path)
+    else:  # a statement, for a store of this version
+        with opened(path) as store:
+            keep(store, submitted(1))
+        with tables(str(path)) as other:
+            other.execute(spoil)
     before = path.read_bytes() if path.is_file() else b""
     with pytest.raises(StoreError) as told, opened(path) as store:
         loaded(store)
     assert str(told.value).startswith(f"store {path}: ")
     assert words in str(told.value).lower()
     assert "\n" not in str(told.value)
-    if spoil is not spoilt:  # what is opened first is the server's
+    if not isinstance(spoil, str):  # what is opened first is the server's
         assert before == (path.read_bytes() if path.is_file() else b"")

@@ -99,7 +99,7 @@ def test_a_word_that_is_cut_short_leaves_the_one_before(path: Path, record_path:
         restored(path)
 
 
-@pytest.mark.parametrize("content", [b"", b"something else\n" * 4000, bytes(98_368)])
+@pytest.mark.parametrize("content", [b"", b"something else\n" * 4000, bytes(98_368), bytes(65_600)])
 def test_what_is_no_record_is_refused_in_one_line(
     path: Path, record_path: Path, content: bytes
 ) -> None:

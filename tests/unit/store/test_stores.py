@@ -215,14 +215,14 @@ def test_retention_takes_the_oldest_that_are_over_and_their_events(place: str) -
 
 def test_events_of_no_task_are_bounded_and_refusals_push_out_no_halts(place: str) -> None:
     bound = 20_000  # of one kind
-    halts: list[Event] = [QueuePaused(1, R.STOPPED, "client", 1.0)] * 3
+    halts: list[Event] = [QueuePaused(1, R.STOPPED, "client", 1.0)] * 300
     refusal = SubmissionRefused(1, TASK_MOVE, R.STOPPED, "", "client", 2.0)
     with opened(place) as store:
         keep(store, *halts, *[refusal] * (bound + 5_000))
     with opened(place) as store, tables(place) as connection:
         end = time.monotonic() + 20.0
         count = "SELECT count(*) FROM journal"
-        while connection.execute(count).fetchone()[0] > bound + 3 and time.monotonic() < end:
+        while connection.execute(count).fetchone()[0] > bound + 300 and time.monotonic() < end:
             time.sleep(0.05)
         left = [event for _, event in store.journal()]
     assert left == [*halts, *[refusal] * bound]

@@ -1,6 +1,7 @@
 """Goals in words, as people at a terminal or a ground station read them."""
 
 from mav_tasks.tasks.goal import (
+    Drive,
     Face,
     Goal,
     GoTo,
@@ -12,6 +13,7 @@ from mav_tasks.tasks.goal import (
     SetSpeed,
     Wait,
     describe,
+    kind_of,
 )
 
 PLACE = GoTo(LocalPlace(1.0, -2.0))
@@ -33,3 +35,5 @@ def test_goals_in_words() -> None:
     )
     for goal, said in words:
         assert describe(goal) == said
+    kinds = [kind_of(goal) for goal in (Drive(1.0, 0.0, 1.0), GoTo(None), Wait(1.0))]
+    assert kinds == ["drive", "return", "wait"]

@@ -13,6 +13,7 @@ from mav_tasks.tasks.repetition import (
     MAX_REPEAT,
     brought_forward,
     canonical,
+    left_out_words,
     next_run,
     repeating,
     rule_of,
@@ -53,6 +54,13 @@ def test_a_period_counts_from_the_planned_start_and_leaves_out_what_has_passed()
         if (run := next_run(HOURLY, now=now, wall_offset=OFFSET)) is not None
     ]
     assert starts == [(3700.0, 0), (3700.0, 0), (7300.0, 1), (90_100.0, 24)]
+    for text, words in (("60", "2777 runs"), ("* * * * *", "100 or more runs")):
+        terms = Terms(repeat=text, start_utc=int(OFFSET))
+        run = next_run(terms, now=166_650.0, wall_offset=OFFSET)
+        assert run is not None
+        assert left_out_words(run.left_out, text) == words
+    never = Terms(repeat="* * */20 * 1L", start_utc=1)
+    assert next_run(never, now=0.0, wall_offset=OFFSET) is None
 
 
 def test_an_expression_is_read_in_its_zone() -> None:
@@ -107,6 +115,7 @@ def test_what_never_comes_has_no_time_and_is_found_out_soon() -> None:
     assert parse_cron("* * */20 * 1L").next(utc("2026-11-26T00:00")) is None
     assert parse_cron("0 0 29 2 *").next(utc("2097-03-01T00:00")) == utc("2104-02-29T00:00")
     assert parse_cron("0 6 * * *").next(1e18) is None  # no such year
+    assert utc_text(1e18) == "1000000000000000000 s UTC"
 
 
 def test_what_is_no_repetition_is_refused() -> None:

@@ -9,9 +9,10 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry import Polygon as Shape
 
+from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon, Zone, check
 from mav_tasks.tasks.frames import to_global, to_local
-from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, Jump, LocalPlace, Move, SetSpeed
 from mav_tasks.tasks.task import Pose
 
 ORIGIN = GlobalPlace(0, 0)
@@ -105,6 +106,14 @@ def test_ways_are_allowed_or_not_in_both_directions() -> None:
     for zones, start, end, is_allowed in WAYS:
         there, back = allows(fence(*zones), start, end), allows(fence(*zones), end, start)
         assert (there, back) == (is_allowed, is_allowed), (zones, start, end)
+
+
+def test_a_way_between_places_of_a_plan_is_found_whatever_lies_between() -> None:
+    bounds, start, end = Bounds(), GoTo(corner(5, -5)), GoTo(corner(5, 15))
+    bounds.fence = Fence((POND,))
+    for between, found in ((SetSpeed(1.0), 2), (Jump(2, 1), 2), (Move(1.0), None)):
+        assert bounds.forbidden_leg((start, between, end), ORIGIN) == found, between
+    assert bounds.refuge(Pose(0.0, 0.0, 0.0), ORIGIN) is None
 
 
 def test_the_room_ends_a_millimetre_before_the_boundary() -> None:

@@ -9,13 +9,15 @@ from hypothesis import strategies as st
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import (
     CREEP_SPEED,
+    ZERO,
     Velocity,
     done_so_far,
     has_arrived,
+    is_settled,
     steer,
     wrap,
 )
-from mav_tasks.tasks.goal import Move, Rotate
+from mav_tasks.tasks.goal import Move, Rotate, Wait
 from mav_tasks.tasks.task import Pose
 
 DRIVING = Driving()
@@ -88,6 +90,8 @@ def test_it_has_arrived_within_the_tolerance() -> None:
     ):
         assert has_arrived(goal, remaining, within=1.0, driving=DRIVING) is arrived
         assert has_arrived(goal, remaining / 2, within=0.5, driving=DRIVING) is arrived
+    assert not is_settled(Wait(3.0), 0.1, driving=DRIVING)
+    assert steer(Wait(3.0), HERE, HERE, remaining=0.1, driving=DRIVING) == ZERO
 
 
 @given(

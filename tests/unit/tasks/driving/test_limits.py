@@ -32,7 +32,12 @@ def test_what_is_asked_for_is_ramped_up_and_never_down() -> None:
 
 
 def test_what_is_not_finite_becomes_a_stop() -> None:
-    for wish in (Velocity(nan, 0.1), Velocity(0.5, nan), Velocity(inf, -inf)):
+    for wish in (
+        Velocity(nan, 0.1),
+        Velocity(0.5, nan),
+        Velocity(inf, -inf),
+        Velocity(0.5, 0.0, nan),
+    ):
         assert out(wish, FAST) == ZERO
 
 

@@ -11,6 +11,7 @@ from mav_tasks.tasks.driving.mission_sequencer import (
     present_goal,
     started,
 )
+from mav_tasks.tasks.driving.stage import look_on_the_way
 from mav_tasks.tasks.goal import (
     Delay,
     GoTo,
@@ -65,6 +66,9 @@ def test_what_lies_between_belongs_to_the_way_to_the_next() -> None:
     second = following(plan, first)
     assert second is not None
     assert (second.step, second.pending) == (4, (1, 2, 3))
+    for elapsed, left in ((1.0, (2, 3)), (2.5, ())):
+        found = look_on_the_way(plan, second, to_place=9.0, elapsed=elapsed)
+        assert found.progress.pending == left
     last = following(plan, second)
     assert last is not None
     assert (last.step, last.pending, is_over(plan, last)) == (7, (1, 2, 3, 5, 6), True)

@@ -19,10 +19,17 @@ from mav_tasks.tasks.driving.path import (
     pose_on,
     runs_of,
 )
-from mav_tasks.tasks.driving.planner import SPARE, Steering, is_allowed, way_to, way_to_pose
+from mav_tasks.tasks.driving.planner import (
+    SPARE,
+    Steering,
+    is_allowed,
+    set_out_to,
+    way_to,
+    way_to_pose,
+)
 from mav_tasks.tasks.frames import to_global
-from mav_tasks.tasks.goal import GlobalPlace, LocalPlace
-from mav_tasks.tasks.task import Bend, Pose
+from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace
+from mav_tasks.tasks.task import Bend, Pose, Progress
 from tests.unit.tasks.samples import motion
 
 RADIUS = 1.5
@@ -101,6 +108,9 @@ def test_a_bend_keeps_clear_of_the_fence_where_it_can() -> None:
     careful = way(place, Steering(RADIUS, reverses=False, fence=fence))
     assert is_allowed(HERE, careful, fence, clear=0.3)
     assert not is_allowed(HERE, bold, fence, clear=0.3)
+    assert is_allowed(HERE, bold, None)
+    assert is_allowed(HERE, (Bend(0.0, 3.0),), box(1.0, -1.0, 9.0, 1.0)), "back in"
+    assert set_out_to(GoTo(place), Progress(), HERE, LocalPlace(0.0, 0.0), FORWARD_ONLY).path
 
 
 @given(poses, places, st.floats(0, 1), st.floats(-0.4, 0.4))

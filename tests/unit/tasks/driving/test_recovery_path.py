@@ -1,5 +1,6 @@
 """From wherever an interruption left the vehicle, back to where the task can go on."""
 
+from dataclasses import replace
 from math import copysign, cos, hypot, pi, radians, sin
 
 from hypothesis import assume, given, settings
@@ -8,6 +9,7 @@ from hypothesis import strategies as st
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import Motion, wrap
 from mav_tasks.tasks.driving.path_follower import PathFollower
+from mav_tasks.tasks.driving.planner import Steering
 from mav_tasks.tasks.driving.recovery_path import (
     OFF_TRACK,
     ON_SPOT,
@@ -15,9 +17,10 @@ from mav_tasks.tasks.driving.recovery_path import (
     is_off_line,
     recovery_path,
     resumed,
+    was_handled,
 )
 from mav_tasks.tasks.goal import Drive, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
-from mav_tasks.tasks.task import Marks, Pose, Progress, Task, TaskId
+from mav_tasks.tasks.task import Bend, Marks, Pose, Progress, Task, TaskId
 from tests.unit.tasks.samples import SOMEBODY, TASK_MOVE, motion
 
 ANCHOR = Pose(10.0, 20.0, radians(30))
@@ -100,6 +103,18 @@ def test_a_rotation_displaced_anywhere_goes_back_to_its_spot_and_heading() -> No
 def test_off_its_line_is_further_than_a_metre_or_past_the_end() -> None:
     begun = Progress(anchor=ANCHOR, done=4.0)
     on_way = Progress(anchor=NORTHWARDS, leg=1, done=2.0, target=TARGET)
+    in_bend = replace(on_way, path=(Bend(0.5, 6.0),))
+    for progress, north, was in (
+        (in_bend, 9.0, False),
+        (Progress(), 0.01, False),
+        (Progress(), 9, True),
+    ):
+        task = Task(TaskId(1), 1, TASK_MOVE, WAY, SOMEBODY, Marks(), 0.0, progress=progress)
+        assert was_handled(task, NORTHWARDS, Pose(north, 0.0, 0.0)) is was
+    car = Steering(2.0, reverses=False)
+    for pose in (Pose(1.68, 0.92, 1.0), Pose(-9.0, 0.0, 0.0)):
+        found = resumed(WAY, in_bend, motion(pose, at=0.0), turns_first=False, steering=car)
+        assert (found == in_bend) is (pose.yaw == 1.0), pose
     for goal, progress, pose, is_off in (
         (Move(10.0), begun, beside(5.0, OFF_TRACK - 0.01), False),
         (Move(10.0), begun, beside(5.0, OFF), True),
@@ -114,6 +129,8 @@ def test_off_its_line_is_further_than_a_metre_or_past_the_end() -> None:
         (Drive(0.5, 0.0, 5.0), begun, beside(9.0, 9.0), False),
         (Move(1.0), Progress(), Pose(99.0, 99.0, 0.0), False),  # it has not begun
         (WAY, on_way, Pose(2.0, 1.1, 0.0), True),
+        (WAY, in_bend, Pose(2.0, 2.0, 0.0), False),
+        (WAY, in_bend, Pose(9.0, 9.0, 0.0), True),
     ):
         task = Task(TaskId(1), 1, TASK_MOVE, goal, SOMEBODY, Marks(), 0.0, progress=progress)
         assert is_off_line(task, pose) is is_off, (goal, pose)
