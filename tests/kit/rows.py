@@ -23,6 +23,8 @@ PLACES = {
     "autopilot": (1, 1),
     "server": (1, 191),
     "all": (0, 0),
+    "rover": (1, 0),
+    "unknown": (1, 99),
     "any": (250, 191),
     "other": (250, 5),
     "second": (2, 191),
