@@ -42,6 +42,7 @@ SHORT = {
     "NOT_ALLOWED": "DENIED #108",
     "POND": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION",
 }
+PARAMETERS = IDS["PARAM_VALUE"], IDS["PARAM_ERROR"]
 NAMES = {number: name for name, number in IDS.items()}
 
 
@@ -106,7 +107,8 @@ def ask(world: World, text: str, client: FakeClient | None = None) -> None:
 
 def number_of(name: str) -> int:
     """Return the number of a command, as in the standard or in our dialect."""
-    return int(getattr(common, f"MAV_CMD_{name}", None) or MavCmd[name])
+    of_standard = getattr(common, f"MAV_CMD_{name}", None)
+    return int(name if name.isdigit() else of_standard or MavCmd[name])
 
 
 def check(world: World, table: str, **clients: FakeClient) -> None:
@@ -129,6 +131,12 @@ def check(world: World, table: str, **clients: FakeClient) -> None:
         named = [
             f"{common.mavlink_map[n].msgname}@{by}" for n, by in ids if n in common.mavlink_map
         ]
+        for packet in client.received[packets:]:
+            if packet.message_id in PARAMETERS:
+                each = client.decoded(packet)
+                is_value = packet.message_id == PARAMETERS[0]
+                what = f"={each.param_value:g}" if is_value else f": error {each.error}"
+                named.append(each.param_id + what)
         said = " | ".join(client.texts()[texts:] + named)
         numbers = [f"#{ack.result_param2}" for ack in client.acks[commands:]]
         numbers += [f"#{ack.opaque_id}" for ack in acks(client)[plans:]]
