@@ -23,7 +23,7 @@ from tests.scenarios.conftest import MakeWorld
 ROVER, SERVER = (1, 1), (1, 191)
 REAL32, INT32 = 9, 6
 OPEN_FILE = 4  # opcode of FILE_TRANSFER_PROTOCOL
-NOT_THERE, OUT_OF_RANGE, NOT_ALLOWED = 1, 2, 3  # MAV_PARAM_ERROR
+NOT_ALLOWED = 3  # MAV_PARAM_ERROR
 
 
 def ask_all(component: int, *, system: int = 1) -> Any:
