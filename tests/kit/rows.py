@@ -1,7 +1,9 @@
 """Requests as the rows of a text, each with its answer.
 
-A row is a request, " : ", the result in its ack ("-": it gets none) and words in the texts that
-come with it. A request is a command, a mission message, or a plan with its items; " & " joins some.
+A row is a request, " : ", the result in its ack ("-": it gets none), and what is with it: words in
+the texts that come, and the number in the ack ("#1"), with " / " between them. A request is a
+command, a mission message, or a plan with its items; " & " joins some. "name> " before it is who
+sends it, if that is not the world's own client.
 """
 
 import re
@@ -13,13 +15,16 @@ from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavResult
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
-from tests.kit.client import IDS
+from tests.kit.client import IDS, FakeClient
 from tests.kit.mission import Item, Upload, acks
 from tests.kit.world import World, at
 
 PLACES = {
     "autopilot": (1, 1),
     "server": (1, 191),
+    "all": (0, 0),
+    "rover": (1, 0),
+    "unknown": (1, 99),
     "any": (250, 191),
     "other": (250, 5),
     "second": (2, 191),
@@ -34,8 +39,10 @@ SHORT = {
     "EIGHT": "0,0,0,0,0,0,0,0",
     "BUSY": "TEMPORARILY_REJECTED",
     "IN": "NAV_FENCE_POLYGON_VERTEX_INCLUSION",
+    "NOT_ALLOWED": "DENIED #108",
     "POND": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION",
 }
+PARAMETERS = IDS["PARAM_VALUE"], IDS["PARAM_ERROR"]
 NAMES = {number: name for name, number in IDS.items()}
 
 
@@ -62,11 +69,11 @@ def item(text: str) -> Item:
     return Item(number_of(name), 0, 0, *params)._replace(**fields)
 
 
-def ask(world: World, text: str) -> None:
+def ask(world: World, text: str, client: FakeClient | None = None) -> None:
     """Send a request, or do what else a row begins with."""
     first, *items = text.split(";")
     name, numbers, fields = parsed(first)
-    client = world.client
+    client = client or world.client
     is_of_server = name == "plan" or name.isupper()
     target = fields.pop("to", PLACES["server" if is_of_server else "autopilot"])
     if name == "wait":
@@ -100,20 +107,23 @@ def ask(world: World, text: str) -> None:
 
 def number_of(name: str) -> int:
     """Return the number of a command, as in the standard or in our dialect."""
-    return int(getattr(common, f"MAV_CMD_{name}", None) or MavCmd[name])
+    of_standard = getattr(common, f"MAV_CMD_{name}", None)
+    return int(name if name.isdigit() else of_standard or MavCmd[name])
 
 
-def check(world: World, table: str) -> None:
+def check(world: World, table: str, **clients: FakeClient) -> None:
     """Send requests one by one, and compare the answers to each."""
     table = re.sub(r"\w+", lambda word: SHORT.get(word[0], word[0]), table)
-    client, wrong = world.client, []
+    wrong = []
     for row in table.strip().splitlines():
         request, _, answer = row.strip().partition(" : ")
         result, _, words = answer.partition(" ")
+        who, _, request = request.rpartition("> ")
+        client = clients.get(who, world.client)
         packets = len(client.received)
         texts, commands, plans = len(client.texts()), len(client.acks), len(acks(client))
         for each in request.split(" & "):
-            ask(world, each)
+            ask(world, each, client)
         world.run(0.4)
         got = [MavResult(ack.result).name for ack in client.acks[commands:]]
         got += [MavMissionResult(ack.result).name for ack in acks(client)[plans:]]
@@ -121,7 +131,16 @@ def check(world: World, table: str) -> None:
         named = [
             f"{common.mavlink_map[n].msgname}@{by}" for n, by in ids if n in common.mavlink_map
         ]
+        for packet in client.received[packets:]:
+            if packet.message_id in PARAMETERS:
+                each = client.decoded(packet)
+                is_value = packet.message_id == PARAMETERS[0]
+                what = f"={each.param_value:g}" if is_value else f": error {each.error}"
+                named.append(each.param_id + what)
         said = " | ".join(client.texts()[texts:] + named)
-        if "+".join(got) != result.strip("-") or words not in said:
-            wrong.append(f"{request}: {got} {client.texts()[texts:]}, not {answer}")
+        numbers = [f"#{ack.result_param2}" for ack in client.acks[commands:]]
+        numbers += [f"#{ack.opaque_id}" for ack in acks(client)[plans:]]
+        are_right = all(w in (numbers if w[:1] == "#" else said) for w in words.split(" / "))
+        if "+".join(got) != result.strip("-") or not are_right:
+            wrong.append(f"{who} {request}: {got} {numbers} {client.texts()[texts:]}, not {answer}")
     assert not wrong, "\n".join(wrong)

@@ -1,6 +1,5 @@
 """The server's settings as parameters of its component, and the rover's own beside them."""
 
-from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from mav_tasks.tasks.server_events import ParameterSet
 from tests.kit.cases import for_each
 from tests.kit.client import FakeClient
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import check
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -23,7 +23,7 @@ from tests.scenarios.conftest import MakeWorld
 ROVER, SERVER = (1, 1), (1, 191)
 REAL32, INT32 = 9, 6
 OPEN_FILE = 4  # opcode of FILE_TRANSFER_PROTOCOL
-NOT_THERE, OUT_OF_RANGE, NOT_ALLOWED = 1, 2, 3  # MAV_PARAM_ERROR
+NOT_ALLOWED = 3  # MAV_PARAM_ERROR
 
 
 def ask_all(component: int, *, system: int = 1) -> Any:
@@ -87,26 +87,19 @@ def test_lists_are_not_sent_faster_than_anybody_reads_them(world: World) -> None
     assert len(told(world.client)) - before == len(PARAMETERS)
 
 
-def test_one_is_read_by_name_and_by_number(world: World) -> None:
-    world.client.send(ask(191, "TSK_SPEED_MAX"))
-    world.client.send(ask(191, index=0))
-    world.client.send(ask(0, "TSK_QUOTA"))
-    world.run(0.2)
+def test_one_is_read_and_set_by_name_and_read_by_number(world: World) -> None:
+    check(
+        world,
+        """
+param_request_read to=server TSK_SPEED_MAX -1 : - TSK_SPEED_MAX=2
+param_request_read to=server _ 0 : - TSK_SPEED=0.5
+param_request_read to=rover TSK_QUOTA -1 : - TSK_QUOTA=500
+param_request_read to=server TSK_NONE -1 : - TSK_NONE: error 1
+param_request_read to=server _ 99 : - : error 1
+param_set to=server TSK_NONE 1 9 : - TSK_NONE: error 1 / TSK_NONE: no such parameter
+""",
+    )
     assert told(world.client) == [("TSK_SPEED_MAX", 2.0), ("TSK_SPEED", 0.5), ("TSK_QUOTA", 500.0)]
-
-
-def test_of_one_that_is_not_there_the_client_is_told_so(world: World) -> None:
-    world.client.send(ask(191, "TSK_NONE"))
-    world.client.send(ask(191, index=99))
-    world.client.send(put("TSK_NONE", 1.0))
-    world.run(0.2)
-    assert errors(world.client) == [
-        ("TSK_NONE", NOT_THERE),
-        ("", NOT_THERE),
-        ("TSK_NONE", NOT_THERE),
-    ]
-    assert told(world.client) == []
-    assert "TSK_NONE: no such parameter" in world.client.texts()
 
 
 def test_who_reads_the_rovers_from_a_file_gets_the_list(make_world: MakeWorld) -> None:
@@ -132,21 +125,15 @@ def test_a_change_has_effect_and_everybody_is_told(world: World) -> None:
     world.until_idle(tasks=1)
 
 
-@for_each(
-    "message, says",
-    [
-        (put("TSK_SPEED", 50.0), "TSK_SPEED 50: not in 0.05..10"),
-        (put("TSK_SPEED", nan), "TSK_SPEED nan: not in 0.05..10"),
-        (put("TSK_SPEED", 3.0), "TSK_SPEED 3 is more than TSK_SPEED_MAX 2"),
-        (put("TSK_SPEED", 1.0, type_=INT32), "TSK_SPEED must be sent as REAL32"),
-    ],
-)
-def test_a_bad_value_changes_nothing_and_is_named(world: World, message: Any, says: str) -> None:
-    world.client.send(message)
-    world.run(0.2)
-    assert errors(world.client) == [("TSK_SPEED", OUT_OF_RANGE)]
-    assert told(world.client) == [("TSK_SPEED", 0.5)]
-    assert says in " ".join(world.client.texts())
+def test_a_bad_value_changes_nothing_and_is_named(world: World) -> None:
+    table = """
+param_set to=server TSK_SPEED 50 9 : - SAME / TSK_SPEED 50: not in 0.05..10
+param_set to=server TSK_SPEED nan 9 : - SAME / TSK_SPEED nan: not in 0.05..10
+param_set to=server TSK_SPEED 3 9 : - SAME / TSK_SPEED 3 is more than TSK_SPEED_MAX 2
+param_set to=server TSK_SPEED 1 6 : - SAME / TSK_SPEED must be sent as REAL32
+"""
+    check(world, table.replace("SAME", "TSK_SPEED: error 2 / TSK_SPEED=0.5"))
+    assert told(world.client) == [("TSK_SPEED", 0.5)] * 4
     assert world.events(ParameterSet) == []
 
 

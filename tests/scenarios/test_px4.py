@@ -15,14 +15,14 @@ from rover_sim.frames import Frame
 from rover_sim.kinematic_bodies import kinematic_body
 from rover_sim.personas import PX4, Mode, Persona
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, DENIED
-from tests.kit.mission import Item, reached
+from tests.kit.client import ACCEPTED
+from tests.kit.mission import reached
 from tests.kit.px4 import PROMPT_GENERIC, PROMPT_PX4, go_to
-from tests.kit.world import World, at, is_at, near_pose
+from tests.kit.rows import check
+from tests.kit.world import World, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 DRIVE = 54002
-WAYPOINT, YAW_SPEED, START = 16, 213, 300
 
 every = for_each("persona", [PROMPT_PX4, PROMPT_GENERIC])
 each = pytest.mark.parametrize("persona", [PROMPT_PX4, PROMPT_GENERIC], ids=lambda p: p.name)
@@ -82,10 +82,9 @@ class TestDriving:
     @every
     def test_a_plan_is_driven(self, make_world: MakeWorld, persona: Persona) -> None:
         world = make_world(persona=persona)
-        plan = [Item(WAYPOINT, **at(*p)) for p in ((1.5, 0), (1.5, 1.5), (0, 1.5), (0, 0))]
-        assert world.upload(plan).result == 0
-        world.client.command(START, target=(1, 1))
-        world.run(0.2)
+        plan = "mission; TO=1.5,0; TO=1.5,1.5; TO=0,1.5; TO=0,0 : ACCEPTED"
+        check(world, plan.replace("TO=", "NAV_WAYPOINT at="))
+        check(world, "MISSION_START to=autopilot : ACCEPTED #1")
         world.until_state(1, S.COMPLETED, within=90)
         assert reached(world.client) == [0, 1, 2, 3], "no item is home"
         assert is_at(world, 0.0, 0.0)
@@ -144,23 +143,14 @@ class TestStanding:
         assert max(turned) < 5.0, "it is not turned to the north"
 
 
-class TestWhatItCannotDo:
-    @for_each(
-        "command, params, words",
-        [
-            (DRIVE, (-0.5, 0.0, 2.0), "reverse"),
-            (DRIVE, (0.5, 10.0, 2.0), "yaw rate"),
-            (YAW_SPEED, (90.0, -0.5), "reverse"),
-        ],
-    )
-    def test_is_refused_with_what_is_wrong(
-        self, world: World, command: int, params: tuple[float, ...], words: str
-    ) -> None:
-        sent = world.client.command(command, *params)
-        world.run(0.2)
-        assert sent.answer == (DENIED, R.NOT_SUPPORTED_BY_VEHICLE)
-        assert world.client.said(words)
-        assert world.tasks() == ()
+def test_what_it_cannot_do_is_refused_with_what_is_wrong(world: World) -> None:
+    table = """
+TASK_DRIVE -0.5 0 2 : REFUSED / reverse
+TASK_DRIVE 0.5 10 2 : REFUSED / yaw rate
+NAV_SET_YAW_SPEED 90 -0.5 : REFUSED / reverse
+"""
+    check(world, table.replace("REFUSED", f"DENIED #{R.NOT_SUPPORTED_BY_VEHICLE}"))
+    assert world.tasks() == ()
 
 
 class TestStop:

@@ -1,6 +1,5 @@
 """A server ends, well or not, and another one goes on from what it had stored."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -12,10 +11,11 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
-from tests.kit.mission import Download, Item, reached
+from tests.kit.mission import Download, reached
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import check
 from tests.kit.store import PromptSqliteStore
-from tests.kit.world import OFF, World, at, is_at, near_pose
+from tests.kit.world import OFF, World, is_at, near_pose
 from tests.scenarios.conftest import MakeWorld
 
 VERSION = 148  # AUTOPILOT_VERSION
@@ -189,45 +189,36 @@ def test_after_a_good_end_waiting_tasks_go_on_unless_it_was_long_ago(
 
 
 def test_a_submission_is_known_again(world: World, path: Path) -> None:
-    world.client.pause()
-    first = world.client.move(1, nonce=77)
-    world.run(0.3)
-    plain = world.client.move(2)
-    world.run(0.3)
-    ids = first.task_id, plain.task_id
+    check(
+        world,
+        """
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+TASK_MOVE 1 0 0 77 0 0 5 : ACCEPTED #1
+TASK_MOVE 2 0 0 0 0 0 5 : ACCEPTED #2
+""",
+    )
     restart(world, path, away=0.0)
-    again = world.client.move(1, nonce=77)
-    world.run(0.3)
-    other = world.client.move(3, nonce=77)
-    world.run(0.3)
-    later = world.client.command(MOVE, 2, 0, 0, 0, 0, 0, 5, confirmation=1)
-    world.run(0.3)
-    assert (again.task_id, later.task_id) == ids
-    assert other.answer == (DENIED, R.NONCE_REUSED)
-    new = world.client.move(4)
-    world.run(0.3)
-    assert new.task_id == 3
-
-
-def upload(
-    world: World, items: Sequence[Item], *, kind: int = 0, target: tuple[int, int] = (1, 1)
-) -> None:
-    assert world.upload(items, kind=kind, target=target).result == 0
+    check(
+        world,
+        f"""
+TASK_MOVE 1 0 0 77 0 0 5 : ACCEPTED #1
+TASK_MOVE 3 0 0 77 0 0 5 : DENIED #{R.NONCE_REUSED}
+TASK_MOVE 2 0 0 0 0 0 5 confirmation=1 : ACCEPTED #2
+TASK_MOVE 4 0 0 0 0 0 5 : ACCEPTED #3
+""",
+    )
 
 
 def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:
-    plan = (Item(16, frame=0, current=1), Item(16, **at(1, 0)), Item(16, **at(1, 1)))
-    yard = [
-        Item(5001, **at(*corner), param1=4, param4=0, frame=0)
-        for corner in ((-3, -3), (3, -3), (3, 3), (-3, 3))
-    ]
-    upload(world, plan)
-    upload(world, yard, kind=1)
+    check(
+        world,
+        """
+mission; NAV_WAYPOINT frame=0 current=1; NAV_WAYPOINT at=1,0; NAV_WAYPOINT at=1,1 : ACCEPTED
+fence; IN 4 0 0 0 at=-3,-3; IN 4 0 0 0 at=3,-3; IN 4 0 0 0 at=3,3; IN 4 0 0 0 at=-3,3 : ACCEPTED
+""",
+    )
     restart(world, path, well=True)
-    world.run(1)
-    world.client.command_int(192, -1, 0, 0, 0, **at(5, 0), frame=0)
-    world.run(0.2)
-    assert world.client.acks_of(192)[-1] == (DENIED, R.OUTSIDE_FENCE)
+    check(world, f"DO_REPOSITION -1 at=5,0 frame=0 : DENIED #{R.OUTSIDE_FENCE}")
     download = Download(world.client)
     world.until(lambda: download.is_done, within=5)
     assert (download.count, download.opaque_id) == (3, 1)
@@ -237,8 +228,7 @@ def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:
 
 
 def test_a_plan_goes_on_with_the_item_that_was_driven(world: World, path: Path) -> None:
-    items = [Item(16, **at(*p)) for p in ((1, 0), (3, 0), (3, 2))]
-    upload(world, items, target=(1, 191))
+    check(world, "plan; NAV_WAYPOINT at=1,0; NAV_WAYPOINT at=3,0; NAV_WAYPOINT at=3,2 : ACCEPTED")
     world.until(lambda: reached(world.client) == [0], within=20)
     world.run(1)
     restart(world, path)

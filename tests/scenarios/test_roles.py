@@ -1,10 +1,8 @@
 """Who may do what: an observer, a submitter, an operator, and who is in charge of safety."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import pytest
-from pymavlink.dialects.v20 import common
 
 from mav_tasks.settings import Limits, Roles, Settings
 from mav_tasks.tasks.events import QueuePaused, SubmissionRefused, TaskChanged
@@ -14,32 +12,21 @@ from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
-    AUTO,
     DENIED,
-    DRIVE,
-    GUIDED,
-    HOLD,
     IDS,
     MANUAL,
-    RTL,
     TEMPORARILY_REJECTED,
     FakeClient,
     Sent,
-    set_mode,
-    setpoint,
-    sticks,
 )
-from tests.kit.mission import MISSION_ACK, Ack, Item, Upload
-from tests.kit.world import World, at
+from tests.kit.rows import SHORT, ask, check
+from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
-CANCEL, CLEAR, MODIFY = 54010, 54011, 54012
-PRIORITY, PREEMPTIVE, RUN_BEFORE = 1, 6, 11  # TASK_MODIFY, param2
-CHANGE_SPEED, MISSION_START, SET_FENCE, REBOOT = 178, 300, 207, 246
-WAYPOINT, RELAY, FENCE_CIRCLE = 16, 181, 5003
-FENCE = 1  # MAV_MISSION_TYPE
-MISSION_DENIED = 14  # MAV_MISSION_RESULT
+MODIFY, PRIORITY, CHANGE_SPEED = 54012, 1, 178
 OBSERVER, SUBMITTER, OTHER, OPERATOR = 9, 10, 11, 12  # system ids
+PEOPLE = {"submitter": SUBMITTER, "other": OTHER, "operator": OPERATOR}
+ZEROS = SHORT["ZEROS"]
 #: of the client that every world has
 ADDRESSES = {
     "9/190": "observer",
@@ -47,8 +34,6 @@ ADDRESSES = {
     "11/190": "submitter",
     "12/190": "operator",
 }
-NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
-
 MakeRoles = Callable[..., World]
 
 
@@ -82,50 +67,50 @@ def active(world: World, distance: float, *, who: FakeClient | None = None) -> i
     return sent.task_id
 
 
-def upload(world: World, client: FakeClient, *items: Item, **kw: Any) -> int | None:
-    sent = Upload(client, items or (Item(WAYPOINT, **place(2.0)),) * 2, **kw)
-    world.run(2.0)
-    return sent.result
-
-
-def place(north: float) -> Mapping[str, Any]:
-    found = at(north, 0.0)
-    return {"x": found["x"], "y": found["y"]}
-
-
-#: what an observer may not do
-REFUSED: dict[str, Callable[[FakeClient], Sent]] = {
-    "move": lambda c: c.move(1.0),
-    "rotate": lambda c: c.rotate(10.0),
-    "drive": lambda c: c.command(DRIVE, 0.3, 0, 1),
-    "go to": lambda c: c.command_int(192, -1, 1, target=(1, 1), frame=6, **at(1.0, 0.0)),
-    "go on": lambda c: c.proceed(),
-    "cancel": lambda c: c.command(CANCEL, 1),
-    "clear": lambda c: c.command(CLEAR),
-    "modify": lambda c: c.command(MODIFY, 1, PRIORITY, 9),
-    "speed": lambda c: c.command(CHANGE_SPEED, 1, 0.4),
-    "guided": lambda c: c.mode(GUIDED),
-    "manual": lambda c: c.mode(MANUAL),
-    "return": lambda c: c.mode(RTL),
-    "mission": lambda c: c.command(MISSION_START),
-    "arm": lambda c: c.arm(),
-    "relay": lambda c: c.command(RELAY, 0, 1, target=(1, 1)),
-    "reboot": lambda c: c.command(REBOOT, 1, target=(1, 1)),
-    "fence off": lambda c: c.command(SET_FENCE, 0, target=(1, 1)),
-    "unknown": lambda c: c.command(31010, 1, target=(1, 1)),
-}
-
-
 def test_an_observer_changes_nothing(with_roles: MakeRoles) -> None:
     world = with_roles()
-    task = active(world, 5.0)
-    observer = join(world, OBSERVER)
-    answers = {what: answer(world, ask(observer)) for what, ask in REFUSED.items()}
-    assert answers == dict.fromkeys(REFUSED, NOT_ALLOWED)
-    assert observer.said("role observer may not")
+    task = active(world, 12.0)
+    check(
+        world,
+        """
+observer> TASK_MOVE 1 : NOT_ALLOWED / role observer may not
+observer> TASK_ROTATE 10 : NOT_ALLOWED
+observer> TASK_DRIVE 0.3 0 1 : NOT_ALLOWED
+observer> DO_REPOSITION -1 1 to=autopilot frame=6 at=1,0 : NOT_ALLOWED
+observer> DO_PAUSE_CONTINUE 1 : NOT_ALLOWED
+observer> TASK_CANCEL 1 : NOT_ALLOWED
+observer> TASK_CLEAR : NOT_ALLOWED
+observer> TASK_MODIFY 1 1 9 : NOT_ALLOWED
+observer> DO_CHANGE_SPEED 1 0.4 : NOT_ALLOWED
+observer> DO_SET_MODE 1 15 to=autopilot : NOT_ALLOWED
+observer> DO_SET_MODE 1 0 to=autopilot : NOT_ALLOWED
+observer> DO_SET_MODE 1 11 to=autopilot : NOT_ALLOWED
+observer> MISSION_START : NOT_ALLOWED
+observer> ARM 1 : NOT_ALLOWED
+observer> DO_SET_RELAY 0 1 to=autopilot : NOT_ALLOWED
+observer> PREFLIGHT_REBOOT_SHUTDOWN 1 to=autopilot : NOT_ALLOWED
+observer> DO_FENCE_ENABLE 0 to=autopilot : NOT_ALLOWED
+observer> USER_1 1 to=autopilot : NOT_ALLOWED
+""",
+        observer=join(world, OBSERVER),
+    )
     assert [each.id for each in world.tasks()] == [task]
     assert world.state(task)[0] is S.EXECUTING
     world.until_state(task, S.COMPLETED)
+
+
+#: what has no answer
+UNANSWERED = f"""client:set_mode 1 1 15
+client:set_mode 1 1 10
+client:set_mode 1 1 11
+client:set_position_target_local_ned 0 1 1 8 1479 0 0 0 0.5 0 0 0 0 0 0 0
+client:manual_control 1 900 0 0 0 0
+client:param_set 1 1 CRUISE_SPEED 5.0 9
+client:set_attitude_target 0 1 1 0 1,0,0,0 0 0 0 0.5
+client:file_transfer_protocol 0 1 1 0,0,0,6,{ZEROS}
+client:v2_extension 0 1 1 7 0,0,{ZEROS}
+client:system_time 1800000000000000 1
+client:mission_item_int 1 1 0 6 16 2 1 0 0 0 0 1 1 0 0"""
 
 
 def test_what_it_sends_without_an_answer_goes_nowhere(with_roles: MakeRoles) -> None:
@@ -133,20 +118,8 @@ def test_what_it_sends_without_an_answer_goes_nowhere(with_roles: MakeRoles) -> 
     observer = join(world, OBSERVER)
     towards = world.overheard(lambda source, _target, _data: source.startswith("server:vehicles"))
     mode = world.mode()
-    for message in (
-        set_mode(GUIDED),
-        set_mode(AUTO),
-        set_mode(RTL),
-        setpoint(0.5),
-        sticks(900),
-        common.MAVLink_param_set_message(1, 1, b"CRUISE_SPEED", 5.0, 9),
-        common.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5),
-        common.MAVLink_file_transfer_protocol_message(0, 1, 1, [0, 0, 0, 6] + [0] * 247),
-        common.MAVLink_v2_extension_message(0, 1, 1, 7, [0] * 249),
-        common.MAVLink_system_time_message(1_800_000_000_000_000, 1),
-        common.MAVLink_mission_item_int_message(1, 1, 0, 6, 16, 2, 1, 0, 0, 0, 0, 1, 1, 0, 0),
-    ):
-        observer.send(message)
+    for message in UNANSWERED.splitlines():
+        ask(world, message, observer)
         world.run(0.1)
     numbers = {data[7] | data[8] << 8 for data in towards}
     names = {name for name, number in IDS.items() if number in numbers}
@@ -156,27 +129,24 @@ def test_what_it_sends_without_an_answer_goes_nowhere(with_roles: MakeRoles) -> 
     assert world.stands()
 
 
+STOPS = """TASK_STOP : KILLED
+TASK_STOP to=all : KILLED
+DO_PAUSE_CONTINUE 0 : PAUSED
+DO_SET_MODE 1 4 to=autopilot : PAUSED
+COMPONENT_ARM_DISARM 0 to=autopilot : PAUSED
+client:set_mode 1 1 4 : PAUSED"""
+
+
 @for_each("who", [OBSERVER, SUBMITTER])
-@for_each(
-    "stop, state",
-    [
-        (lambda c: c.stop(), S.KILLED),
-        (lambda c: c.stop(target=(0, 0)), S.KILLED),
-        (lambda c: c.pause(), S.PAUSED),
-        (lambda c: c.mode(HOLD), S.PAUSED),
-        (lambda c: c.arm(False), S.PAUSED),
-        (lambda c: c.send(set_mode(HOLD)), S.PAUSED),
-    ],
-)
-def test_what_only_stops_a_rover_everybody_may(
-    with_roles: MakeRoles, who: int, stop: Callable[[FakeClient], Any], state: S
-) -> None:
+@for_each("stop", STOPS.splitlines())
+def test_what_only_stops_a_rover_everybody_may(with_roles: MakeRoles, who: int, stop: str) -> None:
     world = with_roles()
     task = world.client.move(20.0)
     somebody = join(world, who)
     world.until_state(task.task_id, S.EXECUTING)
-    stop(somebody)
-    world.until_state(task.task_id, state, within=2.0)
+    request, _, state = stop.partition(" : ")
+    ask(world, request, somebody)
+    world.until_state(task.task_id, S[state], within=2.0)
     world.until(world.stands, within=3.0)
 
 
@@ -184,83 +154,68 @@ def test_only_an_operator_releases_a_stop_which_is_kept_with_its_sender(
     with_roles: MakeRoles,
 ) -> None:
     world = with_roles()
-    people = {number: join(world, number) for number in (OBSERVER, SUBMITTER, OPERATOR)}
+    observer, submitter, operator = (join(world, n) for n in (OBSERVER, SUBMITTER, OPERATOR))
     task = active(world, 20.0)
-    assert answer(world, people[OBSERVER].stop()) == (ACCEPTED, task)
+    assert answer(world, observer.stop()) == (ACCEPTED, task)
     assert world.paused() is R.STOPPED
     (pause,) = world.events(QueuePaused)
     (killed,) = [event for event in world.events(TaskChanged) if event.new is S.KILLED]
     assert pause.actor == killed.actor == "9/190@client 9"
-    for number in (OBSERVER, SUBMITTER):
-        assert answer(world, people[number].proceed()) == NOT_ALLOWED
+    for client in (observer, submitter):
+        assert answer(world, client.proceed()) == (DENIED, R.NOT_ALLOWED)
     assert world.paused() is R.STOPPED
-    assert answer(world, people[OPERATOR].proceed()) == (ACCEPTED, 0)
+    assert answer(world, operator.proceed()) == (ACCEPTED, 0)
     assert world.paused() is R.NONE
 
 
 def test_a_submitter_has_its_own_tasks_and_nobody_else_s(with_roles: MakeRoles) -> None:
     world = with_roles()
-    submitter, other = join(world, SUBMITTER), join(world, OTHER)
-    first = world.client.move(20.0)
-    world.run(0.2)
-    own, theirs = submitter.move(1.0), other.move(2.0)
-    world.run(0.2)
-    for task in (first.task_id, theirs.task_id, 0):
-        assert answer(world, submitter.command(CANCEL, task)) == NOT_ALLOWED
-    assert answer(world, submitter.command(MODIFY, theirs.task_id, PRIORITY, 1)) == NOT_ALLOWED
-    assert answer(world, submitter.command(CLEAR)) == NOT_ALLOWED
-    assert answer(world, submitter.proceed()) == NOT_ALLOWED
-    assert answer(world, submitter.command(MODIFY, own.task_id, PREEMPTIVE, 1)) == NOT_ALLOWED
-    assert "may not make a task pre-emptive; operator may" in " ".join(submitter.texts())
-    modified = submitter.command(MODIFY, own.task_id, PRIORITY, 4)
-    assert answer(world, modified) == (ACCEPTED, own.task_id)
-    cancelled = submitter.command(CANCEL, own.task_id)
-    assert answer(world, cancelled) == (ACCEPTED, own.task_id)
-    operator = join(world, OPERATOR)
-    for task in (theirs.task_id, first.task_id):
-        assert answer(world, operator.command(CANCEL, task)) == (ACCEPTED, task)
+    people = {name: join(world, number) for name, number in PEOPLE.items()}
+    check(
+        world,
+        """
+TASK_MOVE 20 : ACCEPTED #1
+submitter> TASK_MOVE 1 : ACCEPTED #2
+other> TASK_MOVE 2 : ACCEPTED #3
+submitter> TASK_CANCEL 1 : NOT_ALLOWED
+submitter> TASK_CANCEL 3 : NOT_ALLOWED
+submitter> TASK_CANCEL 0 : NOT_ALLOWED
+submitter> TASK_MODIFY 3 1 1 : NOT_ALLOWED
+submitter> TASK_CLEAR : NOT_ALLOWED
+submitter> DO_PAUSE_CONTINUE 1 : NOT_ALLOWED
+submitter> TASK_MODIFY 2 6 1 : NOT_ALLOWED / may not make a task pre-emptive; operator may
+submitter> TASK_MODIFY 2 1 4 : ACCEPTED #2
+submitter> TASK_CANCEL 2 : ACCEPTED #2
+operator> TASK_CANCEL 3 : ACCEPTED #3
+operator> TASK_CANCEL 1 : ACCEPTED #1
+""",
+        **people,
+    )
 
 
 def test_a_submitter_does_not_exceed_its_limits(with_roles: MakeRoles) -> None:
     limits = Limits(tasks=("move", "goto", "plan"), max_priority=6, max_speed=0.4, quota=2)
     world = with_roles(submitter=limits)
-    submitter = join(world, SUBMITTER)
-    world.client.pause()
-    world.run(0.2)
-
-    def refusal(sent: Sent) -> tuple[tuple[int, int] | None, str]:
-        return answer(world, sent), submitter.texts()[-1]
-
-    assert refusal(submitter.move(1.0, priority=7)) == (
-        NOT_ALLOWED,
-        "role submitter may use priority 6 at most, not 7",
+    check(
+        world,
+        """
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+submitter> TASK_MOVE 1 0 0 0 0 0 7 : NOT_ALLOWED / role submitter may use priority 6 at most, not 7
+submitter> TASK_ROTATE 10 : NOT_ALLOWED / may not submit a rotate, only move, goto, plan
+submitter> TASK_MOVE 1 0.5 : NOT_ALLOWED / role submitter may drive 0.4 m/s at most, not 0.5
+submitter> TASK_MOVE 1 0.4 0 0 0 0 6 : ACCEPTED #1
+submitter> TASK_MODIFY 1 1 10 : NOT_ALLOWED
+submitter> TASK_MOVE 1.1 : ACCEPTED #2
+submitter> TASK_MOVE 1.2 : BUSY #101 / role submitter may have at most 2 waiting tasks
+TASK_ROTATE 10 0 0 0 0 0 9 : ACCEPTED #3
+submitter> TASK_MODIFY 1 11 3 : NOT_ALLOWED
+""",
+        submitter=join(world, SUBMITTER),
     )
-    assert refusal(submitter.rotate(10.0)) == (
-        NOT_ALLOWED,
-        "role submitter may not submit a rotate, only move, goto, plan",
-    )
-    assert refusal(submitter.move(1.0, speed=0.5)) == (
-        NOT_ALLOWED,
-        "role submitter may drive 0.4 m/s at most, not 0.5",
-    )
-    first = submitter.move(1.0, priority=6, speed=0.4)
-    assert answer(world, first) == (ACCEPTED, first.task_id)
-    raised = submitter.command(MODIFY, first.task_id, PRIORITY, 10)
-    assert answer(world, raised) == NOT_ALLOWED
-    second = submitter.move(1.1)
-    world.run(0.2)
-    assert refusal(submitter.move(1.2)) == (
-        (TEMPORARILY_REJECTED, R.QUOTA),
-        "role submitter may have at most 2 waiting tasks",
-    )
-    assert [task.id for task in world.tasks()] == [first.task_id, second.task_id]
-    urgent = world.client.rotate(10.0, priority=9)
-    assert answer(world, urgent) == (ACCEPTED, urgent.task_id)
-    moved = submitter.command(MODIFY, first.task_id, RUN_BEFORE, urgent.task_id)
-    assert answer(world, moved) == NOT_ALLOWED
+    assert [task.id for task in world.tasks()] == [1, 2, 3]
     reasons = [event.reason for event in world.events(SubmissionRefused)]
     assert reasons.count(R.NOT_ALLOWED) == 5
-    assert answer(world, world.client.rotate(10.0, priority=10)), "nobody else is bound by it"
+    check(world, "TASK_ROTATE 10 0 0 0 0 0 10 : ACCEPTED #4")  # nobody else is bound by it
 
 
 def test_its_tasks_drive_no_faster_whoever_sets_the_speed(with_roles: MakeRoles) -> None:
@@ -281,35 +236,36 @@ def test_its_tasks_drive_no_faster_whoever_sets_the_speed(with_roles: MakeRoles)
 
 def test_a_plan_is_bound_by_the_same_limits(with_roles: MakeRoles) -> None:
     world = with_roles(submitter=Limits(tasks=("goto",), max_speed=0.5))
-    submitter = join(world, SUBMITTER)
-    one = Item(WAYPOINT, **place(2.0))
-    assert upload(world, submitter, one, target=(1, 191)) == 0
-    assert upload(world, submitter, one, one, target=(1, 191)) != 0
-    fast = Item(CHANGE_SPEED, param1=1, param2=0.9, param4=0.0, frame=2)
-    assert upload(world, submitter, fast, one, target=(1, 191)) != 0
-    relay = Item(RELAY, param1=0, param2=1, param4=0.0, frame=2)
-    refused = Upload(submitter, (relay, one), target=(1, 191))
-    world.run(2.0)
-    assert (refused.result, refused.opaque_id) == (MISSION_DENIED, R.NOT_ALLOWED)
-    assert submitter.said("contains rover commands")
+    check(
+        world,
+        """
+submitter> plan; TO : ACCEPTED
+submitter> plan; TO; TO : DENIED
+submitter> plan; DO_CHANGE_SPEED 1 0.9 0 0 frame=2; TO : DENIED
+submitter> plan; DO_SET_RELAY 0 1 0 0 frame=2; TO : DENIED #108 / contains rover commands
+""".replace("TO", "NAV_WAYPOINT at=2,0"),
+        submitter=join(world, SUBMITTER),
+    )
     assert len(world.tasks()) == 1
 
 
 def test_a_plan_is_started_and_replaced_by_its_owner_or_an_operator(with_roles: MakeRoles) -> None:
     world = with_roles()
-    submitter, other = join(world, SUBMITTER), join(world, OTHER)
-    operator = join(world, OPERATOR)
-    assert upload(world, submitter, target=(1, 1)) == 0
-    assert upload(world, other, target=(1, 1)) != 0
-    assert answer(world, other.command(MISSION_START, target=(1, 1))) == NOT_ALLOWED
-    assert answer(world, other.mode(AUTO)) == NOT_ALLOWED
-    other.send(common.MAVLink_mission_clear_all_message(1, 1, 0))
-    world.run(1.0)
-    assert [Ack.of(p.payload).result for p in other.of_id(MISSION_ACK)][-1] == MISSION_DENIED
-    assert upload(world, operator, target=(1, 1)) == 0
-    assert answer(world, submitter.command(MISSION_START, target=(1, 1))) == NOT_ALLOWED
-    started = operator.command(MISSION_START, target=(1, 1))
-    assert answer(world, started) == (ACCEPTED, started.task_id)
+    people = {name: join(world, number) for name, number in PEOPLE.items()}
+    check(
+        world,
+        """
+submitter> mission; TO; TO : ACCEPTED
+other> mission; TO; TO : DENIED
+other> MISSION_START to=autopilot : NOT_ALLOWED
+other> DO_SET_MODE 1 10 to=autopilot : NOT_ALLOWED
+other> client:mission_clear_all 1 1 0 : DENIED
+operator> mission; TO; TO : ACCEPTED
+submitter> MISSION_START to=autopilot : NOT_ALLOWED
+operator> MISSION_START to=autopilot : ACCEPTED #2
+""".replace("TO", "NAV_WAYPOINT at=2,0"),
+        **people,
+    )
 
 
 @for_each("by", ["operator", "the rover's own switch"])
@@ -325,10 +281,13 @@ def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str
         world.operator_arm(True)
     world.run(2)
     submitter.move(1.0)
-    upload(world, submitter, target=(1, 1))
+    ask(world, "mission; NAV_WAYPOINT at=2,0; NAV_WAYPOINT at=2,0", submitter)
+    world.run(2)
     at = world.now
-    assert answer(world, submitter.command(MISSION_START, target=(1, 1))) == NOT_ALLOWED
-    assert "may not end manual control; operator may" in " ".join(submitter.texts())
+    refused = (
+        "> MISSION_START to=autopilot : NOT_ALLOWED / may not end manual control; operator may"
+    )
+    check(world, f"submitter{refused}", submitter=submitter)
     world.run(3)
     assert world.observer.sent_since(at) == []
     assert world.mode() is Mode.MANUAL
@@ -336,32 +295,36 @@ def test_a_submitter_does_not_end_driving_by_hand(with_roles: MakeRoles, by: str
 
 def test_what_bounds_a_rover_is_of_safety_alone(with_roles: MakeRoles) -> None:
     world = with_roles()
-    operator = join(world, OPERATOR)
     before = world.rover.autopilot.parameters["CRUISE_SPEED"]
-    fence = Item(FENCE_CIRCLE, **place(0.0), param1=50.0, param4=0.0)
-    assert upload(world, operator, fence, target=(1, 1), kind=FENCE) != 0
-    assert answer(world, operator.command(SET_FENCE, 0, target=(1, 1))) == NOT_ALLOWED
-    for component, name in ((191, b"TSK_SPEED"), (1, b"CRUISE_SPEED")):
-        operator.send(common.MAVLink_param_set_message(1, component, name, 1.5, 9))
-    world.run(0.5)
-    assert "role operator may not set parameters; safety may" in operator.texts()
+    check(
+        world,
+        """
+operator> fence; NAV_FENCE_CIRCLE_INCLUSION 50 0 0 0 at=0,0 : DENIED
+operator> DO_FENCE_ENABLE 0 to=autopilot : NOT_ALLOWED
+operator> client:param_set 1 191 TSK_SPEED 1.5 9 : - role operator may not set parameters; safety
+operator> client:param_set 1 1 CRUISE_SPEED 1.5 9 : -
+fence; NAV_FENCE_CIRCLE_INCLUSION 50 0 0 0 at=0,0 : ACCEPTED
+client:param_set 1 191 TSK_SPEED 0.7 9 : -
+""",
+        operator=join(world, OPERATOR),
+    )
     assert world.rover.autopilot.parameters["CRUISE_SPEED"] == before
-    assert upload(world, world.client, fence, target=(1, 1), kind=FENCE) == 0
-    world.client.send(common.MAVLink_param_set_message(1, 191, b"TSK_SPEED", 0.7, 9))
-    world.run(0.5)
     assert world.server.engine.parameters == {"TSK_SPEED": pytest.approx(0.7)}
 
 
 def test_to_run_at_once_is_for_operators(with_roles: MakeRoles) -> None:
     world = with_roles(guided="now")
-    submitter, operator = join(world, SUBMITTER), join(world, OPERATOR)
-    world.client.move(20.0)
-    world.run(3.0)
-    go = (-1, 1, 0, 0)
-    sent = submitter.command_int(192, *go, target=(1, 1), frame=6, **at(1.0, 0.0))
-    assert answer(world, sent) == NOT_ALLOWED
-    sent = operator.command_int(192, *go, target=(1, 1), frame=6, **at(1.0, 0.0))
-    assert answer(world, sent) == (ACCEPTED, sent.task_id)
+    people = {name: join(world, number) for name, number in PEOPLE.items()}
+    check(
+        world,
+        """
+TASK_MOVE 20 : ACCEPTED
+wait 3 : -
+submitter> DO_REPOSITION -1 1 0 0 to=autopilot frame=6 at=1,0 : NOT_ALLOWED
+operator> DO_REPOSITION -1 1 0 0 to=autopilot frame=6 at=1,0 : ACCEPTED #2
+""",
+        **people,
+    )
 
 
 def test_requests_that_are_too_many_are_refused_but_for_stop(with_roles: MakeRoles) -> None:

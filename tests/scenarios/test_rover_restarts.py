@@ -9,6 +9,7 @@ from rover_sim.personas import PX4, Mode, Persona
 from tests.kit import px4
 from tests.kit.cases import anew, for_each
 from tests.kit.client import ACCEPTED, Sent
+from tests.kit.rows import ask
 from tests.kit.world import PROMPT, World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -95,17 +96,11 @@ def test_a_release_while_it_boots_waits_and_says_why(driving: World, order: str)
     world.until_state(1, S.COMPLETED)
 
 
-HALTS = {
-    "pause": lambda w: w.client.pause(),
-    "STOP": lambda w: w.client.stop(),
-    "cancel": lambda w: w.client.command(54010, 1),
-    "a restart": lambda w: w.rover.autopilot.reboot(now=w.now),
-    "another mode": lambda w: w.operator_mode(Mode.AUTO),
-}
+HALTS = "DO_PAUSE_CONTINUE 0, TASK_STOP, TASK_CANCEL 1, operator auto, a restart"
 
 
 @for_each("persona", MAKES)
-@for_each("halt", HALTS)
+@for_each("halt", HALTS.split(", "))
 def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
     world = driving
     world.fault(Faults(withheld=frozenset({POSITION})))
@@ -113,7 +108,10 @@ def test_a_halt_ends_a_release_that_waits(driving: World, halt: str) -> None:
     world.until_state(1, S.HELD, within=3)
     release(world, AGAIN)
     where, at = world.pose(), world.now
-    HALTS[halt](world)
+    if halt == "a restart":
+        restart(world, up=0.0)
+    else:
+        ask(world, halt)
     world.run(4)
     world.fault(Faults())
     world.run(10)

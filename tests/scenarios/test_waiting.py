@@ -7,13 +7,13 @@ from mav_tasks.tasks.events import TaskChanged
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, DENIED, MOVE
+from tests.kit.client import ACCEPTED, MOVE
 from tests.kit.rows import check
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
-CANCEL, MODIFY = 54010, 54012
-PRIORITY, START_DELAY, DEADLINE, RUN_AFTER, PREEMPTIBLE, PREEMPTIVE, START_UTC = range(1, 8)
+MODIFY = 54012
+DEADLINE, START_UTC = 3, 7
 UTC = 1_800_000_000.0  # s, at the beginning of these worlds
 DAY = 86_400.0
 
@@ -117,32 +117,27 @@ def test_tasks_run_after_each_other_across_rovers(make_world: MakeWorld) -> None
     assert order_of_start(world) == [first, second, third]
 
 
-def change(world: World, task: int, prop: int, value: float) -> None:
-    sent = world.client.command(MODIFY, task, prop, value)
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, task)
-
-
 def test_a_task_goes_ahead_with_the_rank_of_the_most_urgent_that_waits_for_it(world: World) -> None:
-    world.client.pause()
-    low, other = submit(world, priority=2), submit(world, 0.3)
-    middle = submit(world, after=low, priority=1)
-    urgent = submit(world, 0.1, after=middle, priority=8)
-    for prop, value, order in (
-        (PRIORITY, 8, [low, other]),
-        (PRIORITY, 4, [other, low]),
-        (PRIORITY, 8, [low, other]),
-        (RUN_AFTER, other, [other, low]),
-        (RUN_AFTER, middle, [low, other]),
-    ):
-        change(world, urgent, prop, value)
-        assert in_order(world, low, other) == order, (prop, value)
-    world.client.command(CANCEL, urgent)
-    world.run(0.1)
-    assert in_order(world, low, other) == [other, low]
+    check(
+        world,
+        """
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+TASK_MOVE 0.2 0 0 0 0 0 2 : ACCEPTED #1
+TASK_MOVE 0.3 0 0 0 0 0 5 : ACCEPTED #2
+TASK_MOVE 0.2 0 0 0 1 0 1 : ACCEPTED #3
+TASK_MOVE 0.1 0 0 0 3 0 8 : ACCEPTED #4
+""",
+    )
+    for changed, order in (("1 8", [1, 2]), ("1 4", [2, 1]), ("1 8", [1, 2]), ("4 2", [2, 1])):
+        check(world, f"TASK_MODIFY 4 {changed} : ACCEPTED #4")
+        assert in_order(world, 1, 2) == order, changed
+    check(world, "TASK_MODIFY 4 4 3 : ACCEPTED #4")
+    assert in_order(world, 1, 2) == [1, 2]
+    check(world, "TASK_CANCEL 4 : ACCEPTED #4")
+    assert in_order(world, 1, 2) == [2, 1]
     world.client.proceed()
     world.until_idle(tasks=4)
-    assert order_of_start(world) == [other, low, middle]
+    assert order_of_start(world) == [2, 1, 3]
 
 
 def test_what_is_scheduled_comes_when_its_time_comes(world: World) -> None:
@@ -178,35 +173,20 @@ TASK_MODIFY 2 2 -1 : DENIED param3 start delay -1
     assert world.task(second) == before
 
 
-RUN_BEFORE = 11
-
-
 def test_a_task_is_put_between_two_others_and_keeps_its_priority(world: World) -> None:
     world.client.pause()
-    first, second, third, urgent = (
-        submit(world, at / 10, priority=each) for at, each in enumerate((5, 5, 2, 9), 1)
-    )
-    for task, other, order in (
-        (third, second, [urgent, first, third, second]),
-        (second, third, [urgent, first, second, third]),
-        (first, urgent, [first, urgent, second, third]),
-        (urgent, third, [first, second, urgent, third]),
-        (first, 0, [second, urgent, third, first]),
-        (third, 0, [second, urgent, first, third]),
-    ):
-        sent = world.client.command(MODIFY, task, RUN_BEFORE, other)
-        world.run(0.1)
-        assert sent.answer == (ACCEPTED, task)
-        assert in_order(world, *sorted(order)) == order
-    assert [world.task(each).priority for each in (first, third, urgent)] == [5, 2, 9]
-    late = submit(world, 0.5)
-    world.client.command(MODIFY, urgent, PRIORITY, 4)
-    world.run(0.1)
-    order = [second, first, third, late, urgent]
-    assert in_order(world, *sorted(order)) == order
-    sent = world.client.command(MODIFY, urgent, RUN_BEFORE, 77)
-    world.run(0.1)
-    assert sent.answer == (DENIED, R.WRONG_STATE)
+    for number, priority in enumerate((5, 5, 2, 9), 1):
+        submit(world, number / 10, priority=priority)
+    for row in ["3 2: 4132", "2 3: 4123", "1 4: 1423", "4 3: 1243", "1 0: 2431", "3 0: 2413"]:
+        changed, _, order = row.partition(": ")
+        task, other = changed.split()
+        check(world, f"TASK_MODIFY {task} 11 {other} : ACCEPTED #{task}")
+        assert in_order(world, 1, 2, 3, 4) == list(map(int, order)), row
+    assert [world.task(each).priority for each in (1, 3, 4)] == [5, 2, 9]
+    submit(world, 0.5)
+    check(world, "TASK_MODIFY 4 1 4 : ACCEPTED #4")
+    assert in_order(world, 1, 2, 3, 4, 5) == [2, 1, 3, 5, 4]
+    check(world, f"TASK_MODIFY 4 11 77 : DENIED #{R.WRONG_STATE}")
 
 
 def in_order(world: World, *tasks: int) -> list[int]:

@@ -38,9 +38,15 @@ class Rig:
             ("c", LinkSide.CLIENTS, True),
         ):
             self.engine.handle(LinkChanged(link, side, up=True, is_stream=is_stream), now=0.0)
+        self.peer("v", OLD, up=True)
 
     def peer(self, link: str, peer: object, *, up: bool) -> None:
         self.engine.handle(PeerChanged(link, peer, up), now=self.now)
+
+    def moves(self, new: object) -> None:
+        """The rover's connection ends, and there is another one."""
+        self.peer("v", OLD, up=False)
+        self.peer("v", new, up=True)
 
     def says(self, link: str, peer: object, data: bytes, *, cut: int = 0) -> None:
         pieces = [data[:cut], data[cut:]] if cut else [data]
@@ -82,7 +88,6 @@ def rig() -> Rig:
 
 
 def test_who_comes_is_spoken_to_before_it_has_said_anything(rig: Rig) -> None:
-    rig.peer("v", OLD, up=True)
     rig.peer("c", CLIENT, up=True)
     assert ids(rig.passes(1.5), "v", OLD)[:1] == [0]
     rig.engine.take_packets()
@@ -95,7 +100,6 @@ def test_a_packet_may_come_in_pieces(link: str) -> None:
     """Also in datagrams: a bridge from a serial line sends what it has read, whatever that is."""
     for cut in range(1, 21):
         rig = Rig()
-        rig.peer("v", OLD, up=True)
         rig.says(link, OLD, rig.packer.pack(ROVER, Address(1, 1), seq=0), cut=cut)
         assert len(rig.engine.snapshot(now=0.0).vehicles) == 1, cut
 
@@ -109,10 +113,8 @@ def test_what_two_senders_cut_is_not_mixed(rig: Rig) -> None:
 
 
 def test_half_a_packet_of_who_is_gone_spoils_nothing(rig: Rig) -> None:
-    rig.peer("v", OLD, up=True)
     rig.says("v", OLD, rig.packer.pack(ROVER, Address(1, 1), seq=0)[:12])
-    rig.peer("v", OLD, up=False)
-    rig.peer("v", OLD, up=True)
+    rig.moves(OLD)
     rig.rover(OLD)
     assert len(rig.engine.snapshot(now=0.0).vehicles) == 1
 
@@ -127,10 +129,8 @@ def test_a_client_that_is_gone_is_forgotten_at_once(rig: Rig) -> None:
 
 
 def test_a_vehicle_that_is_gone_may_be_back_at_once_from_anywhere(rig: Rig) -> None:
-    rig.peer("v", OLD, up=True)
     rig.rover(OLD)
-    rig.peer("v", OLD, up=False)
-    rig.peer("v", NEW, up=True)
+    rig.moves(NEW)
     rig.now = 0.2
     rig.rover(NEW, seq=1)
     assert "rover 1: is now at 10.0.0.1:2" in " ".join(map(str, rig.engine.take_events()))
@@ -144,11 +144,9 @@ def test_what_is_on_another_connection_is_armed_only_if_it_says_so_itself(
     rig: Rig, place: object
 ) -> None:
     """Its numbers begin anew, a little below those of before: that is no heartbeat overtaken."""
-    rig.peer("v", OLD, up=True)
     rig.rover(OLD, seq=50, message=ARMED)
     assert rig.is_armed
-    rig.peer("v", OLD, up=False)
-    rig.peer("v", place, up=True)
+    rig.moves(place)
     rig.now = 0.2
     rig.rover(place, seq=0)
     assert not rig.is_armed
@@ -156,7 +154,6 @@ def test_what_is_on_another_connection_is_armed_only_if_it_says_so_itself(
 
 def test_heartbeats_are_not_overtaken_by_many_other_packets_between_them(rig: Rig) -> None:
     """A log is being downloaded, and a heartbeat was asked for."""
-    rig.peer("v", OLD, up=True)
     rig.rover(OLD, seq=0, message=ARMED)
     for seq in range(1, 200):
         rig.now += 0.002
@@ -178,7 +175,6 @@ def test_what_is_at_another_place_is_armed_only_if_we_may_arm_there(
     rig = Rig(Settings(arming=arming))
     change = LinkChanged("radio", LinkSide.VEHICLES, up=True, is_local=is_local, is_stream=True)
     rig.engine.handle(change, now=0.0)
-    rig.peer("v", OLD, up=True)
     rig.rover(OLD)
     rig.peer("v", OLD, up=False)
     rig.peer("radio", NEW, up=True)
@@ -216,7 +212,6 @@ def test_a_vehicle_comes_back_however_often_its_connection_breaks(rig: Rig) -> N
 
 
 def test_numbers_towards_a_line_that_comes_back_go_on(rig: Rig) -> None:
-    rig.peer("v", OLD, up=True)
     rig.rover(OLD)
     before = [o.data[4] for o in rig.passes(2.5) if o.peer == OLD]
     rig.peer("v", OLD, up=False)
