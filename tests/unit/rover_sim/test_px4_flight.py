@@ -158,19 +158,18 @@ def test_by_default_lost_setpoints_are_a_drive_home_where_it_disarms_itself() ->
 
 
 def test_parameters_choose_what_a_lost_stream_is_answered_with() -> None:
-    for offboard_loss, stick_loss, mode, armed in [
-        (5, 2, Mode.HOLD, True),
-        (3, 1, Mode.RTL, True),
-        (4, 2, Mode.LAND, True),
-        (6, 2, Mode.GUIDED, False),
-        (7, 2, Mode.GUIDED, False),
-        (0, 1, Mode.HOLD, True),
-        (1, 3, Mode.LAND, True),
-        (2, 6, Mode.GUIDED, False),
-        (0, 0, Mode.GUIDED, True),  # no action: it drives on
-    ]:
+    for row in """5 2: HOLD armed
+        3 1: RTL armed
+        4 2: LAND armed
+        6 2: GUIDED
+        7 2: GUIDED
+        0 1: HOLD armed
+        1 3: LAND armed
+        2 6: GUIDED
+        0 0: GUIDED armed""".splitlines():  # the last: no action, it drives on
+        parameters, _, (mode, *armed) = map(str.split, row.partition(":"))
         rig = lost()
-        rig.autopilot.parameters["COM_OBL_RC_ACT"] = offboard_loss
-        rig.autopilot.parameters["NAV_RCL_ACT"] = stick_loss
+        for name, value in zip(("COM_OBL_RC_ACT", "NAV_RCL_ACT"), parameters, strict=True):
+            rig.autopilot.parameters[name] = int(value)
         rig.run(1.3)
-        assert (rig.autopilot.mode, rig.autopilot.armed) == (mode, armed)
+        assert (rig.autopilot.mode, rig.autopilot.armed) == (Mode[mode], bool(armed)), row

@@ -1,5 +1,6 @@
 """Places and ways against a fence: its boundary in cases, and random ones as shapely judges."""
 
+import re
 from collections import Counter
 from math import atan2, cos, inf, nan, pi, sin, tau
 from random import Random
@@ -65,47 +66,73 @@ RIGHT = box(0, 6, 10, 16)  # overlaps the box between 6 and 10 east
 EITHER = polygon(*BOX, group=1), polygon(*RIGHT, group=2)
 MM = 0.001  # m: the boundary is that wide, on either side
 
-PLACES: tuple[tuple[tuple[Zone, ...], dict[Point, bool]], ...] = (
-    ((YARD,), {(N, E): False, (N - 0.9 * MM, 5): False, (N - 1.1 * MM, 5): True}),
-    ((POND,), {(N, 5): False, (N + 0.9 * MM, 5): False, (N + 1.1 * MM, 5): True}),
-    ((YARD,), {(5, E - 0.9 * MM): False, (5, E - 1.1 * MM): True, (5, E + 1.1 * MM): False}),
-    ((POND,), {(N + 0.6 * MM, E + 0.6 * MM): False, (N + 0.9 * MM, E + 0.9 * MM): True}),
-    ((ROUND_YARD,), {(5 - 0.9 * MM, 0): False, (5, 0): False, (5 - 1.1 * MM, 0): True}),
-    ((ROUND_POND,), {(5 + 0.9 * MM, 0): False, (5, 0): False, (5 + 1.1 * MM, 0): True}),
-    ((polygon(*(p for p in U for _ in "ab")),), {(1, 5): True, (5, 5): False}),  # each twice
-    ((polygon(*STAR),), {(7, 0): True, (0, 0): False}),  # where it covers twice is a hole
-)
+ZONES: dict[str, tuple[Zone, ...]] = {
+    "yard": (YARD,),
+    "pond": (POND,),
+    "round yard": (ROUND_YARD,),
+    "round pond": (ROUND_POND,),
+    "U": (polygon(*(p for p in U for _ in "ab")),),  # each corner twice
+    "star": (polygon(*STAR),),  # where it covers twice is a hole
+    "either": EITHER,
+    "neighbours": (EITHER[0], polygon(*box(0, 10, 10, 16), group=2)),  # they share an edge
+}
+
+
+def point(text: str) -> Point:
+    """Return a place by its metres or "mm" north and east; N and E are of the box's corner."""
+    known = {"N": N, "E": E}
+    north, east = (
+        sum(
+            known[term] if term in known else float(term.removesuffix("mm")) * unit
+            for term in re.findall(r"[+-]?[\w.]+", part)
+            for unit in [MM if term.endswith("mm") else 1.0]
+        )
+        for part in text.split(",")
+    )
+    return north, east
 
 
 def test_places_are_allowed_or_not() -> None:
-    for zones, places in PLACES:
-        found = {place: allows(fence(*zones), place) for place in places}
-        assert found == places, zones
+    for row in """yard: N,E no; N-0.9mm,5 no; N-1.1mm,5 yes
+        pond: N,5 no; N+0.9mm,5 no; N+1.1mm,5 yes
+        yard: 5,E-0.9mm no; 5,E-1.1mm yes; 5,E+1.1mm no
+        pond: N+0.6mm,E+0.6mm no; N+0.9mm,E+0.9mm yes
+        round yard: 5-0.9mm,0 no; 5,0 no; 5-1.1mm,0 yes
+        round pond: 5+0.9mm,0 no; 5,0 no; 5+1.1mm,0 yes
+        U: 1,5 yes; 5,5 no
+        star: 7,0 yes; 0,0 no""".splitlines():
+        zones, _, places = row.strip().partition(": ")
+        for place in places.split("; "):
+            where, answer = place.split(" ")
+            assert allows(fence(*ZONES[zones]), point(where)) is (answer == "yes"), (zones, place)
 
 
-WAYS: tuple[tuple[tuple[Zone, ...], Point, Point, bool], ...] = (
-    ((POND,), (5, -5), (5, 15), False),  # through it, though both ends are allowed
-    ((POND,), (N + 4, E - 4), (N - 4, E + 4), False),  # touching a corner
-    ((POND,), (N + 4 + 2 * MM, E - 4), (N - 4 + 2 * MM, E + 4), True),
-    ((POND,), (N, 2), (N, 8), False),  # along an edge, or in line with it through a corner
-    ((POND,), (N, -5), (N, 15), False),
-    ((POND,), (N, 11), (N, 15), True),
-    ((POND,), (N + 0.9 * MM, 11), (N, -5), False),
-    ((POND,), (N + 1.5 * MM, -50), (N + 1.5 * MM, 15), True),
-    ((ROUND_POND,), (5, -9), (5, 9), False),  # a tangent
-    ((ROUND_POND,), (5 + 0.9 * MM, -9), (5 + 0.9 * MM, 9), False),
-    ((ROUND_POND,), (5 + 1.1 * MM, -9), (5 + 1.1 * MM, 9), True),
-    ((YARD,), (5, 5), (5, 5), True),  # of no length
-    ((YARD,), (N, 5), (N, 5), False),
-    (EITHER, (5, 1), (5, 15), True),  # from one group to another
-    ((EITHER[0], polygon(*box(0, 10, 10, 16), group=2)), (5, 1), (5, 15), False),  # a shared edge
-)
+#: through the pond though both ends are allowed, touching its corner, along an edge or in line with
+#: it through a corner; a tangent; of no length; from one group to another
+WAYS = """pond: 5,-5 5,15 no
+pond: N+4,E-4 N-4,E+4 no
+pond: N+4+2mm,E-4 N-4+2mm,E+4 yes
+pond: N,2 N,8 no
+pond: N,-5 N,15 no
+pond: N,11 N,15 yes
+pond: N+0.9mm,11 N,-5 no
+pond: N+1.5mm,-50 N+1.5mm,15 yes
+round pond: 5,-9 5,9 no
+round pond: 5+0.9mm,-9 5+0.9mm,9 no
+round pond: 5+1.1mm,-9 5+1.1mm,9 yes
+yard: 5,5 5,5 yes
+yard: N,5 N,5 no
+either: 5,1 5,15 yes
+neighbours: 5,1 5,15 no"""
 
 
 def test_ways_are_allowed_or_not_in_both_directions() -> None:
-    for zones, start, end, is_allowed in WAYS:
-        there, back = allows(fence(*zones), start, end), allows(fence(*zones), end, start)
-        assert (there, back) == (is_allowed, is_allowed), (zones, start, end)
+    for row in WAYS.splitlines():
+        zones, _, rest = row.partition(": ")
+        *ends, answer = rest.split(" ")
+        way = [point(end) for end in ends]
+        for direction in (way, way[::-1]):
+            assert allows(fence(*ZONES[zones]), *direction) is (answer == "yes"), row
 
 
 def test_a_way_between_places_of_a_plan_is_found_whatever_lies_between() -> None:
@@ -123,7 +150,7 @@ def test_the_room_ends_a_millimetre_before_the_boundary() -> None:
         ((YARD,), Pose(5, 2, EAST), True, E - 2 - MM),
         ((YARD,), Pose(5, E - 8, EAST), False, E - 8 - spot(0, 0)[1] - MM),
         ((ROUND_POND,), Pose(-9, 0, pi), False, 4 - MM),
-        ((polygon(*(p for p in U for _ in "ab")),), Pose(1, 5, 0), True, spot(2, 3)[0] - 1 - MM),
+        (ZONES["U"], Pose(1, 5, 0), True, spot(2, 3)[0] - 1 - MM),
         ((POND,), Pose(5, 5, 0), True, 0.0),  # where it may not be
     )
     for zones, pose, forward, wanted in cases:

@@ -1,5 +1,7 @@
 """The order of a plan's steps."""
 
+from typing import Any
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,6 +30,19 @@ from mav_tasks.tasks.goal import (
 from mav_tasks.tasks.task import Progress
 
 A, B, C = (GoTo(LocalPlace(float(n), 0.0)) for n in range(3))
+STEPS: dict[str, Any] = {"A": A, "B": B, "C": C, "nothing": Nothing(), "perform": Perform()}
+KINDS: dict[str, Any] = {"jump": Jump, "wait": Wait, "speed": SetSpeed}
+
+
+def plan_of(text: str) -> Plan:
+    """Return the plan of steps in words, some with numbers."""
+    words = (word.rstrip(")").partition("(") for word in text.split())
+    return Plan(
+        tuple(
+            KINDS[name](*map(int, values.split(","))) if values else STEPS[name]
+            for name, _, values in words
+        )
+    )
 
 
 def order(plan: Plan, *, limit: int = 100) -> list[int]:
@@ -42,20 +57,19 @@ def order(plan: Plan, *, limit: int = 100) -> list[int]:
 
 
 def test_steps_are_driven_in_order_and_jumps_as_often_as_they_say() -> None:
-    for plan, driven in (
-        (Plan((Nothing(), A, Perform(), Nothing(), B, Wait(1.0), SetSpeed(1.0))), [1, 4, 5]),
-        (Plan((A, B, C), first=1), [1, 2]),
-        (Plan((A, B, Jump(0, 0), C)), [0, 1, 3]),
-        (Plan((A, B, Jump(0, 1), C)), [0, 1, 0, 1, 3]),
-        (Plan((A, B, Jump(0, 2), C)), [0, 1, 0, 1, 0, 1, 3]),
-        (Plan((A, B, Jump(0, -1), C)), [0, 1] * 50),
-        (Plan((A, Jump(3, 1), B, C)), [0, 3]),
-        (Plan((A, Jump(3, -1), B)), [0]),  # past the end
-        # a loop within a loop counts over the whole plan, as autopilots do
-        (Plan((A, Jump(0, 1), B, Jump(0, 1))), [0, 0, 2, 0, 2]),
-        (Plan(()), []),
-    ):
-        assert order(plan) == driven, plan
+    rows = """nothing A perform nothing B wait(1) speed(1): 1 4 5
+        A B jump(0,0) C: 0 1 3
+        A B jump(0,1) C: 0 1 0 1 3
+        A B jump(0,2) C: 0 1 0 1 0 1 3
+        A jump(3,1) B C: 0 3
+        A jump(3,-1) B: 0
+        A jump(0,1) B jump(0,1): 0 0 2 0 2
+        :"""  # a jump past the end; a loop within a loop counts over the whole plan
+    for row in rows.splitlines():
+        text, _, driven = row.partition(":")
+        assert order(plan_of(text)) == [int(step) for step in driven.split()], row
+    assert order(Plan((A, B, C), first=1)) == [1, 2]
+    assert order(plan_of("A B jump(0,-1) C")) == [0, 1] * 50
     assert present_goal(Plan(()), started(Plan(()), Progress())) is END
 
 
@@ -77,18 +91,16 @@ def test_what_lies_between_belongs_to_the_way_to_the_next() -> None:
 
 
 def test_a_loop_in_which_nothing_is_driven_is_found() -> None:
-    cases: tuple[tuple[tuple[Step, ...], int | None], ...] = (
-        ((A, B, Jump(0, 3)), None),
-        ((A, Jump(1, 1)), 1),
-        ((A, Perform(), Jump(1, 2), B), 2),
-        ((A, Jump(2, 1), Jump(1, 1)), 2),
-        ((Jump(2, 1), A, Jump(0, 1), B), 2),  # forward over what would be driven
-        ((A, Jump(0, 1), Jump(0, 1)), None),
-        ((A, Wait(0.0), Jump(1, -1)), 2),
-        ((A, Wait(1.0), Jump(1, -1)), None),
-    )
-    for steps, found in cases:
-        assert loops_in_vain(Plan(steps)) == found, steps
+    for row in """A B jump(0,3): none
+        A jump(1,1): 1
+        A perform jump(1,2) B: 2
+        A jump(2,1) jump(1,1): 2
+        jump(2,1) A jump(0,1) B: 2
+        A jump(0,1) jump(0,1): none
+        A wait(0) jump(1,-1): 2
+        A wait(1) jump(1,-1): none""".splitlines():  # the fifth: forward over what would be driven
+        text, _, found = row.partition(": ")
+        assert loops_in_vain(plan_of(text)) == (None if found == "none" else int(found)), row
 
 
 steps_of_any_kind = st.lists(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import copysign, cos, hypot, pi, radians, sin
+from typing import Any
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -47,6 +48,10 @@ def back(goal: SingleGoal, done: float, pose: Pose) -> PathFollower | None:
     return recovery_path(goal, progress, motion(pose, at=0.0), honours_yaw_rate=True)
 
 
+def task_of(goal: SingleGoal, progress: Progress) -> Task:
+    return Task(TaskId(1), 1, TASK_MOVE, goal, SOMEBODY, Marks(), 0.0, progress=progress)
+
+
 def is_led(goal: SingleGoal, done: float, pose: Pose, end: Pose) -> bool:
     """Whether a point that follows the way back exactly ends there, and as the goal was."""
     course = back(goal, done, pose)
@@ -68,18 +73,31 @@ def is_led(goal: SingleGoal, done: float, pose: Pose, end: Pose) -> bool:
     return False
 
 
+GOALS: dict[str, Any] = {kind.__name__: kind for kind in (Move, Rotate, Drive, Wait)}
+
+
+def goal_of(text: str) -> SingleGoal:
+    name, *values = text.split()
+    return GOALS[name](*numbers(*values))  # type: ignore[no-any-return]
+
+
+def numbers(*words: str) -> list[float]:
+    """Return numbers; "near" and "far" are a bit less and more than the limits."""
+    known = {"near": OFF_TRACK - 0.01, "far": OFF, "-far": -OFF}
+    return [known[word] if word in known else float(word) for word in words]
+
+
 def test_there_is_no_way_back_where_it_goes_on_by_itself() -> None:
-    cases: tuple[tuple[SingleGoal, float, Pose], ...] = (
-        *((Move(10.0), 3.0, beside(along, 0.0)) for along in (0.0, 3.0, 3.5, 1.0, 9.99)),
-        (Move(-10.0), 3.0, beside(-3.5, 0.0)),
-        *((Move(10.0), 3.0, beside(3.0, across)) for across in (0.9, -0.9, ON_SPOT / 2)),
-        (Move(10.0), 3.0, beside(10.0 + PAST_END / 2, 0.0)),
-        *((Rotate(-2.0), 1.0, beside(0, 0.01, radians(t) - 1.0)) for t in (0, 29, -29)),
-        (Drive(0.5, 0.1, 9.0), 3.0, beside(7.0, -8.0, 2.0)),  # these promise a time only
-        (Wait(9.0), 3.0, beside(7.0, -8.0, 2.0)),
-    )
-    for goal, done, pose in cases:
-        assert back(goal, done, pose) is None, (goal, pose)
+    tilt, spot, end = radians(29), ON_SPOT / 2, 10.0 + PAST_END / 2
+    for row in f"""Move 10: 3: 0 0, 3 0, 3.5 0, 1 0, 9.99 0, 3 0.9, 3 -0.9, 3 {spot}, {end} 0
+        Move -10: 3: -3.5 0
+        Rotate -2: 1: 0 0.01 -1, 0 0.01 {tilt - 1}, 0 0.01 {-tilt - 1}
+        Drive 0.5 0.1 9: 3: 7 -8 2
+        Wait 9: 3: 7 -8 2""".splitlines():  # the last two promise a time only
+        goal, done, places = row.split(":")
+        for place in places.split(","):
+            found = back(goal_of(goal), float(done), beside(*numbers(*place.split())))
+            assert found is None, (goal, place)
     assert back(Rotate(pi), 1.0, beside(0.0, 0.0, 1.0 + radians(31))) is not None
 
 
@@ -109,46 +127,49 @@ def test_off_its_line_is_further_than_a_metre_or_past_the_end() -> None:
         (Progress(), 0.01, False),
         (Progress(), 9, True),
     ):
-        task = Task(TaskId(1), 1, TASK_MOVE, WAY, SOMEBODY, Marks(), 0.0, progress=progress)
-        assert was_handled(task, NORTHWARDS, Pose(north, 0.0, 0.0)) is was
+        assert was_handled(task_of(WAY, progress), NORTHWARDS, Pose(north, 0.0, 0.0)) is was
     car = Steering(2.0, reverses=False)
     for pose in (Pose(1.68, 0.92, 1.0), Pose(-9.0, 0.0, 0.0)):
         found = resumed(WAY, in_bend, motion(pose, at=0.0), turns_first=False, steering=car)
         assert (found == in_bend) is (pose.yaw == 1.0), pose
+    for row in f"""Move 10: on it: 5 near
+        Move 10: off it: 5 far
+        Move 10: off it: 5 -far
+        Move 10: on it: {10.0 + PAST_END - 0.01} 0
+        Move 10: off it: {10.0 + OVER} 0
+        Move 10: off it: -far 0
+        Move -10: on it: -5 0.5
+        Move -10: off it: far 0
+        Rotate 1: on it: 0 near 3
+        Rotate 1: off it: 0 far
+        Drive 0.5 0 5: on it: 9 9""".splitlines():
+        text, where, place = row.split(":")
+        task = task_of(goal_of(text), begun)
+        assert is_off_line(task, beside(*numbers(*place.split()))) is ("off" in where), row
     for goal, progress, pose, is_off in (
-        (Move(10.0), begun, beside(5.0, OFF_TRACK - 0.01), False),
-        (Move(10.0), begun, beside(5.0, OFF), True),
-        (Move(10.0), begun, beside(5.0, -OFF), True),
-        (Move(10.0), begun, beside(10.0 + PAST_END - 0.01, 0.0), False),
-        (Move(10.0), begun, beside(10.0 + OVER, 0.0), True),
-        (Move(10.0), begun, beside(-OFF, 0.0), True),
-        (Move(-10.0), begun, beside(-5.0, 0.5), False),
-        (Move(-10.0), begun, beside(OFF, 0.0), True),
-        (Rotate(1.0), begun, beside(0.0, OFF_TRACK - 0.01, 3.0), False),
-        (Rotate(1.0), begun, beside(0.0, OFF), True),
-        (Drive(0.5, 0.0, 5.0), begun, beside(9.0, 9.0), False),
         (Move(1.0), Progress(), Pose(99.0, 99.0, 0.0), False),  # it has not begun
         (WAY, on_way, Pose(2.0, 1.1, 0.0), True),
         (WAY, in_bend, Pose(2.0, 2.0, 0.0), False),
         (WAY, in_bend, Pose(9.0, 9.0, 0.0), True),
     ):
-        task = Task(TaskId(1), 1, TASK_MOVE, goal, SOMEBODY, Marks(), 0.0, progress=progress)
-        assert is_off_line(task, pose) is is_off, (goal, pose)
+        assert is_off_line(task_of(goal, progress), pose) is is_off, (goal, pose)
 
 
 def test_a_way_goes_on_near_its_line_or_place_and_is_else_begun_again_from_here() -> None:
-    for goal, leg, anchor, pose, goes_on in (
-        (WAY, 1, NORTHWARDS, Pose(2.0, 0.9, 1.0), True),
-        (WAY, 1, NORTHWARDS, Pose(2.0, 1.1, 0.0), False),
-        (WAY, 1, NORTHWARDS, Pose(-0.1, 0.0, 0.0), False),
-        (WAY, 1, NORTHWARDS, Pose(5.1, 0.0, 0.0), False),
-        (WAY, 3, Pose(5.0, 0.0, 1.0), Pose(5.03, 0.0, 1.0), True),  # the wait at the place
-        (WAY, 3, Pose(5.0, 0.0, 1.0), Pose(5.1, 0.0, 1.0), False),
-        (GoTo(TARGET, radius=0.5, wait=3.0), 2, Pose(4.6, 0, 0), Pose(4.6, 0.0, 1.0), True),
-    ):
-        progress = Progress(anchor=anchor, leg=leg, done=2.0, target=TARGET)
+    near = GoTo(TARGET, radius=0.5, wait=3.0)
+    for row in """1: 0 0 0: 2 0.9 1: goes on
+        1: 0 0 0: 2 1.1 0: begins again
+        1: 0 0 0: -0.1 0 0: begins again
+        1: 0 0 0: 5.1 0 0: begins again
+        3: 5 0 1: 5.03 0 1: goes on
+        3: 5 0 1: 5.1 0 1: begins again
+        2: 4.6 0 0: 4.6 0 1: goes on""".splitlines():  # 3: the wait at the place
+        leg, *poses, then = row.split(":")
+        anchor, pose = (Pose(*numbers(*each.split())) for each in poses)
+        progress = Progress(anchor=anchor, leg=int(leg), done=2.0, target=TARGET)
+        goal = near if progress.leg == 2 else WAY
         again = resumed(goal, progress, motion(pose, at=0.0), turns_first=True)
-        if goes_on:
+        if "goes on" in then:
             assert again == progress, (leg, pose)
         else:
             found = again.leg, again.done, again.anchor, again.target
