@@ -28,6 +28,7 @@ PLACES = {
     "any": (250, 191),
     "other": (250, 5),
     "second": (2, 191),
+    "camera": (1, 100),
 }
 KINDS = {"plan": 0, "mission": 0, "fence": 1, "rally": 2}
 SHORT = {

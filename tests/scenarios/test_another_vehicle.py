@@ -15,6 +15,7 @@ from rover_sim.personas import Mode, Persona
 from tests.kit.cases import for_each
 from tests.kit.client import ARM, MOVE, SET_MODE
 from tests.kit.px4 import PROMPT_PX4
+from tests.kit.rows import ask
 from tests.kit.volume import some
 from tests.kit.world import MODE_COMMAND, PROMPT, SETPOINT, World, ways_of
 from tests.scenarios.conftest import MakeWorld
@@ -151,16 +152,11 @@ def stopped(world: World) -> None:
 
 
 STATES = [running, lost, paused, held, waiting, scheduled, idle, stopped]
-WORDS: dict[str, Callable[[World], object]] = {
-    "nothing": lambda _world: None,
-    "STOP": lambda world: world.client.stop(),
-    "pause": lambda world: world.client.pause(),
-    "resume": lambda world: world.client.proceed(),
-    "arm": lambda world: world.client.arm(),
-}
+STOP, PAUSE, RESUME = "TASK_STOP", "DO_PAUSE_CONTINUE 0", "DO_PAUSE_CONTINUE 1"
+ARMING = "COMPONENT_ARM_DISARM 1 to=autopilot"
 #: each state with the words that mean most, and the other words where there is something to undo
-CASES = [(state, word) for state in STATES for word in ("nothing", "STOP")] + [
-    (state, word) for state in (running, waiting, stopped) for word in ("pause", "resume", "arm")
+CASES = [(state, word) for state in STATES for word in ("", STOP)] + [
+    (state, word) for state in (running, waiting, stopped) for word in (PAUSE, RESUME, ARMING)
 ]
 
 
@@ -173,16 +169,18 @@ def test_nothing_of_the_old_ones_control_reaches_the_new_one(
     world = make_world(persona=PERSONAS[old])
     state(world)
     was_stopped = world.paused() is R.STOPPED
-    swapped = Swapped(world, PERSONAS[new], at_first_beat=lambda: WORDS[word](world))
+    swapped = Swapped(
+        world, PERSONAS[new], at_first_beat=(lambda: ask(world, word)) if word else lambda: None
+    )
     world.run(10)
     assert swapped.met_at is not None
     swapped.check_untouched()
     waits = [task for task in world.tasks() if task.state not in (S.KILLED, S.COMPLETED)]
-    if word == "STOP" or (was_stopped and word != "resume"):
+    if word == STOP or (was_stopped and word != RESUME):
         assert world.paused() is R.STOPPED
     elif waits:
         assert world.paused() in (R.RESTARTED, R.TAKEOVER)
-    if word != "STOP" and state in (running, lost, paused, held):
+    if word != STOP and state in (running, lost, paused, held):
         assert world.state(1) == (S.HELD, R.FRAME_RESET)
     notes = [note.text for note in world.events(VehicleNoted) if "another vehicle" in note.text]
     assert len(notes) == 1

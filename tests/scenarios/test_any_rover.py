@@ -14,6 +14,7 @@ from tests.kit.cases import for_each
 from tests.kit.client import ACCEPTED, ACK, DENIED, MOVE, TEMPORARILY_REJECTED, Sent
 from tests.kit.mission import Item, Upload
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import ask
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -171,20 +172,14 @@ def test_a_rover_that_its_own_failsafe_has_stopped_loses_the_task_also_over_a_re
     assert submit(world, 0.5, nonce=9).task_id == task
 
 
-def halt_by_a_person(world: World, halt: str) -> None:
-    """Halt rover 1, which is idle."""
-    match halt:
-        case "stop":
-            world.client.stop(target=(1, 191))
-        case "pause":
-            world.client.pause(target=(1, 191))
-        case "hold":
-            world.client.mode(4, target=(1, 1))
-        case "disarm":
-            world.client.arm(False, target=(1, 1))
-        case "manual":
-            world.operator_mode(Mode.MANUAL)
-    world.run(2.0)
+#: by a person, of rover 1
+HALTS = f"""
+TASK_STOP
+DO_PAUSE_CONTINUE 0
+DO_SET_MODE 1 4 to=autopilot
+COMPONENT_ARM_DISARM 0 to=autopilot
+operator {Mode.MANUAL.value}
+"""
 
 
 def submit_later(world: World, delay: float) -> int:
@@ -203,7 +198,7 @@ def server_again(world: World, store: PromptSqliteStore) -> None:
 
 
 @for_each("restarts", [False, True])
-@for_each("halt", ["stop", "pause", "hold", "disarm", "manual"])
+@for_each("halt", HALTS.strip().split("\n"))
 def test_the_task_of_an_idle_rover_that_a_person_halts_stays(
     make_world: MakeWorld, tmp_path: Any, halt: str, restarts: bool
 ) -> None:
@@ -215,7 +210,8 @@ def test_the_task_of_an_idle_rover_that_a_person_halts_stays(
     world.run(2.0)
     task = submit_later(world, 15.0)
     assert rover_of(world, task) == 1
-    halt_by_a_person(world, halt)
+    ask(world, halt)
+    world.run(2.0)
     world.rovers[0].autopilot.set_faults(Faults(silent=True))
     if restarts:
         server_again(world, store)

@@ -49,14 +49,6 @@ def place(north: float, east: float) -> Item:
     return Item(WAYPOINT, **at(north, east))
 
 
-def test_a_place_outside_is_denied_and_one_inside_is_driven_to(world: World) -> None:
-    assert fenced(world, *YARD) == 0
-    assert go_to(world, 4, 0) == (DENIED, R.OUTSIDE_FENCE)
-    assert go_to(world, 2, 1) == (ACCEPTED, 1)
-    world.until_state(1, S.COMPLETED)
-    assert is_at(world, 2, 1)
-
-
 def test_it_comes_back_as_it_was_and_is_named(world: World) -> None:
     fenced(world, *YARD, *POND)
     download = Download(world.client, kind=FENCE)

@@ -28,6 +28,7 @@ from tests.kit.client import (
     FakeClient,
     setpoint,
 )
+from tests.kit.rows import check
 from tests.kit.world import SETPOINT, World
 from tests.scenarios.conftest import MakeWorld
 
@@ -105,22 +106,15 @@ def test_each_client_has_its_own_intervals(world: World) -> None:
 
 
 def test_every_request_for_a_message_is_answered(world: World) -> None:
-    known = world.client.command(REQUEST, 148, target=(1, 1))
-    world.run(0.1)
-    unknown = world.client.command(REQUEST, 435, target=(1, 1))
-    world.run(0.1)
-    ours = world.client.command(REQUEST, 435, target=(1, 191))
-    world.run(0.1)
-    world.lose_acks()
-    silent = world.client.command(REQUEST, 148, target=(1, 1))
-    world.run(0.5)
-    assert [s.result for s in (known, unknown, ours, silent)] == [
-        ACCEPTED,
-        UNSUPPORTED,
-        UNSUPPORTED,
-        UNSUPPORTED,
-    ]
-    assert world.client.heard("AUTOPILOT_VERSION")
+    check(
+        world,
+        """
+REQUEST_MESSAGE 148 to=autopilot : ACCEPTED AUTOPILOT_VERSION
+REQUEST_MESSAGE 435 to=autopilot : UNSUPPORTED
+REQUEST_MESSAGE 435 : UNSUPPORTED
+lose 77 & REQUEST_MESSAGE 148 to=autopilot & wait 0.2 : UNSUPPORTED
+""",
+    )
 
 
 # commands

@@ -23,6 +23,7 @@ from tests.kit.client import (
 )
 from tests.kit.px4 import MISSION, PROMPT_PX4
 from tests.kit.restarts import UTC
+from tests.kit.rows import parsed
 from tests.kit.world import PROMPT, World
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_roles import (
@@ -115,19 +116,18 @@ def test_only_an_operator_s_stop_clears_the_queue(with_roles: MakeRoles) -> None
     assert world.state(waiting.task_id)[0] is S.CANCELLED
 
 
-BOUNDING = {
-    "fence item": common.MAVLink_mission_item_int_message(
-        1, 1, 0, 6, 5003, 0, 1, 9, 0, 0, 0, 0, 0, 0, FENCE
-    ),
-    "no fence": common.MAVLink_mission_clear_all_message(1, 1, FENCE),
-    "nothing at all": common.MAVLink_mission_clear_all_message(1, 1, 255),
-    "old fence": ardupilot.MAVLink_fence_point_message(1, 1, 0, 0, 0, 0),
-    "old rally": ardupilot.MAVLink_rally_point_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0),
-    "device": ardupilot.MAVLink_device_op_write_message(1, 1, 0, 0, 0, 0, b"x", 0, 1, [0] * 128),
-}
+#: a fence's item, no fence, nothing at all, an old fence, an old rally point, a device
+BOUNDING = f"""
+mission_item_int 1 1 0 6 5003 0 1 9 0 0 0 0 0 0 {FENCE}
+mission_clear_all 1 1 {FENCE}
+mission_clear_all 1 1 255
+fence_point 1 1 0 0 0 0
+rally_point 1 1 0 0 0 0 0 0 0 0
+device_op_write 1 1 0 0 0 0 x 0 1 {",".join("0" * 128)}
+"""
 
 
-@for_each("what", BOUNDING)
+@for_each("what", BOUNDING.strip().split("\n"))
 @for_each("who", [OPERATOR, 255])
 def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
     make_world: MakeWorld, what: str, who: int
@@ -136,7 +136,8 @@ def test_what_bounds_a_rover_is_not_passed_on_for_an_operator(
     roles = Roles(unsigned="safety", addresses={"12/190": "operator"})
     world = make_world(settings=Settings(roles=roles, claim=False))
     client = join(world, who)
-    message = BOUNDING[what]
+    name, numbers, _ = parsed(what)
+    message = getattr(ardupilot, f"MAVLink_{name}_message")(*numbers)
     passed = world.passed_on((who, 190))
     client.send(message)
     world.run(0.2)

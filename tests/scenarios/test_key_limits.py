@@ -17,9 +17,7 @@ from tests.kit.cases import anew, for_each
 from tests.kit.client import (
     ACCEPTED,
     DENIED,
-    DRIVE,
     GUIDED,
-    MANUAL,
     RTL,
     FakeClient,
     Sent,
@@ -28,19 +26,18 @@ from tests.kit.client import (
 )
 from tests.kit.mission import Item, Upload
 from tests.kit.restarts import UTC, restart
+from tests.kit.rows import ask, check
 from tests.kit.store import PromptSqliteStore
 from tests.kit.world import World, at, put_home
 from tests.scenarios.conftest import MakeWorld
 
-WAYPOINT, JUMP, OPTIONS, MOVE, SPEED, RETURN = 16, 177, 54014, 54000, 178, 20
-REPOSITION, RELAY, MODIFY, CANCEL = 192, 181, 54012, 54010
-SERVO = 183
+WAYPOINT, OPTIONS, SPEED, RETURN = 16, 54014, 178, 20
+REPOSITION, MODIFY, CANCEL = 192, 54012, 54010
 PRIORITY = 1  # TASK_MODIFY, param2
 BOSS = Key("boss", bytes(range(32)), "operator")
 SECRET = bytes(range(1, 33))
 NOT_ALLOWED = (DENIED, R.NOT_ALLOWED)
-MISSION_ACCEPTED, MISSION_DENIED = 0, 14
-ANY = (250, 191)
+MISSION_ACCEPTED = 0
 
 
 def agents(limits: Limits | None = None, *, role: str = "submitter", secret: bytes = SECRET) -> Key:
@@ -86,10 +83,8 @@ def answer(world: World, sent: Sent) -> tuple[int, int] | None:
     return sent.answer
 
 
-def uploaded(
-    world: World, client: FakeClient, *items: Item, target: tuple[int, int] = (1, 191)
-) -> Upload:
-    return world.upload(items, target=target, client=client)
+def uploaded(world: World, client: FakeClient, *items: Item) -> Upload:
+    return world.upload(items, target=(1, 191), client=client)
 
 
 def places(*norths: float) -> list[Item]:
@@ -117,21 +112,20 @@ def way(world: World, tasks: int) -> tuple[float, float]:
 # speed
 
 
-@for_each(
-    "send",
-    [
-        lambda agent: agent.move(1.0, speed=0.2),
-        lambda agent: agent.command(DRIVE, -0.2, 0, 1),
-        lambda agent: agent.command_int(REPOSITION, 0.2, 0, target=(1, 1), frame=6, **at(1, 0)),
-    ],
-)
 def test_a_higher_speed_is_refused_in_words(
-    world: World, limited: Callable[..., FakeClient], send: Callable[[FakeClient], Sent]
+    world: World, limited: Callable[..., FakeClient]
 ) -> None:
-    agent = limited(max_speed=0.1)
-    assert answer(world, send(agent)) == NOT_ALLOWED
-    assert "key agent may drive 0.1 m/s at most, not 0.2" in agent.texts()
-    assert uploaded(world, agent, of_ours(SPEED, 1, 0.2), *places(1.0)).result == MISSION_DENIED
+    world.client = agent = limited(max_speed=0.1)
+    check(
+        world,
+        """
+TASK_MOVE 1 0.2 0 0 0 0 5 & wait 1.2 : DENIED key agent may drive 0.1 m/s at most, not 0.2
+TASK_DRIVE -0.2 0 1 & wait 1.2 : DENIED
+DO_REPOSITION 0.2 0 to=autopilot frame=6 at=1,0 & wait 1.2 : DENIED
+plan; DO_CHANGE_SPEED 1 0.2 0 0 frame=2; GO 0.01 0 0 0 at=1,0 & wait 1.2 : DENIED
+""",
+    )
+    assert {(ack.result, ack.result_param2) for ack in agent.acks} == {NOT_ALLOWED}
     assert world.tasks() == ()
 
 
@@ -149,46 +143,41 @@ def test_the_tighter_limit_counts_and_an_operators_key_has_limits_too(
 # distance
 
 
-def goes(north: float) -> Callable[[World, FakeClient], object]:
-    return lambda _world, agent: agent.command_int(
-        REPOSITION, -1, 0, target=(1, 1), frame=6, **at(north, 0)
-    )
+def go_to(world: World, agent: FakeClient, north: float) -> None:
+    agent.command_int(REPOSITION, -1, 0, target=(1, 1), frame=6, **at(north, 0))
+    world.run(0.3)
 
 
-def plan(*items: Item, target: tuple[int, int] = (1, 191)) -> Callable[[World, FakeClient], object]:
-    return lambda world, agent: uploaded(world, agent, *items, target=target)
+#: from 0, 0, heading north; within 3 m
+WITHIN = """
+TASK_MOVE 3 0 0 0 0 0 5
+TASK_DRIVE 0.5 0 6
+DO_REPOSITION -1 0 to=autopilot frame=6 at=2.9,0
+plan; NAV_WAYPOINT 0.01 0 0 0 at=1.45,0; NAV_WAYPOINT 0.01 0 0 0 at=0,0
+plan; TASK_MOVE 1 0 0 0 frame=2; DO_JUMP 0 2 0 0 frame=2
+plan to=any; NAV_WAYPOINT 0.01 0 0 0 at=1.49,0; NAV_WAYPOINT 0.01 0 0 0 at=0,0
+"""
+BEYOND = """
+TASK_MOVE 3.1 0 0 0 0 0 5 : DENIED
+TASK_MOVE -3.1 0 0 0 0 0 5 : DENIED
+TASK_DRIVE -0.5 0 6.5 : DENIED
+DO_REPOSITION -1 0 to=autopilot frame=6 at=3.1,0 : DENIED
+plan; GO 0.01 0 0 0 at=1.6,0; GO 0.01 0 0 0 at=0,0 & wait 1 : DENIED
+plan; TASK_MOVE 1 0 0 0 frame=2; TASK_MOVE -2.1 0 0 0 frame=2 & wait 1 : DENIED
+plan; TASK_MOVE 1 0 0 0 frame=2; DO_JUMP 0 3 0 0 frame=2 & wait 1 : DENIED
+plan; TASK_MOVE 0.01 0 0 0 frame=2; DO_JUMP 0 -1 0 0 frame=2 & wait 1 : DENIED
+mission; GO 0.01 0 0 0 at=0,0; GO 0.01 0 0 0 at=1.6,0; GO 0.01 0 0 0 at=0,0 & wait 1 : DENIED
+plan to=any; GO 0.01 0 0 0 at=1.6,0; GO 0.01 0 0 0 at=0,0 & wait 1 : DENIED
+TASK_MOVE 3.1 0 0 0 0 0 5 to=any : DENIED
+"""
 
 
-#: from 0, 0, heading north; within 3 m, and beyond
-WITHIN: dict[str, Callable[[World, FakeClient], object]] = {
-    "move": lambda _world, agent: agent.move(3.0),
-    "drive": lambda _world, agent: agent.command(DRIVE, 0.5, 0, 6),
-    "go to": goes(2.9),
-    "plan": plan(*places(1.45, 0.0)),
-    "jumps": plan(of_ours(MOVE, 1.0), of_ours(JUMP, 0, 2)),
-    "any rover": plan(*places(1.49, 0.0), target=ANY),
-}
-BEYOND: dict[str, Callable[[World, FakeClient], object]] = {
-    "move": lambda _world, agent: agent.move(3.1),
-    "backwards": lambda _world, agent: agent.move(-3.1),
-    "drive": lambda _world, agent: agent.command(DRIVE, -0.5, 0, 6.5),
-    "go to": goes(3.1),
-    "plan": plan(*places(1.6, 0.0)),
-    "moves": plan(of_ours(MOVE, 1.0), of_ours(MOVE, -2.1)),
-    "jumps": plan(of_ours(MOVE, 1.0), of_ours(JUMP, 0, 3)),
-    "for ever": plan(of_ours(MOVE, 0.01), of_ours(JUMP, 0, -1)),
-    "staged": plan(*places(0.0, 1.6, 0.0), target=(1, 1)),
-    "any rover": plan(*places(1.6, 0.0), target=ANY),
-    "any rover's move": lambda _world, agent: agent.move(3.1, target=ANY),
-}
-
-
-@for_each("what", WITHIN)
+@for_each("what", WITHIN.strip().split("\n"))
 def test_a_way_within_the_limit_is_driven(
     world: World, limited: Callable[..., FakeClient], what: str
 ) -> None:
-    agent = limited(max_distance=3.0)
-    WITHIN[what](world, agent)
+    world.client = limited(max_distance=3.0)
+    ask(world, what)
     world.run(0.3)
     metres, _ = way(world, 1)
     assert world.state(1)[0] is S.COMPLETED
@@ -196,15 +185,9 @@ def test_a_way_within_the_limit_is_driven(
 
 
 def test_a_longer_way_is_refused_in_words(world: World, limited: Callable[..., FakeClient]) -> None:
-    agent = limited(max_distance=3.0)
-    for what, send in BEYOND.items():
-        sent = send(world, agent)
-        world.run(1.2)
-        if isinstance(sent, Sent):
-            assert sent.answer == NOT_ALLOWED, what
-        else:
-            assert isinstance(sent, Upload)
-            assert sent.result == MISSION_DENIED, what
+    world.client = agent = limited(max_distance=3.0)
+    check(world, BEYOND)
+    assert {(ack.result, ack.result_param2) for ack in agent.acks} == {NOT_ALLOWED}
     assert agent.said("key agent may drive 3 m at most in a task")
     world.run(5.0)
     assert world.tasks() == ()
@@ -232,11 +215,9 @@ def test_a_way_begins_where_the_tasks_before_it_end(
 ) -> None:
     agent, boss = limited(max_distance=3.0), signing(world, BOSS, name="boss")
     assert answer(world, boss.move(6.0)) == (ACCEPTED, 1)
-    goes(1.0)(world, agent)
-    world.run(0.3)
+    go_to(world, agent, 1.0)
     assert len(world.tasks()) == 1  # 5 m back, by its turn
-    goes(8.0)(world, agent)
-    world.run(0.3)
+    go_to(world, agent, 8.0)
     way(world, 2)
     assert world.state(2)[0] is S.COMPLETED
     assert world.pose()[0] == pytest.approx(8.0, abs=0.1)
@@ -257,27 +238,23 @@ def test_a_task_that_would_begin_too_far_away_fails_where_the_rover_stands(
     assert world.pose()[0] == pytest.approx(-4.0, abs=0.1)
 
 
-@for_each(
-    "send",
-    [
-        lambda agent: agent.arm(),
-        lambda agent: agent.mode(GUIDED),
-        lambda agent: agent.mode(MANUAL),
-        lambda agent: agent.command(SERVO, 1, 1500, target=(1, 1)),
-        lambda agent: agent.command(SPEED, 1, 2.0, target=(1, 100)),
-    ],
-)
 @for_each("limits", [{"max_speed": 0.5}, {"max_distance": 3.0}])
 def test_a_bounded_key_drives_by_tasks_alone(
-    world: World,
-    limited: Callable[..., FakeClient],
-    send: Callable[[FakeClient], Sent],
-    limits: dict[str, float],
+    world: World, limited: Callable[..., FakeClient], limits: dict[str, float]
 ) -> None:
-    agent = limited("safety", **limits)
-    assert answer(world, send(agent)) == NOT_ALLOWED
-    assert agent.said("its limits of speed or way allow only tasks")
-    assert uploaded(world, agent, *places(1.0), of_ours(RELAY, 0, 1)).result == MISSION_DENIED
+    world.client = agent = limited("safety", **limits)
+    check(
+        world,
+        """
+COMPONENT_ARM_DISARM 1 to=autopilot : DENIED its limits of speed or way allow only tasks
+DO_SET_MODE 1 15 to=autopilot : DENIED
+DO_SET_MODE 1 0 to=autopilot : DENIED
+DO_SET_SERVO 1 1500 to=autopilot : DENIED
+DO_CHANGE_SPEED 1 2 to=camera : DENIED
+plan; GO 0.01 0 0 0 at=1,0; DO_SET_RELAY 0 1 0 0 frame=2 & wait 1 : DENIED
+""",
+    )
+    assert {(ack.result, ack.result_param2) for ack in agent.acks} == {NOT_ALLOWED}
     agent.stream(setpoint(1.0), rate=20)
     agent.stream(sticks(x=900), rate=20)
     boss = signing(world, BOSS, name="boss")
