@@ -160,13 +160,6 @@ def test_a_request_is_not_hidden_in_another_ones_body(page: Web) -> None:
     assert answer.startswith(b"HTTP/1.1 400")
 
 
-def test_a_flood_is_refused_and_keeps_no_stop_back(page: Web) -> None:
-    for host, words in (("{host}", b"HTTP/1.1 429"), ("Host: x\r\n", b"connection: close")):
-        asked = f"GET /api/v1/session HTTP/1.1\r\n{host}\r\n" * 900
-        assert words in _raw(page, f"{asked}GET / HTTP/1.0\r\n\r\n")
-        assert page.post("/stop", {})["phase"] == "acknowledged"
-
-
 def test_behind_a_proxy_with_tls_only_its_own_pages_may_change_something(
     tmp_path: Path, both: tuple[Stand, Web]
 ) -> None:
