@@ -21,27 +21,27 @@ from tests.kit.client import (
     set_mode,
     setpoint,
 )
+from tests.kit.mission import Item
 from tests.kit.px4 import MISSION, PROMPT_PX4
 from tests.kit.restarts import UTC
 from tests.kit.rows import parsed
-from tests.kit.world import PROMPT, World
+from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
 from tests.scenarios.test_roles import (
-    FENCE,
     OBSERVER,
     OPERATOR,
     SUBMITTER,
-    WAYPOINT,
     MakeRoles,
     active,
     answer,
     join,
-    place,
-    upload,
 )
 from tests.scenarios.test_roles import with_roles as with_roles
 from tests.scenarios.test_signed_rovers import sent_to_rover
 from tests.scenarios.test_signing import ALICE, BOB, put, signing
+
+WAYPOINT = 16
+FENCE = 1  # MAV_MISSION_TYPE
 
 
 def radio_status() -> object:
@@ -91,7 +91,7 @@ def test_a_plan_that_is_started_again_keeps_to_the_limits_of_who_starts_it(
     )
     world = make_world(settings=Settings(roles=roles), persona=persona)
     submitter = join(world, SUBMITTER)
-    assert upload(world, submitter, target=(1, 1)) == 0
+    assert world.upload([Item(WAYPOINT, **at(2.0, 0.0))] * 2, client=submitter).result == 0
     for number in (1, 2):
         submitter.send(set_mode(mode))
         world.run(0.3)
@@ -207,7 +207,7 @@ def test_an_upload_is_of_who_began_it_and_not_of_its_endpoint(world: World) -> N
     world.run(1.5)
 
     def items(number: int) -> Message:
-        where = place(2.0 + number)
+        where = at(2.0 + number, 0.0)
         return common.MAVLink_mission_item_int_message(
             1, 191, number, 6, WAYPOINT, 0, 1, 0, 0, 0, 0, where["x"], where["y"], 0, 0
         )

@@ -13,7 +13,7 @@ from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
 MODIFY = 54012
-DEADLINE, START_UTC = 3, 7
+PRIORITY, START_DELAY, DEADLINE, RUN_AFTER, PREEMPTIBLE, PREEMPTIVE, START_UTC = range(1, 8)
 UTC = 1_800_000_000.0  # s, at the beginning of these worlds
 DAY = 86_400.0
 
