@@ -142,11 +142,14 @@ def read(path: Path) -> Record:
 def _measure(path: Path) -> tuple[int, str | None]:
     """Return the number of lines before the end mark, and the mark's reason, None without a mark.
 
-    Raise RecordError if the mark's count or digest does not match the lines before it.
+    Raise RecordError if the mark's count or digest does not match the lines before it, or if
+    anything comes after it.
     """
     digest = blake2b(digest_size=16)
-    lines = 0
+    lines, why = 0, None
     for number, raw in _numbered(path):
+        if why is not None:
+            raise RecordError(f"{path}: data after its end")
         if raw.startswith(b'["end",'):
             try:
                 _, why, count, given = loads(raw)
@@ -155,10 +158,10 @@ def _measure(path: Path) -> tuple[int, str | None]:
                 raise RecordError(f"{path}: line {number} is not a valid end mark") from error
             if (count, given) != (lines, digest.hexdigest()):
                 raise RecordError(f"{path}: modified after it was written")
-            return lines, why
+            continue
         digest.update(raw + b"\n")
         lines = number
-    return lines, None
+    return lines, why
 
 
 def _first_line(path: Path) -> dict[str, Any]:

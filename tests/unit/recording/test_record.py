@@ -302,6 +302,8 @@ def test_a_file_that_is_none_is_said_so(whole: Path, tmp_path: Path) -> None:
         gzip.compress(b"x" * 70_000),
         gzip.compress(b"[" * 10**6),
         changed(whole, lambda lines: lines[:-1]).read_bytes() + b"more",
+        whole.read_bytes() + b"more",
+        whole.read_bytes() + gzip.compress(b"{}\n"),
     ]
     for data in (b"\x00" * 100, b"text", *packed, *beginning):
         other.write_bytes(data)
