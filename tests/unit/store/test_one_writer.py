@@ -21,6 +21,7 @@ from tests.unit.store.samples import PATIENCE, loaded, opened, submitted, wait_f
 from tests.unit.store.test_failures import ROOT, child, kept, line
 
 SOME = 30  # tasks
+REFUSALS = 500  # of which each may meet a write of the server
 MANY = 1500  # tasks, for which the log is written back to the file
 
 
@@ -121,6 +122,18 @@ def test_a_second_server_is_refused_and_the_first_goes_on(
     assert rest, "it went on"
     assert {each.split()[0] for each in rest} == {"kept"}
     assert len(found(path)) >= int(rest[-1].split()[1])
+
+
+def test_who_is_refused_is_told_by_whom_also_while_that_one_writes(path: Path) -> None:
+    said = set()
+    with child(path) as process:
+        kept(process, at_least=SOME)
+        for _ in range(REFUSALS):
+            with pytest.raises(StoreError) as refused, opened(path):
+                pass
+            said.add(str(refused.value).partition(", since")[0])
+    place = f"in use by the server on {socket.gethostname()}, pid {process.pid}"
+    assert said == {f"store {path}: {place}"}
 
 
 @pytest.mark.parametrize("deed", [renamed, folder_moved, replaced, another_copied_over])
