@@ -86,14 +86,8 @@ class SimulatedFleet(JudgedWorld, FleetWorld):
         self._forget_requests()
         self.started_at = self.now
 
-    def _forget_requests(self) -> None:
-        """Forget what only one gateway knew; another may still carry out what that passed on."""
-        wishes = self.wishes.copy()
-        super()._forget_requests()
-        self.wishes.update(wishes)
-
     def dropped(self, gateway: str) -> None:
-        """Note that what a gateway was asked for is lost, with its vehicles."""
+        """Note that a gateway has lost its vehicles, and what it was asked for."""
         super().dropped(gateway)
         self._forget_requests()
 

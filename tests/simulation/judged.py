@@ -191,8 +191,8 @@ class JudgedWorld(World):
         return None if due is None else max(due, ceil(due / GRAIN - 1e-6) * GRAIN)
 
     def _forget_requests(self) -> None:
-        """Forget what only a server knew that has ended: submissions without a nonce."""
-        for known in (self.asked, self.wishes, self.submitted, self._known):
+        """Forget what only a server that has ended knew: its debts of answers, what it had read."""
+        for known in (self.asked, self.submitted, self._known):
             known.clear()
 
     def _restored(self, rover: int, restored: Restored) -> None:

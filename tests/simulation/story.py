@@ -100,7 +100,6 @@ class _Teller:
     def __init__(self, seed: int) -> None:
         self._seed, self._number = seed, (number := drawn_from(seed))
         self._random = random = Random(number)
-        self._has_gateways = seed % (THEMES + 1) == THEMES
         count = random.choice((2, 3, 4))
         self._cast = Cast(
             make=(make := MAKES[number // THEMES % len(MAKES)]),
@@ -110,7 +109,7 @@ class _Teller:
             on_restart=random.choice(("pause", "continue")),
             on_failure=random.choice(("pause", "continue")),
             preemption_gap=random.choice((0, 3)),
-            gateways=random.choice((2, 3)) if self._has_gateways else 0,
+            gateways=random.choice((2, 3)) if seed % (THEMES + 1) == THEMES else 0,
         )
         self._moves: list[Move] = []
         self._at = 0.0
@@ -137,7 +136,7 @@ class _Teller:
             *(self._drive_all, self._person, self._rover_fails, self._net_changes),
             *(self._server_fails, self._disk_fails, self._copy, self._pick(*themes)),
         ]
-        if self._has_gateways:
+        if self._cast.gateways:
             more = self._person, self._rover_fails, self._net_changes, self._copy
             of_clients = self._halt_then_copy, self._overtaken, self._stopped, self._parked
             others = [self._drive_all, self._pick(*more), self._pick(*of_clients)]

@@ -27,6 +27,7 @@ from tests.kit.observer import Observer
 from tests.kit.volume import tries
 from tests.simulation import invariants
 from tests.simulation.faults import FAULTS
+from tests.simulation.fleet import SimulatedFleet
 from tests.simulation.invariants import INVARIANTS, Stillness
 from tests.simulation.judged import Asked, Driven
 from tests.simulation.moves import Found, play
@@ -264,6 +265,20 @@ def test_every_rule_is_able_to_fail(
 
     with pytest.raises(Violation, match=BREAKS[breaks]):
         break_it()
+
+
+def test_a_gateway_that_moves_what_it_does_not_have_is_found(tmp_path: Path) -> None:
+    fleet = SimulatedFleet(
+        tmp_path, replace(CAST, gateways=2), seed=0, persona=ARDUPILOT, settings=Settings()
+    )
+    fleet.ready()
+    (other,) = set(fleet.gateways) - {fleet.database.holder(1)}
+    fleet.net.send(f"{other}:vehicles", "rover1", of_server(setpoint(0.0)))
+    fleet.judge(fleet.now, everything=True)
+    fleet.net.send(f"{other}:vehicles", "rover1", of_server(setpoint(0.5)))
+    with pytest.raises(Violation, match=f"gateway {other} moves rover1, which "):
+        fleet.judge(fleet.now, everything=True)
+    fleet.close()
 
 
 def test_every_rule_of_the_list_has_a_case_above() -> None:

@@ -153,6 +153,12 @@ class SimulatedWorld(JudgedWorld):
             if halts.system_id in driven and not halts.in_force:
                 halts.person(invariants.STALL, drives=False, now=self.now)
 
+    def read_late(self, seconds: float) -> Callable[[], None]:
+        """Let the server not read the second link for a while; return what ends that."""
+        self.watched.unread_links.setdefault(SECOND_LINK, [])
+        self.disturb(0, seconds - 6.0)
+        return partial(self.watched.read_again, SECOND_LINK)
+
     def step_wall_clock(self, seconds: float) -> None:
         """Make the wall clock of the server's machine jump."""
         self.disk.wall_offset += seconds
@@ -177,14 +183,7 @@ class SimulatedWorld(JudgedWorld):
         self.disk.write(events)
         self.end_server()
         self._forget_requests()
+        self.wishes.clear()
         self.is_away = True
         self._death = self.now, ended_well
         self.disturb(0)
-
-    # reading late
-
-    def read_late(self, seconds: float) -> Callable[[], None]:
-        """Let the server not read the second link for a while; return what ends that."""
-        self.watched.unread_links.setdefault(SECOND_LINK, [])
-        self.disturb(0, seconds - 6.0)
-        return partial(self.watched.read_again, SECOND_LINK)

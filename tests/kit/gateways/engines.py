@@ -141,7 +141,7 @@ class FleetLink(MemoryLink):
             self.send(peer, data)
         while self.under_way and self.under_way[0][0] <= now:
             _, peer, data, arrived = self.under_way.popleft()
-            if peer[0] != BACK:  # type: ignore[index]
+            if isinstance(peer, tuple) and peer[0] != BACK:
                 self._world.passes_on(self._gateway, data, arrived)
             self.arrived.append((peer, data))
             self.times.append(arrived)
@@ -344,7 +344,7 @@ class Gateway:
         self.store.grant_ids()
 
     def _drop(self) -> None:
-        """Begin anew, without what was asked for and not answered."""
+        """Begin with a new engine; requests that have no answer yet are lost."""
         self._begin()
         self.world.dropped(self.name)
 
@@ -529,7 +529,7 @@ class FleetWorld(World):
         return self.database.holder(int(rover.removeprefix("rover"))) == link.partition(":")[0]
 
     def dropped(self, gateway: str) -> None:
-        """Note that a gateway has lost its lease, and begins anew, without its vehicles."""
+        """Note that a gateway has lost its lease: its new engine has no vehicle."""
         for vehicle, observer in enumerate(self.observers, self.first_id):
             if self.database.holder(vehicle) == gateway:
                 observer.server_restarted()
