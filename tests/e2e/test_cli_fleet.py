@@ -47,7 +47,7 @@ pause --all --json => {{"done": "pause", "vehicle": 1}} … {{"done": "pause", "
 queue => rover 1: no task runs; queue paused (operator)
 resume --vehicle 1 => 0 rover 1: resumed
 resume --all => 0
-stop --vehicle 2 => 0 STOP is in force for rover 2: no task runs until 'mav-tasks resume --vehicle 2'
+stop --vehicle 2 => 0 STOP is in force for rover 2: no task runs until 'mav-tasks … --vehicle 2'
 queue --json => "paused": null … "paused": "stopped"
 resume --all => 0
 submit wait 500 --every 600 --vehicle 2 => 0
@@ -60,7 +60,7 @@ submit face 90 --vehicle any => 1 mav-tasks: {NO_ROVER_CAN}
 submit goto 1 1 --local --vehicle any => name the rover, or give latitude and longitude
 resume --all => 0
 submit move 0.1 --vehicle any => 0 rover
-vehicles => 1 … 2"""  # noqa: E501
+vehicles => 1 … 2"""
 
 
 def test_what_can_mean_either_rover_is_asked_back_and_what_is_for_all_is_for_all(

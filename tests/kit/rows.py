@@ -44,7 +44,6 @@ SHORT = {
     "POND": "NAV_FENCE_POLYGON_VERTEX_EXCLUSION",
 }
 PARAMETERS = IDS["PARAM_VALUE"], IDS["PARAM_ERROR"]
-NAMES = {number: name for name, number in IDS.items()}
 
 
 def number(word: str) -> Any:
@@ -117,7 +116,8 @@ def check(world: World, table: str, **clients: FakeClient) -> None:
     table = re.sub(r"\w+", lambda word: SHORT.get(word[0], word[0]), table)
     wrong = []
     for row in table.strip().splitlines():
-        request, _, answer = row.strip().partition(" : ")
+        request, has_answer, answer = row.strip().partition(" : ")
+        assert has_answer, f"a row without an answer: {row}"
         result, _, words = answer.partition(" ")
         who, _, request = request.rpartition("> ")
         client = clients.get(who, world.client)

@@ -50,7 +50,7 @@ def test_who_is_not_answered_is_told_what_the_link_brought() -> None:
         ([said.sign(raw, clock=now - 10**8)], "signed for another time"),
         ([said.sign(raw, clock=now)] * 2, "signed for another time"),
     ):
-        client = SyncClient(f"udpin:127.0.0.1:{port}", timeout=0.2, key=key)
+        client = SyncClient(f"udpin:127.0.0.1:{port}", timeout=1.0, key=key)
         client.open()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for packet in packets:
@@ -66,7 +66,7 @@ async def test_a_connection_that_ends_is_named() -> None:
         client = Client(f"tcp:127.0.0.1:{listener.getsockname()[1]}", timeout=0.5)
         client.open()
         connection, _ = await asyncio.to_thread(listener.accept)
-        await asyncio.sleep(0.2)
+        await asyncio.to_thread(connection.recv, 1)  # more is left unread, which resets it
         connection.close()
     with pytest.raises(LinkDown, match=r"lost: Connection reset"):
         await client.found()
