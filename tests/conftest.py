@@ -1,5 +1,6 @@
 """Tests and their processes do not read the configuration of the user who runs them."""
 
+import gc
 import os
 import signal
 import sys
@@ -41,6 +42,12 @@ def closed_stores() -> Iterator[None]:
 def pytest_configure(config: pytest.Config) -> None:
     """Fail for unexpected skips."""
     config.pluginmanager.register(Skips())
+
+
+def pytest_collection_finish() -> None:
+    """Keep the collector away from thousands of modules and tests: a tenth of the time."""
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 100)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

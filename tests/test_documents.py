@@ -180,8 +180,7 @@ def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
         assert run("submit", "move", "0.3", "--wait").status == 0
         it.rover.end()  # still armed
         again = ("-m", "rover_sim", "--port", str(it.rover_port), "--body", "kinematic")
-        ready = ("--boot", "none", *rover_options(broken))
-        with process(*again, *ready, folder=tmp_path, name="broken") as rover:
+        with process(*again, *rover_options(broken), folder=tmp_path, name="broken") as rover:
             rover.wait_for("rover 1")
             it.server.wait_for("rover 1: restarted")  # nobody types the next command sooner
             ended = [run(*shlex.split(command)[1:]) for command in told]

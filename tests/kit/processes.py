@@ -91,6 +91,7 @@ def process(
         XDG_STATE_HOME=str(folder),
         # a machine that is busy with tests stands still for half a second now and then
         MAV_TASKS_WATCH_LATE_TICK="0.9",
+        MAV_TASKS_WATCH_COMMIT="1.5",
     )
     popen = started(arguments, python=python, output=output, folder=folder, env=env)
     running = Process(popen, output)
