@@ -66,6 +66,15 @@ log --json --csv: choose one of them
 log --task -1: not a valid id
 log --until 2h --follow: choose one of them
 log --store=: path or the URL of a store
+log --store FOLDER/no: does not exist; choose another with --store
+log --store FILE: it is empty
+log --store ~nobody.there/x: store ~nobody.there/x
+log --store postgresql://host:no/x: the port is a number
+log --store postgresql://host/x?colour=red: invalid URI query parameter
+log --store postgresql://a:b/c@host/x: write %40 for @
+qgc-actions --install --documents FILE: Not a directory
+export FOLDER --mcap FOLDER/out: not a file
+export FOLDER/no --mcap FOLDER/out: FOLDER/no
 qgc-actions --only: give at least one --action
 mcp --max-queued 3: keys add agent --role submitter --quota 3
 mcp --http 127.0.0.1: expected HOST:PORT
