@@ -51,11 +51,7 @@ def test_a_gateway_answers_its_fleet_and_nobody_else() -> None:
         for data in (b"no answer", *[question] * 70):
             other.sendto(data, sender)
             other.sendto(data, (HOST, b.port))
-        seen: list[Seen] = []
-
-        def has_seen() -> list[Seen]:
-            seen.extend(b.receive("b", 7, now=1.0) + a.receive("a", 1, now=1.1))
-            return seen
-
-        wait_until(has_seen, within=5)
-        assert seen == [Seen("b", Sign.ANSWERED, 1.0)]
+        found = wait_until(
+            lambda: b.receive("b", 7, now=1.0) + a.receive("a", 1, now=1.1), within=5
+        )
+        assert found == [Seen("b", Sign.ANSWERED, 1.0)]
