@@ -54,7 +54,9 @@ LINKS = """--client  => udpin:host:port
 --client udpin:127.0.0.1:1?key=ben => key ben was revoked on
 --vehicle udpin:127.0.0.1:1?key=anna => key anna has role safety
 --client udpin:127.0.0.1:1?key=rover => key rover has role vehicle
---gateway a => --gateway a needs --store postgresql:"""
+--gateway a => --gateway a needs --store postgresql:
+--gateway a --store postgresql://nowhere.invalid/x => check the host's name in the URL
+--gateway a --store postgresql:///x?host=/nowhere => is the server running there?"""
 
 
 def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
@@ -65,10 +67,10 @@ def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
         assert called("keys", *words.split(), "--keys", str(ring)).status == 0
     for row in LINKS.splitlines():
         arguments, _, told = row.partition(" => ")
-        option, url = arguments.split(" ")
-        keys = ("--set", f"signing.keys={ring}") if "?key" in url else ()
-        push = () if option == "--push" else ("--no-push",)
-        assert_one_clear_line(run("serve", *push, option, url, *keys), *told.split(" … "))
+        keys = ("--set", f"signing.keys={ring}") if "?key" in arguments else ()
+        push = () if "--push" in arguments else ("--no-push",)
+        done = run("serve", *push, *arguments.split(" "), *keys)
+        assert_one_clear_line(done, *told.split(" … "))
 
 
 def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:

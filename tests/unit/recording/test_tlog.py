@@ -34,6 +34,8 @@ from mav_tasks.settings import Recording, Settings
 from tests.kit.processes import wait_until
 
 ROVER, SERVER, GCS, OUR_OWN = Address(1, 1), Address(1, 191), Address(255, 190), Address(250, 191)
+#: a heartbeat in MAVLink 1
+OLD = bytes.fromhex("fe0909010100000000000a0300040301a4")
 OFFSET = 1_763_726_400.0  # UTC - monotonic
 LINKS: list[Input] = [
     LinkChanged("rovers", LinkSide.VEHICLES, up=True),
@@ -93,9 +95,10 @@ def told(folder: Path) -> list[tuple[float, str, tuple[int, int], int]]:
 
 def test_each_packet_stands_there_once_at_its_time(tmp_path: Path) -> None:
     tlog = started(tmp_path)
-    came = [packet(heartbeat(), ROVER, 7), packet(attitude(1), ROVER, 8)]
+    came = [packet(heartbeat(), ROVER, 7), packet(attitude(1), ROVER, 8), OLD, OLD[:-1] + b"?"]
     tlog.on_input(Packets("rovers", [("rover", data) for data in came]), now=1.25)
     passed_on = [to_client(packet(attitude(1), ROVER, 30), peer) for peer in ("gcs", "script")]
+    passed_on.append(to_client(OLD))
     shown = to_client(packet(heartbeat(mode=15), ROVER, 31))  # another mode than its own
     tlog.on_output([*passed_on, shown], [], now=1.25)
     asked = packet(m.CommandLong(1, 191, 54000, 0, 1.0, 0, 0, 0, 0, 0, 5), GCS, 3)
@@ -113,6 +116,7 @@ def test_each_packet_stands_there_once_at_its_time(tmp_path: Path) -> None:
     assert told(tmp_path) == [
         (1.25, "HEARTBEAT", ROVER, 7),
         (1.25, "ATTITUDE", ROVER, 8),
+        (1.25, "HEARTBEAT", ROVER, 9),
         (1.5, "COMMAND_LONG", GCS, 3),
         (1.5, "COMMAND_ACK", SERVER, 1),
         (1.5, "COMMAND_ACK", ROVER, 32),
