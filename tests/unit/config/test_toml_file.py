@@ -39,6 +39,7 @@ speed = 1 => 1: speed: no such key; did you mean driving.speed?
 "driving.speed" = 1 => 1: "driving.speed": no such key; did you mean driving.speed?
 [drivin]¶speed = 1 => 1: drivin: no such table; did you mean driving?
 [zzz] => 1: zzz: no such table
+a.b.c.d.e.f.g.h.i.j.k = 1 => 1: a: no such table
 driving = 1 => 1: driving: expected a table, [driving]
 [[driving]]¶speed = 1 => 1: driving: expected a table, [driving]
 [driving.speed]¶x = 1 => 1: driving.speed = { "x" = 1 }: not a number: 0.05..10 m/s

@@ -275,8 +275,9 @@ unreadable header: no time | 1 | {"now": "noon"} | []
 def edited(row: str, lines: list[Any]) -> list[Any]:
     """Return the lines of a record, changed as a row of BAD_LINES says."""
     _, count, change, more = row.split(" | ")
-    first = [line | loads(change) for line in lines[: int(count)][:1]]
-    return [*first, *lines[: int(count)][1:], *loads(more)]
+    kept = lines[: int(count)]
+    kept[:1] = [line | loads(change) for line in kept[:1]]
+    return [*kept, *loads(more)]
 
 
 def test_what_this_version_cannot_read_is_said_in_one_line(whole: Path) -> None:

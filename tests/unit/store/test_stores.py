@@ -297,6 +297,17 @@ def test_a_file_of_the_first_version_is_read_and_brought_up_to_date(tmp_path: Pa
     assert ([task.id for task in found.tasks], found.paused) == ([1], {1: R.STOPPED})
 
 
+def test_a_task_of_a_version_with_fewer_fields_is_read(tmp_path: Path) -> None:
+    place = str(tmp_path / "tasks.sqlite3")
+    with opened(place) as store:
+        keep(store, submitted(1))
+    with tables(place) as older:
+        older.execute("UPDATE formats SET names = json_remove(names, '$.TaskSubmitted[#-2]')")
+        older.execute("UPDATE tasks SET submitted = json_remove(submitted, '$[#-2]')")
+    with opened(place) as store:
+        assert loaded(store).tasks == (submitted(1).task,)
+
+
 def test_a_store_in_postgresql_says_which_package_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in sys.modules if name.startswith("mav_tasks.store.postgres")]:
         monkeypatch.delitem(sys.modules, name)
