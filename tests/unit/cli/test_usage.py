@@ -72,7 +72,7 @@ log --store ~nobody.there/x: store ~nobody.there/x
 log --store postgresql://host:no/x: the port is a number
 log --store postgresql://host/x?colour=red: invalid URI query parameter
 log --store postgresql://a:b/c@host/x: write %40 for @
-log --store postgresql://HOST/x: the host's name is not valid
+log --store postgres://aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa/x: not valid
 log --store postgresql://a:secret@nowhere.invalid/x: store postgresql://a@nowhere.invalid/x: failed
 log --store postgresql://nowhere.invalid/x: check the host's name in the URL
 log --store postgresql://127.0.0.1:9/x: is the server running there?
@@ -102,7 +102,6 @@ def test_each_option_is_understood_or_named_in_one_line(tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.touch(0o600)
     others = OTHERS.replace("FILE", str(file)).replace("FOLDER", str(tmp_path))
-    others = others.replace("//HOST", f"//{'a' * 70}")
     cases: dict[tuple[str, ...], str] = {
         **{("submit", "move", "1", "--in", text): words for text, words in DURATIONS.items()},
         **{("submit", "move", "1", "--at", text): words for text, words in MOMENTS.items()},
