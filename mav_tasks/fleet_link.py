@@ -69,8 +69,7 @@ class FleetLink:
 
     def send(self, peer: Peer, data: bytes, *, first: bool = False) -> None:
         """Send a packet on its way to another gateway, or back to one; never block."""
-        if not isinstance(peer, tuple):
-            return
+        assert isinstance(peer, tuple), "as this link and the engine make it"
         *way, gateway, number = peer
         kind, waited = _BACK, 0.0
         if way == [TOWARDS]:

@@ -154,10 +154,10 @@ class Runner:
         *,
         clients: Sequence[Link],
         vehicles: Sequence[Link],
+        reload: Reload,
+        keys: Keys,
         observers: Sequence[EngineObserver] = (),
-        reload: Reload | None = None,
         policies: Mapping[str, LinkPolicy] | None = None,
-        keys: Keys | None = None,
         lease: Lease | None = None,
         clock: Callable[[], float] = boot_time,
     ) -> None:
@@ -183,7 +183,7 @@ class Runner:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._due = inf  # when the timer fires, in the engine's time
-        self._reader: LinkReader | None = None
+        self._reader = LinkReader(self._sides, clock=clock, note=self._note)
         self._ran_at = inf  # when the last callback began
         self._over: asyncio.Future[int] | None = None
         #: s to handle a datagram of a link and send the results: longer with many clients
@@ -203,8 +203,9 @@ class Runner:
         for number in (signal.SIGINT, signal.SIGTERM):
             self._loop.add_signal_handler(number, self._on_signal)
         try:
-            if self._keys is not None:
-                self._begin_keys(self._keys)
+            if self._keys.keys is not None:
+                self._put_keys(self._keys.keys)
+            self._keys.begin(self._put_keys)
             for link, side in self._sides:
                 policy = self._policies.get(link.name, TAKES_ALL)
                 self._guarded(link_changed(link, side, policy))
@@ -212,19 +213,17 @@ class Runner:
                     is_heard = partial(self._pump.engine.has_heard, link.name)
                     is_signed = not policy.takes_unsigned
                     link.watch(is_heard, has_packet=has_packet, is_signed=is_signed)
-            self._reader = LinkReader(self._sides, clock=self._clock, note=self._note)
             for link, _ in self._sides:
-                self._loop.add_reader(link.fileno(), self._on_readable, self._reader)
+                self._loop.add_reader(link.fileno(), self._on_readable)
             if self._store_fd is not None:
                 self._loop.add_reader(self._store_fd, self._on_stored)
             if self._lease is not None and (lease_fd := self._lease.fileno()) is not None:
                 self._loop.add_reader(lease_fd, self._on_lease, self._lease)
                 self._hear(self._lease, self._loop)
             self._tend(self._loop)
-            if self._reload is not None:
-                self._loop.add_signal_handler(signal.SIGHUP, self._on_hangup, self._reload)
-                if self._reload.was_asked:
-                    self._reload.begin(self._put)
+            self._loop.add_signal_handler(signal.SIGHUP, self._on_hangup)
+            if self._reload.was_asked:
+                self._reload.begin(self._put)
             return await self._over
         finally:
             if self._store_fd is not None:
@@ -234,37 +233,35 @@ class Runner:
             for link, _ in self._sides:
                 self._loop.remove_reader(link.fileno())
                 link.close()
-            if self._reader is not None:
-                self._reader.close()
-            if self._keys is not None:
-                self._keys.close()
+            self._reader.close()
+            self._keys.close()
             self._close_store()
             self._pump.close()
 
-    def _on_readable(self, reader: LinkReader) -> None:
+    def _on_readable(self) -> None:
         """Read all readable links together, so that the order of callbacks does not matter."""
         self._wake()
-        clients, vehicles = reader.readable()
+        clients, vehicles = self._reader.readable()
         if clients:
-            self._take_in(reader, clients)
+            self._take_in(clients)
         for link in vehicles:
-            self._take_in(reader, [link])
-        reader.note_gone()
+            self._take_in([link])
+        self._reader.note_gone()
         if self._streams:  # they have no stamps
-            reader.look()
+            self._reader.look()
 
     def _wake(self) -> None:
         """Check whether this process has stalled: if so, handle the backlog first."""
         now, before = self._clock(), self._ran_at
         self._ran_at = now
-        if self._reader is None or now - before <= STOOD_STILL:
+        if now - before <= STOOD_STILL:
             return
         self._due = inf  # the timer must be set again: the loop's clock stood still while suspended
         packets = self._reader.read_late(before)
         self._guarded(AtOnce(packets) if packets else None)
         self._reader.note_gone()
 
-    def _take_in(self, reader: LinkReader, links: Sequence[Link]) -> None:
+    def _take_in(self, links: Sequence[Link]) -> None:
         """Handle a share of what these links have, so that no setpoint waits for all of it.
 
         The rest stays in the kernel until the next turn, which is at once.
@@ -274,7 +271,7 @@ class Runner:
             return
         began = self._clock()
         room = max(self._due - began, TURN) / sum(self._each_takes[link.name] for link in links)
-        packets = reader.read(links, max(1, int(min(room, DRAIN))))
+        packets = self._reader.read(links, max(1, int(min(room, DRAIN))))
         if not packets:
             return
         self._guarded(AtOnce(packets) if len(packets) > 1 else packets[0])
@@ -304,8 +301,7 @@ class Runner:
         for link in self._streams:
             link.poll()
             self._note(link, link.take_changes())
-        if self._reader is not None:
-            self._reader.look()
+        self._reader.look()
 
     def _hear(self, lease: Lease, loop: asyncio.AbstractEventLoop) -> None:
         """Report to the fleet which vehicles are heard, again and again."""
@@ -349,19 +345,19 @@ class Runner:
             self._loop.add_signal_handler(number, self._leave_at_once)
         self._guarded(Shutdown())
 
-    def _on_hangup(self, reload: Reload) -> None:
+    def _on_hangup(self) -> None:
         """Read the settings again; if the terminal is gone, shut down instead."""
         assert self._loop is not None
         if self._terminals:  # SIGHUP may come a moment before the terminal is gone
-            self._loop.call_later(HANGUP, self._end_or_begin, reload)
+            self._loop.call_later(HANGUP, self._end_or_begin)
         else:
-            reload.begin(self._put)
+            self._reload.begin(self._put)
 
-    def _end_or_begin(self, reload: Reload) -> None:
+    def _end_or_begin(self) -> None:
         if self._is_ending:  # kernel and shell both send SIGHUP when a terminal closes
             return
         if all(map(os.isatty, self._terminals)):
-            reload.begin(self._put)
+            self._reload.begin(self._put)
         else:
             self._on_signal()
 
@@ -374,13 +370,8 @@ class Runner:
                 log.warning("parameter of an earlier run ignored: %s", why)
         return self._pump.engine.parameters
 
-    def _begin_keys(self, keys: Keys) -> None:
-        """Give the engine the keys before its first packet, and later their changes."""
-        if keys.keys is not None:
-            self._put_keys(keys.keys)
-        keys.begin(self._put_keys)
-
     def _put_keys(self, keys: tuple[Key, ...]) -> None:
+        """Give the engine the keys, before its first packet and when they change."""
         self._guarded(KeysChanged(keys))
 
     def _leave_at_once(self) -> None:

@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from mav_tasks.metrics.endpoint import Endpoint
 
 
-def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
+def serve(settings: ServerSettings, *, reload: Reload) -> int:
     """Run a server until a signal; return the exit code. Raise UsageError if it cannot start.
 
-    With ``reload``, SIGHUP reads the configuration again.
+    SIGHUP reads the configuration again, by ``reload``.
     """
     code = _serve(settings, reload)
     while code == EVICTED:
@@ -61,7 +61,7 @@ def serve(settings: ServerSettings, *, reload: Reload | None = None) -> int:
     return code
 
 
-def _serve_again(settings: ServerSettings, reload: Reload | None) -> int:
+def _serve_again(settings: ServerSettings, reload: Reload) -> int:
     """Serve once the fleet's database can be used: no fault of it ends a gateway that served."""
     from mav_tasks.gateway import check_database  # noqa: PLC0415  # needs an extra
 
@@ -79,7 +79,7 @@ def _serve_again(settings: ServerSettings, reload: Reload | None) -> int:
         time.sleep(AGAIN)
 
 
-def _serve(settings: ServerSettings, reload: Reload | None) -> int:
+def _serve(settings: ServerSettings, reload: Reload) -> int:
     """Run a server until a signal, or until its fleet has ended its lease (EVICTED)."""
     links = settings.links
     for _, fault in faults_of(links):
@@ -87,8 +87,7 @@ def _serve(settings: ServerSettings, reload: Reload | None) -> int:
     asked, pushing = links_of(links), pushing_url(links)
     pushed = pushed_to(links)
     _take_signals()
-    if reload is not None:
-        signal.signal(signal.SIGHUP, reload.note)
+    signal.signal(signal.SIGHUP, reload.note)
     say = partial(_say, as_json=settings.log.format == "json")
     with ExitStack() as opened:
         opened.enter_context(log_to_stderr(settings.log))
@@ -113,7 +112,7 @@ def _serve(settings: ServerSettings, reload: Reload | None) -> int:
         opened.callback(store.close)
         note_latest(store.place)
         restored = store.load()
-        if reload is not None and reload.file is not None:
+        if reload.file is not None:
             say(f"configuration {reload.file}")
         if keys.keys is not None:
             usable = sum(1 for key in keys.keys if key.secret)
@@ -231,7 +230,7 @@ async def _run(
     restored: Restored | None,
     clients: Sequence[Link],
     vehicles: Sequence[Link],
-    reload: Reload | None,
+    reload: Reload,
     keys: RingWatch,
     say: Callable[[str], None],
     metrics: "Endpoint | None",

@@ -10,7 +10,6 @@ Each gateway has a channel of its own, and all have one in common. PostgreSQL no
 database only, so fleets in two databases never meet. ``mav_tasks.fleet.exchange`` has the rules.
 """
 
-import re
 import secrets
 import select
 from contextlib import closing
@@ -35,7 +34,6 @@ RETRY = 0.2  # s from a failure to connect to the next attempt
 CLOSE_LIMIT = 0.5  # s for what still waits, at the end
 LIMITS = Limits(answer=1.0, statement=1.0, lock=1.0, in_transaction=1.0, sending=1.0)
 
-_NAME = re.compile(r"[A-Za-z0-9._-]{1,40}")
 _NOTIFY = (
     "SELECT count(pg_notify(channel, payload))"
     " FROM unnest(?::text[], ?::text[]) AS notification (channel, payload)"
@@ -50,9 +48,10 @@ class Carrier:
     """
 
     def __init__(self, address: Address, name: str) -> None:
-        """Begin, as the gateway of this name, in a database that has the tables of a fleet."""
-        if not _NAME.fullmatch(name):
-            raise ValueError(f"gateway {name!r}: a name has up to 40 letters, digits, dots, - or _")
+        """Begin, as the gateway of this name, in a database that has the tables of a fleet.
+
+        ``name``: one that ``Keeper`` has taken.
+        """
         self._address = address
         self._name = name
         self._outbox = SharedOutbox()
@@ -88,23 +87,19 @@ class Carrier:
             it.refused,
         )
 
-    def send(
-        self, to: str, payload: bytes, *, first: bool = False, until: float | None = None
-    ) -> None:
+    def send(self, to: str, payload: bytes, *, first: bool = False) -> None:
         """Send a datagram (up to 400 bytes) to the gateway of a name; "": to all others.
 
-        It leaves in the order of ``send``, but before all others if it is ``first``, and until
-        ``until`` (boot_time) or not at all: by default 0.5 s, and 1 s if it is first. Those that
-        are first are sent again after a lost connection, and may arrive twice; without a connection
-        they wait until there is one, whatever ``until`` says. Once they have left
-        they are delivered, however late; ``waited`` tells. Others must also arrive until ``until``.
+        It leaves in the order of ``send``, but before all others if it is ``first``, and within
+        0.5 s or not at all, 1 s if it is first. Those that are first are sent again after a lost
+        connection, and may arrive twice; without a connection they wait until there is one. Once
+        they have left they are delivered, however late; ``waited`` tells. Others must also arrive
+        in that time.
         """
         if len(payload) > LONGEST:
             raise ValueError(f"a datagram of {len(payload)} bytes: it has up to {LONGEST}")
         now = boot_time()
-        if until is None:
-            until = now + (KEPT if first else OF_USE)
-        self._outbox.put(to, Waiting(payload, now, until, first))
+        self._outbox.put(to, Waiting(payload, now, now + (KEPT if first else OF_USE), first))
 
     def take(self, most: float = inf) -> list[Arrived | Trouble]:
         """Return up to ``most`` of what has arrived, in its order, and troubles.

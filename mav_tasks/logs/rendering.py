@@ -158,7 +158,5 @@ def _value(value: Any, name: str, offset: float) -> Any:
     if is_dataclass(value):
         kind = {"kind": type(value).__name__} if type(value) in _CHOICES else {}
         return kind | _values(value, offset)
-    if isinstance(value, tuple):
-        # a plan may have thousands of steps: their number is enough
-        return len(value) if any(map(is_dataclass, value)) else list(value)
-    return value
+    # a plan may have thousands of steps: their number is enough
+    return len(value) if any(map(is_dataclass, value)) else list(value)

@@ -5,7 +5,6 @@ the incomplete packet at the end of a log whose writer was killed, or bytes of a
 programs' logs are read, too, with packets of other dialects and some that have a wrong CRC.
 """
 
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -38,10 +37,8 @@ class Piece(NamedTuple):
 
 
 def pieces(path: Path) -> Iterator[Piece]:
-    """Yield the pieces of a telemetry log; raise RecordError if the file is none."""
+    """Yield the pieces of a file that is no record; raise RecordError if it is no telemetry log."""
     try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise RecordError(f"{path}: not a file")
         with path.open("rb") as file:
             yield from _pieces(path, file)
     except OSError as error:

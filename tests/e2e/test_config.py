@@ -6,8 +6,11 @@ import re
 import signal
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
+from mav_tasks.store import open_store
+from mav_tasks.tasks.server_events import ParameterSet
 from tests.e2e.test_usage import run
 from tests.kit.processes import (
     Process,
@@ -33,8 +36,13 @@ def test_sighup_changes_what_can_change_while_a_rover_drives(tmp_path: Path) -> 
     path, store = tmp_path / "c.toml", tmp_path / "tasks.sqlite3"
     path.write_text("[driving]\nspeed = 0.4\n", encoding="utf-8")
     options = ("--config", str(path), "--set", "watch.stuck=20")
+    with closing(open_store(str(store))) as earlier:
+        earlier.append([ParameterSet("TSK_QUOTA", -1.0, "a", 1.0)])
     with stand(tmp_path, *options, serve_store=str(store)) as it:
         it.server.wait_for(f"configuration {re.escape(str(path))}\n")
+        it.server.wait_for("parameters of an earlier run: TSK_QUOTA -1")
+        ignored = "mav-tasks: parameter of an earlier run ignored: TSK_QUOTA -1: not in 1..100000\n"
+        it.server.wait_for(ignored)
         client = it.connect()
         it.drive(client, 1.0)
         path.write_text("[driving]\nspeed = 1.2\n[rules]\narming = 'server'\n", encoding="utf-8")
@@ -50,7 +58,7 @@ def test_sighup_changes_what_can_change_while_a_rover_drives(tmp_path: Path) -> 
         client.mav.param_set_send(1, 191, b"TSK_SPEED", 0.9, 9)
         it.server.wait_for("TSK_SPEED")
         shown = run("config", "show", "driving.speed", environment={"MAV_TASKS_STORE": str(store)})
-        assert shown == (0, "driving.speed = 0.9  # m/s, TSK_SPEED, set by a client\n", "")
+        assert shown == (0, "driving.speed = 0.9  # m/s, TSK_SPEED, set by a client\n", ignored)
         it.server.end()
     assert it.server.popen.returncode == 0
 

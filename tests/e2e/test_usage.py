@@ -44,27 +44,33 @@ def test_a_port_in_use_is_named() -> None:
         )
 
 
+LINKS = """--client  => udpin:host:port
+--vehicle tcp:no.such.host.invalid:5760 => no.such.host.invalid
+--client serial:/dev/null:57600 => not a serial device
+--client udpin:0.0.0.0:14560 => --insecure … signing key
+--vehicle udpout:192.0.2.1:14580 => --insecure … signing key
+--push 192.0.2.1:14550 => --insecure … signing key
+--vehicle udpin:127.0.0.1:1?key=carl => no key 'carl' (usable keys: anna, rover)
+--client udpin:127.0.0.1:1?key=ben => key ben was revoked on
+--vehicle udpin:127.0.0.1:1?key=anna => key anna has role safety
+--client udpin:127.0.0.1:1?key=rover => key rover has role vehicle
+--gateway a => --gateway a needs --store postgresql:
+--gateway a --store postgresql://nowhere.invalid/x => check the host's name in the URL
+--gateway a --store postgresql:///x?host=/nowhere => is the server running there?"""
+
+
 def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
     """That of URLs is in tests/unit/links."""
     ring = tmp_path / "keys.toml"
-    for command in (("add", "ben", "--role", "safety"), ("revoke", "ben"), ("add", "anna")):
-        role = ("--role", "safety") if command == ("add", "anna") else ()
-        assert called("keys", *command, *role, "--keys", str(ring)).status == 0
-    near = "udpin:127.0.0.1:1"
-    for option, url, *words in (
-        ("--client", "", "udpin:host:port"),
-        ("--vehicle", "tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
-        ("--client", "serial:/dev/null:57600", "not a serial device"),
-        ("--client", "udpin:0.0.0.0:14560", "--insecure", "signing key"),
-        ("--vehicle", "udpout:192.0.2.1:14580", "--insecure", "signing key"),
-        ("--push", "192.0.2.1:14550", "--insecure", "signing key"),
-        ("--vehicle", f"{near}?key=carl", "no key 'carl' (usable keys: anna)"),
-        ("--client", f"{near}?key=ben", "key ben was revoked on"),
-        ("--vehicle", f"{near}?key=anna", "key anna has role safety"),
-    ):
-        keys = ("--set", f"signing.keys={ring}") if "?key" in url else ()
-        push = () if option == "--push" else ("--no-push",)
-        assert_one_clear_line(run("serve", *push, option, url, *keys), *words)
+    said = "add ben --role safety; revoke ben; add anna --role safety; add rover --role vehicle"
+    for words in said.split("; "):
+        assert called("keys", *words.split(), "--keys", str(ring)).status == 0
+    for row in LINKS.splitlines():
+        arguments, _, told = row.partition(" => ")
+        keys = ("--set", f"signing.keys={ring}") if "?key" in arguments else ()
+        push = () if "--push" in arguments else ("--no-push",)
+        done = run("serve", *push, *arguments.split(" "), *keys)
+        assert_one_clear_line(done, *told.split(" … "))
 
 
 def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:

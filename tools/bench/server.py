@@ -15,10 +15,14 @@ import cProfile
 import json
 import sys
 import time
+from pathlib import Path
 
 from mav_tasks.clock import boot_time
+from mav_tasks.config.configuration import Sources
+from mav_tasks.config.reload import Reload
 from mav_tasks.engine.engine import Engine
 from mav_tasks.engine.inputs import Peer
+from mav_tasks.key_ring.watch import RingWatch
 from mav_tasks.links.udp import UdpLink, UdpUrl
 from mav_tasks.logs.setup import log_to_stderr
 from mav_tasks.mavlink import messages as m
@@ -96,7 +100,16 @@ async def _serve(options: argparse.Namespace, vehicle_link: TimedLink) -> int:
             )
         )
     print(READY, flush=True)
-    runner = Runner(engine, store, clients=clients, vehicles=[vehicle_link], observers=recorders)
+    sources = Sources("", {})
+    runner = Runner(
+        engine,
+        store,
+        clients=clients,
+        vehicles=[vehicle_link],
+        reload=Reload(sources, sources.load()),
+        keys=RingWatch(Path("no ring"), None),
+        observers=recorders,
+    )
     return await runner.run()
 
 

@@ -66,6 +66,21 @@ log --json --csv: choose one of them
 log --task -1: not a valid id
 log --until 2h --follow: choose one of them
 log --store=: path or the URL of a store
+log --store FOLDER/no: does not exist; choose another with --store
+log --store FILE: it is empty
+log --store ~nobody.there/x: store ~nobody.there/x
+log --store postgresql://host:no/x: the port is a number
+log --store postgresql://host/x?colour=red: invalid URI query parameter
+log --store postgresql://a:b/c@host/x: write %40 for @
+log --store postgres://aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa/x: not valid
+log --store postgresql://a:secret@nowhere.invalid/x: store postgresql://a@nowhere.invalid/x: failed
+log --store postgresql://nowhere.invalid/x: check the host's name in the URL
+log --store postgresql://127.0.0.1:9/x: is the server running there?
+log --store postgresql:///x?host=/nowhere: is the server running there?
+log --store mysql://a:sec@ret@x/x?sslpassword=y: store mysql://a@x/x: unknown kind; expected a path
+qgc-actions --install --documents FILE: Not a directory
+export FOLDER --mcap FOLDER/out: not a file
+export FOLDER/no --mcap FOLDER/out: FOLDER/no
 qgc-actions --only: give at least one --action
 mcp --max-queued 3: keys add agent --role submitter --quota 3
 mcp --http 127.0.0.1: expected HOST:PORT
@@ -125,30 +140,32 @@ def test_the_doctor_names_what_is_wrong(tmp_path: Path) -> None:
         assert (done.status, words in done.output) == (1, True), (text, done)
 
 
+#: a ring, ¶ for the end of a line => what is wrong with it
+RINGS = """x = 1 => expected only tables [keys.NAME]
+keys.anna = 1 => :1: expected a table [keys.NAME]
+[keys.anna]¶role = "boss" => :1: key anna: expected a role, one of observer, submitter,
+[keys.anna]¶role = "operator" => :1: key anna: expected a secret, 64 hexadecimal digits
+ANNA"12" => :1: key anna: secret: expected 64 hexadecimal digits
+ANNA"ZEROS" => :1: key anna: secret: all digits are zero
+ANNA"DIGITS"¶colour = 1 => :1: key anna: only role, secret, fingerprint,
+ANNA"DIGITS"¶revoked = 2026-11-21T14:30:00Z => :1: key anna: it was revoked, but still
+ANNA"DIGITS"¶derivation = "magic" => :1: key anna: derivation: expected one of sha256,
+REVOKED¶retired_secret = "ONES" => retired_secret does not match fingerprint
+ANNA"DIGITS"¶[keys.ben]¶role = "safety"¶secret = "DIGITS" => :4: key ben: this secret exists
+ANNA"DIGITS"¶ANNA"DIGITS" => :4: Cannot declare ('keys', 'anna') twice
+[keys.DIGITS] => :1: '…' is not a key name:
+[DIGITS]¶[DIGITS]¶ => :2: Cannot declare ('…',) twice
+LONG => larger than 256 kB"""
 DIGITS = "0123456789abcdef" * 4
-ENTRY = f'[keys.anna]\nrole = "operator"\nsecret = "{DIGITS}"\n'
-REVOKED = """[keys.anna]
-role = "operator"
-fingerprint = "0123456789abcdef"
-revoked = 2026-11-21T14:30:00Z
-"""
-#: a ring -> what is wrong with it
-RINGS = {
-    "x = 1": "expected only tables [keys.NAME]",
-    "keys.anna = 1": ":1: expected a table [keys.NAME]",
-    '[keys.anna]\nrole = "boss"': ":1: key anna: expected a role, one of observer, submitter,",
-    '[keys.anna]\nrole = "operator"': ":1: key anna: expected a secret, 64 hexadecimal digits",
-    ENTRY.replace(DIGITS, "12"): ":1: key anna: secret: expected 64 hexadecimal digits",
-    ENTRY.replace(DIGITS, "0" * 64): ":1: key anna: secret: all digits are zero",
-    f"{ENTRY}colour = 1": ":1: key anna: only role, secret, fingerprint,",
-    f"{ENTRY}revoked = 2026-11-21T14:30:00Z": ":1: key anna: it was revoked, but still",
-    f'{ENTRY}derivation = "magic"': ":1: key anna: derivation: expected one of sha256,",
-    f'{REVOKED}retired_secret = "{"1" * 64}"': "retired_secret does not match fingerprint",
-    f'{ENTRY}[keys.ben]\nrole = "safety"\nsecret = "{DIGITS}"': ":4: key ben: this secret exists",
-    f"{ENTRY}{ENTRY}": ":4: Cannot declare ('keys', 'anna') twice",
-    f"[keys.{DIGITS}]": ":1: '…' is not a key name: ",
-    f"[{DIGITS}]\n[{DIGITS}]\n": ":2: Cannot declare ('…',) twice",
-    "#" * 300_000: "larger than 256 kB",
+SHORT = {
+    "REVOKED": '[keys.anna]¶role = "operator"¶fingerprint = "0123456789abcdef"¶'
+    "revoked = 2026-11-21T14:30:00Z",
+    "ANNA": '[keys.anna]¶role = "operator"¶secret = ',
+    "DIGITS": DIGITS,
+    "ZEROS": "0" * 64,
+    "ONES": "1" * 64,
+    "LONG": "#" * 300_000,
+    "¶": "\n",
 }
 
 
@@ -156,7 +173,10 @@ def test_a_fault_of_a_key_ring_is_named_with_its_line_and_no_secret(tmp_path: Pa
     ring = tmp_path / "keys.toml"
     ring.touch(0o600)
     wrong = []
-    for text, words in RINGS.items():
+    for row in RINGS.splitlines():
+        text, words = row.split(" => ")
+        for short, long in SHORT.items():
+            text = text.replace(short, long)
         ring.write_text(text, encoding="utf-8")
         done = called("keys", "list", "--keys", str(ring))
         told = done.output + done.error

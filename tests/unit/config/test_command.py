@@ -73,6 +73,10 @@ def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) ->
     assert re.search(r"^queueing\.quota = 7 +# MAV_TASKS_QUEUEING_QUOTA$", output, re.MULTILINE)
     assert re.search(r"^store\.path = \":memory:\" +# MAV_TASKS_STORE$", output, re.MULTILINE)
     assert re.search(r"^driving\.max_speed = 2 +# m/s, default$", output, re.MULTILINE)
+    for store in (tmp_path, tmp_path, path, "~nobody.there/x"):
+        done = run("config", "show", environment={"MAV_TASKS_STORE": str(store)})
+        assert f"parameters set by clients are not shown: store {store}: " in done[2]
+        Path(f"{tmp_path}-wal").touch()
     again.write_text(output, encoding="utf-8")
     assert run("config", "check", str(again)) == (0, "ok\n", "")
     code, output, _ = run(

@@ -38,7 +38,8 @@ STILL = 'WARNING rules.arming: "auto" -> "server" needs a restart: still "auto"'
                 NOT_APPLIED,
                 "ERROR configuration: FILE: No such file or directory",
                 NOT_APPLIED,
-                "INFO configuration: reloaded, no changes",
+                "WARNING configuration: still reloading; it will be read once more",
+                *["INFO configuration: reloaded, no changes"] * 2,
             ],
             [],
         ),
@@ -93,8 +94,10 @@ def test_what_can_change_is_in_force_and_the_rest_says_that_it_is_not(
             if text is not None:
                 path.write_text(text, encoding="utf-8")
             before, turns = len(caplog.records), 0
-            reload.begin(take)
-            while len(caplog.records) == before and turns < 40:
+            is_twice = text == ""
+            for _ in range(1 + is_twice):
+                reload.begin(take)
+            while len(caplog.records) <= before + 2 * is_twice and turns < 40:
                 await asyncio.sleep(0.05)
                 turns += 1
             path.touch()

@@ -30,8 +30,10 @@ WAY = GoTo(GlobalPlace(470_000_000, 80_000_000), speed=0.5)
 EXECUTING, PAUSED = TaskState.EXECUTING, TaskState.PAUSED
 
 
-def submitted(goal: Goal, number: int, label: str = "") -> e.TaskSubmitted:
-    terms = Terms(deadline=AT + 60, label=label)
+def submitted(
+    goal: Goal, number: int, label: str = "", deadline: float = AT + 60
+) -> e.TaskSubmitted:
+    terms = Terms(deadline=deadline, label=label)
     task = Task(TaskId(number), 1, 54000, goal, SOMEBODY, Marks(number), AT, terms)
     return e.TaskSubmitted(task, AT)
 
@@ -49,7 +51,7 @@ HOME = Frame(None, None, AT - 50)
 SAMPLES: list[tuple[e.Event, str]] = [
     (submitted(Move(3.0), 17), '"task": 17, "actor": "SOMEBODY", "state": "queued"'),
     (submitted(Drive(0.5, 0.25, 2.0), 18), '"task": 18'),
-    (submitted(Plan((Wait(1.0), WAY), "source"), 19, "patrol"), '"task": 19'),
+    (submitted(Plan((Wait(1.0), WAY), "source"), 19, "patrol", 1e300), '"task": 19'),
     (
         changed(PAUSED, TaskReason.LINK_LOST),
         '"task": 17, "old": "executing", "new": "paused", "reason": "link_lost"',
@@ -143,7 +145,8 @@ def test_every_kind_is_an_object_with_its_values_and_words(log: Callable[..., li
         assert told["message"] == WORDS.get(number, str(event))
         of_none = ParameterSet | e.ServerStopped | SignatureRefused
         assert "vehicle" in told or isinstance(event, of_none)
-    assert found[0]["terms"]["deadline"] == "2026-11-21T10:01:00.250Z"
+    deadlines = [each["terms"]["deadline"] for each in found[:3]]
+    assert deadlines == [*["2026-11-21T10:01:00.250Z"] * 2, None]
     assert found[1]["goal"] == {"kind": "Drive", "forward": 0.5, "yaw_rate": 0.25, "duration": 2.0}
     assert (found[2]["goal"]["kind"], found[2]["goal"]["steps"]) == ("Plan", 2)
 

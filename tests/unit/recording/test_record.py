@@ -8,6 +8,7 @@ import tracemalloc
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from json import dumps, loads
 from math import inf, nan
 from pathlib import Path
@@ -252,35 +253,37 @@ def test_a_record_cut_anywhere_is_replayed_as_far_as_it_goes(whole: Path) -> Non
         assert "same" in words.splitlines()[-1]
 
 
-def with_tasks(first: dict[str, Any]) -> dict[str, Any]:
-    return {**first, "restored": {"tasks": 1}}
+#: what is said | how many lines are kept | what changes in the first | lines after those
+BAD_LINES = r"""is unreadable | -1 | {} | [["packets", 9.0, "x", [["y"]]]]
+datagrams | 2 | {} | [["packets", 1.0, "x", [["y", "MQ=="]], [0.5, 0.5]]]
+'melody' is unknown | -1 | {} | [["melody", 9.0]]
+Settings.colour is unknown | 1 | {"settings": {"colour": "red"}} | []
+its format is 2; this version reads 3 | 0 | {} | [{"mav-tasks record": 2}]
+recorded by version 0.0.1, whose events have another | 1 | {"rows": {}, "version": "0.0.1"} | []
+line 2 is not a task | 1 | {"restored": {"tasks": 1}} | [["deadline", 1.0]]
+line 2 is unreadable | 1 | {} | [["link", "now"]]
+not a record of decisions | 0 | {} | [[1, 2, 3]]
+no peer | 2 | {} | [["peer", 1.0, "x", 0.5, true]]
+line 2 is unreadable: not | 1 | {} | [["out", 1.0]]
+unreadable tasks | 1 | {"restored": {"tasks": 1}} | [["task", [1]]]
+ends before the run began | 1 | {"restored": {"tasks": 1}} | []
+unreadable header: no words | 1 | {"version": "\u001b[31m1"} | []
+unreadable header: no time | 1 | {"now": "noon"} | []
+ is not a valid end mark | -1 | {} | [["end", "\u001b[31m", 1, ""]]"""
 
 
-BAD_LINES: dict[str, Callable[[list[Any]], list[Any]]] = {
-    "is unreadable": lambda lines: [*lines[:-1], ["packets", 9.0, "x", [["y"]]]],
-    "datagrams": lambda lines: [*lines[:2], ["packets", 1.0, "x", [["y", "MQ=="]], [0.5, 0.5]]],
-    "'melody' is unknown": lambda lines: [*lines[:-1], ["melody", 9.0]],
-    "Settings.colour is unknown": lambda lines: [{**lines[0], "settings": {"colour": "red"}}],
-    "its format is 2; this version reads 3": lambda lines: [{"mav-tasks record": 2}],
-    "recorded by version 0.0.1, whose events have another format": lambda lines: [
-        {**lines[0], "rows": {}, "version": "0.0.1"}
-    ],
-    "line 2 is not a task": lambda lines: [with_tasks(lines[0]), ["deadline", 1.0]],
-    "line 2 is unreadable": lambda lines: [lines[0], ["link", "now"]],
-    "not a record of decisions": lambda lines: [[1, 2, 3]],
-    "no peer": lambda lines: [*lines[:2], ["peer", 1.0, "x", 0.5, True]],
-    "line 2 is unreadable: not": lambda lines: [lines[0], ["out", 1.0]],
-    "unreadable tasks": lambda lines: [with_tasks(lines[0]), ["task", [1]]],
-    "ends before the run began": lambda lines: [with_tasks(lines[0])],
-    "unreadable header: no words": lambda lines: [{**lines[0], "version": "\x1b[31m1"}],
-    "unreadable header: no time": lambda lines: [{**lines[0], "now": "noon"}],
-    " is not a valid end mark": lambda lines: [*lines[:-1], ["end", "\x1b[31m", 1, ""]],
-}
+def edited(row: str, lines: list[Any]) -> list[Any]:
+    """Return the lines of a record, changed as a row of BAD_LINES says."""
+    _, count, change, more = row.split(" | ")
+    kept = lines[: int(count)]
+    kept[:1] = [line | loads(change) for line in kept[:1]]
+    return [*kept, *loads(more)]
 
 
 def test_what_this_version_cannot_read_is_said_in_one_line(whole: Path) -> None:
-    for words, change in BAD_LINES.items():
-        path = changed(whole, change)
+    for row in BAD_LINES.splitlines():
+        words = row.partition(" | ")[0]
+        path = changed(whole, partial(edited, row))
         result = CliRunner().invoke(app, ["replay", "--quiet", str(path)])
         assert isinstance(result.exception, RecordError), words
         told = str(result.exception)

@@ -172,19 +172,22 @@ def another_file(path: Path) -> None:
     path.parent.write_text("not a folder", encoding="ascii")
 
 
+EDITED = """UPDATE tasks SET submitted = '[1, 2]' => its contents are invalid
+UPDATE tasks SET submitted = 'x' => it is damaged (expecting value
+UPDATE tasks SET submitted = replace(submitted, 'Move', 'Dance') => 'dance'
+UPDATE formats SET names = '{}' => has another format
+INSERT INTO vehicles (vehicle, paused) VALUES (1, 999) => it is damaged (999
+DROP TABLE plans => no such table: plans
+DROP TABLE writer => a table has lost its row"""
+
+
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
         (no_database, "not a database"),
         (truncated, "damaged"),
         (damaged, "damaged"),
-        ("UPDATE tasks SET submitted = '[1, 2]'", "its contents are invalid"),
-        ("UPDATE tasks SET submitted = 'x'", "it is damaged (expecting value"),
-        ("UPDATE tasks SET submitted = replace(submitted, 'Move', 'Dance')", "'dance'"),
-        ("UPDATE formats SET names = '{}'", "has another format"),
-        ("INSERT INTO vehicles (vehicle, paused) VALUES (1, 999)", "it is damaged (999"),
-        ("DROP TABLE plans", "no such table: plans"),
-        ("DROP TABLE writer", "a table has lost its row"),
+        *(row.split(" => ") for row in EDITED.splitlines()),
         (of_a_newer_version, "newer version"),
         (of_another_program, "another program"),
         (Path.mkdir, "directory"),

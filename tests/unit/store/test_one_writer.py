@@ -17,7 +17,15 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.errors import StoreError
-from tests.unit.store.samples import PATIENCE, loaded, opened, submitted, wait_for, wait_for_failure
+from tests.kit.databases import tables
+from tests.unit.store.samples import (
+    PATIENCE,
+    loaded,
+    opened,
+    submitted,
+    wait_for,
+    wait_for_failure,
+)
 from tests.unit.store.test_failures import ROOT, child, kept, line
 
 SOME = 30  # tasks
@@ -176,6 +184,22 @@ def test_a_server_that_has_nothing_to_write_notices_it_too(path: Path) -> None:
         away.rename(path)
         store.append([submitted(1)])
         wait_for(store, 1)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        ("writer SET epoch = epoch + 1", "has taken the store over"),
+        ("meta SET last_number = 99", "another file was copied over it"),
+    ],
+)
+def test_a_server_after_which_another_has_written_says_so(
+    path: Path, spoil: str, words: str
+) -> None:
+    with opened(path) as store, tables(str(path)) as other:
+        other.execute(f"UPDATE {spoil}")
+        store.append([submitted(1)])
+        assert words in wait_for_failure(store).text
 
 
 def test_what_was_copied_over_it_is_left_as_it_is(path: Path) -> None:

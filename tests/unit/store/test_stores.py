@@ -1,5 +1,6 @@
 """What every durable store does, on each kind of database."""
 
+import sys
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -32,7 +33,7 @@ from mav_tasks.tasks.events import (
 from mav_tasks.tasks.goal import Goal
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
-from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen
+from mav_tasks.tasks.server_events import ParameterSet, SignaturesSeen, SignatureTime
 from mav_tasks.tasks.task import MAX_TASK_ID, Pose, Progress, TaskId, Terms
 from tests.kit.databases import locked, tables
 from tests.unit.store.samples import (
@@ -52,6 +53,7 @@ from tests.unit.store.samples import (
 st.register_type_strategy(float, st.integers(-(2**20), 2**20).map(lambda n: n / 8))
 st.register_type_strategy(int, st.integers(0, 2**20))
 st.register_type_strategy(str, st.text(st.characters(min_codepoint=32, max_codepoint=0x2FFF)))
+FIRST, SECOND = (SignatureTime("key", link, 1, 1, 7) for link in (0, 1))
 #: the others only change what the next life knows
 JOURNALLED = [each for each in get_args(Event) if each not in (TaskProgressed, SignaturesSeen)]
 
@@ -155,6 +157,7 @@ def test_what_is_known_of_vehicles_comes_back(place: str) -> None:
         ParameterSet("TSK_SPEED", 0.8, "client", 5.0),
         ParameterSet("TSK_QUOTA", 20.0, "client", 5.0),
         ParameterSet("TSK_QUOTA", None, "client", 6.0),
+        SignaturesSeen((FIRST, SECOND), (), 9, 6.0),
         ServerStopped((1, 2), 7.0),
     ]
     with opened(place) as store:
@@ -166,6 +169,9 @@ def test_what_is_known_of_vehicles_comes_back(place: str) -> None:
         assert found.plans == {(1, 0): (17, "items")}
         assert found.parameters == {"TSK_SPEED": 0.8}
         assert list(store.journal())[-1] == (len(events), events[-1])
+        store.append([SignaturesSeen((), (replace(FIRST, timestamp=0),), 9, 8.0)])
+    with opened(place) as store:
+        assert loaded(store).signatures == (SECOND,)
 
 
 def test_times_are_those_of_the_process_that_loads(place: str) -> None:
@@ -197,7 +203,7 @@ def test_retention_takes_the_oldest_that_are_over_and_their_events(place: str) -
     for number in range(1, 501):
         task = submitted(number, at=now - 10_000).task
         events.append(changed(task, S.CANCELLED, at=now - 6000 + 10 * number)[1])
-    events += [VehicleSeen(1, "old", now - 7000), VehicleSeen(1, "new", now - 5)]
+    events += [VehicleSeen(1, "old", now - 7000)] * 2_001 + [VehicleSeen(1, "new", now - 5)]
     with opened(place) as store:
         store.append(events)
     for retention, first in (
@@ -291,16 +297,23 @@ def test_a_file_of_the_first_version_is_read_and_brought_up_to_date(tmp_path: Pa
     assert ([task.id for task in found.tasks], found.paused) == ([1], {1: R.STOPPED})
 
 
-def test_a_place_of_an_unknown_kind_is_no_path_and_its_password_is_not_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(StoreError) as told:
-        open_store("mysql://anna:sec@ret@host/fleet?sslpassword=other")
-    assert str(told.value).startswith(
-        "store mysql://anna@host/fleet: unknown kind; expected a path"
-    )
-    assert list(tmp_path.iterdir()) == []
+def test_a_task_of_a_version_with_fewer_fields_is_read(tmp_path: Path) -> None:
+    place = str(tmp_path / "tasks.sqlite3")
+    with opened(place) as store:
+        keep(store, submitted(1))
+    with tables(place) as older:
+        older.execute("UPDATE formats SET names = json_remove(names, '$.TaskSubmitted[#-2]')")
+        older.execute("UPDATE tasks SET submitted = json_remove(submitted, '$[#-2]')")
+    with opened(place) as store:
+        assert loaded(store).tasks == (submitted(1).task,)
+
+
+def test_a_store_in_postgresql_says_which_package_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith("mav_tasks.store.postgres")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "psycopg", None)  # an import of it fails
+    with pytest.raises(StoreError, match=r"^store postgresql://anna@host/x: needs the package psy"):
+        open_store("postgresql://anna:secret@host/x")
 
 
 def test_a_store_in_memory_keeps_the_order_and_no_state_over_runs() -> None:
@@ -309,5 +322,7 @@ def test_a_store_in_memory_keeps_the_order_and_no_state_over_runs() -> None:
         events = cancelled(1, at=1.0)
         assert keep(store, *events)[-1] == Kept(2)
         assert list(store.journal()) == list(enumerate(events, 1))
+        store.append(events * 100_000)
+        assert [number for number, _ in store.journal()] == list(range(100_003, 200_003))
     with pytest.raises(StoreError, match="no journal"):
         kind_of(":memory:").open_journal(":memory:", Which())

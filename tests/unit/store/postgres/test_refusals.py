@@ -9,8 +9,8 @@ import pytest
 
 from mav_tasks.errors import StoreError
 from mav_tasks.store import Which, kind_of
+from tests.kit.databases import foreign, tables
 from tests.kit.postgres import PostgresServer
-from tests.kit.processes import free_tcp_ports
 from tests.unit.store.postgres.gateways import Gateway
 from tests.unit.store.samples import loaded, opened, submitted, wait_for
 
@@ -37,18 +37,6 @@ def role(server: PostgresServer, name: str, options: str = "") -> Iterator[str]:
 
 def name_of(url: str) -> str:
     return url.rpartition("/")[2]
-
-
-def test_an_unknown_host() -> None:
-    text = refusal("postgresql://anna:secret@nowhere.invalid/fleet")
-    assert text.startswith("store postgresql://anna@nowhere.invalid/fleet: failed to resolve host")
-    assert text.endswith("check the host's name in the URL")
-
-
-def test_nobody_listens() -> None:
-    (port,) = free_tcp_ports(1)
-    assert "is the server running there?" in refusal(f"postgresql://127.0.0.1:{port}/fleet")
-    assert "is the server running there?" in refusal("postgresql:///fleet?host=/nowhere/at/all")
 
 
 def test_a_database_and_a_role_that_do_not_exist(postgres: PostgresServer) -> None:
@@ -91,6 +79,7 @@ def test_each_right_that_a_role_lacks_is_named(postgres: PostgresServer) -> None
         def sql(statement: str) -> None:
             postgres.execute(f"{statement} {name}", database=name_of(url))
 
+        assert "may not create the schema mav_tasks: GRANT CREATE ON DATABASE" in refusal(theirs)
         postgres.execute("CREATE SCHEMA mav_tasks", database=name_of(url))
         sql("GRANT USAGE ON SCHEMA mav_tasks TO")
         assert "lacks CREATE on the schema: GRANT CREATE ON SCHEMA" in refusal(theirs)
@@ -115,6 +104,30 @@ def test_each_right_that_a_role_lacks_is_named(postgres: PostgresServer) -> None
         with opened(theirs) as store:
             store.append([submitted(1)])
             wait_for(store, 1)
+        postgres.execute("DELETE FROM mav_tasks.versions WHERE version > 3", database=name_of(url))
+        assert "must be converted by the role that owns its tables" in refusal(theirs)
+
+
+def test_a_database_without_a_store_of_ours_is_not_read(
+    postgres: PostgresServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url, other = postgres.new_database(), postgres.new_database()
+    foreign(other)
+    for place, words in ((url, "no store in it yet"), (other, "tables of another program")):
+        with pytest.raises(StoreError, match=words):
+            kind_of(place).open_journal(place, Which())
+    assert "tables of another program" in refusal(other)
+    with tables(url) as first:  # a server that is about to make the tables
+        first.execute(f"SELECT pg_advisory_lock({0x4D565453_00000001})")
+        assert "in use by another server" in refusal(url)
+        first.execute("SELECT pg_advisory_unlock_all()")
+        opened(url).__enter__().close()
+        first.execute("DELETE FROM writer")
+        assert "a table has lost its row" in refusal(url)
+        first.execute("DELETE FROM meta")
+        assert "its table meta is empty" in refusal(url)
+    monkeypatch.setenv("XDG_DATA_HOME", "/dev/null")
+    assert "/dev/null/mav-tasks cannot be created" in refusal(postgres.new_database())
 
 
 def test_a_database_of_a_newer_version(postgres: PostgresServer) -> None:
