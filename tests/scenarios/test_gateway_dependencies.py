@@ -150,6 +150,6 @@ b> TASK_MOVE 1 to=second & NAV_WAYPOINT at=3,0 to=second frame=0 : ACCEPTED+ACCE
     ):
         pair.mend(here, A)
         pair.cut(there, A)
-        pair.until(lambda: pair.holder(A) is pair.gateways[here], within=20)
-        pair.run(5.0)
+        pair.run(20.0)
+        assert pair.database.holder(A) == here
         check(pair, rows, b=near)

@@ -565,6 +565,16 @@ TASK_MODIFY 1 4 2 : ACCEPTED
 RESTART
 wait 4 & DO_PAUSE_CONTINUE 1 & wait 9 : ACCEPTED Task 2 done / Task 1 started
 """,
+        """
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+TASK_MOVE 1 0 0 77 : ACCEPTED #1
+TASK_MOVE 2 : ACCEPTED #2
+RESTART
+TASK_MOVE 1 0 0 77 : ACCEPTED #1
+TASK_MOVE 3 0 0 77 : DENIED nonce 77 was used for another task
+TASK_MOVE 2 confirmation=1 : ACCEPTED #2
+TASK_MOVE 4 : ACCEPTED #3
+""",
     ],
 )
 def test_requests_after_a_crash(make_world: MakeWorld, path: Path, table: str) -> None:

@@ -188,27 +188,6 @@ def test_after_a_good_end_waiting_tasks_go_on_unless_it_was_long_ago(
         assert world.state(1)[0] is S.COMPLETED
 
 
-def test_a_submission_is_known_again(world: World, path: Path) -> None:
-    check(
-        world,
-        """
-DO_PAUSE_CONTINUE 0 : ACCEPTED
-TASK_MOVE 1 0 0 77 0 0 5 : ACCEPTED #1
-TASK_MOVE 2 0 0 0 0 0 5 : ACCEPTED #2
-""",
-    )
-    restart(world, path, away=0.0)
-    check(
-        world,
-        f"""
-TASK_MOVE 1 0 0 77 0 0 5 : ACCEPTED #1
-TASK_MOVE 3 0 0 77 0 0 5 : DENIED #{R.NONCE_REUSED}
-TASK_MOVE 2 0 0 0 0 0 5 confirmation=1 : ACCEPTED #2
-TASK_MOVE 4 0 0 0 0 0 5 : ACCEPTED #3
-""",
-    )
-
-
 def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:
     check(
         world,
