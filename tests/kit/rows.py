@@ -36,6 +36,7 @@ SHORT = {
     "KEY": ",".join(["0"] * 32),
     "ZEROS": ",".join(["0"] * 247),
     "ARM": "COMPONENT_ARM_DISARM to=autopilot",
+    "BLIND": "fault withheld=30,32",
     "CLICK": "DO_REPOSITION -1 1 0 nan to=autopilot",
     "HOLD": "DO_SET_MODE 1 4 3 to=autopilot",
     "LONG": "Failsafe" + "x" * 42,

@@ -300,9 +300,10 @@ rover:statustext 4 LONG 7 0 & rover:statustext 4 LONGER 7 0 : - failsafe: Failsa
             {"realism": replace(PROMPT.realism, tells_origin=False)},
             """
 rover:gps_global_origin -353632620 1491652370 0 : -
-NAV_WAYPOINT at=0.3,0 frame=0 : ACCEPTED Task 1
-wait 3 : -
-wait 4 : - Task 1 done
+NAV_WAYPOINT at=0.3,0 frame=0 & wait 7 : ACCEPTED Task 1 done
+fault withheld=33,49,242 & reboot & wait 12 : - Rover 1 restarted
+NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED Task 2 waits: no valid position
+fault & wait 9 : - Task 2 done
 """,
         ),
         (
@@ -410,6 +411,21 @@ TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue paused
         (
             {},
             """
+TASK_MOVE 9 & wait 2 & operator rtl & wait 1 : ACCEPTED Task 1 paused: takeover
+DO_PAUSE_CONTINUE 0 & rover:statustext 4 Failsafe 0 0 : ACCEPTED was taken over by its failsafe
+operator hold & wait 4 & TASK_CANCEL 1 & DO_PAUSE_CONTINUE 1 : ACCEPTED+ACCEPTED
+plan; GO at=3,0; CONDITION_DELAY 2; DO_SET_SERVO 1 1 & wait 15 : ACCEPTED Task 2 done / command 183
+TASK_MOVE 1 & fault silent=1 deaf=1 & wait 5 : ACCEPTED Task 3 paused: position lost
+reboot & fault & wait 20 : - Rover 1 restarted / Task 3 done
+fault deaf=1 & reboot & wait 4 : - Rover 1 restarted
+rover:command_ack 511 2 0 0 250 191 : -
+rover:command_ack 511 2 0 0 250 191 : -
+fault & wait 2 : - LOCAL_POSITION_NED@1
+""",
+        ),
+        (
+            {},
+            """
 operator rtl & wait 1 & TASK_MOVE 2 : ACCEPTED Task 1
 TASK_MODIFY 1 3 2 : ACCEPTED
 sleep 5 : - Task 1 expired: deadline
@@ -432,13 +448,21 @@ TASK_STOP : ACCEPTED Task 2 stopped for good / Task 3 stopped for good
 """,
         ),
         (
-            {"settings": Settings(queueing=Queueing(capacity=1), driving=Driving(max_distance=5))},
+            {
+                "settings": Settings(
+                    watch=Watch(position_lost=9),
+                    queueing=Queueing(capacity=1),
+                    driving=Driving(max_distance=5),
+                )
+            },
             """
-TASK_MOVE -4 : ACCEPTED Task 1
-NAV_WAYPOINT at=3,0 frame=0 : ACCEPTED Task 2
+fault refuse_mode=1 withheld=30,32 & TASK_MOVE 0.1 & wait 0.4 & BLIND & wait 2 : ACCEPTED Task 1
+fault & wait 9 : - Task 1 done
+TASK_MOVE -4 : ACCEPTED Task 2
+NAV_WAYPOINT at=3,0 frame=0 : ACCEPTED Task 3
 TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue full
-wait 15 : - Task 1 done / Task 2 failed: bad parameter
-TASK_MOVE 4 & wait 3 & TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED+ACCEPTED Task 3 cancelled
+wait 15 : - Task 2 done / Task 3 failed: bad parameter
+TASK_MOVE 4 & wait 3 & TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED+ACCEPTED Task 4 cancelled
 """,
         ),
         (
@@ -466,7 +490,7 @@ wait 5 : - Task 1 failed: stuck
             """
 TASK_MOVE 9 & wait 4 : ACCEPTED Task 1 started
 HOLD & CLICK at=5,0 frame=0 : ACCEPTED Task 1 paused
-fault withheld=30,32 & wait 3 : ACCEPTED stays paused: cannot start: no position
+BLIND & wait 3 : ACCEPTED stays paused: cannot start: no position
 fault & wait 5 & DO_PAUSE_CONTINUE 1 & wait 3 : ACCEPTED Task 1 started
 HOLD & CLICK at=6,0 frame=0 : ACCEPTED Task 1 paused
 TASK_STOP & wait 3 : ACCEPTED+ACCEPTED Task 3 waits, press Continue (STOP in force)
