@@ -599,6 +599,12 @@ TASK_MOVE 3 0 0 77 : DENIED nonce 77 was used for another task
 TASK_MOVE 2 confirmation=1 : ACCEPTED #2
 TASK_MOVE 4 : ACCEPTED #3
 """,
+        """
+TASK_MOVE 2 & wait 3 : ACCEPTED Task 1
+RESTART
+wait 4 & DO_PAUSE_CONTINUE 1 : ACCEPTED #0 / keeps task 1 on hold: press
+wait 3 & DO_PAUSE_CONTINUE 1 : DENIED #112 / task 1 is held / release it (again
+""",
     ],
 )
 def test_requests_after_a_crash(make_world: MakeWorld, path: Path, table: str) -> None:
