@@ -87,6 +87,8 @@ def ask(world: World, text: str, client: FakeClient | None = None) -> None:
         world.fault(Faults(**fields))
     elif name == "lose":
         world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
+    elif name == "again":
+        client.send_raw(client.last_command)
     elif name == "sleep":
         world.suspend_server(numbers[0])
     elif name == "reboot":

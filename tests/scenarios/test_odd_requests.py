@@ -20,7 +20,7 @@ from tests.kit.client import ACCEPTED, DENIED, command_long
 from tests.kit.mission import Download
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.restarts import UTC, restart
-from tests.kit.rows import PLACES, ask, check
+from tests.kit.rows import ask, check
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
@@ -260,7 +260,8 @@ DO_CHANGE_SPEED 1 1 to=any : -
 TASK_CANCEL 1 to=any : DENIED command 54010 must name one rover
 mission_count 1 1 to=any : UNSUPPORTED belongs to one rover: name it
 fence to=any; NAV_WAYPOINT at=1,0 : UNSUPPORTED belongs to one rover
-TASK_MOVE 1 0 0 0 0 60 to=any : ACCEPTED Rover 1 chosen: free
+TASK_MOVE 1 0 0 9 0 60 to=any : ACCEPTED #1 / Rover 1 chosen: free
+again : ACCEPTED #1
 fault battery=12 : -
 wait 6 : - battery 12%
 """,
@@ -488,7 +489,7 @@ wait 5 : - Task 1 failed: stuck
                 "store": LateStore(delay=1.0),
             },
             """
-TASK_MOVE 9 & wait 4 : ACCEPTED Task 1 started
+TASK_MOVE 9 to=any & again & wait 4 : ACCEPTED Task 1 started
 HOLD & CLICK at=5,0 frame=0 : ACCEPTED Task 1 paused
 BLIND & wait 3 : ACCEPTED stays paused: cannot start: no position
 fault & wait 5 & DO_PAUSE_CONTINUE 1 & wait 3 : ACCEPTED Task 1 started
@@ -500,16 +501,6 @@ TASK_STOP & wait 3 : ACCEPTED+ACCEPTED Task 3 waits, press Continue (STOP in for
 )
 def test_each_has_its_answer(make_world: MakeWorld, kw: dict[str, Any], table: str) -> None:
     check(make_world(**kw), table)
-
-
-def test_a_packet_for_any_rover_that_comes_twice_is_one_request(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    packet = world.client.send(command_long(54_000, 0.2, 0, 0, 9, target=PLACES["any"]))
-    world.run(0.2)
-    world.client.send_raw(packet)
-    world.run(0.2)
-    assert world.client.acks_of(54_000) == [(ACCEPTED, 1)] * 2
-    assert len(world.tasks()) == 1
 
 
 @for_each("request", [f"plan; {PAIR}", f"mission; {PAIR}", "DO_SET_MODE 1 11 to=autopilot"])
@@ -545,22 +536,6 @@ def test_a_flood_of_refusals_is_answered_and_not_told(world: World) -> None:
     assert len(world.events(SubmissionRefused)) < 30
 
 
-def test_requests_about_a_rover_that_is_not_heard_yet(make_world: MakeWorld, path: Path) -> None:
-    world = make_world(rovers=2, store=PromptSqliteStore(path, wall_offset=UTC))
-    check(world, "TASK_MOVE 1 0 0 7 0 600 to=any : ACCEPTED Rover 1 chosen")
-    world.fault(Faults(silent=True))
-    restart(world, path)
-    check(
-        world,
-        """
-REQUEST_MESSAGE 242 : -
-REQUEST_MESSAGE 54000 1 to=any : ACCEPTED
-REQUEST_MESSAGE 54002 1 to=second : ACCEPTED
-TASK_MOVE 1 0 0 7 0 600 to=any : ACCEPTED
-""",
-    )
-
-
 @for_each(
     "table",
     [
@@ -594,6 +569,7 @@ DO_PAUSE_CONTINUE 0 : ACCEPTED
 TASK_MOVE 1 0 0 77 : ACCEPTED #1
 TASK_MOVE 2 : ACCEPTED #2
 RESTART
+again : ACCEPTED #2
 TASK_MOVE 1 0 0 77 : ACCEPTED #1
 TASK_MOVE 3 0 0 77 : DENIED nonce 77 was used for another task
 TASK_MOVE 2 confirmation=1 : ACCEPTED #2
@@ -605,12 +581,20 @@ RESTART
 wait 4 & DO_PAUSE_CONTINUE 1 : ACCEPTED #0 / keeps task 1 on hold: press
 wait 3 & DO_PAUSE_CONTINUE 1 : DENIED #112 / task 1 is held / release it (again
 """,
+        """
+TASK_MOVE 1 0 0 7 0 600 to=any & fault silent=1 : ACCEPTED Rover 1 chosen
+RESTART
+REQUEST_MESSAGE 242 : -
+REQUEST_MESSAGE 54000 1 to=any : ACCEPTED
+REQUEST_MESSAGE 54002 1 to=second : ACCEPTED
+TASK_MOVE 1 0 0 7 0 600 to=any : ACCEPTED
+""",
     ],
 )
 def test_requests_after_a_crash(make_world: MakeWorld, path: Path, table: str) -> None:
     queueing, watch = Queueing(preemption_gap=3, preemption_rest=0.3), Watch(ready_timeout=20)
     store = PromptSqliteStore(path, wall_offset=UTC)
-    world = make_world(store=store, settings=Settings(queueing=queueing, watch=watch))
+    world = make_world(rovers=2, store=store, settings=Settings(queueing=queueing, watch=watch))
     before, _, after = table.partition("RESTART\n")
     check(world, before)
     restart(world, path, away=0.0, settles=1.0)
@@ -654,6 +638,22 @@ def test_more_places_than_a_link_has_room_for(world: World) -> None:
     world.run(1)
     known = world.server.engine.snapshot(now=world.now).vehicles
     assert [vehicle.system_id for vehicle in known] == [1]
+
+
+def test_the_submissions_of_many_are_remembered_while_they_matter(world: World) -> None:
+    world.client.pause()
+    for number in range(300):
+        packer = common.MAVLink(None, 1 + number % 200, 200 + number // 200)
+        world.client.send_raw(command_long(54_000, 1.0).pack(packer))
+        world.run(0.05)
+    acks = [(ACCEPTED, number) for number in range(1, 301)]
+    assert world.client.acks_of(54_000) == acks
+
+
+def test_no_rover_is_heard() -> None:
+    world = World()
+    world.fault(Faults(silent=True))
+    check(world, "TASK_MOVE 1 to=any : FAILED #9")
 
 
 def test_what_comes_from_a_link_that_is_not_there_is_not_heard(world: World) -> None:
