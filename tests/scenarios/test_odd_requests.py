@@ -304,7 +304,10 @@ rover:gps_global_origin -353632620 1491652370 0 : -
 NAV_WAYPOINT at=0.3,0 frame=0 & wait 7 : ACCEPTED Task 1 done
 fault withheld=33,49,242 & reboot & wait 12 : - Rover 1 restarted
 NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED Task 2 waits: no valid position
-fault & wait 9 : - Task 2 done
+REQUEST_MESSAGE 54000 2 & TASK_CANCEL 2 : ACCEPTED+ACCEPTED
+plan; GO x=30000 y=0 frame=1; GO at=6,0; GO at=7,0 : ACCEPTED Task 3
+wait 12 : - Task 3 paused: position lost
+fault & wait 15 : - Task 3 done
 """,
         ),
         (
@@ -446,12 +449,14 @@ wait 22 : - would leave the fence in task 1 / Task 1 held: stopped at the fence
 TASK_CANCEL 1 & wait 2 & CLICK at=0,0 frame=0 : ACCEPTED+ACCEPTED Task 2
 CLICK at=0,9 frame=0 : ACCEPTED Task 3
 TASK_STOP : ACCEPTED Task 2 stopped for good / Task 3 stopped for good
+wait 4 & DO_PAUSE_CONTINUE 1 & TASK_MOVE -4 & wait 3 : ACCEPTED+ACCEPTED Task 4 started
+TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED Task 4 cancelled / Rover 1 restarted
 """,
         ),
         (
             {
                 "settings": Settings(
-                    watch=Watch(position_lost=9),
+                    watch=Watch(position_lost=9, start_timeout=3, heartbeat_lost=9),
                     queueing=Queueing(capacity=1),
                     driving=Driving(max_distance=5),
                 )
@@ -463,7 +468,7 @@ TASK_MOVE -4 : ACCEPTED Task 2
 NAV_WAYPOINT at=3,0 frame=0 : ACCEPTED Task 3
 TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue full
 wait 15 : - Task 2 done / Task 3 failed: bad parameter
-TASK_MOVE 4 & wait 3 & TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED+ACCEPTED Task 4 cancelled
+lose 0 & TASK_MOVE 4 & wait 3 : ACCEPTED Task 4 failed: start timeout
 """,
         ),
         (
