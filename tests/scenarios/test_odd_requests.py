@@ -472,12 +472,20 @@ lose 0 & TASK_MOVE 4 & wait 3 : ACCEPTED Task 4 failed: start timeout
 """,
         ),
         (
-            {"persona": PROMPT_PX4, "settings": Settings(watch=Watch(ready_timeout=5))},
+            {
+                "persona": PROMPT_PX4,
+                "settings": Settings(watch=Watch(ready_timeout=5), queueing=Queueing(capacity=1)),
+            },
             """
+mission; GO at=0.3,0 & wait 1 : ACCEPTED Task 1
+DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 9 : ACCEPTED+ACCEPTED Task 1 done
+ARM 0 & wait 5 & TASK_MOVE 1 0 0 0 0 60 : ACCEPTED+ACCEPTED Task 2
+DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 1 : ACCEPTED+ACCEPTED queue full: 1
+TASK_CANCEL 2 & ARM 0 & wait 5 & DO_PAUSE_CONTINUE 1 : ACCEPTED+ACCEPTED+ACCEPTED
 fault refuse_arm=1 : -
 TASK_MOVE 3 & wait 1 : ACCEPTED not ready to arm
 rover:param_value COM_OBL_RC_ACT 1 9 1 1 : - keeps moving when setpoints stop
-fault & wait 9 : - Task 1 failed: loss failsafe
+fault & wait 9 : - Task 3 failed: loss failsafe
 """,
         ),
         (
