@@ -659,8 +659,7 @@ def test_the_submissions_of_many_are_remembered_while_they_matter(world: World) 
         packer = common.MAVLink(None, 1 + number % 200, 200 + number // 200)
         world.client.send_raw(command_long(54_000, 1.0).pack(packer))
         world.run(0.05)
-    acks = [(ACCEPTED, number) for number in range(1, 301)]
-    assert world.client.acks_of(54_000) == acks
+    assert world.client.acks_of(54_000) == [(ACCEPTED, number) for number in range(1, 301)]
 
 
 def test_no_rover_is_heard() -> None:
