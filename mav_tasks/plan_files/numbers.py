@@ -7,18 +7,19 @@ from struct import pack, unpack
 from mav_tasks.plan_files.entries import AXES, PLAIN, Axis
 
 NOT_GIVEN = 0x7FFFFFFF  # of x and y of MISSION_ITEM_INT, which have no NaN
-FLOAT_DIGITS = range(6, 10)  # a float32 needs nine at the most
+FEW_DIGITS = range(6, 9)
+ALL_DIGITS = 9  # these tell every float32
 
 
 def shortest(value: float) -> float:
     """Return the float with the fewest digits that is the same float32, if it came from one."""
     if not isfinite(value) or unpack("<f", pack("<f", value))[0] != value:
         return value
-    for digits in FLOAT_DIGITS:
+    for digits in FEW_DIGITS:
         candidate = float(f"{value:.{digits}g}")
         if pack("<f", candidate) == pack("<f", value):
             return candidate
-    raise AssertionError("nine digits tell every float32")
+    return float(f"{value:.{ALL_DIGITS}g}")
 
 
 def place(frame: int, x: int, y: int) -> tuple[float, float]:

@@ -223,8 +223,7 @@ class PendingTasks:
             if task := self._waiting(task_id):
                 self.end(task, S.EXPIRED, R.DEADLINE, actor=SERVER, now=now)
         for task_id in self.times.starts.take(now=now):
-            if task := self._waiting(task_id):
-                self._settle(task, now=now)
+            self._settle(self._registry[task_id], now=now)
 
     def set_wall_offset(self, offset: float, *, now: float) -> None:
         """Set UTC minus monotonic time, s; this moves the tasks that start at a UTC time."""
@@ -404,12 +403,9 @@ class PendingTasks:
         over = [task_id]
         while over:
             for dependent in self._dependencies.take(over.pop()):
-                task = self._waiting(dependent)
-                if task is None:
-                    continue
                 if completed:
                     self._waiters[dependent].is_met = True
-                    self._settle(task, now=now)
+                    self._settle(self._registry[dependent], now=now)
                 else:
                     self._fail(dependent, now=now)
                     over.append(dependent)

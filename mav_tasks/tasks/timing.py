@@ -6,7 +6,9 @@ turn. They exclude what follows: the rest of the turn, the kernel, the network. 
 counts: no interval spans a pause.
 """
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from math import ceil
 
 from mav_tasks.histogram import Histogram
@@ -59,9 +61,7 @@ class Timing:
 class TimingMeter:
     """Meter of one task's intervals. Its memory is bounded, however long the task drives."""
 
-    def __init__(
-        self, *, period: float, before: Timing | None = None, every: Histogram | None = None
-    ) -> None:
+    def __init__(self, *, period: float, every: Histogram, before: Timing | None = None) -> None:
         """``before`` is the timing of the task so far, with its spread.
 
         ``every`` counts the intervals of all tasks of the vehicle.
@@ -90,8 +90,7 @@ class TimingMeter:
             int(interval * _PER_FINE + 0.5) if interval < FINE_END else _coarse_bucket(interval)
         )
         self._counts[bucket] = self._counts.get(bucket, 0) + 1
-        if self._every is not None:
-            self._every.note(interval)
+        self._every.note(interval)
         if interval > self._longest:
             self._longest = interval
         if interval > self._late_after:
@@ -115,12 +114,9 @@ class TimingMeter:
 
     def _percentile(self, spread: list[tuple[int, int]], rank: int) -> float:
         """Return the length that ``rank`` of the intervals do not exceed."""
-        seen = 0
-        for bucket, number in spread:
-            seen += number
-            if seen >= rank:
-                return min(_length_of(bucket), self._longest)
-        raise AssertionError("a rank is at most the number of intervals")
+        buckets, numbers = zip(*spread, strict=True)
+        found = bisect_left(list(accumulate(numbers)), rank)  # at most the last one
+        return min(_length_of(buckets[found]), self._longest)
 
 
 def _coarse_bucket(interval: float) -> int:

@@ -97,11 +97,8 @@ class Turns:
         first = self._lineup.queue.first()
         if not self._lineup.suspended_ids:
             return first
-        resumable = [task for task in self._lineup.suspended if task.state is S.PAUSED]
-        if not resumable:
-            return first
         rank = self._lineup.room.rank
-        best = min(resumable, key=rank)
+        best = min(self._lineup.suspended, key=rank)  # all of them are paused: none is held
         if first is not None and self._lineup.queue.rank(first) < rank(best):
             return first
         return best.id

@@ -161,6 +161,7 @@ class FakeClient:
     received: list[Received] = field(default_factory=list)
     #: called with each message and its bytes, before they are sent
     on_sent: Callable[[Message, bytes], None] = lambda *_: None
+    last_command: bytes = b""  # as it was sent
 
     def __post_init__(self) -> None:
         self.link = self.net.link(self.name)
@@ -417,7 +418,7 @@ class FakeClient:
                 and sent.at + sent.repeats[sent.times_sent] <= now
             ):
                 sent.times_sent += 1
-                self.send(sent.message)
+                self.last_command = self.send(sent.message)
 
 
 def command_long(

@@ -36,6 +36,11 @@ SHORT = {
     "KEY": ",".join(["0"] * 32),
     "ZEROS": ",".join(["0"] * 247),
     "ARM": "COMPONENT_ARM_DISARM to=autopilot",
+    "BLIND": "fault withheld=30,32",
+    "CLICK": "DO_REPOSITION -1 1 0 nan to=autopilot",
+    "HOLD": "DO_SET_MODE 1 4 3 to=autopilot",
+    "LONG": "Failsafe" + "x" * 42,
+    "LONGER": "Failsafe" + "x" * 41 + "y",
     "MANY_TEXTS": " & ".join(f"rover:statustext 6 x{n:049} {n % 40 + 1} 0" for n in range(80)),
     "EIGHT": "0,0,0,0,0,0,0,0",
     "BUSY": "TEMPORARILY_REJECTED",
@@ -82,6 +87,12 @@ def ask(world: World, text: str, client: FakeClient | None = None) -> None:
         world.fault(Faults(**fields))
     elif name == "lose":
         world.watched.loses = lambda source, _, data: source == "rover1" and data[7] == numbers[0]
+    elif name == "again":
+        client.send_raw(client.last_command)
+    elif name == "sleep":
+        world.suspend_server(numbers[0])
+    elif name == "reboot":
+        world.rover.autopilot.reboot(now=world.now)
     elif name == "operator":
         world.operator_mode(Mode(numbers[0].decode()))
     elif name == "unread":

@@ -11,7 +11,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED, MOVE, TEMPORARILY_REJECTED
+from tests.kit.client import ACCEPTED, DRIVE, MOVE, TEMPORARILY_REJECTED
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
 
@@ -116,8 +116,9 @@ def test_command_cancel_takes_the_askers_latest_of_that_command(world: World) ->
     world.client.rotate(10)
     world.run(0.1)
     acks = len(world.client.acks)
-    message = m.CommandCancel(1, 191, MOVE)
-    world.client.send_raw(Packer().pack(message, Address(255, 190), seq=200))
+    for command in (DRIVE, MOVE):  # there is none of the first
+        message = m.CommandCancel(1, 191, command)
+        world.client.send_raw(Packer().pack(message, Address(255, 190), seq=200))
     world.run(0.3)
     assert world.state(2) == (S.CANCELLED, R.CANCELLED)
     assert [world.state(i)[0] for i in (3, 4)] == [S.QUEUED, S.QUEUED]

@@ -6,11 +6,13 @@ from pathlib import Path
 import pytest
 
 from mav_tasks.tasks.lifecycle import TaskReason as R
+from mav_tasks.tasks.lifecycle import TaskState as S
 from mav_tasks.tasks.task import Task
 from tests.kit.client import ACCEPTED, Sent
 from tests.kit.gateways.engines import FleetWorld
 from tests.kit.gateways.order import early_starts
 from tests.kit.mission import Item, Upload
+from tests.kit.rows import check
 from tests.kit.world import at
 
 WITHIN = 1.0  # s for the answer of the database
@@ -113,3 +115,41 @@ def test_a_circle_over_gateways_is_refused(pair: Pair) -> None:
     pair.run(0.3)
     assert [each.answer[1] for each in changes if each.answer] == [R.UNKNOWN_DEPENDENCY, R.CYCLE]
     assert pair.task(first.task_id).terms.after == 0
+
+
+def test_a_task_starts_or_fails_with_the_one_at_another_gateway_that_it_runs_after(
+    pair: Pair,
+) -> None:
+    first, second = pair.submit(A, 0.5), pair.submit(A, 0.6)
+    waiting = [pair.submit(B, 0.5, after=each) for each in (first, second)]
+    check(
+        pair,
+        f"""
+REQUEST_MESSAGE 54000 {waiting[0]} to=second : ACCEPTED
+wait 2 & TASK_CANCEL {second} & wait 9 : ACCEPTED
+b> TASK_MOVE 1 0 0 0 {second} to=second : DENIED that task has ended (cancelled)
+""",
+        b=pair.clients["b"],
+    )
+    assert [pair.task(each).state for each in waiting] == [S.COMPLETED, S.FAILED]
+
+
+def test_a_gateway_forgets_one_of_its_rovers_and_no_other(pair: Pair) -> None:
+    near = pair.clients["b"]
+    for here, there, rows in (
+        (
+            "b",
+            "server",
+            """
+b> TASK_MOVE 0.3 & wait 5 : ACCEPTED done
+b> NAV_WAYPOINT at=1,0 frame=0 & TASK_MOVE 3 : ACCEPTED+ACCEPTED
+b> TASK_MOVE 1 to=second & NAV_WAYPOINT at=3,0 to=second frame=0 : ACCEPTED+ACCEPTED
+""",
+        ),
+        ("server", "b", "b> TASK_MOVE 3 : ACCEPTED"),
+    ):
+        pair.mend(here, A)
+        pair.cut(there, A)
+        pair.run(20.0)
+        assert pair.database.holder(A) == here
+        check(pair, rows, b=near)

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import common
 from mav_tasks.engine.inputs import Congestion, Packets, PeerChanged
 from mav_tasks.in_memory import CLIENT_LINK, VEHICLE_LINK
 from mav_tasks.mavlink.enums import MavAutopilot
-from mav_tasks.settings import Clients, Roles, Settings
+from mav_tasks.settings import Clients, Driving, Queueing, Roles, Settings, Watch
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
@@ -20,7 +20,7 @@ from tests.kit.client import ACCEPTED, DENIED, command_long
 from tests.kit.mission import Download
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.restarts import UTC, restart
-from tests.kit.rows import PLACES, ask, check
+from tests.kit.rows import ask, check
 from tests.kit.store import LateStore, PromptSqliteStore
 from tests.kit.world import PROMPT, World, at
 from tests.scenarios.conftest import MakeWorld
@@ -128,6 +128,7 @@ plan; NAV_WAYPOINT x=2147483647; NAV_LOITER_TURNS 1 0 1 : ACCEPTED Task 1
 mission; NAV_WAYPOINT; NAV_WAYPOINT at=1,0; DO_SET_SERVO 1 frame=2 : ACCEPTED Task 2
 mission_request_list 0 : - MISSION_COUNT@1
 mission_request 2 : - MISSION_ITEM@1
+wait 40 & mission_request_list 0 : - MISSION_COUNT@1
 MISSION_START 9 : DENIED param1 first item 9: the plan has 3 items
 mission_set_current 9 : - item 9: the last item is 2
 mission_set_current 1 : -
@@ -259,7 +260,8 @@ DO_CHANGE_SPEED 1 1 to=any : -
 TASK_CANCEL 1 to=any : DENIED command 54010 must name one rover
 mission_count 1 1 to=any : UNSUPPORTED belongs to one rover: name it
 fence to=any; NAV_WAYPOINT at=1,0 : UNSUPPORTED belongs to one rover
-TASK_MOVE 1 0 0 0 0 60 to=any : ACCEPTED Rover 1 chosen: free
+TASK_MOVE 1 0 0 9 0 60 to=any : ACCEPTED #1 / Rover 1 chosen: free
+again : ACCEPTED #1
 fault battery=12 : -
 wait 6 : - battery 12%
 """,
@@ -292,16 +294,20 @@ wait 2 & fault refuse_mode=1 & wait 8 : - Task 2 done
 fault : -
 TASK_MOVE 9 : ACCEPTED Task 3
 wait 2 & operator rtl & wait 1 : - Task 3
-rover:statustext 4 Failsafe 0 0 : - was taken over by its failsafe: Failsafe
+rover:statustext 4 LONG 7 0 & rover:statustext 4 LONGER 7 0 : - failsafe: Failsafexxxx / x[?]
 """,
         ),
         (
             {"realism": replace(PROMPT.realism, tells_origin=False)},
             """
 rover:gps_global_origin -353632620 1491652370 0 : -
-NAV_WAYPOINT at=0.3,0 frame=0 : ACCEPTED Task 1
-wait 3 : -
-wait 4 : - Task 1 done
+NAV_WAYPOINT at=0.3,0 frame=0 & wait 7 : ACCEPTED Task 1 done
+fault withheld=33,49,242 & reboot & wait 12 : - Rover 1 restarted
+NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED Task 2 waits: no valid position
+REQUEST_MESSAGE 54000 2 & TASK_CANCEL 2 : ACCEPTED+ACCEPTED
+plan; GO x=30000 y=0 frame=1; GO at=6,0; GO at=7,0 : ACCEPTED Task 3
+wait 12 : - Task 3 paused: position lost
+fault & wait 15 : - Task 3 done
 """,
         ),
         (
@@ -317,6 +323,7 @@ mission_count 1 : DENIED role observer may not
 DO_PAUSE_CONTINUE 0 : ACCEPTED
 wait 4 : -
 DO_REPOSITION -1 1 0 nan at=1,0 frame=0 : ACCEPTED Task 1 waits, press Continue
+CLICK at=2,0 frame=0 : ACCEPTED Task 2 waits, press Continue
 """,
         ),
         (
@@ -338,20 +345,175 @@ mission; GO at=2,0 : ACCEPTED
 ARM 1 : ACCEPTED
 """,
         ),
+        (
+            {},
+            """
+TASK_MOVE 9 : ACCEPTED Task 1
+wait 3 & fault position_jump=50,0 & wait 1 : - Task 1 held: position reference changed
+TASK_MOVE 1 to=any : BUSY no rover can: rover 1: a task is held
+fault & wait 5 : -
+DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED
+CLICK at=5,0 frame=0 : ACCEPTED Task 2 starts now
+TASK_RELEASE 1 0 : DENIED task 2 is executing: release task 1 later
+TASK_MOVE 1 : ACCEPTED Task 3 waits, press Continue
+REQUEST_MESSAGE 54000 3 : ACCEPTED
+DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED Task 2 paused
+TASK_RELEASE 1 0 : ACCEPTED Task 1 waits: released
+DO_PAUSE_CONTINUE 1 & wait 3 : ACCEPTED task 1 is next
+fault position_jump=50,0 & wait 1 : - Task 1 held / Task 2 held
+fault & wait 5 & DO_PAUSE_CONTINUE 0 & wait 5 : ACCEPTED
+CLICK at=6,0 frame=0 : ACCEPTED Task 4 starts now
+TASK_STOP : ACCEPTED Task 4 stopped for good
+wait 5 & TASK_RELEASE 1 0 : BUSY STOP is in force: press Continue first
+TASK_CANCEL 1 : ACCEPTED Task 1 cancelled
+""",
+        ),
+        (
+            {},
+            """
+fault refuse_arm=1 : -
+TASK_MOVE 1 : ACCEPTED Task 1
+DO_CHANGE_SPEED 1 0.3 : ACCEPTED
+wait 1 & fault refuse_arm=1 position_jump=50,0 & wait 2 : - not ready to arm
+fault & wait 9 : - Task 1 done
+DO_SET_MODE 1 11 to=autopilot & wait 3 & DO_PAUSE_CONTINUE 0 : ACCEPTED+ACCEPTED Task 2 paused
+wait 5 & DO_PAUSE_CONTINUE 1 : ACCEPTED task 2 is next, return home
+wait 9 : - Task 2 done
+plan; GO at=1,0; NAV_SET_YAW_SPEED 45 0.5 : ACCEPTED Task 3
+wait 7 & DO_CHANGE_SPEED 1 0.4 : ACCEPTED
+TASK_CANCEL 0 & TASK_MOVE 1 to=any : ACCEPTED+ACCEPTED Rover 1 chosen: free in
+wait 9 : - Task 3 cancelled / Task 4 done
+plan; GO x=50000 y=0 frame=1 : ACCEPTED
+wait 3 & reboot & wait 8 : - Task 5 held
+TASK_RELEASE 5 1 : DENIED the position reference of task 5 is lost
+""",
+        ),
+        (
+            {},
+            """
+TASK_MOVE 1 0 0 0 0 60 : ACCEPTED Task 1
+TASK_MOVE 2 0 0 0 1 10 : ACCEPTED Task 2
+TASK_MOVE 0.3 to=any & wait 4 : ACCEPTED Rover 1 chosen: free
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+TASK_MOVE 3 : ACCEPTED Task 4
+TASK_MOVE 2 0 0 0 4 : ACCEPTED Task 5
+TASK_MODIFY 4 3 12 & TASK_MODIFY 5 3 13 : ACCEPTED+ACCEPTED
+sleep 20 : - Task 4 expired: deadline / Task 5 failed: dependency failed
+NAV_WAYPOINT at=1,0 frame=0 : ACCEPTED Task 6
+NAV_WAYPOINT x=10000 y=0 frame=1 : ACCEPTED repeated goal, no new task: see task 6
+NAV_WAYPOINT 1 x=10000 y=1 frame=1 : ACCEPTED Task 7
+NAV_WAYPOINT x=10000 y=1 frame=1 : ACCEPTED Task 8
+TASK_MOVE 1.1 & TASK_MOVE 1.2 & TASK_MOVE 1.3 : ACCEPTED+ACCEPTED+ACCEPTED
+TASK_MOVE 2.1 & TASK_MOVE 2.2 & TASK_MOVE 2.3 : ACCEPTED+ACCEPTED+ACCEPTED
+TASK_MOVE 3.1 & TASK_MOVE 3.2 & TASK_MOVE 3.3 : ACCEPTED+ACCEPTED+ACCEPTED
+TASK_MOVE 4.1 & TASK_MOVE 4.2 & TASK_MOVE 4.3 : ACCEPTED+ACCEPTED+ACCEPTED
+TASK_MOVE 5.1 & TASK_MOVE 5.2 & TASK_MOVE 5.3 : ACCEPTED+ACCEPTED+ACCEPTED
+TASK_MOVE 6.1 & TASK_MOVE 6.2 & TASK_MOVE 6.3 : ACCEPTED+ACCEPTED+ACCEPTED
+TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue paused
+""",
+        ),
+        (
+            {},
+            """
+TASK_MOVE 9 & wait 2 & operator rtl & wait 1 : ACCEPTED Task 1 paused: takeover
+DO_PAUSE_CONTINUE 0 & rover:statustext 4 Failsafe 0 0 : ACCEPTED was taken over by its failsafe
+operator hold & wait 4 & TASK_CANCEL 1 & DO_PAUSE_CONTINUE 1 : ACCEPTED+ACCEPTED
+plan; GO at=3,0; CONDITION_DELAY 2; DO_SET_SERVO 1 1 & wait 15 : ACCEPTED Task 2 done / command 183
+TASK_MOVE 1 & fault silent=1 deaf=1 & wait 5 : ACCEPTED Task 3 paused: position lost
+reboot & fault & wait 20 : - Rover 1 restarted / Task 3 done
+fault deaf=1 & reboot & wait 4 : - Rover 1 restarted
+rover:command_ack 511 2 0 0 250 191 : -
+rover:command_ack 511 2 0 0 250 191 : -
+fault & wait 2 : - LOCAL_POSITION_NED@1
+""",
+        ),
+        (
+            {},
+            """
+operator rtl & wait 1 & TASK_MOVE 2 : ACCEPTED Task 1
+TASK_MODIFY 1 3 2 : ACCEPTED
+sleep 5 : - Task 1 expired: deadline
+operator hold & wait 4 & ARM 1 & wait 1 & DO_SET_MODE 1 15 to=autopilot : ACCEPTED+ACCEPTED
+client:set_position_target_local_ned 0 1 1 8 1479 0 0 0 0.1 0 0 0 0 0 0 0 : -
+TASK_MOVE 1 to=any : BUSY no rover can: rover 1: a client drives it
+operator manual & wait 4 & TASK_MOVE 1 to=any : BUSY no rover can: rover 1: wrong mode
+""",
+        ),
+        (
+            {},
+            """
+plan; GO at=1,0; GO at=2,0; GO at=2,4; GO at=2,8 : ACCEPTED Task 1
+wait 2 : -
+fence; POND 4 at=1.5,5; POND 4 at=2.5,5; POND 4 at=2.5,6; POND 4 at=1.5,6 : ACCEPTED
+wait 22 : - would leave the fence in task 1 / Task 1 held: stopped at the fence
+TASK_CANCEL 1 & wait 2 & CLICK at=0,0 frame=0 : ACCEPTED+ACCEPTED Task 2
+CLICK at=0,9 frame=0 : ACCEPTED Task 3
+TASK_STOP : ACCEPTED Task 2 stopped for good / Task 3 stopped for good
+wait 4 & DO_PAUSE_CONTINUE 1 & TASK_MOVE -4 & wait 3 : ACCEPTED+ACCEPTED Task 4 started
+TASK_CANCEL 0 & reboot & wait 3 : ACCEPTED Task 4 cancelled / Rover 1 restarted
+""",
+        ),
+        (
+            {
+                "settings": Settings(
+                    watch=Watch(position_lost=9, start_timeout=3, heartbeat_lost=9),
+                    queueing=Queueing(capacity=1),
+                    driving=Driving(max_distance=5),
+                )
+            },
+            """
+fault refuse_mode=1 withheld=30,32 & TASK_MOVE 0.1 & wait 0.4 & BLIND & wait 2 : ACCEPTED Task 1
+fault & wait 9 : - Task 1 done
+TASK_MOVE -4 : ACCEPTED Task 2
+NAV_WAYPOINT at=3,0 frame=0 : ACCEPTED Task 3
+TASK_MOVE 1 to=any : BUSY no rover can: rover 1: queue full
+wait 15 : - Task 2 done / Task 3 failed: bad parameter
+lose 0 & TASK_MOVE 4 & wait 3 : ACCEPTED Task 4 failed: start timeout
+""",
+        ),
+        (
+            {
+                "persona": PROMPT_PX4,
+                "settings": Settings(watch=Watch(ready_timeout=5), queueing=Queueing(capacity=1)),
+            },
+            """
+mission; GO at=0.3,0 & wait 1 : ACCEPTED Task 1
+DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 9 : ACCEPTED+ACCEPTED Task 1 done
+ARM 0 & wait 5 & TASK_MOVE 1 0 0 0 0 60 : ACCEPTED+ACCEPTED Task 2
+DO_SET_MODE 1 4 4 to=autopilot & wait 1 & ARM 1 & wait 1 : ACCEPTED+ACCEPTED queue full: 1
+TASK_CANCEL 2 & ARM 0 & wait 5 & DO_PAUSE_CONTINUE 1 : ACCEPTED+ACCEPTED+ACCEPTED
+fault refuse_arm=1 : -
+TASK_MOVE 3 & wait 1 : ACCEPTED not ready to arm
+rover:param_value COM_OBL_RC_ACT 1 9 1 1 : - keeps moving when setpoints stop
+fault & wait 9 : - Task 3 failed: loss failsafe
+""",
+        ),
+        (
+            {"persona": PROMPT_PX4, "settings": Settings(yaw_rate="honoured")},
+            """
+TASK_ROTATE 10 : ACCEPTED Task 1
+wait 5 : - Task 1 failed: stuck
+""",
+        ),
+        (
+            {
+                "persona": PROMPT_PX4,
+                "settings": Settings(watch=Watch(commit=5)),
+                "store": LateStore(delay=1.0),
+            },
+            """
+TASK_MOVE 9 to=any & again & wait 4 : ACCEPTED Task 1 started
+HOLD & CLICK at=5,0 frame=0 : ACCEPTED Task 1 paused
+BLIND & wait 3 : ACCEPTED stays paused: cannot start: no position
+fault & wait 5 & DO_PAUSE_CONTINUE 1 & wait 3 : ACCEPTED Task 1 started
+HOLD & CLICK at=6,0 frame=0 : ACCEPTED Task 1 paused
+TASK_STOP & wait 3 : ACCEPTED+ACCEPTED Task 3 waits, press Continue (STOP in force)
+""",
+        ),
     ],
 )
 def test_each_has_its_answer(make_world: MakeWorld, kw: dict[str, Any], table: str) -> None:
     check(make_world(**kw), table)
-
-
-def test_a_packet_for_any_rover_that_comes_twice_is_one_request(make_world: MakeWorld) -> None:
-    world = make_world(rovers=2)
-    packet = world.client.send(command_long(54_000, 0.2, 0, 0, 9, target=PLACES["any"]))
-    world.run(0.2)
-    world.client.send_raw(packet)
-    world.run(0.2)
-    assert world.client.acks_of(54_000) == [(ACCEPTED, 1)] * 2
-    assert len(world.tasks()) == 1
 
 
 @for_each("request", [f"plan; {PAIR}", f"mission; {PAIR}", "DO_SET_MODE 1 11 to=autopilot"])
@@ -387,20 +549,69 @@ def test_a_flood_of_refusals_is_answered_and_not_told(world: World) -> None:
     assert len(world.events(SubmissionRefused)) < 30
 
 
-def test_requests_about_a_rover_that_is_not_heard_yet(make_world: MakeWorld, path: Path) -> None:
-    world = make_world(rovers=2, store=PromptSqliteStore(path, wall_offset=UTC))
-    check(world, "TASK_MOVE 1 0 0 7 0 600 to=any : ACCEPTED Rover 1 chosen")
-    world.fault(Faults(silent=True))
-    restart(world, path)
-    check(
-        world,
+@for_each(
+    "table",
+    [
         """
+TASK_ROTATE 270 & wait 4 : ACCEPTED Task 1
+RESTART
+wait 4 & TASK_RELEASE 1 1 : DENIED the progress of task 1 is unknown
+fault silent=1 & wait 5 & TASK_RELEASE 1 0 : ACCEPTED Task 1 waits: the rover is silent
+wait 25 : - holds task 1 again: waited too long (rover silent). Release it again
+""",
+        """
+TASK_MOVE 9 & wait 3 : ACCEPTED Task 1
+RESTART
+fault position_jump=0,3 & wait 6 & TASK_RELEASE 1 1 : DENIED the rover is off the path of task 1
+""",
+        """
+TASK_MOVE 3 0 0 0 0 0 1 & wait 3 : ACCEPTED Task 1
+TASK_MOVE -1 0 0 0 0 0 9 & wait 2 & reboot : ACCEPTED Task 1 paused: preempted
+RESTART
+wait 9 & TASK_CANCEL 2 : ACCEPTED
+wait 9 & DO_PAUSE_CONTINUE 1 : ACCEPTED Task 1 held: position reference changed
+""",
+        """
+DO_PAUSE_CONTINUE 0 & TASK_MOVE 1 & TASK_ROTATE 9 : ACCEPTED+ACCEPTED+ACCEPTED
+TASK_MODIFY 1 4 2 : ACCEPTED
+RESTART
+wait 4 & DO_PAUSE_CONTINUE 1 & wait 9 : ACCEPTED Task 2 done / Task 1 started
+""",
+        """
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+TASK_MOVE 1 0 0 77 : ACCEPTED #1
+TASK_MOVE 2 : ACCEPTED #2
+RESTART
+again : ACCEPTED #2
+TASK_MOVE 1 0 0 77 : ACCEPTED #1
+TASK_MOVE 3 0 0 77 : DENIED nonce 77 was used for another task
+TASK_MOVE 2 confirmation=1 : ACCEPTED #2
+TASK_MOVE 4 : ACCEPTED #3
+""",
+        """
+TASK_MOVE 2 & wait 3 : ACCEPTED Task 1
+RESTART
+wait 4 & DO_PAUSE_CONTINUE 1 : ACCEPTED #0 / keeps task 1 on hold: press
+wait 3 & DO_PAUSE_CONTINUE 1 : DENIED #112 / task 1 is held / release it (again
+""",
+        """
+TASK_MOVE 1 0 0 7 0 600 to=any & fault silent=1 : ACCEPTED Rover 1 chosen
+RESTART
 REQUEST_MESSAGE 242 : -
 REQUEST_MESSAGE 54000 1 to=any : ACCEPTED
 REQUEST_MESSAGE 54002 1 to=second : ACCEPTED
 TASK_MOVE 1 0 0 7 0 600 to=any : ACCEPTED
 """,
-    )
+    ],
+)
+def test_requests_after_a_crash(make_world: MakeWorld, path: Path, table: str) -> None:
+    queueing, watch = Queueing(preemption_gap=3, preemption_rest=0.3), Watch(ready_timeout=20)
+    store = PromptSqliteStore(path, wall_offset=UTC)
+    world = make_world(rovers=2, store=store, settings=Settings(queueing=queueing, watch=watch))
+    before, _, after = table.partition("RESTART\n")
+    check(world, before)
+    restart(world, path, away=0.0, settles=1.0)
+    check(world, after)
 
 
 def test_a_client_has_the_priority_of_its_address(make_world: MakeWorld) -> None:
@@ -440,6 +651,21 @@ def test_more_places_than_a_link_has_room_for(world: World) -> None:
     world.run(1)
     known = world.server.engine.snapshot(now=world.now).vehicles
     assert [vehicle.system_id for vehicle in known] == [1]
+
+
+def test_the_submissions_of_many_are_remembered_while_they_matter(world: World) -> None:
+    world.client.pause()
+    for number in range(300):
+        packer = common.MAVLink(None, 1 + number % 200, 200 + number // 200)
+        world.client.send_raw(command_long(54_000, 1.0).pack(packer))
+        world.run(0.05)
+    assert world.client.acks_of(54_000) == [(ACCEPTED, number) for number in range(1, 301)]
+
+
+def test_no_rover_is_heard() -> None:
+    world = World()
+    world.fault(Faults(silent=True))
+    check(world, "TASK_MOVE 1 to=any : FAILED #9")
 
 
 def test_what_comes_from_a_link_that_is_not_there_is_not_heard(world: World) -> None:

@@ -10,7 +10,7 @@ from mav_tasks.tasks.lifecycle import TaskReason as R
 from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.personas import Mode
 from tests.kit.cases import anew, for_each
-from tests.kit.client import ACCEPTED, DENIED, MOVE, TEMPORARILY_REJECTED
+from tests.kit.client import ACCEPTED, MOVE, TEMPORARILY_REJECTED
 from tests.kit.mission import Download, reached
 from tests.kit.restarts import UTC, restart
 from tests.kit.rows import check
@@ -78,22 +78,6 @@ def test_a_held_task_is_released_and_the_rest_goes_on(world: World, path: Path, 
     end = {AGAIN: driven + 5.0, REMAINDER: 5.0, SKIP: driven}[how]
     assert near_pose(world.pose(), (end, 0.0, 90.0))
     assert world.state(1) == ((S.CANCELLED, R.SKIPPED) if how == SKIP else (S.COMPLETED, R.NONE))
-
-
-def test_continue_does_not_pass_over_a_held_task(world: World, path: Path) -> None:
-    world.client.move(2.0)
-    world.run(3)
-    restart(world, path)
-    sent = world.client.proceed()
-    world.run(0.1)
-    assert sent.answer == (ACCEPTED, 0), "the queue goes on when that is decided"
-    assert world.client.said("keeps task 1 on hold: press")
-    world.run(3)
-    assert (world.state(1)[0], world.stands()) == (S.HELD, True)
-    again = world.client.proceed()
-    world.run(0.1)
-    assert again.answer == (DENIED, R.WRONG_STATE)
-    assert world.client.said("release it (again")
 
 
 def test_what_was_paused_or_interrupted_stays_so_and_ends_where_it_should(
@@ -186,27 +170,6 @@ def test_after_a_good_end_waiting_tasks_go_on_unless_it_was_long_ago(
     if paused is R.NONE:
         world.until_idle(tasks=1)  # its time has come while nobody looked
         assert world.state(1)[0] is S.COMPLETED
-
-
-def test_a_submission_is_known_again(world: World, path: Path) -> None:
-    check(
-        world,
-        """
-DO_PAUSE_CONTINUE 0 : ACCEPTED
-TASK_MOVE 1 0 0 77 0 0 5 : ACCEPTED #1
-TASK_MOVE 2 0 0 0 0 0 5 : ACCEPTED #2
-""",
-    )
-    restart(world, path, away=0.0)
-    check(
-        world,
-        f"""
-TASK_MOVE 1 0 0 77 0 0 5 : ACCEPTED #1
-TASK_MOVE 3 0 0 77 0 0 5 : DENIED #{R.NONCE_REUSED}
-TASK_MOVE 2 0 0 0 0 0 5 confirmation=1 : ACCEPTED #2
-TASK_MOVE 4 0 0 0 0 0 5 : ACCEPTED #3
-""",
-    )
 
 
 def test_plans_and_the_fence_are_kept(world: World, path: Path) -> None:

@@ -195,6 +195,8 @@ def wpl(*lines: str) -> str:
 
 def test_a_plan_gives_its_items_home_fence_and_rally_points() -> None:
     assert parse_plan(PLAN) == READ
+    empty = {"polygon": [], "breachReturn": [1, 2, 3], "version": 1}
+    assert parse_plan(changed("geoFence", empty)).fence == ()
 
 
 def test_a_text_file_gives_its_items_and_home() -> None:

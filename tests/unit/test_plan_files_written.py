@@ -22,6 +22,7 @@ from mav_tasks.plan_files import (
     fence_of,
     format_plan,
     format_wpl,
+    mission_of,
     parse_plan,
     read_plan,
     write_plan,
@@ -121,7 +122,7 @@ def test_a_fence_as_it_was_sent_is_the_fence() -> None:
     sent = fence_items(PlanFile((), None, FENCE, ()))
     back = PlanItem(5000, 0, (0.0, 0.0, 0.0, 0.0), 1, 2, 0.0, False)
     assert fence_of((*sent, back)).fence == FENCE
-    assert fence_of(()).fence == ()
+    assert fence_of(()) == mission_of((), has_home_item=True) == PlanFile((), None, (), ())
     with pytest.raises(PlanFileError, match="groups"):
         fence_of([replace(item, params=(item.params[0], 1.0, 0.0, 0.0)) for item in sent])
     with pytest.raises(PlanFileError, match="item 16"):

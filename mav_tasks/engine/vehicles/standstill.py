@@ -130,8 +130,6 @@ class Standstill:
 
     def _first_within(self, window: float, *, now: float) -> Sample | None:
         """Return the oldest sample of a window; None if the window is older than all samples."""
-        if window > KEPT:
-            return None
         since = now - window
         first = None
         for sample in reversed(self._samples):  # most windows are much shorter than KEPT

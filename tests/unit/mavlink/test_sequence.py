@@ -1,6 +1,7 @@
 """Outgoing seq = incoming + injected − withheld, for each source."""
 
 from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.number_line import NumberLine
 from mav_tasks.mavlink.sequence import MOST, SequenceKeeper
 
 
@@ -22,3 +23,19 @@ def test_nor_are_those_in_whose_name_is_sent() -> None:
     for source in sources:
         assert [keeper.injected(source) for _ in range(2)] == [0, 1]
     assert [keeper.injected(source) for source in sources[:MOST]] == [0] * MOST, "forgotten"
+
+
+def test_a_source_that_begins_anew_goes_on_after_what_has_passed() -> None:
+    keeper, source = SequenceKeeper(), Address(1, 1)
+    numbers = []
+    for begins in (9, 0):
+        keeper.continued(source, begins)
+        numbers.append(keeper.forwarded(source, begins))
+    assert numbers == [9, 10]
+
+
+def test_a_packet_left_after_the_one_before_it_came_if_that_came() -> None:
+    line = NumberLine()
+    assert [line.place(seq, now=float(seq)) for seq in (5, 9)] == [5, 9]
+    assert [line.sent_after(number, now=10.0) for number in (3, 7, 9)] == [0.0, 5.0, 10.0]
+    assert not line.has_all(9, within=1.0)

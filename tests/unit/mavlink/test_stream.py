@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
-from mav_tasks.mavlink.stream import PATIENCE, StreamSplitter
+from mav_tasks.mavlink.stream import MAX_STREAMS, PATIENCE, PeerStreams, StreamSplitter
 from tests.unit.mavlink.samples import stock_message, stock_packet
 from tests.unit.mavlink.test_packet import HEARTBEAT, V1, V2, signed, unknown
 
@@ -87,3 +87,10 @@ def test_a_packet_with_a_flipped_bit_is_none_and_the_next_is_whole() -> None:
             came = split(bytes(bad) + STREAM)
             assert [raw for raw in came if raw in PACKETS][-len(PACKETS) :] == PACKETS, index
             assert packet not in came[: len(came) - len(PACKETS)]
+
+
+def test_of_too_many_unfinished_packets_the_oldest_is_forgotten() -> None:
+    streams = PeerStreams(is_stream=True)
+    for peer in range(MAX_STREAMS + 1):
+        streams.feed(peer, V2[:9], now=0.0)
+    assert [len(streams.feed(peer, V2[9:], now=0.0)) for peer in (0, MAX_STREAMS)] == [0, 1]

@@ -20,21 +20,28 @@ from mav_tasks.errors import UsageError
 from mav_tasks.links.link_limits import TO_VEHICLES
 from mav_tasks.links.url import parse_url
 from mav_tasks.metrics.collector import Collector
+from mav_tasks.metrics.families import TASKS
 from mav_tasks.metrics.http_server import Answer, HttpServer, Page, listening
 from mav_tasks.metrics.pages import Pages
-from mav_tasks.tasks.events import QueueContinued, TaskModified
+from mav_tasks.tasks.events import QueueContinued, TaskChanged, TaskModified, TaskSubmitted
 from mav_tasks.tasks.restored import Restored
 from tests.kit.awaited import awaited
-from tests.kit.client import MOVE
 from tests.kit.processes import free_tcp_ports
+from tests.kit.rows import check
 from tests.kit.scraped import asked
 from tests.kit.world import World
 
+LATER = """
+TASK_MOVE 1 0 0 0 0 1 & wait 2 : ACCEPTED
+mission; GO; GO at=1,0 : ACCEPTED
+DO_PAUSE_CONTINUE 0 : ACCEPTED
+"""
 LINES = """mav_tasks_halts_not_stored_total{vehicle="1"} 1
 mav_tasks_link_bytes_total{link="gcs",direction="received"} 10
-mav_tasks_queue_length{vehicle="1"} 1
+mav_tasks_queue_length{vehicle="1"} 3
 mav_tasks_store_writable 1
-mav_tasks_tasks{vehicle="1",state="blocked",reason="waiting_for_start"} 1"""
+mav_tasks_tasks{vehicle="1",state="blocked",reason="waiting_for_start"} 2
+mav_tasks_task_interruptions_total{vehicle="1",state="paused",reason="operator"} 1"""
 
 
 async def broken() -> Answer:
@@ -44,10 +51,7 @@ async def broken() -> Answer:
 @awaited
 async def test_the_pages_say_what_is_ready_and_what_was_counted() -> None:
     world = World().ready()
-    first = world.client.move(9.0)
-    world.run(1.0)
-    world.client.command(MOVE, 1.0, 0, 0, 0, first.task_id)
-    world.run(1.0)
+    check(world, "TASK_MOVE 9 & wait 1 & TASK_MOVE 1 0 0 0 1 & wait 1 : ACCEPTED+ACCEPTED")
     port, other = free_tcp_ports(2)
     urls = "tcp:127.0.0.1:9", f"tcpin:127.0.0.1:{other}"
     links = [parse_url(url).open(limits=TO_VEHICLES) for url in urls]
@@ -87,6 +91,10 @@ async def test_the_pages_say_what_is_ready_and_what_was_counted() -> None:
     ):
         collector.on_input(item, now=world.now)
         assert await page("/readyz") == f"{expected}\n"
+    assert len(collector.vehicles([1, 2])[TASKS]) == 2, "two tasks; there is no rover 2 any more"
+    check(world, LATER)
+    collector.on_output([], world.events(TaskSubmitted), now=world.now)
+    collector.on_output([], world.events(TaskChanged), now=world.now)
     second = world.tasks()[1]
     for terms in (second.terms, replace(second.terms, is_staged=True)):
         event = TaskModified(second.id, 1, 2, terms, "a client", world.now)

@@ -40,7 +40,16 @@ def test_a_car_that_cannot_come_back_has_one_try_and_others_correct_their_end() 
 
 def test_who_stands_beside_its_place_drives_there_again_and_who_circles_it_does_not() -> None:
     place = LocalPlace(0.0, 3.0)
-    for goal, misses in ((GoTo(place), 1), (GoTo(place, radius=3.0, turns=1.0), 0)):
-        course = PathFollower(goal, Progress(anchor=ORIGIN, leg=WAY, target=place))
+    begun = Progress(anchor=ORIGIN, leg=WAY, target=place)
+    for goal, car, misses in (
+        (GoTo(place), None, 1),
+        (GoTo(place), CAR, 1),
+        (GoTo(place, radius=3.0, turns=1.0), None, 0),
+    ):
+        course = PathFollower(goal, begun, steering=car)
         course.advance(motion(at=100.0))
         assert course.misses == misses, goal
+    course = PathFollower(GoTo(place), begun, passing=0.5, within=0.3)
+    course.look(motion(Pose(5.0, 0.0, 0.0), at=100.0), elapsed=0.05)
+    assert not course.is_passing, "it went by"
+    assert course.has_arrived(stands=False, driving=Driving()), "it stops and tries again"

@@ -14,6 +14,7 @@ from mav_tasks.tasks.driving.path import (
     Follow,
     Path,
     beside,
+    curvature_at,
     nearest,
     path_length,
     pose_on,
@@ -146,3 +147,4 @@ def test_a_bend_slows_it_down_and_a_straight_before_it_does_not() -> None:
             ).forward
         )
     assert speeds == [1.5, pytest.approx(bend_speed(0.5, driving))]
+    assert curvature_at(path, 99.0) == 0.0

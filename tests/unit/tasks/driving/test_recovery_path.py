@@ -132,6 +132,8 @@ def test_off_its_line_is_further_than_a_metre_or_past_the_end() -> None:
     for pose in (Pose(1.68, 0.92, 1.0), Pose(-9.0, 0.0, 0.0)):
         found = resumed(WAY, in_bend, motion(pose, at=0.0), turns_first=False, steering=car)
         assert (found == in_bend) is (pose.yaw == 1.0), pose
+    aside = motion(beside(4.0, 5.0), at=0.0)
+    assert recovery_path(Move(9.0), begun, aside, honours_yaw_rate=True, steering=car)
     for row in f"""Move 10: on it: 5 near
         Move 10: off it: 5 far
         Move 10: off it: 5 -far
