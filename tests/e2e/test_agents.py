@@ -75,6 +75,9 @@ async def test_stop_ends_the_task_and_only_a_present_epoch_resumes(
         assert queue["paused"] == "stopped"
         assert f"epoch: {queue['halt_epoch']}" in queue["advice"]
         assert queue["halt_epoch"] > before["halt_epoch"]
+        waiting = await it.drive("after the stop", MOVE)
+        assert "The queue is paused (" in waiting["advice"]
+        await it.call("cancel", id=waiting["id"])
         assert "epoch: missing" in await it.refused("resume")
         assert "epoch: expected at least 1" in await it.refused("resume", epoch=0)
         assert await it.refused("resume", epoch=before["halt_epoch"])
@@ -82,22 +85,35 @@ async def test_stop_ends_the_task_and_only_a_present_epoch_resumes(
         assert (await it.call("queue"))["paused"] is None
 
 
+#: a call, what it is refused with; KEY: an idempotency key
+REFUSED = """submit "goals": [{"kind": "move", "distance": 1e6}], KEY => distance 1000000 not in
+submit "goals": [{"kind": "home"}], "label": "ééééééééééééé", KEY => label
+submit "goals": [{"kind": "home"}] => idempotency_key: missing
+submit "goals": [{"kind": "home"}], "vehicle": 9, KEY => no rover 9
+submit "goals": [], KEY => goals: expected at least 1
+submit "goals": [{"kind": "fly"}], KEY => goals[0].kind 'fly'
+submit "goals": [{"kind": "home"}], "start_in": 1e9, KEY => start_in: expected at most
+task "id": 999999.0 => no task 999999
+task "id": true => id True: expected a whole number
+release "id": 1, "how": "all", "epoch": 1 => how 'all': expected one of again, remainder, skip
+queue "rover": 1 => rover: unknown; expected vehicle, limit"""
+
+
 @awaited
 async def test_a_refusal_is_the_result_of_a_call_with_its_reason(
     running: Stand, tmp_path: Path
 ) -> None:
+    calls = REFUSED.replace("KEY", '"idempotency_key": "refused"')
     async with agent(running, tmp_path) as it:
-        key = {"idempotency_key": "refused"}
-        far = await it.refused("submit", goals=[{"kind": "move", "distance": 1e6}], **key)
-        assert "distance 1000000 not in" in far
-        assert "label" in await it.refused("submit", goals=[MOVE], label="é" * 20, **key)
-        assert "idempotency_key: missing" in await it.refused("submit", goals=[MOVE])
-        assert "no rover 9" in await it.refused("submit", goals=[MOVE], vehicle=9, **key)
-        assert "no task 999999" in await it.refused("task", id=999_999)
-        assert "goals: expected at least 1" in await it.refused("submit", goals=[], **key)
+        for tool, arguments, words in re.findall(r"(\w+) (.*) => (.*)", calls):
+            assert words in await it.refused(tool, **json.loads(f"{{{arguments}}}"))
         with pytest.raises(MCPError, match="no tool 'fly'; there are vehicles"):
             await it.client.call_tool("fly", {})
         assert (await it.call("queue"))["waiting"] == []
+    async with agent(running, tmp_path, "--read-only", "--vehicle", "1") as it:
+        assert "only rover 1 is offered" in await it.refused("queue", vehicle=2)
+        with pytest.raises(MCPError, match="no tool 'submit'"):
+            await it.call("submit")
 
 
 @pytest.mark.parametrize(
@@ -282,7 +298,11 @@ async def test_a_held_task_requires_input(running: Stand, tmp_path: Path) -> Non
         await answer(key, "decline", "skip")
         with pytest.raises(MCPError, match="how 'all': expected one of remainder"):
             await answer(key, "accept", "all")
-        assert (await it.call("task", id=number))["state"] == "held"
+        assert (await it.call("wait", id=number))["state"] == "held"
+        assert f"Task {number} is held" in (await it.call("queue"))["advice"]
+        await it.client.call_tool("submit", {"goals": [MOVE], "idempotency_key": "behind"})
+        assert "release the held task before it" in tasks.created[1].status_message
+        await it.call("cancel", id=number + 1)
         await accepted(lambda: answer(key, "accept", "remainder"))
         queue = await it.call("queue")
         if queue["paused"]:
