@@ -337,6 +337,10 @@ queue => executing
 clear --all --yes => 0
 queue => no task runs"""
 SILENT = """queue => silent for
+submit move 1 => waits: rover silent; check the rover's radio and power
+queue => waits: rover silent; check the rover's radio and power
+doctor => WRONG
+clear => 0
 ready => 1 mav-tasks: the server answers, but does not hear rover 1 (silent for
 doctor => WRONG  rover 1 … silent for
 vehicles => ago"""

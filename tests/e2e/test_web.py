@@ -307,7 +307,7 @@ def test_a_session_is_a_cookie_that_scripts_cannot_read(
     token = add_key(tmp_path, "anna", "submitter")
     shown = ("--tiles", "https://{s}.tiles.example/{z}/{x}/{y}", "--records", str(tmp_path))
     with web(tmp_path, both[0], *shown, name="session") as it:
-        for headers in ({}, {"authorization": "Bearer x"}):
+        for headers in ({}, {"authorization": "Bearer x"}, {"cookie": "a/b=1"}):
             assert it.send("GET", "/session", None, **headers).status_code == 401
         policy = it.client.get("/").headers["content-security-policy"]
         assert "img-src 'self' https://*.tiles.example " in policy
