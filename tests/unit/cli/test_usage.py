@@ -125,7 +125,6 @@ store.path = "postgresql:///x": the server looks at it when it starts
 store.path = "FILE": chmod 600
 store.path = "/dev/null/x": this user may not write it
 store.path = "/proc/none/x": less than 100 MB free
-links.clients = ["pigeon:1"]: serve would not start
 signing.keys = "/dev/null/x": mav-tasks keys list
 signing.keys = "RING": no usable key
 links.clients = ["udpin:0.0.0.0:14560"]: no client has a signing key
