@@ -90,16 +90,22 @@ def test_it_says_which_version_it_is() -> None:
     assert re.fullmatch(r"mav-tasks \d+\.\d+\.\d+\n", mav_tasks("--version").output)
 
 
+#: the number of a word of a command, the command, and how that word may go on
+COMPLETED = """2 submit  => drive face goto home move rotate wait
+2 sim --bo => --body --boot
+3 sim --body  => auto bullet kinematic"""
+
+
 def test_a_shell_can_complete_commands() -> None:
     it = f"{sys.executable} -m mav_tasks.cli --show-completion"
     shown = subprocess.run(  # in a shell: it prints the completion of the shell that called it
         ["bash", "-c", f"{it}; exit $?"], capture_output=True, text=True, timeout=30, check=True
     )
     assert "_MAV_TASKS_COMPLETE=complete_bash" in shown.stdout
-    words = mav_tasks(
-        _MAV_TASKS_COMPLETE="complete_bash", COMP_WORDS="mav-tasks submit ", COMP_CWORD="2"
-    )
-    assert set(words.lines) == {"move", "rotate", "drive", "goto", "face", "wait", "home"}
+    for number, typed, found in re.findall("(.) (.*) => (.*)", COMPLETED):
+        said = {"COMP_WORDS": f"mav-tasks {typed}", "COMP_CWORD": number}
+        words = mav_tasks(_MAV_TASKS_COMPLETE="complete_bash", **said)
+        assert sorted(words.lines) == found.split()
 
 
 @pytest.mark.parametrize(

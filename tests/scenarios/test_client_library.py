@@ -250,7 +250,7 @@ def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
                     with suppress(ClientError):
                         await task.modify(label=label)
                         assert world.server.task(task.id).terms.label == label
-            with world.lossy_link(loss=0.35):
+            with world.lossy_link(loss=0.35, duplication=0.5):
                 assert len(await client.mission()) == 3, "with home"
                 assert await client.set_rally_points(RALLY) == 1
                 assert len(await client.rally_points()) == 1

@@ -3,9 +3,13 @@
 import os
 import re
 import sqlite3
+from datetime import UTC, datetime
+from math import inf
 from pathlib import Path
 
 from mav_tasks.cli.output import wrapped
+from mav_tasks.cli.times import moment_ago
+from mav_tasks.cli.words import silence_of
 from tests.kit.commands import called
 
 NOBODY = "udpout:127.0.0.1:9"
@@ -113,7 +117,9 @@ def test_each_option_is_understood_or_named_in_one_line(tmp_path: Path) -> None:
     assert wrong == []
 
 
-def test_a_line_is_wrapped_at_words_and_what_continues_it_is_indented() -> None:
+def test_times_are_told_in_words_and_lines_are_wrapped_at_words() -> None:
+    assert moment_ago(86_400.0, now=datetime(2026, 11, 22, 10, 30, tzinfo=UTC)) == "2026-11-21 10:30"
+    assert silence_of(inf) == "not heard since the server started"
     assert wrapped("one two\n", 7) == "one two\n"
     assert wrapped("a line of several words\n", 20) == "a line of several\n    words\n"
 

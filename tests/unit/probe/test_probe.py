@@ -107,11 +107,13 @@ def test_who_else_drives_it_is_left_alone() -> None:
     """Also a server that the probe has dialled instead of the rover."""
     for said, words in (
         ([(COMPUTER, (1, 191)), (QUEUE, (1, 191))], "task server 1/191 is on this link: probe on"),
+        ([(STATION, (250, 192))], "task server 250/192 is on this link: end it first"),
+        ([(m.CommandAck(400, 2, 0, 108, 245, 190), (1, 1))], "task server 1/1 is on this link"),
         ([(STATION, (250, 191))], "task server 250/191 is on this link: end it first"),
         ([(SETPOINT, (245, 190))], "245/190 sends setpoints: the rover is being driven"),
     ):
         world = ProbeWorld(drive=True)
-        world.run(1.0)
+        world.run(1.5)
         for message, source in said:
             world.somebody_sends(message, Address(*source))
             world.run(2.5)  # it is asked what it is
@@ -297,7 +299,7 @@ def test_a_car_is_driven_in_a_larger_area_and_not_asked_to_turn_on_the_spot() ->
     profile = profile_of(world.finish().findings, probed="2026-11-22T10:00:00Z")
     assert (world.driven.ended, world.rests()) == ("", True)
     assert [profile.turning, profile.yaw_rate, profile.reverse] == ["steered", "honoured", "yes"]
-    assert world.farthest < 4.0
+    assert (world.farthest < 4.0, why_none(world.probe.findings)) == (True, "")
     assert not [each for _, each in world.setpoints() if each.vx == 0.0 and each.yaw_rate]
 
 
@@ -309,6 +311,7 @@ def test_what_cannot_be_driven_safely_is_not_driven() -> None:
         (ARDUPILOT, withheld[0], None, unknown),
         (ARDUPILOT, withheld[1], None, unknown),
         (SLOW, Faults(), None, "not driven: "),
+        (replace(GENERIC, autopilot=MavAutopilot.INVALID), Faults(), None, "not driven: the server does not drive"),
         (ARDUPILOT, Faults(), (COMPUTER, (1, 100)), other),
         (
             *(ARDUPILOT, Faults(), (m.CommandAck(400, 0, 0, 0, 245, 190), (1, 1))),
