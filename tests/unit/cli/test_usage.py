@@ -3,9 +3,13 @@
 import os
 import re
 import sqlite3
+import sys
 from datetime import UTC, datetime
+from io import StringIO
 from math import inf
 from pathlib import Path
+
+import pytest
 
 from mav_tasks.cli.output import wrapped
 from mav_tasks.cli.times import moment_ago
@@ -117,11 +121,29 @@ def test_each_option_is_understood_or_named_in_one_line(tmp_path: Path) -> None:
     assert wrong == []
 
 
+NOON = datetime(2026, 11, 22, 12, tzinfo=UTC)
+
+
 def test_times_are_told_in_words_and_lines_are_wrapped_at_words() -> None:
-    assert moment_ago(86_400.0, now=datetime(2026, 11, 22, 10, 30, tzinfo=UTC)) == "2026-11-21 10:30"
+    assert moment_ago(86_400.0, now=NOON) == "2026-11-21 12:00"
     assert silence_of(inf) == "not heard since the server started"
     assert wrapped("one two\n", 7) == "one two\n"
     assert wrapped("a line of several words\n", 20) == "a line of several\n    words\n"
+
+
+class Typed(StringIO):
+    """What somebody types at a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_rover_is_driven_only_after_a_yes(monkeypatch: pytest.MonkeyPatch) -> None:
+    for answer, words in {"no": "the answer was not yes", "yes": "Connection refused"}.items():
+        monkeypatch.setattr(sys, "stdin", Typed(answer))
+        done = called("probe", "tcp:127.0.0.1:9", "--drive", "--timeout", "1")
+        assert "yes" in done.error.partition("?")[2]
+        assert words in done.error
 
 
 #: a configuration -> what the doctor says

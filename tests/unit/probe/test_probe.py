@@ -28,6 +28,7 @@ from tests.kit.probing import BOX, ProbeWorld, is_moving
 MAKES = (ARDUPILOT, PX4, GENERIC)  # a generic one is spoken to as a PX4
 EACH = pytest.mark.parametrize("persona", MAKES, ids=lambda p: p.name)
 SLOW = replace(ARDUPILOT, streams=replace(ARDUPILOT.streams, shortest_interval=0.5))
+OTHER = replace(GENERIC, autopilot=MavAutopilot.INVALID)
 STATION = m.Heartbeat(MavType.GCS, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)
 COMPUTER = m.Heartbeat(MavType.ONBOARD_CONTROLLER, MavAutopilot.INVALID, 0, 0, MavState.ACTIVE, 3)
 SETPOINT = m.SetPositionTargetLocalNed(0, 1, 1, 8, 0x05C7, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0)
@@ -311,7 +312,12 @@ def test_what_cannot_be_driven_safely_is_not_driven() -> None:
         (ARDUPILOT, withheld[0], None, unknown),
         (ARDUPILOT, withheld[1], None, unknown),
         (SLOW, Faults(), None, "not driven: "),
-        (replace(GENERIC, autopilot=MavAutopilot.INVALID), Faults(), None, "not driven: the server does not drive"),
+        (
+            OTHER,
+            Faults(),
+            None,
+            "not driven: the server does not drive",
+        ),
         (ARDUPILOT, Faults(), (COMPUTER, (1, 100)), other),
         (
             *(ARDUPILOT, Faults(), (m.CommandAck(400, 0, 0, 0, 245, 190), (1, 1))),
