@@ -1,5 +1,6 @@
 """Attacks on a real web process, beside a real server and rover. Each was one that worked."""
 
+import json
 import re
 import socket
 from collections.abc import Iterator
@@ -83,6 +84,23 @@ def test_an_epoch_that_names_no_halt_does_not_release_a_stop(page: Web, epoch: o
     assert page.get("/vehicles/1/queue")["paused"] == "stopped"
 
 
+TRIES = """POST /vehicles/1/resume {"epoch": SEEN}
+POST /tasks/TASK/release {"how": "again", "epoch": SEEN}
+POST /tasks/LATER/release {"how": "remainder", "epoch": SEEN}
+POST /vehicles/1/tasks {"goals": [{"kind": "move", "distance": 5}], "priority": 10}
+POST /vehicles/1/tasks {"goals": [{"kind": "rotate", "angle": 90}]}
+POST /vehicles/1/tasks {"goals": [{"kind": "home"}], "priority": 10}
+POST /vehicles/1/missions {"text": PLAN, "priority": 10}
+PATCH /tasks/LATER {"delay": 0, "priority": 10, "preemptive": true}
+POST /vehicles/1/pause {}
+PUT /vehicles/1/fence {"circle": CIRCLE}
+DELETE /vehicles/1/fence null
+POST /tasks/TASK/cancel {}
+POST /tasks/LATER/cancel {"kill": true}
+POST /vehicles/1/clear {"running_too": true}
+POST /vehicles/1/tasks {"goals": [{"kind": "move", "distance": 5}], "priority": 10}"""
+
+
 def test_nothing_but_a_resume_that_has_seen_it_ends_a_stop(both: tuple[Stand, Web]) -> None:
     """Each operation that may set a rover in motion, by a page that shows an older STOP."""
     it, page = both
@@ -100,24 +118,14 @@ def test_nothing_but_a_resume_that_has_seen_it_ends_a_stop(both: tuple[Stand, We
     rover = page.get("/vehicles/1")
     item = "1\t0\t3\t16\t0\t0\t0\t0\t{}\t{}\t0\t1\n".format(*_near(rover))
     plan = "QGC WPL 110\n0" + item[1:] + item
-    tries: list[tuple[str, str, object]] = [
-        ("POST", "/vehicles/1/resume", {"epoch": seen}),
-        ("POST", f"/tasks/{task}/release", {"how": "again", "epoch": seen}),
-        ("POST", f"/tasks/{later}/release", {"how": "remainder", "epoch": seen}),
-        ("POST", "/vehicles/1/tasks", move | {"priority": 10}),
-        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "rotate", "angle": 90}]}),
-        ("POST", "/vehicles/1/tasks", {"goals": [{"kind": "home"}], "priority": 10}),
-        ("POST", "/vehicles/1/missions", {"text": plan, "priority": 10}),
-        ("PATCH", f"/tasks/{later}", {"delay": 0, "priority": 10, "preemptive": True}),
-        ("POST", "/vehicles/1/pause", {}),
-        ("PUT", "/vehicles/1/fence", {"circle": _circle(rover)}),
-        ("DELETE", "/vehicles/1/fence", None),
-        ("POST", f"/tasks/{task}/cancel", {}),
-        ("POST", f"/tasks/{later}/cancel", {"kill": True}),
-        ("POST", "/vehicles/1/clear", {"running_too": True}),
-        ("POST", "/vehicles/1/tasks", move | {"priority": 10}),
-    ]
-    codes = {path: page.send(method, path, body).status_code for method, path, body in tries}
+    known = {"SEEN": seen, "TASK": task, "LATER": later, "PLAN": plan, "CIRCLE": _circle(rover)}
+    rows = re.sub(
+        "[A-Z]+", lambda word: json.dumps(known[word[0]]) if word[0] in known else word[0], TRIES
+    )
+    tries = (row.split(" ", 2) for row in rows.splitlines())
+    codes = {
+        path: page.send(method, path, json.loads(body)).status_code for method, path, body in tries
+    }
     assert codes["/vehicles/1/resume"] == 409
     assert codes["/vehicles/1/missions"] == 201
     queue = page.get("/vehicles/1/queue")
