@@ -408,24 +408,24 @@ def test_a_mission_goes_up_waits_is_driven_and_comes_back(server: str, tmp_path:
     assert_one_line(refused, 2, "--stage")
 
 
+FENCE = """fence upload FOLDER/fence.plan => 0 fence: 4 items
+fence download FOLDER/back.plan => 0 FOLDER/back.plan
+rally upload FOLDER/fence.plan --json => 0 {"done": "rally upload", "items": 1}
+fence upload FOLDER/none.plan => 2 mav-tasks: … fence clear
+rally upload FOLDER/none.plan => 2 mav-tasks: … rally clear
+fence clear => 0
+rally clear => 0
+fence download FOLDER/away.plan => 1 mav-tasks: … no fence"""
+
+
 def test_a_fence_and_rally_points_go_up_and_the_fence_comes_back(
     server: str, tmp_path: Path
 ) -> None:
-    plan, none, back = tmp_path / "fence.plan", tmp_path / "none.plan", tmp_path / "back.plan"
-    plan.write_text(PLAN, encoding="utf-8")
-    none.write_text(NO_FENCE, encoding="utf-8")
-    assert called("fence", "upload", str(plan), server=server).lines == ["fence: 4 items"]
-    called("fence", "download", str(back), server=server)
-    assert read_plan(back).fence == read_plan(plan).fence
-    assert called("rally", "upload", str(plan), "--json", server=server).objects == [
-        {"done": "rally upload", "items": 1}
-    ]
-    away = tmp_path / "away.plan"
-    for kind in ("fence", "rally"):
-        assert_one_line(called(kind, "upload", str(none), server=server), 2, f"{kind} clear")
-        assert called(kind, "clear", server=server).status == 0
-    assert_one_line(called("fence", "download", str(away), server=server), 1, "no fence")
-    assert not away.exists()
+    for name, text in {"fence": PLAN, "none": NO_FENCE}.items():
+        (tmp_path / f"{name}.plan").write_text(text, encoding="utf-8")
+    session(server, FENCE.replace("FOLDER", str(tmp_path)))
+    assert read_plan(tmp_path / "back.plan").fence == parse_plan(PLAN).fence
+    assert not (tmp_path / "away.plan").exists()
 
 
 def test_a_reader_that_goes_is_no_mishap(server: str, client: SyncClient) -> None:
