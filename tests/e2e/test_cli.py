@@ -93,7 +93,8 @@ def test_it_says_which_version_it_is() -> None:
 #: the number of a word of a command, the command, and how that word may go on
 COMPLETED = """2 submit  => drive face goto home move rotate wait
 2 sim --bo => --body --boot
-3 sim --body  => auto bullet kinematic"""
+3 sim --body  => auto bullet kinematic
+3 queue --sign  => """
 
 
 def test_a_shell_can_complete_commands() -> None:
@@ -104,8 +105,8 @@ def test_a_shell_can_complete_commands() -> None:
     assert "_MAV_TASKS_COMPLETE=complete_bash" in shown.stdout
     for number, typed, found in re.findall("(.) (.*) => (.*)", COMPLETED):
         said = {"COMP_WORDS": f"mav-tasks {typed}", "COMP_CWORD": number}
-        words = mav_tasks(_MAV_TASKS_COMPLETE="complete_bash", **said)
-        assert sorted(words.lines) == found.split()
+        words = mav_tasks(_MAV_TASKS_COMPLETE="complete_bash", XDG_CONFIG_HOME="/dev", **said)
+        assert sorted(words.output.split()) == found.split()
 
 
 @pytest.mark.parametrize(

@@ -109,6 +109,8 @@ def test_one_key_makes_one_task(page: Web) -> None:
         assert refused.json()["reason"] == "nonce_reused"
     second = page.post("/vehicles/1/tasks", body, idempotency_key="another key")
     assert second["id"] != first["id"]
+    long = page.send("POST", "/vehicles/1/tasks", body, idempotency_key="x" * 300)
+    assert "expected 1 to" in long.json()["detail"]
 
 
 def test_why_a_task_waits_and_what_helps(page: Web, check: Check) -> None:
@@ -197,19 +199,24 @@ def test_a_plan_is_shown_and_then_queued(page: Web, check: Check) -> None:
     assert wrong.status_code == 422
 
 
+FENCES = """circle {"latitude": -35.3632, "longitude": 149.1652, "radius": 40}
+polygon [{"latitude": -35.362, "longitude": 149.164}, {"latitude": -35.362, "longitude": 149.167}, \
+{"latitude": -35.365, "longitude": 149.165}]"""
+
+
 def test_the_fence_is_set_shown_and_removed(page: Web) -> None:
-    rover = page.get("/vehicles/1")
-    circle = {"latitude": rover["latitude"], "longitude": rover["longitude"], "radius": 40}
-    assert page.send("PUT", "/vehicles/1/fence", {"circle": circle}).json() == {"items": 1}
-    (shape,) = page.get("/vehicles/1/fence")["shapes"]
-    assert (shape["kind"], shape["radius"]) == ("circle", 40)
+    for kind, shape in re.findall("(.*?) (.*)", FENCES):
+        page.send("PUT", "/vehicles/1/fence", {kind: json.loads(shape)})
+        (shown,) = page.get("/vehicles/1/fence")["shapes"]
+        assert (shown["kind"], shown.get("radius")) in (("circle", 40), ("polygon", None))
+        assert kind == shown["kind"]
     far = {"kind": "goto", "north": 400, "east": 0}
     refused = page.send("POST", "/vehicles/1/tasks", {"goals": [far]})
     assert refused.status_code == 409
     assert refused.json()["reason"] in ("outside_fence", None)
     assert page.send("DELETE", "/vehicles/1/fence", None).status_code == 204
     assert page.get("/vehicles/1/fence")["shapes"] == []
-    both = page.send("PUT", "/vehicles/1/fence", {"circle": circle, "polygon": []})
+    both = page.send("PUT", "/vehicles/1/fence", {"circle": json.loads(shape), "polygon": []})
     assert both.status_code == 422
 
 
