@@ -44,27 +44,27 @@ def test_a_port_in_use_is_named() -> None:
         )
 
 
+LINKS = """--client |  | udpin:host:port
+--vehicle | tcp:no.such.host.invalid:5760 | no.such.host.invalid
+--client | serial:/dev/null:57600 | not a serial device
+--client | udpin:0.0.0.0:14560 | --insecure | signing key
+--vehicle | udpout:192.0.2.1:14580 | --insecure | signing key
+--push | 192.0.2.1:14550 | --insecure | signing key
+--vehicle | udpin:127.0.0.1:1?key=carl | no key 'carl' (usable keys: anna)
+--client | udpin:127.0.0.1:1?key=ben | key ben was revoked on
+--vehicle | udpin:127.0.0.1:1?key=anna | key anna has role safety"""
+
+
 def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
     """That of URLs is in tests/unit/links."""
     ring = tmp_path / "keys.toml"
     for command in (("add", "ben", "--role", "safety"), ("revoke", "ben"), ("add", "anna")):
         role = ("--role", "safety") if command == ("add", "anna") else ()
         assert called("keys", *command, *role, "--keys", str(ring)).status == 0
-    near = "udpin:127.0.0.1:1"
-    for option, url, *words in (
-        ("--client", "", "udpin:host:port"),
-        ("--vehicle", "tcp:no.such.host.invalid:5760", "no.such.host.invalid"),
-        ("--client", "serial:/dev/null:57600", "not a serial device"),
-        ("--client", "udpin:0.0.0.0:14560", "--insecure", "signing key"),
-        ("--vehicle", "udpout:192.0.2.1:14580", "--insecure", "signing key"),
-        ("--push", "192.0.2.1:14550", "--insecure", "signing key"),
-        ("--vehicle", f"{near}?key=carl", "no key 'carl' (usable keys: anna)"),
-        ("--client", f"{near}?key=ben", "key ben was revoked on"),
-        ("--vehicle", f"{near}?key=anna", "key anna has role safety"),
-    ):
+    for option, url, *words in (row.split(" | ") for row in LINKS.splitlines()):
         keys = ("--set", f"signing.keys={ring}") if "?key" in url else ()
         push = () if option == "--push" else ("--no-push",)
-        assert_one_clear_line(run("serve", *push, option, url, *keys), *words)
+        assert_one_clear_line(run("serve", *push, option, url.strip(), *keys), *words)
 
 
 #: a package that is missing, a command, and how it ends
