@@ -111,7 +111,13 @@ def test_a_shell_can_complete_commands() -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [("nonsense",), ("submit", "move"), ("submit", "move", "far"), ("submit", "move", "1", "--no")],
+    [
+        ("nonsense",),
+        ("submit", "move"),
+        ("submit", "move", "far"),
+        ("submit", "move", "1", "--no"),
+        ("queue", "--vehicle", "300"),
+    ],
 )
 def test_what_is_no_command_is_status_2(arguments: tuple[str, ...]) -> None:
     done = called(*arguments)
