@@ -278,8 +278,9 @@ def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
             assert [str(end) for end in ends if isinstance(end, ClientError)] == [
                 "the client was closed"
             ] * 5
-            with pytest.raises(MavTasksError, match="open it first"):
-                await client.queue()
+            for call, words in ((client.queue(), "open it first"), (task.done(), "was closed")):
+                with pytest.raises(MavTasksError, match=words):
+                    await call
 
     world.run(script())
 

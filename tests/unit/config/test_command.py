@@ -73,6 +73,8 @@ def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) ->
     assert re.search(r"^queueing\.quota = 7 +# MAV_TASKS_QUEUEING_QUOTA$", output, re.MULTILINE)
     assert re.search(r"^store\.path = \":memory:\" +# MAV_TASKS_STORE$", output, re.MULTILINE)
     assert re.search(r"^driving\.max_speed = 2 +# m/s, default$", output, re.MULTILINE)
+    unknown = run("config", "show", "log", environment={"MAV_TASKS_STORE": "x://y"})
+    assert "parameters set by clients are not shown" in unknown[2]
     again.write_text(output, encoding="utf-8")
     assert run("config", "check", str(again)) == (0, "ok\n", "")
     code, output, _ = run(

@@ -229,6 +229,8 @@ REPORTS = (
 def test_the_report_marks_what_is_not_as_it_must_be() -> None:
     for found, expected in REPORTS:
         lines = [f"{line.mark.value}{line.topic}: {line.words}" for line in lines_of(found)]
+        why = why_none(found)
+        assert why in ("only --drive measures one", "the rover does not report its firmware")
         assert {each.strip() for each in expected.splitlines()} - set(lines) == set(), lines
 
 
@@ -440,7 +442,8 @@ def test_whenever_it_is_ended_the_rover_comes_to_rest(persona: Persona) -> None:
             world.run(after)
         drives = bool(world.setpoints()) and not world.probe.is_over
         before, asked_at = len(world.party.sent), world.now
-        world.probe.interrupt("ended by SIGINT", now=world.now)
+        for _ in range(2):
+            world.probe.interrupt("ended by SIGINT", now=world.now)
         probe = world.finish()
         assert isinstance(probe.error, Interrupted)
         assert world.now < asked_at + 8.0
