@@ -195,8 +195,10 @@ def test_a_plan_is_shown_and_then_queued(page: Web, check: Check) -> None:
     task = page.post("/vehicles/1/missions", {"text": text, "label": "yard"})
     assert task["goals"] == shown["path"]
     page.wait_for(task["id"], "completed")
-    wrong = page.send("POST", "/plans", {"text": "no plan"})
-    assert wrong.status_code == 422
+    many = [ITEM.format(number, 0, 3, latitude, longitude) for number in range(1, 6_002)]
+    for count, status in ((1_500, 201), (6_001, 422)):
+        long = {"text": "QGC WPL 110\n" + "".join(many[:count])}
+        assert page.send("POST", "/vehicles/1/missions", long).status_code == status, count
 
 
 FENCES = """circle {"latitude": -35.3632, "longitude": 149.1652, "radius": 40}
@@ -239,6 +241,7 @@ POST /vehicles/1/resume {} 422 epoch: missing
 POST /tasks/1/release {"how": "perhaps", "epoch": 1} 422 expected one of
 PUT /vehicles/1/fence {} 422 expected one of text, circle, polygon
 PUT /vehicles/1/fence {"text": "nonsense"} 422 text
+POST /plans {"text": "no plan"} 422 text
 GET /tasks/99999 null 404 no task 99999
 GET /nothing null 404 there is nothing at this address
 GET /records/x null 404 --records

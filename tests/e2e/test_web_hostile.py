@@ -61,17 +61,24 @@ def test_no_value_of_a_part_breaks_it(page: Web) -> None:
 NINES = "9" * 5000  # more digits than Python converts
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        *(f"/api/v1/tasks/{number}" for number in (0, 1 << 30, 9_999_999_999, NINES)),
-        *(f"/api/v1/vehicles/{number}/queue" for number in (0, 256, 9_999_999_999, NINES)),
-        *(f"/tasks/{NINES}", f"/tiles/1/{NINES}/1", f"/tiles/1/1/{NINES}", f"/tiles/{NINES}/1/1"),
-    ],
-)
-def test_an_id_out_of_range_is_not_found_and_never_asked_for(page: Web, path: str) -> None:
-    answer = page.client.get(path, timeout=5)  # a request that nobody answers takes 10 s
-    assert answer.status_code == 404
+NOT_FOUND = """/api/v1/tasks/0
+/api/v1/tasks/1073741824
+/api/v1/tasks/9999999999
+/api/v1/tasks/NINES
+/api/v1/vehicles/0/queue
+/api/v1/vehicles/256/queue
+/api/v1/vehicles/9999999999/queue
+/api/v1/vehicles/NINES/queue
+/tasks/NINES
+/tiles/1/NINES/1
+/tiles/1/1/NINES
+/tiles/NINES/1/1"""
+
+
+def test_an_id_out_of_range_is_not_found_and_never_asked_for(page: Web) -> None:
+    for path in NOT_FOUND.replace("NINES", NINES).splitlines():
+        answer = page.client.get(path, timeout=5)  # a request that nobody answers takes 10 s
+        assert answer.status_code == 404, path[:80]
 
 
 @pytest.mark.parametrize("epoch", [0, 1 << 24, 1 << 25, -1, 1 << 32, 1.0, True])
