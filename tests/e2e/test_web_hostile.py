@@ -70,6 +70,7 @@ NOT_FOUND = """/api/v1/tasks/0
 /api/v1/vehicles/9999999999/queue
 /api/v1/vehicles/NINES/queue
 /tasks/NINES
+/tiles/1/1/1
 /tiles/1/NINES/1
 /tiles/1/1/NINES
 /tiles/NINES/1/1"""
