@@ -11,6 +11,7 @@ from typing import Any
 
 from mcp.shared.inbound import MCP_PROTOCOL_VERSION_HEADER
 from mcp_types.version import HANDSHAKE_PROTOCOL_VERSIONS
+from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST = 100  # sessions
@@ -69,6 +70,7 @@ class HttpSessions:
         """Let the SDK open a session; end another one if there are too many."""
         body = await _whole(receive)
         if body is None:
+            await PlainTextResponse("Request body too large", 413)(scope, receive, send)
             return
         waiting = [body]
 

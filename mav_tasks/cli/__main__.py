@@ -2,5 +2,4 @@
 
 from mav_tasks.cli.app import main
 
-if __name__ == "__main__":
-    main()
+main()

@@ -42,12 +42,12 @@ def export(
 
     Reads what serve --tlog and serve --record write. Needs the extra mcap.
     """
-    if (mcap is None) == (tlog is None):
-        raise UsageError("choose one of --mcap OUT and --tlog OUT")
-    if mcap is not None:
+    if mcap is not None and tlog is None:
         _to_mcap(files, mcap, as_json=json, force=force)
-    elif tlog is not None:
+    elif tlog is not None and mcap is None:
         _to_tlog(files, tlog, as_json=json, force=force)
+    else:
+        raise UsageError("choose one of --mcap OUT and --tlog OUT")
 
 
 def _to_mcap(files: Sequence[Path], out: Path, *, as_json: bool, force: bool) -> None:

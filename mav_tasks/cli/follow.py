@@ -160,5 +160,5 @@ class Bar:
         return Group(grid, Text(way_on)) if way_on else grid
 
     def _draw(self) -> None:
-        if self.live is not None:
-            self.live.refresh()
+        assert self.live is not None, "it is set before anything is shown"
+        self.live.refresh()

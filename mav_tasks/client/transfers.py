@@ -113,10 +113,8 @@ class Transfers:
 
     def handle_deadline(self, *, now: float) -> None:
         """Repeat what is due, and start the next transfer."""
-        for each in (self._uploader, self._downloader):
-            due = each.next_deadline()
-            if due is not None and now >= due:
-                each.handle_deadline(now=now)
+        self._uploader.handle_deadline(now=now)
+        self._downloader.handle_deadline(now=now)
         if self._rests_until is not None and now >= self._rests_until:
             self._rests_until = None
             if self._waiting:

@@ -123,8 +123,6 @@ class Watch:
         """Remove a stream. Return the interval to request, s; None: no stream."""
         intervals = self._streams[vehicle]
         intervals.remove(interval)
-        if not intervals:
-            del self._streams[vehicle]
         return min(intervals, default=None)
 
     def stream_of(self, vehicle: int) -> float | None:

@@ -158,7 +158,7 @@ def _own(goal: Move | Rotate | Drive) -> tuple[int, float, float, float]:
         case Rotate():
             _numbers(goal, angle=goal.angle, rate=goal.rate or 0.0)
             return MavCmd.TASK_ROTATE, degrees(goal.angle), degrees(goal.rate or 0.0), 0.0
-        case Drive():
+        case _:
             _numbers(goal, forward=goal.forward, yaw_rate=goal.yaw_rate, duration=goal.duration)
             return MavCmd.TASK_DRIVE, goal.forward, degrees(goal.yaw_rate), goal.duration
 
@@ -174,7 +174,7 @@ def _items(goal: Goal) -> tuple[Item, ...]:
             _numbers(goal, yaw=yaw, rate=rate or 0.0)
             heading, how = degrees(yaw) % 360.0, float(direction)
             return (_item(MavCmd.CONDITION_YAW, heading, degrees(rate or 0.0), how, 0.0),)
-        case GoTo():
+        case _:
             return _way(goal)
 
 

@@ -43,8 +43,8 @@ class _Export:
                 self.counts.events += 1
                 for seen in self._tasks.of(event, time=item.time):
                     self._writer.add(seen)
-            case Restored(tasks=tasks):
-                for seen in self._tasks.restored(tasks, time=item.time):
+            case _:
+                for seen in self._tasks.restored(item.tasks, time=item.time):
                     self._writer.add(seen)
 
     def finish(self) -> Counts:

@@ -62,7 +62,7 @@ def application(
             Route("/readyz", readyz),
             *pages.routes(services.tiles),
         ],
-        exception_handlers={HTTPException: _failed, Problem: _failed, 500: _broken},
+        exception_handlers={HTTPException: _failed, 500: _broken},
     )
     return Guard(
         app,
@@ -84,8 +84,6 @@ def _route(operation: Operation) -> Route:
 
 
 async def _failed(_request: Request, error: Any) -> Response:
-    if isinstance(error, Problem):
-        return error.response()
     words = {404: "there is nothing at this address", 405: "this address does not take that method"}
     detail = words.get(error.status_code, str(error.detail))
     headers = dict(error.headers or {})

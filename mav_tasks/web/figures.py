@@ -92,7 +92,7 @@ class Figures:
             yield from (((str(code),), count) for code, count in sorted(self._answers.items()))
         elif family is STOPS:
             yield from (((outcome,), count) for outcome, count in sorted(self._stops.items()))
-        elif family is ACKNOWLEDGED:
+        else:  # ACKNOWLEDGED
             yield (), self._acknowledged.figures()
 
     def _tasks(self) -> Iterator[Sample]:

@@ -54,7 +54,5 @@ class Journal:
     def submission_of(self, task: int) -> Task | None:
         """Return a task as it was submitted; None if the journal does not have it."""
         with closing(kind_of(self._place).open_journal(self._place, Which(task=task))) as reader:
-            for _, event in reader.take(offset=0.0):
-                if isinstance(event, TaskSubmitted):
-                    return event.task
-        return None
+            events = (event for _, event in reader.take(offset=0.0))
+            return next((each.task for each in events if isinstance(each, TaskSubmitted)), None)

@@ -217,10 +217,10 @@ class Live:
                 self._on_task(news)
             case Text():
                 self._on_text(news)
-            case QueueStatus(vehicle=vehicle):
-                known = self.queues.get(vehicle)
+            case _:
+                known = self.queues.get(news.vehicle)
                 if known is not None and _essence(known) != _essence(news):
-                    self.hurry(vehicle)
+                    self.hurry(news.vehicle)
 
     def _on_task(self, status: TaskStatus) -> None:
         self.stops.on_task(status)

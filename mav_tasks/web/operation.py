@@ -118,8 +118,6 @@ def _queried(field: Field, query: Mapping[str, str]) -> Any:
     text = query.get(field.name)
     if text is None:
         return None
-    if field.type == "string":
-        return field.read({field.name: text})
     try:
         value: float = int(text) if field.type == "integer" else float(text)
     except ValueError:

@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -75,6 +75,9 @@ async def test_stop_ends_the_task_and_only_a_present_epoch_resumes(
         assert queue["paused"] == "stopped"
         assert f"epoch: {queue['halt_epoch']}" in queue["advice"]
         assert queue["halt_epoch"] > before["halt_epoch"]
+        waiting = await it.drive("after the stop", MOVE)
+        assert "The queue is paused (" in waiting["advice"]
+        await it.call("cancel", id=waiting["id"])
         assert "epoch: missing" in await it.refused("resume")
         assert "epoch: expected at least 1" in await it.refused("resume", epoch=0)
         assert await it.refused("resume", epoch=before["halt_epoch"])
@@ -82,49 +85,55 @@ async def test_stop_ends_the_task_and_only_a_present_epoch_resumes(
         assert (await it.call("queue"))["paused"] is None
 
 
+#: a call, what it is refused with; KEY: an idempotency key
+REFUSED = """submit "goals": [{"kind": "move", "distance": 1e6}], KEY => distance 1000000 not in
+submit "goals": [{"kind": "home"}], "label": "ééééééééééééé", KEY => label
+submit "goals": [{"kind": "home"}] => idempotency_key: missing
+submit "goals": [{"kind": "home"}], "vehicle": 9, KEY => no rover 9
+submit "goals": [], KEY => goals: expected at least 1
+submit "goals": [{"kind": "fly"}], KEY => goals[0].kind 'fly'
+submit "goals": [{"kind": "home"}], "start_in": 1e9, KEY => start_in: expected at most
+task "id": 999999.0 => no task 999999
+task "id": true => id True: expected a whole number
+release "id": 1, "how": "all", "epoch": 1 => how 'all': expected one of again, remainder, skip
+queue "rover": 1 => rover: unknown; expected vehicle, limit"""
+
+
 @awaited
 async def test_a_refusal_is_the_result_of_a_call_with_its_reason(
     running: Stand, tmp_path: Path
 ) -> None:
+    calls = REFUSED.replace("KEY", '"idempotency_key": "refused"')
     async with agent(running, tmp_path) as it:
-        key = {"idempotency_key": "refused"}
-        far = await it.refused("submit", goals=[{"kind": "move", "distance": 1e6}], **key)
-        assert "distance 1000000 not in" in far
-        assert "label" in await it.refused("submit", goals=[MOVE], label="é" * 20, **key)
-        assert "idempotency_key: missing" in await it.refused("submit", goals=[MOVE])
-        assert "no rover 9" in await it.refused("submit", goals=[MOVE], vehicle=9, **key)
-        assert "no task 999999" in await it.refused("task", id=999_999)
-        assert "goals: expected at least 1" in await it.refused("submit", goals=[], **key)
+        for tool, arguments, words in re.findall(r"(\w+) (.*) => (.*)", calls):
+            assert words in await it.refused(tool, **json.loads(f"{{{arguments}}}"))
         with pytest.raises(MCPError, match="no tool 'fly'; there are vehicles"):
             await it.client.call_tool("fly", {})
         assert (await it.call("queue"))["waiting"] == []
+    async with agent(running, tmp_path, "--read-only", "--vehicle", "1") as it:
+        assert "only rover 1 is offered" in await it.refused("queue", vehicle=2)
+        with pytest.raises(MCPError, match="no tool 'submit'"):
+            await it.call("submit")
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        {"goals": [{"kind": "move", "distance": 0.5}]},
-        {"goals": [MOVE, MOVE]},
-        {"priority": 6},
-        {"start_in": 901},
-        {"deadline": 600},
-        {"label": "another"},
-    ],
-    ids=lambda other: next(iter(other)),
-)
+OTHERS = """{"goals": [{"kind": "move", "distance": 0.5}]}
+{"goals": [{"kind": "move", "distance": 0.4}, {"kind": "move", "distance": 0.4}]}
+{"priority": 6}
+{"start_in": 901}
+{"deadline": 600}
+{"label": "another"}"""
+
+
 @awaited
-async def test_a_key_with_other_content_is_refused(
-    running: Stand, tmp_path: Path, other: dict[str, Any]
-) -> None:
-    key = f"content {other}"
-    first = {"goals": [MOVE], "start_in": 900, "idempotency_key": key}
+async def test_a_key_with_other_content_is_refused(running: Stand, tmp_path: Path) -> None:
+    first = {"goals": [MOVE], "start_in": 900, "idempotency_key": "content"}
     async with agent(running, tmp_path) as it:
         task = await it.call("submit", **first)
-        words = await it.refused("submit", **(first | other))
-        assert words == (
-            f"idempotency_key {key!r}: it was used for another task;"
-            " repeat that exactly, or use a new key"
-        )
+        for other in map(json.loads, OTHERS.splitlines()):
+            assert await it.refused("submit", **(first | other)) == (
+                "idempotency_key 'content': it was used for another task;"
+                " repeat that exactly, or use a new key"
+            )
         assert (await it.call("submit", **first))["id"] == task["id"]
         await it.call("cancel", id=task["id"])
         assert (await it.call("submit", **first))["state"] == "cancelled"
@@ -282,7 +291,11 @@ async def test_a_held_task_requires_input(running: Stand, tmp_path: Path) -> Non
         await answer(key, "decline", "skip")
         with pytest.raises(MCPError, match="how 'all': expected one of remainder"):
             await answer(key, "accept", "all")
-        assert (await it.call("task", id=number))["state"] == "held"
+        assert (await it.call("wait", id=number))["state"] == "held"
+        assert f"Task {number} is held" in (await it.call("queue"))["advice"]
+        await it.client.call_tool("submit", {"goals": [MOVE], "idempotency_key": "behind"})
+        assert "release the held task before it" in tasks.created[1].status_message
+        await it.call("cancel", id=number + 1)
         await accepted(lambda: answer(key, "accept", "remainder"))
         queue = await it.call("queue")
         if queue["paused"]:
@@ -312,59 +325,44 @@ async def test_an_agent_drives_by_http(over_http: str) -> None:
         assert second.heard
 
 
-@pytest.mark.parametrize(
-    ("headers", "status"),
-    [
-        ({"Host": "evil.example"}, 421),
-        ({"Host": "127.0.0.1.evil.example:{port}"}, 421),
-        ({"Host": "127.0.0.1:{port}", "Origin": "http://evil.example"}, 403),
-        ({"Host": "127.0.0.1:{port}"}, 200),
-    ],
-)
-@pytest.mark.parametrize("version", ["2026-07-28", "2025-11-25"])
-def test_a_page_from_elsewhere_cannot_use_it(
-    over_http: str, headers: dict[str, str], status: int, version: str
-) -> None:
-    found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/mcp", over_http)
-    assert found is not None
-    port = int(found[1])
-    legacy = {"protocolVersion": version, "capabilities": {}, "clientInfo": INFO}
+def asked(place: str, version: str, name: str = "a", **headers: str) -> int:
+    """Return the status of the first request of a program of this name, sent in two pieces."""
+    info = {"name": name, "version": "1"}
+    legacy = {"protocolVersion": version, "capabilities": {}, "clientInfo": info}
     is_legacy = version.startswith("2025")
     method = "initialize" if is_legacy else "tools/list"
     params = legacy if is_legacy else {"_meta": meta(version)}
-    body = json.dumps({"jsonrpc": "2.0", "id": 1, "method": method, "params": params})
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
-    connection.request(
-        "POST",
-        "/mcp",
-        body,
-        {
-            "Content-Type": "application/json",
-            "Accept": "application/json, text/event-stream",
-            "MCP-Protocol-Version": version,
-            "Mcp-Method": method,
-            **{name: value.format(port=port) for name, value in headers.items()},
-        },
-    )
-    answer = connection.getresponse()
-    text = answer.read()
-    connection.close()
-    assert answer.status == status, text
+    body = json.dumps({"jsonrpc": "2.0", "id": 1, "method": method, "params": params}).encode()
+    kinds = {"Content-Type": "application/json", "Accept": "application/json, text/event-stream"}
+    about = {"MCP-Protocol-Version": version, "Mcp-Method": method}
+    with closing(http.client.HTTPConnection(place, timeout=10)) as connection:
+        connection.request("POST", "/mcp", iter([body[:9], body[9:]]), kinds | about | headers)
+        return connection.getresponse().status
 
 
-def test_other_machines_are_refused_and_a_port_in_use_is_named(over_http: str) -> None:
-    beyond = called("mcp", "--http", "0.0.0.0:8765")
-    assert beyond.status == 2
-    assert beyond.error.startswith("mav-tasks: --http 0.0.0.0:8765: 0.0.0.0 can be reached from")
+#: status, host and origin
+PAGES = """421 evil.example http://PLACE
+421 127.0.0.1.evil.example:80 http://PLACE
+403 PLACE http://evil.example
+200 PLACE http://PLACE"""
+
+
+def test_a_page_from_elsewhere_cannot_use_it(over_http: str) -> None:
     place = over_http.removeprefix("http://").removesuffix("/mcp")
-    in_use = called("mcp", "--http", place)
-    assert (in_use.status, in_use.error) == (
-        2,
-        (
-            f"mav-tasks: --http {place}: Address already in use: end the program that has it"
-            " (ss -lntup names it), or choose another\n"
-        ),
-    )
+    for row in PAGES.replace("PLACE", place).splitlines():
+        status, host, origin = row.split()
+        for version in ("2026-07-28", "2025-11-25"):
+            assert asked(place, version, Host=host, Origin=origin) == int(status), (row, version)
+    assert asked(place, "2025-11-25", name="a" * 70_000) == 413
+
+
+def test_a_port_in_use_is_named(over_http: str) -> None:
+    place = over_http.removeprefix("http://").removesuffix("/mcp")
+    for command in ("mcp --http", "web --listen"):
+        in_use = called(*command.split(), place)
+        words = f"mav-tasks: {command[4:]} {place}: Address already in use: end the program that"
+        assert in_use.status == 2
+        assert in_use.error == f"{words} has it (ss -lntup names it), or choose another\n"
 
 
 def test_only_the_protocol_is_on_standard_output(running: Stand, tmp_path: Path) -> None:

@@ -73,6 +73,25 @@ def test_what_is_wrong_with_a_link_is_said_in_one_line(tmp_path: Path) -> None:
         assert_one_clear_line(done, *told.split(" … "))
 
 
+#: a package that is missing, a command, and how it ends
+MISSING = """mcp mcp => mcp needs the package mcp: run pip install '.[mcp]'
+mcap export x --mcap y => export needs the package mcap: run pip install '.[mcap]'
+mcap export x --tlog y => export needs the package mcap
+uvicorn web => the web page needs the package uvicorn: run pip install '.[web]'
+xstatic.pkg.leaflet web --listen 127.0.0.1:0 => the web page needs the package XStatic-Leaflet"""
+WITHOUT = """import sys
+sys.modules[sys.argv.pop(1)] = None
+from mav_tasks.cli.app import main
+main()"""
+
+
+def test_a_package_that_is_missing_is_named() -> None:
+    for arguments, words in re.findall("(.*) => (.*)", MISSING):
+        command = [sys.executable, "-c", WITHOUT, *arguments.split()]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        assert_one_clear_line((done.returncode, "", done.stderr), words)
+
+
 def test_insecure_is_allowed_when_it_is_said(tmp_path: Path) -> None:
     (port,) = free_udp_ports(1)
     with process(
@@ -113,10 +132,12 @@ def test_who_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
     )  # once for each, however often it was tried
 
 
-def test_a_store_without_a_name_is_refused() -> None:
+def test_a_store_without_a_name_or_a_page_without_a_link_is_refused() -> None:
     (port,) = free_udp_ports(1)
     client = ("--client", f"udpin:127.0.0.1:{port}")
     assert_one_clear_line(run("serve", "--no-push", *client, "--store", ""), "--store", ":memory:")
+    dialled = run("serve", "--web", "--client", "udpout:127.0.0.1:9")
+    assert_one_clear_line(dialled, "--web needs a link for clients that listens")
 
 
 @pytest.mark.parametrize("words", [("--sign", "anna", "queue"), ("submit", "--sign", "anna")])

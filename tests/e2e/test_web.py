@@ -74,26 +74,28 @@ def test_a_task_is_submitted_followed_and_driven(page: Web, check: Check) -> Non
     assert history["tasks"][0]["ended_at"] is not None
 
 
+SHOWN = """Session /session
+Vehicles /vehicles
+Vehicle /vehicles/1
+Queue /vehicles/1/queue
+Tasks /vehicles/1/history
+Defaults /vehicles/1/defaults
+Track /vehicles/1/track
+Path /vehicles/1/mission
+Fence /vehicles/1/fence
+Places /vehicles/1/rally
+Task /tasks/{}
+Texts /texts
+Entries /journal?limit=20"""
+
+
 def test_answers_are_as_the_document_says(page: Web, check: Check) -> None:
     document = page.get("/openapi.json")
     assert document["openapi"] == "3.1.0"
     later = move(page, 1.0, delay=1000)
-    for name, path in (
-        ("Session", "/session"),
-        ("Vehicles", "/vehicles"),
-        ("Vehicle", "/vehicles/1"),
-        ("Queue", "/vehicles/1/queue"),
-        ("Tasks", "/vehicles/1/history"),
-        ("Defaults", "/vehicles/1/defaults"),
-        ("Track", "/vehicles/1/track"),
-        ("Path", "/vehicles/1/mission"),
-        ("Fence", "/vehicles/1/fence"),
-        ("Places", "/vehicles/1/rally"),
-        ("Task", f"/tasks/{later['id']}"),
-        ("Texts", "/texts"),
-        ("Entries", "/journal?limit=20"),
-    ):
-        check(name, page.get(path))
+    for row in SHOWN.splitlines():
+        name, path = row.split()
+        check(name, page.get(path.format(later["id"])))
 
 
 def test_one_key_makes_one_task(page: Web) -> None:
@@ -107,6 +109,8 @@ def test_one_key_makes_one_task(page: Web) -> None:
         assert refused.json()["reason"] == "nonce_reused"
     second = page.post("/vehicles/1/tasks", body, idempotency_key="another key")
     assert second["id"] != first["id"]
+    long = page.send("POST", "/vehicles/1/tasks", body, idempotency_key="x" * 300)
+    assert "expected 1 to" in long.json()["detail"]
 
 
 def test_why_a_task_waits_and_what_helps(page: Web, check: Check) -> None:
@@ -191,23 +195,30 @@ def test_a_plan_is_shown_and_then_queued(page: Web, check: Check) -> None:
     task = page.post("/vehicles/1/missions", {"text": text, "label": "yard"})
     assert task["goals"] == shown["path"]
     page.wait_for(task["id"], "completed")
-    wrong = page.send("POST", "/plans", {"text": "no plan"})
-    assert wrong.status_code == 422
+    many = [ITEM.format(number, 0, 3, latitude, longitude) for number in range(1, 6_002)]
+    for count, status in ((1_500, 201), (6_001, 422)):
+        long = {"text": "QGC WPL 110\n" + "".join(many[:count])}
+        assert page.send("POST", "/vehicles/1/missions", long).status_code == status, count
+
+
+FENCES = """circle {"latitude": -35.3632, "longitude": 149.1652, "radius": 40}
+polygon [{"latitude": -35.362, "longitude": 149.164}, {"latitude": -35.362, "longitude": 149.167}, \
+{"latitude": -35.365, "longitude": 149.165}]"""
 
 
 def test_the_fence_is_set_shown_and_removed(page: Web) -> None:
-    rover = page.get("/vehicles/1")
-    circle = {"latitude": rover["latitude"], "longitude": rover["longitude"], "radius": 40}
-    assert page.send("PUT", "/vehicles/1/fence", {"circle": circle}).json() == {"items": 1}
-    (shape,) = page.get("/vehicles/1/fence")["shapes"]
-    assert (shape["kind"], shape["radius"]) == ("circle", 40)
+    for kind, shape in re.findall("(.*?) (.*)", FENCES):
+        page.send("PUT", "/vehicles/1/fence", {kind: json.loads(shape)})
+        (shown,) = page.get("/vehicles/1/fence")["shapes"]
+        assert (shown["kind"], shown.get("radius")) in (("circle", 40), ("polygon", None))
+        assert kind == shown["kind"]
     far = {"kind": "goto", "north": 400, "east": 0}
     refused = page.send("POST", "/vehicles/1/tasks", {"goals": [far]})
     assert refused.status_code == 409
     assert refused.json()["reason"] in ("outside_fence", None)
     assert page.send("DELETE", "/vehicles/1/fence", None).status_code == 204
     assert page.get("/vehicles/1/fence")["shapes"] == []
-    both = page.send("PUT", "/vehicles/1/fence", {"circle": circle, "polygon": []})
+    both = page.send("PUT", "/vehicles/1/fence", {"circle": json.loads(shape), "polygon": []})
     assert both.status_code == 422
 
 
@@ -230,6 +241,7 @@ POST /vehicles/1/resume {} 422 epoch: missing
 POST /tasks/1/release {"how": "perhaps", "epoch": 1} 422 expected one of
 PUT /vehicles/1/fence {} 422 expected one of text, circle, polygon
 PUT /vehicles/1/fence {"text": "nonsense"} 422 text
+POST /plans {"text": "no plan"} 422 text
 GET /tasks/99999 null 404 no task 99999
 GET /nothing null 404 there is nothing at this address
 GET /records/x null 404 --records
@@ -307,7 +319,7 @@ def test_a_session_is_a_cookie_that_scripts_cannot_read(
     token = add_key(tmp_path, "anna", "submitter")
     shown = ("--tiles", "https://{s}.tiles.example/{z}/{x}/{y}", "--records", str(tmp_path))
     with web(tmp_path, both[0], *shown, name="session") as it:
-        for headers in ({}, {"authorization": "Bearer x"}):
+        for headers in ({}, {"authorization": "Bearer x"}, {"cookie": "a/b=1"}):
             assert it.send("GET", "/session", None, **headers).status_code == 401
         policy = it.client.get("/").headers["content-security-policy"]
         assert "img-src 'self' https://*.tiles.example " in policy

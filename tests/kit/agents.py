@@ -13,9 +13,6 @@ from mcp.client.extension import ClientExtension
 
 from tests.kit.processes import Stand, environment_with
 
-#: variables that a process of ours needs; the SDK passes few on
-PASSED_ON = ("PYTHONPATH", "MAV_TASKS_CONFIG", "XDG_CONFIG_HOME", "XDG_STATE_HOME")
-
 
 class Agent:
     """A connected agent."""
@@ -64,11 +61,10 @@ async def agent(
 
     ``mode``: "legacy" for the protocol of 2025, "auto" for the newest one.
     """
-    known = environment_with(XDG_CONFIG_HOME=str(folder), XDG_STATE_HOME=str(folder))
     parameters = StdioServerParameters(
         command=sys.executable,
         args=["-m", "mav_tasks.cli", "mcp", "--server", url_of(stand), *options],
-        env={name: known[name] for name in PASSED_ON if name in known},
+        env=environment_with(XDG_CONFIG_HOME=str(folder), XDG_STATE_HOME=str(folder)),
         cwd=folder,
     )
     with (folder / f"mcp-{os.urandom(4).hex()}.log").open("w") as log:

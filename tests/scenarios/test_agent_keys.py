@@ -9,6 +9,7 @@ import pytest
 
 from mav_tasks import TaskStatus
 from mav_tasks.agents import submission
+from mav_tasks.agents.durable import Durable
 from mav_tasks.agents.rovers import Rovers
 from mav_tasks.agents.submission import Wish
 from mav_tasks.errors import Refused, UsageError
@@ -66,5 +67,22 @@ def test_a_key_is_one_task_until_the_server_forgets_it_and_is_refused_from_then_
         assert world.rovers[0].north == pytest.approx(north, abs=0.01)
         async with agent(world) as rovers:
             assert (await driven(rovers, "twice")).id != first.id
+
+    world.run(script())
+
+
+def test_a_task_of_the_protocol_is_cancelled_once_and_only_by_its_whole_id(
+    world: RoverWorld,
+) -> None:
+    async def script() -> None:
+        async with agent(world) as rovers:
+            durable = Durable(rovers)
+            task_id = durable.created(await submitted(rovers, "later", start_in=900))["taskId"]
+            for wrong in ("1", "1-99-1", f"{task_id[:4]}1"):
+                with pytest.raises(Refused, match="no task"):
+                    await durable.cancel(wrong)
+            for _ in range(2):
+                await durable.cancel(task_id)
+                assert (await durable.get(task_id))["status"] == "cancelled"
 
     world.run(script())

@@ -20,10 +20,14 @@ from mav_tasks import (
     Wait,
 )
 from mav_tasks.errors import ClientError, MavTasksError
+from mav_tasks.in_memory import CLIENT_LINK
 from mav_tasks.plan_files import GeoPoint, PlanFile
+from mav_tasks.store import MemoryStore
+from mav_tasks.tasks.restored import Restored
 from rover_sim.testing.rover_world import RoverWorld
+from rover_sim.testing.virtual_loop import VirtualLoop
 from tests.kit.cases import anew
-from tests.scenarios.conftest import MakeRoverWorld
+from tests.scenarios.conftest import MakeRoverWorld, MakeWorld
 
 S = TaskState
 RALLY = PlanFile((), None, (), (GeoPoint(-353_632_000, 1_491_652_000, 0.0),))
@@ -250,7 +254,7 @@ def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
                     with suppress(ClientError):
                         await task.modify(label=label)
                         assert world.server.task(task.id).terms.label == label
-            with world.lossy_link(loss=0.35):
+            with world.lossy_link(loss=0.35, duplication=0.5):
                 assert len(await client.mission()) == 3, "with home"
                 assert await client.set_rally_points(RALLY) == 1
                 assert len(await client.rally_points()) == 1
@@ -274,7 +278,28 @@ def test_without_an_answer_each_call_says_so_and_a_closed_client_ends_all(
             assert [str(end) for end in ends if isinstance(end, ClientError)] == [
                 "the client was closed"
             ] * 5
-            with pytest.raises(MavTasksError, match="open it first"):
-                await client.queue()
+            for call, words in ((client.queue(), "open it first"), (task.done(), "was closed")):
+                with pytest.raises(MavTasksError, match=words):
+                    await call
 
     world.run(script())
+
+
+def test_tasks_that_a_new_server_does_not_know_are_lost(make_world: MakeWorld) -> None:
+    world = make_world()
+    loop = VirtualLoop(world)
+    loop.allow(60.0, real_seconds=60.0)
+
+    async def script() -> None:
+        async with Client(world.net.link("script", peers=(CLIENT_LINK,))) as client:
+            tasks = [await client.submit(Move(1.0), delay=600.0) for _ in range(2)]
+            world.end_server()
+            world.start_server(MemoryStore(), Restored())
+            await asyncio.sleep(5.0)
+            assert (await client.submit(Move(2.0), delay=600.0)).id == tasks[0].id
+            for task in tasks:
+                with pytest.raises(TaskFailed, match=f"task {task.id}: the server no longer knows"):
+                    await task.done()
+
+    with asyncio.Runner(loop_factory=lambda: loop) as runner:
+        runner.run(script())

@@ -2,8 +2,18 @@
 
 import os
 import re
+import sqlite3
+import sys
+from datetime import UTC, datetime
+from io import StringIO
+from math import inf
 from pathlib import Path
 
+import pytest
+
+from mav_tasks.cli.output import wrapped
+from mav_tasks.cli.times import moment_ago
+from mav_tasks.cli.words import silence_of
 from tests.kit.commands import called
 
 NOBODY = "udpout:127.0.0.1:9"
@@ -34,6 +44,9 @@ PLACES = {
     "0 181 --global": "181",
     "47.3977 8.5456 --global --local": "choose one",
 }
+EMPTY = "create table metadata (name, value); create table tiles (zoom_level);"
+VECTOR = "insert into metadata values ('format', 'pbf'); insert into tiles values (1);"
+TILES = {"empty": EMPTY, "vector": EMPTY + VECTOR}
 #: in FOLDER there is a FILE
 OTHERS = """queue -s pigeon:1: udpout:host:port
 submit move 1 --in 5s --at 14:30: --in and --at
@@ -85,6 +98,7 @@ qgc-actions --only: give at least one --action
 mcp --max-queued 3: keys add agent --role submitter --quota 3
 mcp --http 127.0.0.1: expected HOST:PORT
 mcp --http 10.0.0.1:80: can be reached from other machines
+mcp --http localhost:80 --sign anna --keys FILE: --sign: no key
 mcp --http here:80: can be reached from other machines
 web --listen 8560: expected HOST:PORT
 web --role observer: roles.unsigned=observer
@@ -92,7 +106,9 @@ web --tokens FILE: keys of the key ring now
 web tokens list: keys of the key ring now
 web --name rover.example: who sits elsewhere needs a token
 web --tiles http://x/1: expected a URL with
-web --tiles FOLDER/no: no such file
+web --tiles FOLDER/no --listen localhost:80: no such file
+web --tiles FOLDER/empty: it has no tiles
+web --tiles FOLDER/vector: it has vector tiles
 web --tiles FILE: not an MBTiles file
 web --records FOLDER/no: no such folder
 web --listen 127.0.0.1:99999: expected HOST:PORT"""
@@ -101,6 +117,8 @@ web --listen 127.0.0.1:99999: expected HOST:PORT"""
 def test_each_option_is_understood_or_named_in_one_line(tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.touch(0o600)
+    for name, script in TILES.items():
+        sqlite3.connect(tmp_path / name).executescript(script).connection.close()
     others = OTHERS.replace("FILE", str(file)).replace("FOLDER", str(tmp_path))
     cases: dict[tuple[str, ...], str] = {
         **{("submit", "move", "1", "--in", text): words for text, words in DURATIONS.items()},
@@ -118,11 +136,38 @@ def test_each_option_is_understood_or_named_in_one_line(tmp_path: Path) -> None:
     assert wrong == []
 
 
+NOON = datetime(2026, 11, 22, 12, tzinfo=UTC)
+
+
+def test_times_are_told_in_words_and_lines_are_wrapped_at_words() -> None:
+    assert moment_ago(86_400.0, now=NOON) == "2026-11-21 12:00"
+    assert silence_of(inf) == "not heard since the server started"
+    assert wrapped("one two\n", 7) == "one two\n"
+    assert wrapped("a line of several words\n", 20) == "a line of several\n    words\n"
+
+
+class Typed(StringIO):
+    """What somebody types at a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_rover_is_driven_only_after_a_yes(monkeypatch: pytest.MonkeyPatch) -> None:
+    for answer, words in {"no": "the answer was not yes", "yes": "Connection refused"}.items():
+        monkeypatch.setattr(sys, "stdin", Typed(answer))
+        done = called("probe", "tcp:127.0.0.1:9", "--drive", "--timeout", "1")
+        assert "yes" in done.error.partition("?")[2]
+        assert words in done.error
+
+
 #: a configuration -> what the doctor says
 ILL = """x = 1: serve would not start
 store.path = "x://y": choose another with --store
 store.path = "postgresql:///x": the server looks at it when it starts
 store.path = "FILE": chmod 600
+store.path = "/dev/null/x": this user may not write it
+store.path = "/proc/none/x": less than 100 MB free
 signing.keys = "/dev/null/x": mav-tasks keys list
 signing.keys = "RING": no usable key
 links.clients = ["udpin:0.0.0.0:14560"]: no client has a signing key

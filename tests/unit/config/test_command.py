@@ -77,6 +77,8 @@ def test_what_is_in_force_is_shown_with_who_says_so(run: Run, tmp_path: Path) ->
         done = run("config", "show", environment={"MAV_TASKS_STORE": str(store)})
         assert f"parameters set by clients are not shown: store {store}: " in done[2]
         Path(f"{tmp_path}-wal").touch()
+    unknown = run("config", "show", "log", environment={"MAV_TASKS_STORE": "x://y"})
+    assert "parameters set by clients are not shown" in unknown[2]
     again.write_text(output, encoding="utf-8")
     assert run("config", "check", str(again)) == (0, "ok\n", "")
     code, output, _ = run(
