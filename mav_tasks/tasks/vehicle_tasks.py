@@ -301,18 +301,19 @@ class VehicleTasks(Lineup):
     def restarted(self, *, was_paused: TaskReason, now: float) -> bool:
         """Hold the tasks of a vehicle that has rebooted, and pause the queue until it is resumed.
 
-        Return whether a person must decide about a task: one that has not moved starts again by
-        itself. ``was_paused`` is why the queue was paused before the vehicle showed disarmed: the
+        Return whether a person must look at it first: a task has driven it, perhaps one that was
+        being cancelled. One that has not moved starts again by itself. ``was_paused`` is why the queue was paused before the vehicle showed disarmed: the
         reboot disarmed it, no takeover.
         """
         self.released = None
+        was_driving = self.is_driving
         self._end_cancelling(now=now)
         if not self.suspended_ids and self.executor.begins_again(now=now):
             return False
         self.hold(R.FRAME_RESET, now=now)
-        if self.is_driving and not was_paused:
+        if was_driving and not was_paused:
             self.pause_queue(R.RESTARTED, actor=SERVER, now=now)
-        return self.is_driving
+        return was_driving
 
     def stop(self, *, clear: bool, actor: str, now: float) -> TaskId | None:
         """Kill the active task and latch STOP; with ``clear`` cancel the others. Return its id.

@@ -48,7 +48,7 @@ def for_each(names: str | Sequence[str], values: Iterable[Any]) -> Callable[[Tes
                 try:
                     plain(*args, **arguments(plain, fixtures | case))
                 except Exception as error:  # noqa: BLE001 - the other cases are tried, too
-                    error.add_note(f"with {case}")
+                    error.add_note("with " + ", ".join(f"{k}={v!s:.200}" for k, v in case.items()))
                     failures.append(error)
             if len(failures) == 1:
                 raise failures[0]
