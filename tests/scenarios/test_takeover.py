@@ -1,6 +1,7 @@
 """Somebody else has the rover: not one more setpoint, and everything waits for continue."""
 
 from collections.abc import Callable
+from functools import partial
 
 from pymavlink.dialects.v20 import common
 
@@ -11,13 +12,12 @@ from rover_sim.personas import Mode
 from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
-    AUTO,
-    MANUAL,
     TEMPORARILY_REJECTED,
     rc_override,
     setpoint,
     sticks,
 )
+from tests.kit.rows import ask
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
 
@@ -27,14 +27,16 @@ def packed(message: object, system_id: int, component_id: int) -> bytes:
     return raw
 
 
-#: how the rover can be taken from us, by name
+ROWS = """operator hold
+operator manual
+operator auto
+operator rtl
+DO_SET_MODE 1 10 to=autopilot
+DO_SET_MODE 1 0 to=autopilot"""
+
+#: how the rover can be taken from us, by name, or as a row
 WAYS: dict[str, Callable[[World], object]] = {
-    "switch to HOLD": lambda w: w.operator_mode(Mode.HOLD),
-    "switch to MANUAL": lambda w: w.operator_mode(Mode.MANUAL),
-    "switch to AUTO": lambda w: w.operator_mode(Mode.AUTO),
-    "switch to RTL": lambda w: w.operator_mode(Mode.RTL),
-    "a client asked for AUTO": lambda w: w.client.mode(AUTO),
-    "a client asked for MANUAL": lambda w: w.client.mode(MANUAL),
+    **{row: partial(ask, text=row) for row in ROWS.splitlines()},
     "disarm at the rover": lambda w: w.operator_arm(False),
     "sticks": lambda w: w.client.send(sticks(x=300)),
     "throttle stick": lambda w: w.client.send(sticks(z=300)),

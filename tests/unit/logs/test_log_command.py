@@ -47,62 +47,65 @@ FIGURES = {"count": 136, "p50": 0.05, "p99": 0.0512, "longest": 0.15, "late": 1}
 FULL = "STOP in force: press Continue first"
 REFUSED = e.SubmissionRefused(1, 54000, TaskReason.QUEUE_FULL, FULL, "255/190@a", AT)
 HOME = Frame(None, None, AT - 50)
-#: events of each kind, and what an object says besides event, time, level, message and vehicle
-SAMPLES: list[tuple[e.Event, str]] = [
-    (submitted(Move(3.0), 17), '"task": 17, "actor": "SOMEBODY", "state": "queued"'),
-    (submitted(Drive(0.5, 0.25, 2.0), 18), '"task": 18'),
-    (submitted(Plan((Wait(1.0), WAY), "source"), 19, "patrol", 1e300), '"task": 19'),
-    (
-        changed(PAUSED, TaskReason.LINK_LOST),
-        '"task": 17, "old": "executing", "new": "paused", "reason": "link_lost"',
-    ),
-    (
-        replace(changed(PAUSED, TaskReason.LINK_LOST), timing=TIMING),
-        (
-            '"task": 17, "timing": {"period": 0.05, "count": 136, '
-            '"p50": 0.05, "p99": 0.0512, "longest": 0.15, "late": 1}'
-        ),
-    ),
-    (changed(TaskState.CANCELLED, TaskReason.CANCELLED, "255/190@a"), '"level": "info"'),
-    (changed(TaskState.FAILED, TaskReason.STUCK), '"level": "warning"'),
-    (e.TaskAdvanced(ID, 1, 4, PROGRESS, AT), '"task": 17, "version": 4'),
-    (e.StepReached(ID, 1, 2, True, AT, 3), '"task": 17, "step": 2, "performs": true, "item": 3'),
-    (e.PlanStored(1, 0, 5, "source", "a", AT), '"kind": 0, "plan_id": 5, "actor": "a"'),
-    (e.TaskModified(ID, 1, 2, Terms(priority=9), "a", AT), '"actor": "a", "version": 2'),
-    (
-        e.TaskAssigned(ID, 2, 3, 1, "rover 1: silent; free", AT),
-        '"task": 17, "before": 1, "choice": "rover 1: silent; free", "version": 3',
-    ),
-    (e.TaskWaits(ID, 1, TaskReason.DISARMED, AT), '"task": 17, "reason": "disarmed"'),
-    (e.TaskWithdrawn(ID, 1, AT), '"task": 17'),
-    (
-        REFUSED,
-        (
-            '"command": 54000, "reason": "queue_full", "level": "warning", '
-            '"text": "STOP in force: press Continue first"'
-        ),
-    ),
-    (
-        e.QueuePaused(1, TaskReason.STOPPED, "a", AT),
-        '"reason": "stopped", "actor": "a", "level": "warning"',
-    ),
-    (e.QueueContinued(1, "a", AT), '"actor": "a"'),
-    (e.VehicleIdentified(1, "uid", AT), '"uid": "uid"'),
-    (e.VehicleArmingSet(1, False, AT), '"may_arm": false'),
-    (e.VehicleSpeedSet(1, 0.5, "a", AT), '"speed": 0.5, "actor": "a"'),
-    (
-        e.VehicleHomeSet(1, 473_977_418, 85_455_938, HOME, "a", AT),
-        '"latitude_degE7": 473977418, "longitude_degE7": 85455938, "actor": "a"',
-    ),
-    (ParameterSet("SPEED", 0.5, "a", AT), '"name": "SPEED", "value": 0.5, "actor": "a"'),
-    (e.VehicleHalted(1, 7, TaskReason.OPERATOR, "a", AT), '"epoch": 7, "level": "debug"'),
-    (SignatureRefused("a signed anna", 90.0, AT), '"actor": "a signed anna", "seconds": 90.0'),
-    (e.VehicleSeen(1, "found", AT), '"text": "found"'),
-    (e.VehicleNoted(1, "a\x1b[31mb\r\nc\x07\u202ed\x9b é", AT), '"level": "warning"'),
-    (e.ServerStopped((1, 2), AT), '"unconfirmed": [1, 2]'),
+EVENTS: list[e.Event] = [
+    submitted(Move(3.0), 17),
+    submitted(Drive(0.5, 0.25, 2.0), 18),
+    submitted(Plan((Wait(1.0), WAY), "source"), 19, "patrol", 1e300),
+    changed(PAUSED, TaskReason.LINK_LOST),
+    replace(changed(PAUSED, TaskReason.LINK_LOST), timing=TIMING),
+    changed(TaskState.CANCELLED, TaskReason.CANCELLED, "255/190@a"),
+    changed(TaskState.FAILED, TaskReason.STUCK),
+    e.TaskAdvanced(ID, 1, 4, PROGRESS, AT),
+    e.StepReached(ID, 1, 2, True, AT, 3),
+    e.PlanStored(1, 0, 5, "source", "a", AT),
+    e.TaskModified(ID, 1, 2, Terms(priority=9), "a", AT),
+    e.TaskAssigned(ID, 2, 3, 1, "rover 1: silent; free", AT),
+    e.TaskWaits(ID, 1, TaskReason.DISARMED, AT),
+    e.TaskWithdrawn(ID, 1, AT),
+    REFUSED,
+    e.QueuePaused(1, TaskReason.STOPPED, "a", AT),
+    e.QueueContinued(1, "a", AT),
+    e.VehicleIdentified(1, "uid", AT),
+    e.VehicleArmingSet(1, False, AT),
+    e.VehicleSpeedSet(1, 0.5, "a", AT),
+    e.VehicleHomeSet(1, 473_977_418, 85_455_938, HOME, "a", AT),
+    ParameterSet("SPEED", 0.5, "a", AT),
+    e.VehicleHalted(1, 7, TaskReason.OPERATOR, "a", AT),
+    SignatureRefused("a signed anna", 90.0, AT),
+    e.VehicleSeen(1, "found", AT),
+    e.VehicleNoted(1, "a\x1b[31mb\r\nc\x07\u202ed\x9b é", AT),
+    e.ServerStopped((1, 2), AT),
 ]
-VALUES = [json.loads(f"{{{said}}}".replace("SOMEBODY", str(SOMEBODY))) for _, said in SAMPLES]
-EVENTS = [event for event, _ in SAMPLES]
+#: what the object of each says besides event, time, level, message and vehicle
+SAID = rf""""task": 17, "actor": "{SOMEBODY}", "state": "queued"
+"task": 18
+"task": 19
+"task": 17, "old": "executing", "new": "paused", "reason": "link_lost"
+"task": 17, "timing": {json.dumps({"period": 0.05} | FIGURES)}
+"level": "info"
+"level": "warning"
+"task": 17, "version": 4
+"task": 17, "step": 2, "performs": true, "item": 3
+"kind": 0, "plan_id": 5, "actor": "a"
+"actor": "a", "version": 2
+"task": 17, "before": 1, "choice": "rover 1: silent; free", "version": 3
+"task": 17, "reason": "disarmed"
+"task": 17
+"command": 54000, "reason": "queue_full", "level": "warning", "text": "{FULL}"
+"reason": "stopped", "actor": "a", "level": "warning"
+"actor": "a"
+"uid": "uid"
+"may_arm": false
+"speed": 0.5, "actor": "a"
+"latitude_degE7": 473977418, "longitude_degE7": 85455938, "actor": "a"
+"name": "SPEED", "value": 0.5, "actor": "a"
+"epoch": 7, "level": "debug"
+"actor": "a signed anna", "seconds": 90.0
+"text": "found"
+"level": "warning"
+"unconfirmed": [1, 2]"""
+VALUES = [json.loads(f"{{{row}}}") for row in SAID.splitlines()]
+
 #: the first that differ from what their event says of itself
 WORDS = {
     0: f"rover 1: task 17 submitted: move 3 m, priority 5, by {SOMEBODY}",
