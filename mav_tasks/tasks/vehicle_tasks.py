@@ -302,8 +302,8 @@ class VehicleTasks(Lineup):
         """Hold the tasks of a vehicle that has rebooted, and pause the queue until it is resumed.
 
         Return whether a person must look at it first: a task has driven it, perhaps one that was
-        being cancelled. One that has not moved starts again by itself. ``was_paused`` is why the queue was paused before the vehicle showed disarmed: the
-        reboot disarmed it, no takeover.
+        being cancelled. One that has not moved starts again by itself. ``was_paused`` is why the
+        queue was paused before the vehicle showed disarmed: the reboot disarmed it, no takeover.
         """
         self.released = None
         was_driving = self.is_driving
