@@ -14,7 +14,7 @@ from tests.kit.postgres import PostgresServer, connected
 from tests.kit.processes import Process, free_udp_ports, process, wait_until
 
 S = TaskState
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(200)]
 
 
 class Fleet:
@@ -69,7 +69,7 @@ class Fleet:
     def until_state(self, task_id: int, state: TaskState) -> None:
         wait_until(
             lambda: self.state(task_id) is state,
-            within=30,
+            within=60,
             what=lambda: f"{state.name}: it is {self.state(task_id).name}",
         )
 

@@ -434,6 +434,13 @@ def heartbeat() -> Message:
     return common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 
 
+def packed(message: Message, system_id: int, component_id: int, *, seq: int = 0) -> bytes:
+    """Return a message as a packet of this address."""
+    mav = common.MAVLink(None, system_id, component_id)
+    mav.seq = seq
+    return bytes(message.pack(mav))
+
+
 def setpoint(vx: float, yaw_rate: float = 0.0, *, mask: int = 0x05C7, system: int = 1) -> Message:
     """Return a velocity setpoint in the body frame."""
     return common.MAVLink_set_position_target_local_ned_message(

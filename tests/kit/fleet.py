@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from math import degrees
 from random import Random
-from typing import Any, cast
+from typing import cast
 
 from pymavlink.dialects.v20 import common
 
@@ -22,6 +22,7 @@ from rover_sim.body import Pose
 from rover_sim.faults import Faults
 from rover_sim.vehicle import Vehicle, make_vehicle
 from rover_sim.virtual import VirtualWorld
+from tests.kit.client import packed
 from tests.kit.observer import Observer
 from tests.kit.world import (
     PROMPT,
@@ -309,12 +310,6 @@ def _vehicle_of(event: object) -> int | None:
         return event.task.vehicle
     vehicle: int | None = getattr(event, "vehicle", None)
     return vehicle
-
-
-def packed(message: Any, system_id: int, component_id: int) -> bytes:
-    """Return a message as a packet of this address."""
-    raw: bytes = message.pack(common.MAVLink(None, system_id, component_id))
-    return raw
 
 
 def start_of(number: int) -> Pose:

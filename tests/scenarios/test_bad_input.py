@@ -6,6 +6,7 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.faults import Faults
 from tests.kit.client import (
     heartbeat,
+    packed,
     setpoint,
 )
 from tests.kit.world import World
@@ -38,8 +39,3 @@ def test_unverified_bytes_do_not_move_a_silent_rover_to_another_endpoint(world: 
     world.run(1)
     assert stop.result == common.MAV_RESULT_FAILED
     assert world.mode().name == "HOLD"  # it still hears us
-
-
-def packed(message: object, system_id: int = 255, component_id: int = 190) -> bytes:
-    raw: bytes = message.pack(common.MAVLink(None, system_id, component_id))  # type: ignore[attr-defined]
-    return raw

@@ -16,6 +16,7 @@ from tests.kit.client import (
     FakeClient,
     command_long,
     heartbeat,
+    packed,
 )
 from tests.kit.world import World
 from tests.scenarios.conftest import MakeWorld
@@ -40,11 +41,6 @@ def strangers(world: World, number: int, *messages: bytes) -> list[MemoryLink]:
 
 
 _NAMES = count()
-
-
-def packed(message: object, *, system: int = 77) -> bytes:
-    raw: bytes = message.pack(common.MAVLink(None, system, 190))  # type: ignore[attr-defined]
-    return raw
 
 
 def test_of_a_client_s_flood_so_much_is_looked_at_and_stop_always(make_world: MakeWorld) -> None:
@@ -79,14 +75,14 @@ def test_strangers_drive_nobody_out_and_their_stop_counts(make_world: MakeWorld)
     task = world.client.move(20.0)
     crowd: list[MemoryLink] = []
     for _ in range(20):
-        crowd += strangers(world, 20, packed(heartbeat()))
+        crowd += strangers(world, 20, packed(heartbeat(), 77, 190))
         world.run(0.5)
     sent = [client.request_status(task.task_id) for client in (world.client, *others)]
     world.run(0.2)
     assert [each.result for each in sent] == [ACCEPTED] * 5
     assert len(list(world.server.engine.snapshot(now=world.now).clients)) <= 8
     assert 30 not in {data[7] for link in crowd for _, data in link.receive(100)}, "no telemetry"
-    (link,) = strangers(world, 1, packed(command_long(STOP)))
+    (link,) = strangers(world, 1, packed(command_long(STOP), 77, 190))
     world.until_state(task.task_id, S.KILLED, within=1.0)
     world.run(0.1)
     assert any(data[7] == 77 for _, data in link.receive(100)), "it is answered, too"

@@ -26,6 +26,7 @@ from tests.kit.client import (
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
     FakeClient,
+    packed,
     setpoint,
 )
 from tests.kit.rows import check
@@ -35,13 +36,6 @@ from tests.scenarios.conftest import MakeWorld
 ATTITUDE, POSITION = 30, 32
 OUR_MESSAGES = range(54000, 54050)
 CLEAR = 54011
-
-
-def packed(message: object, system_id: int, component_id: int, *, seq: int = 0) -> bytes:
-    mav = common.MAVLink(None, system_id, component_id)
-    mav.seq = seq
-    raw: bytes = message.pack(mav)  # type: ignore[attr-defined]
-    return raw
 
 
 def rate(client: FakeClient, message_id: int, since: float, until: float) -> float:

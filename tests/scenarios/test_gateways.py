@@ -22,12 +22,12 @@ from tests.kit.client import (
     TEMPORARILY_REJECTED,
     FakeClient,
     command_long,
+    packed,
     setpoint,
 )
 from tests.kit.gateways.engines import FleetWorld, Gateway
 from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT
-from tests.scenarios.test_takeover import packed
 
 FENCE_LINK_ID, STEP = 254, 3.0  # of what a new gateway signs; s that it is ahead
 

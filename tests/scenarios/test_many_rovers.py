@@ -23,9 +23,10 @@ from tests.kit.client import (
     TEMPORARILY_REJECTED,
     Sent,
     TaskStatus,
+    packed,
     setpoint,
 )
-from tests.kit.fleet import Fleet, Layout, packed
+from tests.kit.fleet import Fleet, Layout
 from tests.kit.world import near_pose, twin_of
 from tests.scenarios.conftest import MakeFleet
 

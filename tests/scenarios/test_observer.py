@@ -13,6 +13,7 @@ from tests.kit.client import (
     MANUAL,
     STOP,
     command_long,
+    packed,
     setpoint,
 )
 from tests.kit.observer import Observer
@@ -33,27 +34,27 @@ class Story:
 
     def rover(self, mode: int, *, armed: bool) -> "Story":
         beat = common.MAVLink_heartbeat_message(10, 3, 129 if armed else 1, mode, 4, 3)
-        self.observer.heard(self.now, packed(beat, ROVER), sent_at=self.now)
+        self.observer.heard(self.now, packed(beat, *ROVER), sent_at=self.now)
         return self
 
     def position(self, *, age: float = 0.0) -> "Story":
         sent_at = self.now - age
         place = common.MAVLink_local_position_ned_message(1, 0, 0, 0, 0, 0, 0)
-        self.observer.heard(self.now, packed(place, ROVER), sent_at=sent_at)
+        self.observer.heard(self.now, packed(place, *ROVER), sent_at=sent_at)
         heading = common.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0)
-        self.observer.heard(self.now, packed(heading, ROVER), sent_at=sent_at)
+        self.observer.heard(self.now, packed(heading, *ROVER), sent_at=sent_at)
         return self
 
     def sends(self, message: object, source: tuple[int, int] = SERVER) -> "Story":
-        self.observer.sent(self.now, packed(message, source))
-        self.observer.arrived(self.now, packed(message, source))
+        self.observer.sent(self.now, packed(message, *source))
+        self.observer.arrived(self.now, packed(message, *source))
         return self
 
     def moves(self, speed: float = 0.5) -> "Story":
         return self.sends(setpoint(speed))
 
     def asks(self, message: object) -> "Story":
-        self.observer.asked(self.now, packed(message, CLIENT), peer="client")
+        self.observer.asked(self.now, packed(message, *CLIENT), peer="client")
         return self
 
     def really_unready(self) -> "Story":
@@ -72,11 +73,6 @@ class Story:
         for _ in range(5):
             self.later(0.05).position().moves()
         return self
-
-
-def packed(message: object, source: tuple[int, int]) -> bytes:
-    raw: bytes = message.pack(common.MAVLink(None, *source))  # type: ignore[attr-defined]
-    return raw
 
 
 def mode_request(mode: int) -> object:

@@ -13,6 +13,7 @@ from tests.kit.cases import for_each
 from tests.kit.client import (
     ACCEPTED,
     TEMPORARILY_REJECTED,
+    packed,
     rc_override,
     setpoint,
     sticks,
@@ -20,12 +21,6 @@ from tests.kit.client import (
 from tests.kit.rows import ask
 from tests.kit.world import World, near_pose
 from tests.scenarios.conftest import MakeWorld
-
-
-def packed(message: object, system_id: int, component_id: int) -> bytes:
-    raw: bytes = message.pack(common.MAVLink(None, system_id, component_id))  # type: ignore[attr-defined]
-    return raw
-
 
 ROWS = """operator hold
 operator manual

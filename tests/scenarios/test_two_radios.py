@@ -10,8 +10,8 @@ from mav_tasks.tasks.lifecycle import TaskState as S
 from rover_sim.body import Pose
 from rover_sim.personas import Mode
 from tests.kit.cases import for_each
-from tests.kit.client import ACCEPTED
-from tests.kit.fleet import Fleet, Layout, packed
+from tests.kit.client import ACCEPTED, packed
+from tests.kit.fleet import Fleet, Layout
 from tests.kit.world import near_pose, twin_of
 from tests.scenarios.conftest import MakeFleet
 

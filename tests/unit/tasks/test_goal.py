@@ -19,21 +19,34 @@ from mav_tasks.tasks.goal import (
 PLACE = GoTo(LocalPlace(1.0, -2.0))
 
 
+#: each goal below in words
+WORDS = """move 2 m
+face 270 deg
+go to 1.00 m N, -2.00 m E
+go to 1.00 m N, -2.00 m E
+go to 1.00 m N, -2.00 m E
+plan of 3 items
+plan of 2 items
+plan of 4 items
+plan of 0 items
+plan of 1 item
+plan of 2 items"""
+
+
 def test_goals_in_words() -> None:
-    words: tuple[tuple[Goal, str], ...] = (
-        (Move(2.0), "move 2 m"),
-        (Face(-1.5707963267948966), "face 270 deg"),
-        (PLACE, "go to 1.00 m N, -2.00 m E"),
-        (Plan((PLACE, Nothing())), "go to 1.00 m N, -2.00 m E"),
-        (Plan((SetSpeed(0.4), PLACE, SetSpeed(None), Nothing())), "go to 1.00 m N, -2.00 m E"),
-        (Plan((PLACE, Wait(1.0), Nothing())), "plan of 3 items"),
-        (Plan((PLACE, Wait(1.0), Nothing()), has_options=True), "plan of 2 items"),
-        (Plan((Nothing(),) * 4 + (PLACE,), has_home=True), "plan of 4 items"),
-        (Plan((Nothing(),), has_home=True), "plan of 0 items"),
-        (Plan((Nothing(), PLACE), has_home=True), "plan of 1 item"),
-        (Plan((Wait(1.0), Jump(0, 3))), "plan of 2 items"),
+    goals: tuple[Goal, ...] = (
+        Move(2.0),
+        Face(-1.5707963267948966),
+        PLACE,
+        Plan((PLACE, Nothing())),
+        Plan((SetSpeed(0.4), PLACE, SetSpeed(None), Nothing())),
+        Plan((PLACE, Wait(1.0), Nothing())),
+        Plan((PLACE, Wait(1.0), Nothing()), has_options=True),
+        Plan((Nothing(),) * 4 + (PLACE,), has_home=True),
+        Plan((Nothing(),), has_home=True),
+        Plan((Nothing(), PLACE), has_home=True),
+        Plan((Wait(1.0), Jump(0, 3))),
     )
-    for goal, said in words:
-        assert describe(goal) == said
+    assert [describe(goal) for goal in goals] == WORDS.splitlines()
     kinds = [kind_of(goal) for goal in (Drive(1.0, 0.0, 1.0), GoTo(None), Wait(1.0))]
     assert kinds == ["drive", "return", "wait"]
