@@ -11,7 +11,7 @@ from pathlib import Path
 from mav_tasks.engine.inputs import Input, Outgoing
 from mav_tasks.errors import RecordError
 from mav_tasks.recording.backlog import MOST, PAUSE, ROOM_OF_PACKET, Backlog, room_of
-from mav_tasks.recording.new_files import new_file, stamp
+from mav_tasks.recording.new_files import new_file
 from mav_tasks.recording.record_file import RecordFile
 from mav_tasks.recording.record_lines import FORMAT, MAGIC, ROWS, LineWriter, Unwritable, dumps
 from mav_tasks.recording.surroundings import restored_to_json
@@ -43,14 +43,15 @@ class Decisions:
         *,
         now: float,
         size: int,
+        start: str,
         most_waiting: int = MOST,
     ) -> None:
-        """Create the file; raise RecordError if that fails. ``size``: its limit in bytes.
+        """Create the file, named by ``start``; raise RecordError. ``size``: its limit in bytes.
 
         ``settings``, ``restored`` and ``now`` must be those of the engine.
         """
         try:
-            fd, self.path, _ = new_file(folder, stamp(time.time()), 0, SUFFIX)
+            fd, self.path, _ = new_file(folder, start, 0, SUFFIX)
         except OSError as error:
             raise RecordError(f"cannot write records to {folder}: {error.strerror}") from error
         self._file = RecordFile(fd, size=size)

@@ -33,14 +33,18 @@ class Tlog:
         size: int,
         count: int,
         component_id: int,
+        start: str,
         most_waiting: int = MOST,
         write: Callable[[int, bytes], None] = write_all,
     ) -> None:
-        """``size``: of one file, bytes. ``count``: of files. ``component_id``: the server's."""
+        """``size``: of one file, bytes. ``count``: of files. ``component_id``: the server's.
+
+        ``start`` names the files.
+        """
         self._name = f"telemetry log in {folder}"
         self._backlog: Backlog[Entry] = Backlog(most_waiting)
         self._content = TlogContent(component_id=component_id)
-        self._files = TlogFiles(folder, size=size, count=count, write=write)
+        self._files = TlogFiles(folder, size=size, count=count, start=start, write=write)
         self._too_many = Losses(self._name)
         self._unwritten = Losses(self._name)
         self._retry_at = 0.0  # monotonic s
@@ -85,7 +89,6 @@ class Tlog:
 
     def _write(self) -> None:
         packets: list[bytes] = []
-        now = 0.0
         is_well = True
         for now, item in self._backlog.taken():
             if isinstance(item, Sequence):
@@ -93,20 +96,20 @@ class Tlog:
             else:
                 packets += self._content.of_input(item, now=now)
             if len(packets) >= AT_ONCE:
-                is_well = self._keep(packets, utc=self._content.utc(now))
+                is_well = self._keep(packets)
                 packets = []
         if packets:
-            is_well = self._keep(packets, utc=self._content.utc(now))
+            is_well = self._keep(packets)
         if is_well:
             self._too_many.over()
 
-    def _keep(self, packets: Sequence[bytes], *, utc: float) -> bool:
+    def _keep(self, packets: Sequence[bytes]) -> bool:
         """Write packets, or drop and count them; return whether all were written."""
         why = "waiting after a disk error"
         kept = self._files.kept
         if time.monotonic() >= self._retry_at:
             try:
-                self._files.write(packets, utc=utc)
+                self._files.write(packets)
             except OSError as error:
                 self._retry_at = time.monotonic() + RETRY
                 why = str(error.strerror or error)

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from mav_tasks.folders import make_private
-from mav_tasks.recording.new_files import new_file, stamp, write_all
+from mav_tasks.recording.new_files import new_file, write_all
 
 SUFFIX = ".tlog"
 OURS = re.compile(r"(\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ)(?:\.(\d+))?\.tlog")
@@ -23,13 +23,14 @@ class TlogFiles:
         *,
         size: int,
         count: int,
+        start: str,
         write: Callable[[int, bytes], None] = write_all,
     ) -> None:
         self._folder = folder
         self._size = size
         self._count = count
         self._write_all = write
-        self._start = ""  # start time of the run, in file names
+        self._start = start  # time of the run's start, in file names
         self._number = -1
         self._fd: int | None = None
         self._path = folder
@@ -39,19 +40,19 @@ class TlogFiles:
     def __repr__(self) -> str:
         return f"TlogFiles({self._path}, {self._written} bytes, {self.kept} packets)"
 
-    def write(self, packets: Sequence[bytes], *, utc: float) -> None:
-        """Write packets that begin with their times; the first file is named by ``utc``."""
+    def write(self, packets: Sequence[bytes]) -> None:
+        """Write packets that begin with their times."""
         chunk: list[bytes] = []
         length = 0
         for packet in packets:
             fits = self._fd is not None and self._written + length + len(packet) <= self._size
             if chunk and (length > CHUNK or not fits):
-                self._keep(chunk, utc=utc)
+                self._keep(chunk)
                 chunk, length = [], 0
             chunk.append(packet)
             length += len(packet)
         if chunk:
-            self._keep(chunk, utc=utc)
+            self._keep(chunk)
 
     def close(self) -> None:
         """Close the file; call it last."""
@@ -59,12 +60,12 @@ class TlogFiles:
             os.close(self._fd)
             self._fd = None
 
-    def _keep(self, chunk: Sequence[bytes], *, utc: float) -> None:
+    def _keep(self, chunk: Sequence[bytes]) -> None:
         data = b"".join(chunk)
         is_full = self._written > 0 and self._written + len(data) > self._size
         # a user, or another server, may have removed the file
         if self._fd is None or is_full or os.fstat(self._fd).st_nlink == 0:
-            self._begin(utc)
+            self._begin()
         assert self._fd is not None
         try:
             self._write_all(self._fd, data)
@@ -74,9 +75,8 @@ class TlogFiles:
         self._written += len(data)
         self.kept += len(chunk)
 
-    def _begin(self, utc: float) -> None:
+    def _begin(self) -> None:
         self.close()
-        self._start = self._start or stamp(utc)
         make_private(self._folder)  # it may have been removed
         self._fd, self._path, self._number = new_file(
             self._folder, self._start, self._number + 1, SUFFIX

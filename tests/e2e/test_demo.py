@@ -8,27 +8,26 @@ from pathlib import Path
 
 import pytest
 
+from tests.kit.processes import OF_A_BUSY_MACHINE, environment_with
 from tests.kit.volume import some
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def demo(
-    *options: str, environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def demo(*options: str) -> subprocess.CompletedProcess[str]:
     """Run ./tools/demo to its end."""
     return subprocess.run(
         [str(ROOT / "tools/demo"), *options],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=200,
         check=False,
-        env=environment,
+        env=environment_with(**OF_A_BUSY_MACHINE),
     )
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(240)
 @pytest.mark.parametrize(
     "options", some([(), ("--fast",), ("--fast", "--body", "kinematic")], 0, 2)
 )
@@ -50,7 +49,7 @@ def test_the_demo_shows_three_tasks_and_finds_all_as_it_should_be(options: tuple
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(240)
 def test_in_the_fleet_s_demo_a_gateway_is_killed_and_its_rovers_go_on() -> None:
     done = demo("--fleet", "--body", "kinematic")
 

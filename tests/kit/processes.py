@@ -70,6 +70,10 @@ def wait_until(
     return answer
 
 
+#: a machine that is busy with tests stands still for half a second now and then
+OF_A_BUSY_MACHINE = {"MAV_TASKS_WATCH_LATE_TICK": "0.9", "MAV_TASKS_WATCH_COMMIT": "1.5"}
+
+
 def environment_with(**variables: str) -> dict[str, str]:
     """Return our environment without the user's configuration, plus these variables."""
     return {**os.environ, "MAV_TASKS_CONFIG": "", **variables}
@@ -89,9 +93,7 @@ def process(
         MAV_TASKS_STORE=str(folder / f"{name}.sqlite3"),
         XDG_CONFIG_HOME=str(folder),
         XDG_STATE_HOME=str(folder),
-        # a machine that is busy with tests stands still for half a second now and then
-        MAV_TASKS_WATCH_LATE_TICK="0.9",
-        MAV_TASKS_WATCH_COMMIT="1.5",
+        **OF_A_BUSY_MACHINE,
     )
     popen = started(arguments, python=python, output=output, folder=folder, env=env)
     running = Process(popen, output)

@@ -487,7 +487,9 @@ class World(VirtualWorld):
         observers: list[EngineObserver] = [] if self._outputs is None else [self._outputs]
         if self._records is not None:
             settings = self._settings or Settings()
-            recorder = Decisions(self._records, settings, restored, now=self.now, size=100_000_000)
+            recorder = Decisions(
+                self._records, settings, restored, now=self.now, size=100_000_000, start="world"
+            )
             self.recorders.append(recorder)
             observers.append(recorder)
         return InMemoryServer(

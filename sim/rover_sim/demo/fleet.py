@@ -26,7 +26,7 @@ ROVERS = 4
 METRES = 4.0
 DRIVES = TaskState.EXECUTING
 DRIVEN = 1.5  # s, before a gateway is killed
-LIMIT = 60.0  # s, for each part
+LIMIT = 120.0  # s, for each part
 LOOK = 0.1  # s
 
 

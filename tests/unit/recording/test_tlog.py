@@ -66,7 +66,7 @@ def to_client(data: bytes, peer: str = "gcs") -> Outgoing:
 
 def started(folder: Path, **options: Any) -> EngineObserver:
     recording = Recording(tlog=str(folder), **options)
-    (tlog,) = observers(recording, Settings(), None, now=0.0)
+    (tlog,) = observers(recording, Settings(), None, now=0.0, utc=OFFSET + 1)
     for item in LINKS:
         tlog.on_input(item, now=0.0)
     return tlog
@@ -202,7 +202,7 @@ def test_a_log_that_was_removed_with_its_folder_is_begun_anew(tmp_path: Path) ->
 def test_what_a_slow_disk_loses_is_counted_and_told(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    tlog = Tlog(tmp_path, size=10_000, count=3, component_id=191, most_waiting=100)
+    tlog = Tlog(tmp_path, size=10_000, count=3, component_id=191, start="x", most_waiting=100)
     data = Packets("rovers", [("rover", packet(attitude(1), ROVER))])
     tlog.on_input(AtOnce((data, data)), now=1.0)
     tlog.on_output([to_client(b"")], [], now=1.0)
