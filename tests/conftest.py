@@ -30,6 +30,9 @@ if (
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+LONG = 600.0  # s, the limit of a long test
+
+
 @pytest.fixture(autouse=True)
 def closed_stores() -> Iterator[None]:
     """Close the stores of virtual worlds after each test."""
@@ -50,8 +53,15 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 100)
 
 
+def limit(item: pytest.Item) -> float:
+    """Return the limit of time that a test has of its own."""
+    mark = item.get_closest_marker("timeout")
+    return mark.args[0] if mark else 0.0
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what a compiled core does not allow; the same core, as Python, passes it."""
+    """Begin with the longest; skip what a compiled core does not allow, which passes as Python."""
+    items.sort(key=lambda item: limit(item) < LONG)  # else the last one runs alone for a minute
     if engine.__file__.endswith(".py"):
         return
     for item in items:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.kit.processes import OF_A_BUSY_MACHINE, environment_with
+from tests.kit.processes import OF_A_BUSY_MACHINE, environment_with, wait_until
 from tests.kit.volume import some
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,7 +62,7 @@ def test_in_the_fleet_s_demo_a_gateway_is_killed_and_its_rovers_go_on() -> None:
 
 
 @pytest.mark.timeout(60)
-@pytest.mark.parametrize("after", [0.3, 4.0])
+@pytest.mark.parametrize("after", [0.0, 4.0])
 def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
     running = subprocess.Popen(
         [str(ROOT / "tools/demo"), "--body", "kinematic"],
@@ -71,6 +71,8 @@ def test_ctrl_c_ends_it_without_a_traceback(after: float) -> None:
         text=True,
         start_new_session=True,
     )
+    mapped = Path(f"/proc/{running.pid}/maps")  # Python has begun, and imports
+    wait_until(lambda: "/numpy/" in mapped.read_text(), within=30)
     with pytest.raises(subprocess.TimeoutExpired):
         running.wait(after)
     os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to all of the group

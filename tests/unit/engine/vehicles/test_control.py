@@ -18,7 +18,7 @@ from tests.kit.px4 import PROMPT_PX4
 from tests.kit.world import PROMPT, World
 
 #: the graph takes half a minute, and as much longer as the machine is busy
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # every reachable state is walked
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]  # every reachable state is walked
 
 
 E, F = Event, Effect
