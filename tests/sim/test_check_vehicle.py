@@ -40,8 +40,8 @@ def check(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_what_fails_is_said_again_at_the_end_and_in_the_exit_status(tmp_path: Path) -> None:
-    with rover(tmp_path, "--persona", "px4", "--speed", "10") as url:
-        only = ("--only", "identity", "--speed", "10", "--persona", "ardupilot")
+    with rover(tmp_path, "--persona", "px4", "--speed", "2") as url:
+        only = ("--only", "identity", "--speed", "2", "--persona", "ardupilot")
         result = check(url, *only)
         as_json = check(url, *only, "--json")
     assert (result.returncode, as_json.returncode) == (1, 1)
