@@ -47,6 +47,7 @@ def server(there: Stand, client: SyncClient) -> Iterator[str]:
     yield f"udpout:127.0.0.1:{there.client_port}"
     client.clear(running_too=True)
     wait_until(lambda: client.queue().running is None, within=10, what="nothing that runs")
+    wait_until(lambda: not client.vehicles()[0].armed, within=10, what="a rover at rest")
     with suppress(Refused):
         client.resume()
 
