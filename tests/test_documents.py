@@ -178,7 +178,8 @@ def test_a_rover_that_breaks_goes_as_it_is_told(tmp_path: Path) -> None:
     with stand(tmp_path) as it:
         run = partial(mav_tasks, server=f"udpout:127.0.0.1:{it.client_port}")
         assert run("submit", "move", "0.3", "--wait").status == 0
-        it.rover.end()  # still armed
+        it.server.wait_for("Throttle disarmed")
+        it.rover.end()
         again = ("-m", "rover_sim", "--port", str(it.rover_port), "--body", "kinematic")
         with process(*again, *rover_options(broken), folder=tmp_path, name="broken") as rover:
             rover.wait_for("rover 1")

@@ -99,7 +99,8 @@ def test_stop_is_in_reach_above_a_dialogue(chromium: Any, it: Web, shots: Path) 
     with opened(chromium, it) as page:
         page.click("text=Add a task…")
         page.screenshot(path=str(shots / "add a task.png"))
-        page.click("#stop-all")
+        with page.expect_response("**/api/v1/stop"):
+            page.click("#stop-all")
         says(page, "#stop-outcome", "STOP: acknowledged")
         assert page.is_visible(".box")
         stops = len(next(it.events())[2]["stops"])
