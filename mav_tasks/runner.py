@@ -371,7 +371,7 @@ class Runner:
         return self._pump.engine.parameters
 
     def _put_keys(self, keys: tuple[Key, ...]) -> None:
-        """Give the engine the keys, before its first packet and when they change."""
+        """Tell the engine which keys are usable: before its first packet, and at each change."""
         self._guarded(KeysChanged(keys))
 
     def _leave_at_once(self) -> None:

@@ -116,7 +116,7 @@ def test_command_cancel_takes_the_askers_latest_of_that_command(world: World) ->
     world.client.rotate(10)
     world.run(0.1)
     acks = len(world.client.acks)
-    for command in (DRIVE, MOVE):  # there is none of the first
+    for command in (DRIVE, MOVE):  # no DRIVE waits, so nothing is cancelled for the first one
         message = m.CommandCancel(1, 191, command)
         world.client.send_raw(Packer().pack(message, Address(255, 190), seq=200))
     world.run(0.3)
