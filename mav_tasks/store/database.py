@@ -57,6 +57,7 @@ class Database:
     one that people find at its path, is checked before and after each transaction: by the names of
     file and WAL, by the row of ``writer``, whose epoch is a fencing token, and by that row's page
     in the file itself, for a file that was copied over another one has the same name and inode.
+    That page changes only when a checkpoint writes a new random number there.
 
     Constructor and ``begin`` raise StoreError if the file cannot be used.
     """
@@ -66,7 +67,7 @@ class Database:
     def __init__(self, path: Path, file: HeldFile) -> None:
         self._path = path
         self._file = file
-        self._epoch, self._page = 0, b""
+        self._epoch, self._beat = 0, _random()
         self._replaced: Replaced | None = None
         self._unwritten = 0  # pages in the WAL, about
         with self._at_start():
@@ -91,6 +92,7 @@ class Database:
                 self._connection.close()
                 raise
         self._place = (root - 1) * self._page_size  # of the row of writer
+        self._page = self._page_on_disk()
         self._log = self._identity_of_log()
         self.next_id: int = row[0]
         self.last_number: int = row[1]
@@ -104,13 +106,13 @@ class Database:
 
     def begin(self, fleet: str) -> None:
         """Become the writer, of the store with this name; durable before any rover is moved."""
-        self._epoch = secrets.randbits(62)
+        self._epoch = _random()
         with self._at_start():
             with transaction(self._connection):
                 self._connection.execute("UPDATE meta SET ended_well = 0, fleet = ?", (fleet,))
                 self._connection.execute(
-                    "UPDATE writer SET epoch = ?, host = ?, pid = ?, since = ?",
-                    (self._epoch, socket.gethostname(), os.getpid(), time.time()),
+                    "UPDATE writer SET epoch = ?, beats = ?, host = ?, pid = ?, since = ?",
+                    (self._epoch, self._beat, socket.gethostname(), os.getpid(), time.time()),
                 )
             self._checkpoint("FULL")
             self._log = self._identity_of_log()
@@ -137,7 +139,7 @@ class Database:
             raise
         with suppress(sqlite3.Error):
             self._connection.close()
-        self._page = self._page_on_disk()  # closing may have written the log back
+        self._note_page()  # closing may have written the log back
         self._connection = _connect(self._path)
         _set_up(self._connection)
         with transaction(self._connection):
@@ -207,7 +209,7 @@ class Database:
                 raise self._lost(OVERWRITTEN)
             is_full = self._unwritten >= CHECKPOINT
             if is_full:
-                self._connection.execute("UPDATE writer SET beats = beats + 1")
+                self._connection.execute("UPDATE writer SET beats = ?", (self._beat,))
             yield
         self._check()  # else it went to a file that is no longer there
         if is_full:
@@ -242,17 +244,25 @@ class Database:
         return self._replaced
 
     def _checkpoint(self, mode: str) -> bool:
-        """Write the WAL back to the file; return whether that was all of it.
-
-        Note how the page of ``writer`` is in the file since: nobody else changes it.
-        """
+        """Write the WAL back to the file; return whether that was all of it."""
         try:
             query = f"PRAGMA wal_checkpoint({mode})"
             _, pages, done = self._connection.execute(query).fetchone()
         finally:
-            self._page = self._page_on_disk()
+            self._note_page()
         self._unwritten = 0
         return bool(pages == done)
+
+    def _note_page(self) -> None:
+        """Note how a checkpoint has left the page of ``writer`` in the file.
+
+        Raise Replaced if it is not a checkpoint that has changed it.
+        """
+        page = self._page_on_disk()
+        if page != self._page:
+            if self._beat.to_bytes(8, "big") not in page:
+                raise self._lost(OVERWRITTEN)
+            self._page, self._beat = page, _random()
 
     def _page_on_disk(self) -> bytes:
         return os.pread(self._file.fd, self._page_size, self._place)
@@ -311,6 +321,11 @@ def holder_of(path: Path) -> Holder | None:
             return None if row is None else Holder(*row)
         time.sleep(READ_AFTER)
     return None
+
+
+def _random() -> int:
+    """Return a random integer that SQLite stores as its eight bytes."""
+    return secrets.randbits(62) | 1 << 62
 
 
 def _sync_folder(path: Path) -> None:

@@ -190,7 +190,8 @@ def test_a_task_is_submitted_looked_at_changed_and_called_off(server: str) -> No
     ]
     (gone,) = called("status", str(first), "--json", server=server).objects
     assert gone["state"] in ("cancelling", "cancelled")
-    assert called("clear", server=server).lines == ["rover 1: all waiting tasks cancelled"]
+    # the first task may still be cancelling
+    assert called("clear", server=server).output.startswith("rover 1: all waiting tasks cancelled")
     assert_one_line(called("cancel", str(waiting["id"]), server=server), 1, "has ended")
 
 

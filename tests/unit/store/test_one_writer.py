@@ -81,6 +81,14 @@ def another_copied_over(path: Path) -> Path:
     return path
 
 
+def another_copied_over_in_a_checkpoint(path: Path) -> Path:
+    another_copied_over(path.with_name("before"))
+    before = path.stat().st_mtime_ns
+    while path.stat().st_mtime_ns == before:
+        pass
+    return shutil.copyfile(path.with_name("before"), path)
+
+
 def second(place: Path) -> str:
     """Start a second server; return what it says if it is refused, "" if it begins."""
     done = subprocess.Popen(
@@ -144,7 +152,10 @@ def test_who_is_refused_is_told_by_whom_also_while_that_one_writes(path: Path) -
     assert said == {f"store {path}: {place}"}
 
 
-@pytest.mark.parametrize("deed", [renamed, folder_moved, replaced, another_copied_over])
+@pytest.mark.parametrize(
+    "deed",
+    [renamed, folder_moved, replaced, another_copied_over, another_copied_over_in_a_checkpoint],
+)
 def test_a_server_whose_file_is_no_longer_the_one_that_people_find_says_so_and_keeps_nothing(
     path: Path, deed: Callable[[Path], Path]
 ) -> None:
