@@ -62,7 +62,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE vehicles ADD COLUMN halted_utc REAL",
     ),
     ("ALTER TABLE tasks ADD COLUMN assigned TEXT",),  # the last vehicle, if it was chosen again
-    (  # the server that opened the file last; beats: a random number for each checkpoint; '': no name yet
+    (  # the server that opened the file last; beats: random, per checkpoint; '': no name yet
         (
             "CREATE TABLE writer (one INTEGER PRIMARY KEY CHECK (one = 1), epoch INTEGER NOT NULL,"
             " host TEXT NOT NULL, pid INTEGER NOT NULL, since REAL NOT NULL,"
