@@ -13,7 +13,7 @@ from tests.kit.web import Web, served
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is missing")
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 #: what a browser itself logs for an answer that a test provokes
 OF_THE_BROWSER = "Failed to load resource"
 
