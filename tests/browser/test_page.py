@@ -144,32 +144,31 @@ def test_a_page_that_is_behind_cannot_release_a_newer_stop(chromium: Any, it: We
     assert it.get("/vehicles/1/queue")["paused"] == "stopped"
 
 
-GOALS = [
-    ("move", {"distance": "0.3"}, "move 0.3 m"),
-    ("rotate", {"angle": "20"}, "rotate 20 deg"),
-    ("drive", {"forward": "0.2", "yaw_rate": "0", "duration": "1"}, "drive 0.2 m/s for 1 s"),
-    ("goto", {"north": "1", "east": "0.5"}, "go to 1.00 m N, 0.50 m E"),
-    ("goto_global", {"latitude": "-35.36326", "longitude": "149.16523"}, "go to -35.363260"),
-    ("face", {"heading": "90"}, "face 90 deg"),
-    ("wait", {"duration": "1"}, "wait 1 s"),
-    ("home", {}, "return home"),
-]
+GOALS = """move distance=0.3: move 0.3 m
+rotate angle=20: rotate 20 deg
+drive forward=0.2 yaw_rate=0 duration=1: drive 0.2 m/s for 1 s
+goto north=1 east=0.5: go to 1.00 m N, 0.50 m E
+goto_global latitude=-35.36326 longitude=149.16523: go to -35.363260
+face heading=90: face 90 deg
+wait duration=1: wait 1 s
+home: return home"""
 
 
 def test_tasks_of_every_kind_are_added_with_the_form(chromium: Any, it: Web) -> None:
     it.post("/vehicles/1/pause", {})
     with opened(chromium, it) as page:
-        for kind, numbers, words in GOALS:
+        for goal, words in re.findall("(.*): (.*)", GOALS):
+            kind, *numbers = goal.split()
             page.click("text=Add a task…")
             page.select_option(".box [name=kind]", kind)
-            for name, value in numbers.items():
+            for name, value in (number.split("=") for number in numbers):
                 page.fill(f".box [name={name}]", value)
             page.fill(".box [name=label]", kind)
             says(page, ".box", "The queue is paused (somebody paused it)")
             page.click(".box >> text='Add the task'")
             page.wait_for_selector(".box", state="detached")
             says(page, "#panel-queue .task", f"“{kind}”: {words}")
-    assert it.get("/vehicles/1/queue")["waiting_count"] == len(GOALS)
+    assert it.get("/vehicles/1/queue")["waiting_count"] == 8
 
 
 def test_order_by_arrows_and_by_dragging_leaves_priorities_alone(chromium: Any, it: Web) -> None:
