@@ -169,6 +169,8 @@ rover:param_value SERVO1_FUNCTION nan 9 1 1 : -
 rover:autopilot_version 0 0 0 0 0 EIGHT EIGHT EIGHT 0 0 1 : -
 TASK_MOVE 0.2 : ACCEPTED Task 1
 wait 4 : - Task 1 done
+TASK_MOVE 9 : ACCEPTED Task 2
+wait 2 & ARM 0 21196 to=autopilot : ACCEPTED Task 2 stopped for good
 MANY_TEXTS : - 0000000041
 """,
         ),
