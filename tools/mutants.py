@@ -290,6 +290,7 @@ class Loop:
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Record what the tests reach, then try each mutant."""
+        gc.unfreeze()  # what is frozen is not found
         gc.collect()
         running()
         gc.freeze()  # what is collected would copy pages
