@@ -14,6 +14,7 @@ from tests.kit.places import place as place
 from tests.kit.postgres import postgres as postgres
 from tests.kit.postgres import postgres_server as postgres_server
 from tests.kit.skips import Skips
+from tests.kit.volume import LONG_TESTS
 
 for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
     del os.environ[name]
@@ -30,7 +31,7 @@ if (
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-LONG = 600.0  # s, the limit of a long test
+TAKE_LONG = {"volume", "timeout"}  # marks
 
 
 @pytest.fixture(autouse=True)
@@ -53,15 +54,13 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 100)
 
 
-def limit(item: pytest.Item) -> float:
-    """Return the limit of time that a test has of its own."""
-    mark = item.get_closest_marker("timeout")
-    return mark.args[0] if mark else 0.0
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the longest; skip what a compiled core does not allow, which passes as Python."""
-    items.sort(key=lambda item: limit(item) < LONG)  # else the last one runs alone for a minute
+    for item in items:
+        if f"\n{item.name}\n" in LONG_TESTS:
+            item.add_marker("volume")
+    # else the last one runs alone for a minute
+    items.sort(key=lambda item: TAKE_LONG.isdisjoint(mark.name for mark in item.iter_markers()))
     if engine.__file__.endswith(".py"):
         return
     for item in items:

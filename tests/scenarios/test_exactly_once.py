@@ -52,7 +52,6 @@ class Submitter:
         return not self.left and not self.under_way
 
 
-@pytest.mark.volume
 @pytest.mark.timeout(300)
 def test_submissions_with_nonces_are_as_many_tasks(make_world: MakeWorld) -> None:
     world = make_world(seed=3, settings=ROOMY)

@@ -13,7 +13,6 @@ GROWTH = 1.06  # limit on entries in the end, relative to the half
 FULL = 260  # commands of a client; the server remembers 256
 
 
-@pytest.mark.volume
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 def test_memory_stays_what_it_was(make_world: MakeWorld) -> None:

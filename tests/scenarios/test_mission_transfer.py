@@ -107,7 +107,6 @@ def test_5000_items_go_up_and_come_back(make_world: MakeWorld, target: tuple[int
 # or not at all
 
 
-@pytest.mark.volume
 @pytest.mark.slow
 def test_at_20_percent_loss_a_plan_is_there_whole_or_not_at_all() -> None:
     ends: Counter[str] = Counter()
