@@ -18,7 +18,7 @@ from math import hypot, remainder, tau
 from rover_sim.body import BodyState
 from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
-from tests.kit.words import Kind, Word
+from tests.kit.words import CLEAR, Kind, Word
 
 ACCEPTED, IN_PROGRESS = 0, 5  # MAV_RESULT
 STOPS_WITHIN = 2.5  # s, from 1 m/s, with repeated requests over a net that loses a fifth
@@ -36,6 +36,7 @@ REMEMBERED = 50  # go requests
 WEIGHTS = {Kind.WISH: 1, Kind.MOTION: 2, Kind.GO: 3}
 CONTINUE, CANCEL, STOP, HOLD = "continue", "cancel", "STOP", "HOLD"
 SWITCHED = "HOLD at the rover"  # by a person
+STALLED = "stall"  # of the server, which holds what drove
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +190,8 @@ class Halts:
         elif word.kind is Kind.WISH:
             self._wished_at = now
             self._read_wish(word)
+        elif word.command == CLEAR and self.in_force == STALLED:
+            self._halt = None  # what was held is over
 
     def answered(self, peer: str, command: int, result: int, *, now: float) -> None:
         """Note the server's answer to a client."""

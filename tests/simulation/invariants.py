@@ -18,8 +18,9 @@ from rover_sim.personas import Mode
 from rover_sim.vehicle import Vehicle
 from tests.kit.bounds import too_large
 from tests.kit.client import DRIVE, MOVE, ROTATE
-from tests.kit.halts import Halts
+from tests.kit.halts import STALLED, Halts
 from tests.kit.observer import Observer
+from tests.kit.words import CLEAR
 
 if TYPE_CHECKING:
     from tests.simulation.judged import JudgedWorld as World
@@ -34,8 +35,6 @@ UNHEARD = 6.0  # s after a fault on the way to the rover
 BY_ITSELF = frozenset({Mode.MANUAL, Mode.POSITION, Mode.AUTO, Mode.RTL, Mode.LAND})
 ANSWERED = 12.0  # s, until every command has its answer
 TOLERANCE, SHARE = 0.25, 0.05  # m or rad, and of the goal: what a completed task may lack
-CLEAR = 54011
-STALL = "stall"  # of the server, which holds what drove
 COMPLETES = 90.0  # s, for a metre on the way out
 
 
@@ -117,7 +116,7 @@ def not_driven(world: "World", task_id: int) -> Iterator[str]:
 def taken_from_halted(world: "World", task_id: int, rover: int) -> Iterator[str]:
     """What a person has halted keeps its tasks."""
     for halts in world.halts:
-        if halts.system_id == rover and halts.in_force not in ("", STALL):
+        if halts.system_id == rover and halts.in_force not in ("", STALLED):
             yield f"task {task_id} is taken from rover {rover} after {halts.in_force}"
 
 

@@ -21,8 +21,10 @@ from rover_sim.faults import Faults
 from rover_sim.personas import PERSONAS, Mode
 from tests.kit.client import (
     ARM,
+    DRIVE,
     MOVE,
     PAUSE_CONTINUE,
+    ROTATE,
     SET_MODE,
     STOP,
     FakeClient,
@@ -33,7 +35,7 @@ from tests.kit.client import (
 )
 from tests.kit.mission import Item, Upload
 from tests.kit.packets.mutants import Mutants
-from tests.kit.words import Kind, Said
+from tests.kit.words import CANCEL, CLEAR, MISSION_START, RELEASE, REPOSITION, Kind, Said
 from tests.kit.world import at
 from tests.simulation import invariants
 from tests.simulation.fleet import SimulatedFleet
@@ -41,10 +43,9 @@ from tests.simulation.judged import JudgedWorld
 from tests.simulation.story import HABITS, ROVER, SERVER, Move, Story, drawn_from
 from tests.simulation.world import SimulatedWorld
 
-ROTATE, DRIVE, CANCEL, CLEAR, MODIFY, RELEASE = 54001, 54002, 54010, 54011, 54012, 54013
-START, REPOSITION, WAYPOINT = 300, 192, 16
-REPEATED = 2.0  # s, within which a stock client repeats, unmarked, an unanswered request
+MODIFY, WAYPOINT = 54012, 16
 OFTEN = 300  # changes of a start time
+REPEATED = 2.0  # s, within which a stock client repeats, unmarked, an unanswered request
 NETS = (
     Conditions(delay=0.002),
     Conditions(delay=0.002, jitter=0.02, duplication=0.1),
@@ -214,7 +215,7 @@ class _Player:
             case "release":
                 say(RELEASE, 0, args[1])
             case "start of the mission":
-                say(START, to=ROVER)
+                say(MISSION_START, to=ROVER)
             case "cancel":
                 say(CANCEL, self._task(args[1]), args[2])
             case "clear":

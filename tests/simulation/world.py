@@ -10,7 +10,7 @@ from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import Event
 from mav_tasks.tasks.lifecycle import TaskState
 from rover_sim.personas import Persona
-from tests.simulation import invariants
+from tests.kit.halts import STALLED
 from tests.simulation.disk import Crash, Disk, UncertainStore
 from tests.simulation.judged import JudgedWorld
 from tests.simulation.story import Cast, Move
@@ -151,7 +151,7 @@ class SimulatedWorld(JudgedWorld):
         since, driven = self.stalled
         for halts in self.halts if self.now - since > STALL else ():
             if halts.system_id in driven and not halts.in_force:
-                halts.person(invariants.STALL, drives=False, now=self.now)
+                halts.person(STALLED, drives=False, now=self.now)
 
     def read_late(self, seconds: float) -> Callable[[], None]:
         """Let the server not read the second link for a while; return what ends that."""
