@@ -18,10 +18,11 @@ from tests.kit.volume import LONG_TESTS
 
 for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
     del os.environ[name]
-os.environ["MAV_TASKS_CONFIG"] = ""
-
-# pymavlink fixes its MAVLink version on its first import, whichever test that is in.
-os.environ["MAVLINK20"] = "1"
+os.environ |= {
+    "MAV_TASKS_CONFIG": "",
+    "MAVLINK20": "1",  # pymavlink fixes its version on its first import, whichever test that is in
+    "PIP_NO_COMPILE": "1",  # in the environments of tests, what is imported is compiled
+}
 
 # A shell ignores Ctrl-C in background jobs, and the tests' processes would inherit that.
 if (
