@@ -54,7 +54,14 @@ class LeaseDatabase:
     """
 
     def __init__(
-        self, address: Address, name: str, *, host: str, port: int, system_id: int = 0
+        self,
+        address: Address,
+        name: str,
+        *,
+        host: str,
+        port: int,
+        system_id: int = 0,
+        limits: Limits = LIMITS,
     ) -> None:
         """Make the tables if they are missing, and take the name.
 
@@ -67,6 +74,7 @@ class LeaseDatabase:
         self.name = name
         self._host, self._port = host, port
         self._system_id = system_id
+        self._limits = limits
         self._session: Session | None = None
         self._lock: SessionLock | None = None
         self._number = 0
@@ -89,7 +97,7 @@ class LeaseDatabase:
     def connect(self) -> None:
         """Begin a session, which has the lock of the name; end the earlier one."""
         self.close()
-        session = Session(self._address, purpose=f"gateway {self.name}", limits=LIMITS)
+        session = Session(self._address, purpose=f"gateway {self.name}", limits=self._limits)
         try:
             check_writable(session)
             if not self._number:  # the first time
