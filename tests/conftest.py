@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
+from importlib.util import find_spec
 
 import pytest
 
@@ -56,14 +57,17 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest; skip what a compiled core does not allow, which passes as Python."""
+    """Begin with the longest; skip what lacks something. What patches the core passes as Python."""
     for item in items:
         if f"\n{item.name}\n" in LONG_TESTS:
             item.add_marker("volume")
     # else the last one runs alone for a minute
     items.sort(key=lambda item: TAKE_LONG.isdisjoint(mark.name for mark in item.iter_markers()))
-    if engine.__file__.endswith(".py"):
-        return
+    lacks = {
+        "pybullet": "" if find_spec("pybullet") else "pybullet has no wheel for this Python",
+        "patches_core": "" if engine.__file__.endswith(".py") else "the core is compiled",
+    }
     for item in items:
-        if item.get_closest_marker("patches_core"):
-            item.add_marker(pytest.mark.skip("the core is compiled"))
+        for mark in item.iter_markers():
+            if why := lacks.get(mark.name):
+                item.add_marker(pytest.mark.skip(why))

@@ -119,11 +119,18 @@ class PostgresServer:
         return self._ran("pg_isready", *where).returncode == 0
 
     def _reachable(self, install: Path) -> Path:
-        """Return the programs' folder; a copy if they are root's alone and we are root."""
+        """Return the programs' folder; a copy if they are root's alone and we are root.
+
+        They look for their libraries beside their package.
+        """
         is_open = all(each.stat().st_mode & stat.S_IXOTH for each in install.parents)
         if os.geteuid() != 0 or is_open:
             return install
-        return Path(shutil.copytree(install, self.folder / "programs", symlinks=True))
+        package, programs = install.parent, self.folder / "programs"
+        libraries = f"{package.name}.libs"
+        shutil.copytree(package.with_name(libraries), programs / libraries)
+        copied = shutil.copytree(install, programs / package.name / install.name, symlinks=True)
+        return Path(copied)
 
 
 def installed() -> Path:

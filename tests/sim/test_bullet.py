@@ -27,7 +27,6 @@ def rover(
     variation: float = 0.0,
     seed: int | None = None,
 ) -> Iterator[BulletBody]:
-    pytest.importorskip("pybullet")
     body = BulletBody(start=start, friction=friction, variation=variation, seed=seed)
     with closing(body):
         yield body

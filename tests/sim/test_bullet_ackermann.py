@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from math import degrees, radians
 
 import pytest
@@ -12,7 +11,7 @@ from rover_sim.body import Body, BodyState, Pose
 from rover_sim.bullet import BulletBody
 from rover_sim.frames import TURN_RADIUS, Frame
 
-pytestmark = pytest.mark.skipif(find_spec("pybullet") is None, reason="needs pybullet")
+pytestmark = pytest.mark.pybullet
 
 BODIES: dict[str, Callable[[], Body]] = {
     "bullet": lambda: BulletBody(start=Pose(), frame=Frame.ACKERMANN),

@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -113,13 +112,7 @@ def client(port: int) -> Iterator[Client]:
 
 BODIES = [
     "kinematic",
-    pytest.param(
-        "bullet",
-        marks=[
-            pytest.mark.pybullet,
-            pytest.mark.skipif(find_spec("pybullet") is None, reason="no pybullet"),
-        ],
-    ),
+    pytest.param("bullet", marks=pytest.mark.pybullet),
 ]
 
 
