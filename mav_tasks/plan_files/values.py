@@ -5,7 +5,7 @@ counted in: who sends home as item 0, as to ArduPilot, adds one to it.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 from mav_tasks.mavlink.enums import MavCmd, MavFrame
@@ -14,7 +14,7 @@ NO_PARAMS = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class PlanItem:
+class PlanItem:  # noqa: PLW1641 - the decorator adds it
     """One item to send. NaN in ``params`` and ``z`` is "not given".
 
     ``x`` and ``y`` are degE7 in global frames, m × 1e4 in local ones, plain numbers in the frame
@@ -28,6 +28,10 @@ class PlanItem:
     y: int
     z: float
     autocontinue: bool
+
+    def __eq__(self, other: object) -> bool:
+        """Compare as tuples do: what is not given in both is equal, also from Python 3.13 on."""
+        return isinstance(other, PlanItem) and astuple(self) == astuple(other)
 
 
 class GeoPoint(NamedTuple):
