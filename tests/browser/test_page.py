@@ -64,7 +64,7 @@ def test_stop_acts_at_once_and_says_what_came_of_it(
         says(page, "#stop-outcome", f"ended task {task['id']}")
         says(page, ".card", "STOP is in force. To let it run, press Resume.")
         outcome = text_of(page, "#stop-outcome")
-        assert re.search(r"acknowledged \d+ ms · standing [\d.]+ m?s", outcome)
+        assert re.search(r"acknowledged [\d.]+ m?s · standing [\d.]+ m?s", outcome)
         page.screenshot(path=str(shots / f"stop by {how}.png"))
         it.resume()
         page.wait_for_function("() => !document.getElementById('stop-outcome').textContent")
