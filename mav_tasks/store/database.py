@@ -67,7 +67,7 @@ class Database:
     def __init__(self, path: Path, file: HeldFile) -> None:
         self._path = path
         self._file = file
-        self._epoch, self._beat = 0, _random()
+        self._epoch, self._beat, self._page = 0, _random(), b""
         self._replaced: Replaced | None = None
         self._unwritten = 0  # pages in the WAL, about
         with self._at_start():
@@ -92,7 +92,6 @@ class Database:
                 self._connection.close()
                 raise
         self._place = (root - 1) * self._page_size  # of the row of writer
-        self._page = self._page_on_disk()
         self._log = self._identity_of_log()
         self.next_id: int = row[0]
         self.last_number: int = row[1]
@@ -259,10 +258,11 @@ class Database:
         Raise Replaced if it is not a checkpoint that has changed it.
         """
         page = self._page_on_disk()
-        if page != self._page:
-            if self._beat.to_bytes(8, "big") not in page:
-                raise self._lost(OVERWRITTEN)
-            self._page, self._beat = page, _random()
+        if self._beat.to_bytes(8, "big") in page:
+            self._beat = _random()
+        elif page != self._page and self._epoch.to_bytes(8, "big") in self._page:
+            raise self._lost(OVERWRITTEN)  # before, a reader may have kept our own out of the file
+        self._page = page
 
     def _page_on_disk(self) -> bytes:
         return os.pread(self._file.fd, self._page_size, self._place)
