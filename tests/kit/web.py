@@ -116,7 +116,8 @@ def served(folder: Path) -> Iterator[tuple[Stand, Web]]:
     """Run a server, a rover and a web process that shows it, with one store, for a block."""
     store = str(folder / "tasks.sqlite3")
     with (
-        stand(folder, serve_store=store) as it,
+        # other tests keep the disk busy
+        stand(folder, "--set", "watch.commit=5", serve_store=store) as it,
         web(folder, it, "--store", store) as page,
     ):
         has_rover(page)
