@@ -22,7 +22,7 @@ for name in [name for name in os.environ if name.startswith("MAV_TASKS_")]:
 os.environ |= {
     "MAV_TASKS_CONFIG": "",
     "MAVLINK20": "1",  # pymavlink fixes its version on its first import, whichever test that is in
-    "PIP_NO_COMPILE": "1",  # in the environments of tests, what is imported is compiled
+    "PIP_NO_COMPILE": "no",  # which asks for it: what is imported is compiled
 }
 
 # A shell ignores Ctrl-C in background jobs, and the tests' processes would inherit that.
