@@ -1,7 +1,7 @@
 """Faults that there were, to be put in again: does the simulation find them?
 
 Each is a line of the product and what stood there, or might as well have. ``tools/simulate --fault
-NAME --seeds 24`` plays the stories of CI until one finds it. So many stories, from seed 0, were
+NAME`` plays the 20 stories of CI until one finds it. So many stories, from seed 0, were
 played until it was found: C1 17, C4 10, C5 1, C6 19, D1 2, D2 3, D3 6, D4 17, D10 20, a late mode
 4, a late arming 16, STOP 9, nonces 12, a lease 12, a rival 12, an end told too early 19. With
 another story of a seed these figures change: what finds a fault in 24 stories may need 60 the next

@@ -36,7 +36,7 @@ from tests.simulation.story import Cast, Move, tell
 from tests.simulation.world import SimulatedWorld
 
 SIMULATE = Path(__file__).resolve().parents[2] / "tools/simulate"
-SECONDS, STORIES = 60.0, 12  # of a story, and stories of a test
+SECONDS, STORIES = 60.0, 10  # of a story, and stories of a test
 FOUND_SOON = "D1 an older go is obeyed", 1  # a fault, and a seed that finds it in 20 s
 
 
