@@ -71,6 +71,7 @@ class _Request:
     retry: Retry
     standing: Standing = OURS
     is_urgent: bool = False
+    is_outdated: Callable[[], bool] = lambda: False  # while it waits; then it is not sent
     turn: int = 0  # commands of the same client that were before it in the lane
     joined: list["_Request"] = field(default_factory=list)  # of other clients, the same wish
 
@@ -159,11 +160,16 @@ class CommandSender:
         now: float,
         give_up_after: float,
         immediate: bool = False,
+        is_outdated: Callable[[], bool],
     ) -> None:
-        """Forward a client's command once; its answer, or its lack of one, comes from ``take``."""
+        """Forward a client's command once; its answer, or its lack of one, comes from ``take``.
+
+        If it is outdated when its turn comes, it is answered unsent.
+        """
         retry = Retry.starting(now=now, interval=give_up_after, give_up_after=give_up_after)
         lane = (component, command)
-        self._enqueue(_Request(origin, lane, message, packet, retry, standing, immediate), now=now)
+        request = _Request(origin, lane, message, packet, retry, standing, immediate, is_outdated)
+        self._enqueue(request, now=now)
 
     def withdraw(self, component: int, command: int) -> None:
         """Send no further copy of our own commands of this id, and none that wait."""
@@ -189,15 +195,6 @@ class CommandSender:
             self._answer(lane.in_flight, None)
             lane.in_flight = None
             lane.quiet_until = now + LATE
-
-    def drop(self, is_dropped: Callable[[int], bool]) -> None:
-        """Answer clients' commands that wait, of the ids that ``is_dropped`` names, unsent."""
-        for (_, command), lane in self._lanes.items():
-            if lane.waiting and is_dropped(command):
-                clients = [request for request in lane.waiting if request.origin is not None]
-                lane.waiting = [request for request in lane.waiting if request.origin is None]
-                for request in clients:
-                    self._answer(request, None)
 
     def is_pending(self, component: int, command: int) -> bool:
         """Whether a command of ours of this id is in flight or waits."""
@@ -326,8 +323,12 @@ class CommandSender:
         return True
 
     def _advance(self, lane: _Lane, *, now: float) -> None:
-        if lane.in_flight is None and lane.waiting and now >= lane.quiet_until:
-            lane.in_flight = lane.waiting.pop(0)
+        while lane.in_flight is None and lane.waiting and now >= lane.quiet_until:
+            request = lane.waiting.pop(0)
+            if request.is_outdated():
+                self._answer(request, None)
+            else:
+                lane.in_flight = request
         flying = lane.in_flight
         if flying is not None and flying.retry.is_due(now):
             self._send(flying, now=now)

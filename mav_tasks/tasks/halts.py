@@ -1,6 +1,8 @@
-"""The last halt of a vehicle, by which a request to resume counts as newer or older.
+"""The halts of a vehicle, by which a permission, or a request to resume, is newer or older.
 
 Each halt raises the epoch, whatever its cause: STOP, HOLD, a pause, disarming, a takeover, a loss.
+Equal ones in short order raise it once. ``term`` counts all of them: whatever may move the vehicle
+later holds the term in which it was permitted, and counts in that term only.
 """
 
 from collections.abc import Hashable
@@ -66,10 +68,11 @@ NOBODY = LastHalt(TaskReason.NONE, -inf)
 class Halts:
     """Counter of one vehicle's halts, with the last one."""
 
-    def __init__(self, *, epoch: int = 1, by_somebody: LastHalt = NOBODY) -> None:
-        self.epoch = epoch
+    def __init__(self) -> None:
+        self.epoch = 1
+        self.term = 0
         #: the last one by somebody, until somebody lets the vehicle go on
-        self.by_somebody = by_somebody
+        self.by_somebody = NOBODY
         self.at = -inf  #: s, when the last one came
         self.by: Hashable = None  #: sender of the command; None: no command
         self.number = -1  #: of that command, in its sender's sequence
@@ -96,8 +99,13 @@ class Halts:
         """Whether the last halt was a command, and not seen in the vehicle's telemetry."""
         return self._reason in WORDS
 
+    def restore(self, epoch: int, by_somebody: LastHalt, *, now: float) -> None:
+        """Go on after the halts of an earlier run."""
+        self.epoch, self.by_somebody, self.restored_at = epoch, by_somebody, now
+
     def raise_epoch(self, reason: TaskReason, *, actor: str, now: float) -> bool:
         """Count a halt. Return False if it repeats the last one and does not count."""
+        self.term += 1
         if reason in BY_SOMEBODY:
             is_word = self.by_somebody.reason in WORDS and reason not in WORDS
             self.by_somebody = LastHalt(self.by_somebody.reason if is_word else reason, now)

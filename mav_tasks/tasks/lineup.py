@@ -45,6 +45,7 @@ class Released:
     actor: str
     until: float
     waits_for: TaskReason
+    term: int  # in which it was released
 
 
 class Lineup:
@@ -83,7 +84,7 @@ class Lineup:
         self.stopping_after_kill = False
         self.begun_at = 0.0
         #: a held task that waits until the vehicle has rebooted, or the queue resumes
-        self.released: Released | None = None
+        self.last_released: Released | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.vehicle}, {self.queue!r}, {self.paused.name})"
@@ -98,6 +99,12 @@ class Lineup:
     def suspended(self) -> list[Task]:
         """Suspended tasks: pre-empted, or held."""
         return [self.registry[task_id] for task_id in self.suspended_ids]
+
+    @property
+    def released(self) -> Released | None:
+        """The last release, while its task waits and nothing has halted the vehicle since."""
+        last = self.last_released
+        return last if last is not None and last.term == self.halts.term else None
 
     @property
     def is_driving(self) -> bool:
@@ -171,10 +178,8 @@ class Lineup:
     def halt(self, reason: TaskReason, *, actor: str, now: float) -> None:
         """Record a halt of the vehicle; a request to resume must be newer.
 
-        An immediate task that has not started becomes an ordinary waiting one. A released task that
-        has not started is held as before.
+        An immediate task that has not started becomes an ordinary waiting one.
         """
-        self.released = None
         if self.immediate is not None and (self.active is None or self.active.id != self.immediate):
             self.immediate = None
         if self.halts.raise_epoch(reason, actor=actor, now=now):

@@ -66,7 +66,10 @@ class Releases:
         self._lineup.of_earlier_run.discard(task.id)
         if waits_for:
             until = now + self._lineup.settings.watch.ready_timeout
-            self._lineup.released = Released(task.id, again, may_continue, actor, until, waits_for)
+            term = self._lineup.halts.term
+            self._lineup.last_released = Released(
+                task.id, again, may_continue, actor, until, waits_for, term
+            )
             self._lineup.registry.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
             return
         self._begin_released(again=again, actor=actor, now=now)
@@ -77,7 +80,7 @@ class Releases:
         if release is None:
             return
         if task is None or task.id != release.task_id or task.state is not S.HELD:
-            self._lineup.released = None
+            self._lineup.last_released = None
             return
         waits_for = self._waits_for(task, seen, may_continue=release.may_continue, now=now)
         if not waits_for:
@@ -90,11 +93,11 @@ class Releases:
         elif now >= release.until and waits_for is not R.QUEUE_PAUSED:
             self._note_held(task, f"waited too long ({words_of(waits_for)})", now=now)
         elif waits_for is not release.waits_for:
-            self._lineup.released = replace(release, waits_for=waits_for)
+            self._lineup.last_released = replace(release, waits_for=waits_for)
             self._lineup.registry.record(TaskWaits(task.id, self._lineup.vehicle, waits_for, now))
 
     def _begin_released(self, *, again: bool, actor: str, now: float) -> None:
-        self._lineup.released = None
+        self._lineup.last_released = None
         self._lineup.executor.release(again=again, actor=actor, now=now)
         self._lineup.begun_at = now
 
@@ -114,7 +117,7 @@ class Releases:
         return blocker if blocker in OF_RESTART else R.NONE
 
     def _note_held(self, task: Task, why: str, *, now: float) -> None:
-        self._lineup.released = None
+        self._lineup.last_released = None
         words = f"holds task {task.id} again: {why}. Release it again"
         self._lineup.registry.record(VehicleNoted(self._lineup.vehicle, words, now))
 

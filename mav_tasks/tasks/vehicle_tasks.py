@@ -15,7 +15,7 @@ from mav_tasks.tasks.driving.mission_sequencer import goal_of, present_goal, ski
 from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.halts import NOBODY, Halts, LastHalt
+from mav_tasks.tasks.halts import NOBODY, LastHalt
 from mav_tasks.tasks.lifecycle import (
     CONTINUE_FIRST,
     TAKEN,
@@ -70,8 +70,7 @@ class VehicleTasks(Lineup):
         resuming: Container[TaskId] = (),
     ) -> None:
         """Load the active and suspended tasks of an earlier run; those ``resuming`` go on alone."""
-        self.halts = Halts(epoch=halt_epoch, by_somebody=halt)
-        self.halts.restored_at = now
+        self.halts.restore(halt_epoch, halt, now=now)
         self.halt(R.RESTARTED, actor=SERVER, now=now)
         self.paused = paused
         self.terms.restore(speed=speed, uid=uid, may_be_armed=may_be_armed)
@@ -233,7 +232,6 @@ class VehicleTasks(Lineup):
         If somebody else has the vehicle, a CANCELLING task ends without waiting for standstill.
         """
         self.halt(reason, actor=actor, now=now)
-        self.released = None
         self.executor.pause(reason, actor=actor, now=now)
         self.pause_queue(reason, actor=actor, now=now)
         active = self.active
@@ -305,7 +303,6 @@ class VehicleTasks(Lineup):
         being cancelled. One that has not moved starts again by itself. ``was_paused`` is why the
         queue was paused before the vehicle showed disarmed: the reboot disarmed it, no takeover.
         """
-        self.released = None
         was_driving = self.is_driving
         self._end_cancelling(now=now)
         if not self.suspended_ids and self.executor.begins_again(now=now):

@@ -10,6 +10,7 @@ from math import inf
 from mav_tasks.engine.vehicles.armings import BY_CLIENT, LATE
 from mav_tasks.latest import keep_latest
 from mav_tasks.services.persona import Persona
+from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.view import ModeKind
 
@@ -27,20 +28,30 @@ class Before:
     paused: TaskReason  # why the queue was paused
 
 
+@dataclass(slots=True)
+class Driving:
+    """A client's permission to drive through us, and what it has done with it."""
+
+    term: int  # in which it was given: a halt ends it
+    client: Hashable = None  # that has the grant; only the last one that asked may drive
+    mode: int = -1  # that a client last asked for through us
+    driver: Hashable = None  # the last one that drove through us
+    drove_at: float = -inf
+
+
 class Authority:
     """The permission to arm, who set the present mode, and who else has been driving."""
 
-    def __init__(self, persona: Persona, *, may_arm: bool) -> None:
+    def __init__(self, persona: Persona, halts: Halts, *, may_arm: bool) -> None:
         self._persona = persona
+        self._halts = halts
         #: by the settings: whether we may arm it once a person allows that again
         self.may_arm_again = may_arm
-        self._asked_mode = -1  # the mode that a client last asked for through us
+        self._last_driving = Driving(-1)
         self._asked_at = -inf
         self._passed_on: dict[int, float] = {}  # when a client last asked for each mode
         self._mode_is_ours = False
-        self._granted: set[Hashable] = set()
         self._other_at = -inf  # manual control, or a second controller
-        self._by_client: tuple[Hashable, float] = (None, -inf)  # the last one that drove through us
         self._withheld: tuple[Hashable, float] = (None, -inf)  # the last motion message's sender
         #: whether we may arm it; withdrawn when somebody disarms it or changes its mode
         self.may_arm = may_arm
@@ -50,6 +61,12 @@ class Authority:
 
     def __repr__(self) -> str:
         return f"Authority(may_arm={self.may_arm}, mode_is_ours={self._mode_is_ours})"
+
+    @property
+    def _driving(self) -> Driving:
+        if self._last_driving.term != self._halts.term:
+            self.revoke()
+        return self._last_driving
 
     def withdraw_arming(self) -> None:
         """Stop arming the vehicle, because somebody else controls it."""
@@ -89,10 +106,10 @@ class Authority:
 
         Only the last client that asked may drive: the vehicle would obey neither of two at once.
         """
-        self._asked_mode, self._asked_at = mode, now
+        self._driving.mode, self._asked_at = mode, now
         keep_latest(self._passed_on, mode, now, most=MOST_MODES)
         if mode == self._persona.control_mode:
-            self._granted = {client}
+            self._driving.client = client
             self._mode_is_ours = self._mode_is_ours or present_mode == mode
 
     def mode_changed(self, mode: int, *, by_us: bool, is_late: bool, now: float) -> bool:
@@ -100,12 +117,12 @@ class Authority:
 
         ``is_late``: it was asked for before a halt, so it counts as set by nobody.
         """
+        driving = self._driving
         by_client = (
-            mode == self._asked_mode == self._persona.control_mode
-            and now - self._asked_at <= BY_CLIENT
+            mode == driving.mode == self._persona.control_mode and now - self._asked_at <= BY_CLIENT
         )
-        if mode == self._asked_mode or not by_us:  # a HOLD of ours may show before it does
-            self._asked_mode = -1
+        if mode == driving.mode or not by_us:  # a HOLD of ours may show before it does
+            driving.mode = -1
         self._mode_is_ours = (by_us or by_client) and not is_late
         return self._mode_is_ours
 
@@ -152,11 +169,11 @@ class Authority:
     @property
     def has_any_grant(self) -> bool:
         """Whether any client has a grant to drive."""
-        return bool(self._granted)
+        return self._driving.client is not None
 
     def has_granted(self, client: Hashable) -> bool:
-        """Return whether this client has asked for our mode since the last task or STOP."""
-        return client in self._granted
+        """Return whether this client has asked for our mode since the last task or halt."""
+        return client is not None and client == self._driving.client
 
     def note_withheld(self, client: Hashable, *, now: float) -> None:
         """Note that a client's motion message did not pass."""
@@ -168,28 +185,27 @@ class Authority:
         return who == client and now - at <= STREAM_GAP
 
     def revoke(self) -> None:
-        """Revoke all grants after a task or a halt: a client that wants to drive must ask again.
+        """Revoke the grant, as a halt does: a client that wants to drive must ask again.
 
         No client's motion messages pass from here on, so no client drives any more.
         """
-        self._granted.clear()
-        self._by_client = (None, -inf)
-        self._asked_mode = -1
+        self._last_driving = Driving(self._halts.term)
 
     def forget(self, client: Hashable) -> bool:
         """Forget a client that is gone. Return whether it had a grant. A successor must ask."""
-        had_control = client in self._granted
-        self._granted.discard(client)
+        had_control = self.has_granted(client)
+        if had_control:
+            self._driving.client = None
         return had_control
 
     def note_client(self, client: Hashable, *, now: float) -> None:
         """Note that a client's motion message goes to the vehicle: it is driving."""
-        self._by_client = client, now
+        self._driving.driver, self._driving.drove_at = client, now
 
     def driver(self, *, within: float, now: float) -> Hashable:
         """Return the client that was driving in the last ``within`` seconds, or None."""
-        client, at = self._by_client
-        return client if now - at < within else None
+        driving = self._driving
+        return driving.driver if now - driving.drove_at < within else None
 
     def note_other(self, *, now: float) -> None:
         """Note that somebody who is not our client is driving."""
@@ -197,4 +213,4 @@ class Authority:
 
     def since_other(self, *, now: float) -> float:
         """Return the seconds since somebody else, or a client, was driving."""
-        return now - max(self._other_at, self._by_client[1])
+        return now - max(self._other_at, self._driving.drove_at)

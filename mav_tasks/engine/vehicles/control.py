@@ -90,12 +90,12 @@ class Effect(Enum):
     STAY = auto()  # ask for HOLD although it shows HOLD
     REGAIN = auto()  # it follows the set-points of an earlier run still: it is in our control
     LOSE = auto()  # send nothing more of ours, not even to stop it
-    # earlier requests must not take effect later
+    # earlier requests must not take effect later; each halt of the tasks sees to that
+    OUTDATE = auto()  # as a halt does: whatever was permitted before counts no more
     FORGET_GO_TO = auto()  # that a "go to" may undo a HOLD
     FORGET_START = auto()  # that a mission starts with the arming
     FORGET_RELEASE = auto()  # a released task that has not started is held again
-    REVOKE = auto()  # the grants: a client that wants to drive must ask again
-    DROP_WAITING = auto()  # commands of clients behind an unanswered one, if they might move it
+    REVOKE = auto()  # the grant: a client that wants to drive must ask again
     # the tasks
     COUNT = auto()  # count a halt, so that older requests do not count
     PAUSE = auto()  # queue and active task; the result is its id
@@ -158,46 +158,34 @@ IS_LET_RUN = (Queue.RUNS, Queue.PAUSED)
 NOT_FREE = (*ENGAGED, Grip.STOPPING)
 GOES_INTO_HOLD = (Grip.RELEASING, Grip.STOPPING)
 
-FORGETS = (_F.FORGET_GO_TO, _F.FORGET_START)
-#: no earlier request moves the vehicle later
-TAKE_BACK = (*FORGETS, _F.FORGET_RELEASE, _F.REVOKE, _F.DROP_WAITING)
-LINGERS = (_F.COUNT, *TAKE_BACK[1:], _F.LINGER)  # a "go to" may still follow
 #: somebody has taken it from a task
-TAKES = (_F.COUNT, *TAKE_BACK, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN)
+TAKES = (_F.COUNT, _F.LOSE, _F.TELL_TAKEN, _F.PAUSE_TAKEN)
 UNARMS = (_F.COUNT, _F.OUTDATE_ARMING, _F.EXPECT_DISARMED, _F.WITHDRAW_ARMING)
 HANDS_OVER = (_F.FORGET_START, _F.DO, _F.HAND_OVER)
 
 TABLE = (
     # requests that halt it
-    _row(_E.STOP, *TAKE_BACK, _F.OUTDATE_ARMING, _F.LATCH, _F.BRAKE),
+    _row(_E.STOP, _F.OUTDATE_ARMING, _F.LATCH, _F.BRAKE),
     _row(_E.HOLD, _F.COUNT, _F.BRAKE, queue=Queue.STOPPED),
-    _row(_E.HOLD, *LINGERS, _F.STEP, grip=Grip.DRIVING, lingers=True, work=Work.NONE),
-    _row(_E.HOLD, *LINGERS, _F.PAUSE, _F.STEP, grip=Grip.DRIVING, lingers=True),
-    _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.LET_GO, work=Work.NONE),
-    _row(_E.HOLD, _F.COUNT, *TAKE_BACK, _F.PAUSE, _F.LET_GO),
+    # a "go to" may still follow
+    _row(_E.HOLD, _F.COUNT, _F.LINGER, _F.STEP, grip=Grip.DRIVING, lingers=True, work=Work.NONE),
+    _row(_E.HOLD, _F.PAUSE, _F.LINGER, _F.STEP, grip=Grip.DRIVING, lingers=True),
+    _row(_E.HOLD, _F.COUNT, _F.LET_GO, work=Work.NONE),
+    _row(_E.HOLD, _F.PAUSE, _F.LET_GO),
     # a vehicle that moves without a task is stopped as by HOLD; so is one that was taken over
-    _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _E.HOLD, work=STANDS, grip=Grip.FREE, may_be_armed=True),
-    _row(_E.PAUSE, *TAKE_BACK, _F.PAUSE, _F.STEP),
-    _row(_E.PAUSE_TASKS, *FORGETS, _F.PAUSE, _F.STEP),
-    _row(_E.DISARM, _F.PAUSE, *UNARMS, *TAKE_BACK, _F.LET_GO, grip=ENGAGED, work=HAS_IT),
-    _row(_E.DISARM, *UNARMS, *TAKE_BACK, _F.LET_GO, grip=ENGAGED),
+    _row(_E.PAUSE, _F.PAUSE, _E.HOLD, work=STANDS, grip=Grip.FREE, may_be_armed=True),
+    _row(_E.PAUSE, _F.PAUSE, _F.STEP),
+    _row(_E.PAUSE_TASKS, _F.PAUSE, _F.STEP),
+    _row(_E.DISARM, _F.PAUSE, *UNARMS, _F.LET_GO, grip=ENGAGED, work=HAS_IT),
+    _row(_E.DISARM, *UNARMS, _F.LET_GO, grip=ENGAGED),
     # a stream that ends here would leave a velocity behind
-    _row(_E.DISARM, *UNARMS, *TAKE_BACK, _F.ZERO, driver=Driver.CLIENT, has_failsafe=False),
-    _row(_E.DISARM, *UNARMS, *TAKE_BACK),
+    _row(_E.DISARM, *UNARMS, _F.ZERO, driver=Driver.CLIENT, has_failsafe=False),
+    _row(_E.DISARM, *UNARMS),
     _row(_E.EMERGENCY_STOP, _F.DO, _E.DISARM),
-    _row(_E.CANCEL, *FORGETS, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
+    _row(_E.CANCEL, _F.OUTDATE_OUR_ARMING, _F.DO, _F.STEP),
     # its late set-point would drive it on
-    _row(
-        _E.CLEAR,
-        *(*FORGETS, _F.DO, _F.COUNT, *TAKE_BACK, _F.LET_GO),
-        driver=Driver.CLIENT,
-        grip=Grip.FREE,
-    ),
-    _row(
-        _E.CLEAR,
-        *(*FORGETS, _F.OUTDATE_OUR_ARMING, _F.DO, _F.COUNT),
-        *(_E.DRIVING_ENDS, *TAKE_BACK, _F.STEP),
-    ),
+    _row(_E.CLEAR, _F.DO, _F.COUNT, _F.LET_GO, driver=Driver.CLIENT, grip=Grip.FREE),
+    _row(_E.CLEAR, _F.OUTDATE_OUR_ARMING, _F.DO, _F.COUNT, _F.STEP),
     _row(_E.OPERATOR_LOST, _F.FORGET_RELEASE, _F.FORGET_START, work=Work.NONE),
     _row(
         _E.OPERATOR_LOST,
@@ -207,7 +195,7 @@ TABLE = (
         is_urgent=False,
     ),
     _row(_E.OPERATOR_LOST, _F.FORGET_RELEASE, _F.FORGET_START, _F.TELL, _E.PAUSE),
-    _row(_E.LEASE_ENDS, _E.DRIVING_ENDS, *TAKE_BACK, _F.STEP),
+    _row(_E.LEASE_ENDS, _E.DRIVING_ENDS, _F.OUTDATE, _F.STEP),
     _row(_E.CLOSE, _F.PAUSE, work=HAS_IT, grip=Grip.FREE),
     _row(_E.CLOSE, grip=Grip.FREE),
     _row(_E.CLOSE, _F.PAUSE, _F.BRAKE, work=HAS_IT),
@@ -220,13 +208,13 @@ TABLE = (
     # it was being stopped: no waiting task may drive it off from where somebody takes it
     _row(_E.TAKEN, *TAKES, work=Work.WAITS, queue=IS_LET_RUN, grip=Grip.STOPPING),
     _row(_E.TAKEN, *TAKES, work=HAS_IT, queue=IS_LET_RUN),
-    _row(_E.TAKEN, _F.COUNT, *TAKE_BACK, _F.LOSE),
+    _row(_E.TAKEN, _F.COUNT, _F.LOSE),
     _row(_E.MODE, _F.WITHDRAW_ARMING, _E.TAKEN),
     # the next set-point under way would end a failsafe's HOLD
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN, _F.STAY, has_failsafe=True),
     _row(_E.LAPSED, _F.WITHDRAW_ARMING, _E.TAKEN),
     # nobody has taken it: its task goes on with the lease, out of this HOLD
-    _row(_E.LAPSED_WITH_LEASE, *TAKE_BACK, _F.LOSE, work=Work.LOST),
+    _row(_E.LAPSED_WITH_LEASE, _F.OUTDATE, _F.LOSE, work=Work.LOST),
     _row(_E.LAPSED_WITH_LEASE, _E.LAPSED),
     # something was let go since: it is a person at the vehicle, or as good as one
     _row(_E.LATE_MODE, _E.MODE, work=(Work.RUNS, Work.LOST)),
@@ -257,23 +245,23 @@ TABLE = (
     _row(_E.SECOND, _F.NOTE_OTHERS, grip=Grip.STOPPING),
     _row(
         _E.SECOND,
-        *(_F.COUNT, *TAKE_BACK, _F.NOTE_OTHERS, _F.ZERO),
+        *(_F.COUNT, _F.NOTE_OTHERS, _F.ZERO),
         driver=Driver.CLIENT,
         grip=Grip.FREE,
         work=NO_TASK_HAS_IT,
     ),
-    _row(_E.SECOND, *TAKE_BACK, _F.NOTE_OTHERS, grip=Grip.FREE, work=NO_TASK_HAS_IT),
+    _row(_E.SECOND, _F.OUTDATE, _F.NOTE_OTHERS, grip=Grip.FREE, work=NO_TASK_HAS_IT),
     _row(_E.SECOND, _F.NOTE_OTHERS, _E.TAKEN, grip=Grip.FREE),
     _row(_E.SECOND, _F.NOTE_OTHERS, _F.ZERO_AND_HOLD, _E.TAKEN),
-    _row(_E.REBOOTED, *TAKE_BACK, _F.TELL, queue=Queue.STOPPED),
+    _row(_E.REBOOTED, _F.OUTDATE, _F.TELL, queue=Queue.STOPPED),
     # it may be a late report of its start: HOLD does no harm to a restarted vehicle
     _row(
         _E.REBOOTED,
-        *(*TAKE_BACK, _F.DO),
+        *(_F.OUTDATE, _F.DO),
         grip=GOES_INTO_HOLD,
         work=(Work.NONE, Work.WAITS, Work.STANDS),
     ),
-    _row(_E.REBOOTED, *TAKE_BACK, _F.LOSE, _F.DO),
+    _row(_E.REBOOTED, _F.OUTDATE, _F.LOSE, _F.DO),
     _row(_E.LATE, _F.LET_GO, _F.LEFT, _F.HOLD_TASK, has_failsafe=True),  # a zero would end it
     _row(_E.LATE, _F.ZERO, _F.LEFT, _F.HOLD_TASK),
     _row(_E.TOO_FAST, _F.TELL, _F.HOLD_TASK, _F.HOLD_AT_ONCE),  # a held stick defeats set-points
@@ -281,7 +269,7 @@ TABLE = (
     _row(_E.HEARD_AGAIN, _F.BRAKE, grip=Grip.STOPPING),
     _row(_E.HEARD_AGAIN),
     # requests that let it go
-    _row(_E.CONTINUE, _F.FORGET_GO_TO, _F.DO, _F.RESTORE_ARMING, _F.TELL_HELD, _F.WAKE),
+    _row(_E.CONTINUE, _F.DO, _F.RESTORE_ARMING, _F.TELL_HELD, _F.WAKE),
     # ends a pause; nobody has said that it may be armed again
     _row(_E.GO_ON, _F.DO, _E.LEAVE_MODE, _F.WAKE, queue=(Queue.PAUSED, Queue.TAKEN)),
     _row(_E.GO_ON),
@@ -300,8 +288,8 @@ TABLE = (
     _row(_E.ASK_OTHER_MODE, *HANDS_OVER),
     _row(_E.ARM, _F.DO, _F.KEEP_ARMED),
     # events that move nothing by themselves
-    _row(_E.UNQUEUE, *FORGETS, _F.DO),
-    _row(_E.CLEAR_WAITING, *FORGETS, _F.DO),
+    _row(_E.UNQUEUE, _F.FORGET_START, _F.DO),
+    _row(_E.CLEAR_WAITING, _F.FORGET_START, _F.DO),
     _row(_E.SKIP, _F.DO, _F.REVOKE, _F.WAKE),
     _row(_E.DRIVING_ENDS, driver=(Driver.NOBODY, Driver.OTHERS)),
     _row(_E.DRIVING_ENDS, _F.REVOKE, grip=NOT_FREE),

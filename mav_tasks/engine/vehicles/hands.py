@@ -26,6 +26,7 @@ class Word:
     text: str = ""
     do: Callable[[], Any] = lambda: None  # raises Rejection if refused
     sender: Hashable = None  # sender of a HOLD that a "go to" may undo
+    pauses: bool = False  # of such a HOLD: the queue ran
     clear: bool = False  # of a STOP: also cancel all other tasks
 
 
@@ -75,11 +76,11 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
         case Effect.FORGET_START:
             parts.forget_start()
         case Effect.FORGET_RELEASE:
-            tasks.released = None
+            tasks.last_released = None
         case Effect.REVOKE:
             parts.authority.revoke()
-        case Effect.DROP_WAITING:
-            requests.drop_what_waits()
+        case Effect.OUTDATE:
+            tasks.halts.term += 1
         # the tasks
         case Effect.COUNT:
             tasks.halt(word.reason, actor=word.actor, now=now)
@@ -116,7 +117,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             control.disarm_now(now=now)
             requests.flush(now=now)
         case Effect.LINGER:
-            parts.hold_before.note(word.sender, has_paused=not tasks.paused, now=now)
+            parts.hold_before.note(word.sender, has_paused=word.pauses, now=now)
         case Effect.HAND_OVER:
             control.hand_over()
         case Effect.KEEP_ARMED:

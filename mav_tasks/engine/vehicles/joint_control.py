@@ -86,7 +86,8 @@ class JointControl:
 
     def hold(self, *, sender: Hashable, actor: str, now: float) -> TaskId | None:
         """Handle a client's HOLD. Return the id of the task that it pauses."""
-        return self.on(Event.HOLD, Word(actor=actor, sender=sender), now=now)
+        word = Word(actor=actor, sender=sender, pauses=not self._parts.tasks.paused)
+        return self.on(Event.HOLD, word, now=now)
 
     def pause(self, *, actor: str, now: float) -> TaskId | None:
         """Pause the queue and the active task, if there is one. Return its id."""

@@ -48,15 +48,15 @@ class Parts:
     settings: Settings
     #: of this gateway on its vehicles
     lease: LeaseWatch
+    #: the last HOLD that a "go to" may undo
+    hold_before: HoldBefore
+    #: whether its mission starts when it is armed
+    start_mark: StartMark
+    #: its heartbeats as clients see them
+    shown: ShownHeartbeat
     armings: Armings = field(default_factory=Armings)
     failsafes: OwnFailsafes = field(default_factory=OwnFailsafes)
     sticks: StickWatch = field(default_factory=StickWatch)
-    #: the last HOLD that a "go to" may undo
-    hold_before: HoldBefore = field(default_factory=HoldBefore)
-    #: whether its mission starts when it is armed
-    start_mark: StartMark = field(default_factory=StartMark)
-    #: its heartbeats as clients see them
-    shown: ShownHeartbeat = field(default_factory=ShownHeartbeat)
     #: s, until when it is only listened to: another controller may show itself
     listens_until: float = -inf
     #: handle changes that a person, or a restart, has caused; no task starts before that

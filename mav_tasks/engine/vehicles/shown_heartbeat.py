@@ -18,6 +18,7 @@ from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavModeFlag, MavState
 from mav_tasks.mavlink.messages import Event, Heartbeat
 from mav_tasks.mavlink.packet import Packet, with_payload
+from mav_tasks.tasks.halts import Halts
 
 #: offsets in the payload of HEARTBEAT
 CUSTOM_MODE, BASE_MODE, SYSTEM_STATUS = 0, 6, 7
@@ -31,7 +32,9 @@ MISSION, LOITER = 8, 16
 class ShownHeartbeat:
     """Rewrites the heartbeats of one vehicle for clients."""
 
-    def __init__(self) -> None:
+    def __init__(self, halts: Halts) -> None:
+        self._halts = halts
+        self._term = -1  # in which the mode was to be shown
         self._mode = 0
         self._until = -inf
 
@@ -39,8 +42,8 @@ class ShownHeartbeat:
         return f"ShownHeartbeat({self._mode}, until={self._until:.2f})"
 
     def show(self, mode: int, *, until: float) -> None:
-        """Show a custom_mode until then."""
-        self._mode, self._until = mode, until
+        """Show a custom_mode until then, or until a halt."""
+        self._mode, self._until, self._term = mode, until, self._halts.term
 
     def forget(self) -> None:
         """Show the vehicle's own mode again."""
@@ -64,7 +67,7 @@ class ShownHeartbeat:
             status = _status(payload[BASE_MODE], payload[SYSTEM_STATUS])
             if status != payload[SYSTEM_STATUS]:
                 packet = with_payload(packet, SYSTEM_STATUS, bytes((status,)))
-        if now < self._until:
+        if now < self._until and self._term == self._halts.term:
             packet = with_payload(packet, CUSTOM_MODE, self._mode.to_bytes(BYTES, "little"))
         return packet
 

@@ -8,6 +8,7 @@ from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.rights import Rights
+from mav_tasks.tasks.halts import Halts
 from mav_tasks.tasks.task import Submitter
 
 WAITS = 10.0  # s in which the arming must come
@@ -24,8 +25,10 @@ class Marker(NamedTuple):
 class StartMark:
     """Whether a vehicle's mission starts when it is armed."""
 
-    def __init__(self) -> None:
-        self.marker: Marker | None = None  #: the client that wants it, or None
+    def __init__(self, halts: Halts) -> None:
+        self._halts = halts
+        self._term = -1  # in which it was wanted
+        self.marker: Marker | None = None  #: the last client that wanted it
         self._until = -inf
 
     def __repr__(self) -> str:
@@ -33,12 +36,13 @@ class StartMark:
 
     def put(self, marker: Marker, *, now: float) -> None:
         """Remember that a client wants it, and has not armed yet."""
-        self.marker = marker
+        self.marker, self._term = marker, self._halts.term
         self._until = now + WAITS
 
     def is_put(self, *, now: float) -> bool:
-        """Return whether a client still wants it."""
-        return self.marker is not None and now < self._until
+        """Return whether a client still wants it, and nothing has halted the vehicle since."""
+        is_of_now = self._term == self._halts.term
+        return self.marker is not None and is_of_now and now < self._until
 
     def remove(self) -> None:
         """Forget it, because something else was requested since."""

@@ -14,12 +14,15 @@ from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
+from mav_tasks.engine.vehicles.hold_before import HoldBefore
 from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.parts import Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
+from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
+from mav_tasks.engine.vehicles.start_mark import StartMark
 from mav_tasks.engine.vehicles.takeovers import Takeovers
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
@@ -69,6 +72,7 @@ class Vehicle:
             persona,
             outlet,
             source=Address(settings.identity.system_id, settings.identity.component_id),
+            halts=tasks.halts,
             watch=settings.watch,
             now=now,
         )
@@ -81,9 +85,12 @@ class Vehicle:
             requests,
             VehiclePosition(settings.watch, tasks.bounds),
             monitor,
-            Authority(persona, may_arm=may_arm),
+            Authority(persona, tasks.halts, may_arm=may_arm),
             settings,
             lease,
+            HoldBefore(tasks.halts),
+            StartMark(tasks.halts),
+            ShownHeartbeat(tasks.halts),
         )
         self.system_id = system_id
         self.tasks, self.requests, self.control = tasks, requests, requests.control

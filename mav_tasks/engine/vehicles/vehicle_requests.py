@@ -27,6 +27,7 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.services.phase import Phase
 from mav_tasks.services.turning_kind import TurningKind
 from mav_tasks.settings import Watch
+from mav_tasks.tasks.halts import Halts
 
 ASK_WHICH = 5  # times that a vehicle is asked for AUTOPILOT_VERSION
 ASK_WHICH_EACH = 3.0  # s
@@ -47,10 +48,12 @@ class VehicleRequests:
         outlet: PacketSender,
         *,
         source: Address,
+        halts: Halts,
         watch: Watch,
         now: float,
     ) -> None:
         self._target = target
+        self._halts = halts
         self._persona = persona
         self._source = source
         self._watch = watch
@@ -131,8 +134,13 @@ class VehicleRequests:
         immediate: bool,
         now: float,
     ) -> None:
-        """Forward a client's command; its answer comes from ``take_answers``."""
+        """Forward a client's command; its answer comes from ``take_answers``.
+
+        One that might move the vehicle is not sent after a halt.
+        """
         self.is_home_old |= command == MavCmd.DO_SET_HOME
+        term = self._halts.term
+        may_move = not row_of_command(command).passed_on.passes_under_stop
         self._sender.relay(
             packet,
             message,
@@ -143,6 +151,7 @@ class VehicleRequests:
             now=now,
             give_up_after=self._watch.forward_answer,
             immediate=immediate,
+            is_outdated=lambda: may_move and self._halts.term != term,
         )
         self.flush(now=now)
 
@@ -158,10 +167,6 @@ class VehicleRequests:
         for command in self._performed:
             self._sender.withdraw(self._target.component_id, command)
         self._performed.clear()
-
-    def drop_what_waits(self) -> None:
-        """Drop clients' commands that are queued behind an unanswered one and might move it."""
-        self._sender.drop(lambda command: not row_of_command(command).passed_on.passes_under_stop)
 
     def write_plan(
         self, mission_type: int, items: tuple[Item, ...], done: Done, *, now: float

@@ -123,13 +123,20 @@ def _revoke(state: State) -> Iterator[State]:
         yield state._replace(waits=state.waits & ~Waits.GRANT, driver=Driver.OTHERS)
 
 
+def _outdate(state: State) -> Iterator[State]:
+    """Yield the states after a halt: what was permitted before it counts no more."""
+    for each in _revoke(state):
+        yield each._replace(waits=NOTHING)
+
+
 def _count(state: State) -> Iterator[State]:
-    """Yield the state without pending releases; an immediate task that has not started may wait."""
+    """Yield the states after a halt; an immediate task that has not started may wait."""
     is_urgent = state.is_urgent and state.work not in NO_TASK
-    counted = state._replace(waits=state.waits & ~Waits.RELEASE, is_urgent=is_urgent)
-    yield counted
-    if is_urgent:
-        yield counted._replace(is_urgent=False)
+    for each in _outdate(state):
+        counted = each._replace(is_urgent=is_urgent)
+        yield counted
+        if is_urgent:
+            yield counted._replace(is_urgent=False)
 
 
 def _pause(state: State) -> Iterator[State]:
@@ -154,12 +161,11 @@ def _pause_taken(state: State) -> Iterator[State]:
 
 
 def _latch(state: State) -> Iterator[State]:
-    stopped = state._replace(
-        queue=Queue.STOPPED, waits=state.waits & ~Waits.RELEASE, is_urgent=False
-    )
-    yield stopped._replace(work=Work.NONE)
-    if state.work is not Work.NONE:
-        yield stopped._replace(work=Work.WAITS)
+    for each in _outdate(state):
+        stopped = each._replace(queue=Queue.STOPPED, is_urgent=False)
+        yield stopped._replace(work=Work.NONE)
+        if state.work is not Work.NONE:
+            yield stopped._replace(work=Work.WAITS)
 
 
 def _hold_task(state: State) -> Iterator[State]:
@@ -372,6 +378,7 @@ RESULTS: dict[Effect, Callable[[State], Iterator[State]]] = {
     F.WAKE: _stepped,
     F.REGAIN: lambda state: iter((state._replace(grip=Grip.DRIVING),)),
     F.LOSE: lambda state: iter((state._replace(grip=Grip.FREE),)),
+    F.OUTDATE: _outdate,
     F.FORGET_GO_TO: _without(Waits.GO_TO),
     F.FORGET_START: _without(Waits.START),
     F.FORGET_RELEASE: _without(Waits.RELEASE),
