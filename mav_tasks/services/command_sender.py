@@ -311,7 +311,9 @@ class CommandSender:
         """Whether a client's command is to wait; else it has joined another, or is answered."""
         client = request.standing.client
         before = [each for one in lane.requests for each in (one, *one.joined)]
-        request.turn = sum(each.standing.client == client for each in before)
+        request.turn = sum(
+            each.standing.client == client and not each.is_outdated() for each in before
+        )
         if request.turn >= MAX_EACH:
             self._answer(request, None)
             return False

@@ -94,7 +94,8 @@ class VehicleTasks(Lineup):
     def unidentified(self, *, now: float) -> None:
         """Pause these tasks: their vehicle has a unique id, and this one reports none."""
         self.terms.forget_which()
-        self._wait_for_somebody(now=now)
+        if not self.is_empty:
+            self._wait_for_somebody(now=now)
 
     def _wait_for_somebody(self, *, now: float) -> None:
         """Start nothing before somebody has looked which vehicle this is."""

@@ -16,6 +16,7 @@ from tests.kit.client import (
     AUTO,
     DENIED,
     GUIDED,
+    MOVE,
     FakeClient,
     Message,
     set_mode,
@@ -156,6 +157,7 @@ def test_what_a_revoked_key_drives_stands(world: World) -> None:
     put(world, ALICE)
     client = signing(world, ALICE)
     world.run(1.5)
+    client.command(MOVE, 1, 0, 0, 0, 0, 60)  # it is paused
     client.mode(GUIDED)
     world.run(0.5)
     client.arm()

@@ -175,14 +175,16 @@ TABLE = (
     # a vehicle that moves without a task is stopped as by HOLD; so is one that was taken over
     _row(_E.PAUSE, _F.PAUSE, _E.HOLD, work=STANDS, grip=Grip.FREE, may_be_armed=True),
     _row(_E.PAUSE, _F.PAUSE, _F.STEP),
-    _row(_E.PAUSE_TASKS, _F.PAUSE, _F.STEP),
+    # a client may drive it beside tasks that wait: its velocity must not stay
+    _row(_E.PAUSE_TASKS, _E.DRIVING_ENDS, _F.PAUSE, _F.STEP),
     _row(_E.DISARM, _F.PAUSE, *UNARMS, _F.LET_GO, grip=ENGAGED, work=HAS_IT),
     _row(_E.DISARM, *UNARMS, _F.LET_GO, grip=ENGAGED),
     # a stream that ends here would leave a velocity behind
     _row(_E.DISARM, *UNARMS, _F.ZERO, driver=Driver.CLIENT, has_failsafe=False),
     _row(_E.DISARM, *UNARMS),
     _row(_E.EMERGENCY_STOP, _F.DO, _E.DISARM),
-    _row(_E.CANCEL, _F.OUTDATE_OUR_ARMING, _F.DO, _F.STEP),
+    # one that another task replaces is no halt
+    _row(_E.CANCEL, _F.OUTDATE_OUR_ARMING, _F.DO, _F.REVOKE, _F.STEP),
     # its late set-point would drive it on
     _row(_E.CLEAR, _F.DO, _F.COUNT, _F.LET_GO, driver=Driver.CLIENT, grip=Grip.FREE),
     _row(_E.CLEAR, _F.OUTDATE_OUR_ARMING, _F.DO, _F.COUNT, _F.STEP),
@@ -288,8 +290,8 @@ TABLE = (
     _row(_E.ASK_OTHER_MODE, *HANDS_OVER),
     _row(_E.ARM, _F.DO, _F.KEEP_ARMED),
     # events that move nothing by themselves
-    _row(_E.UNQUEUE, _F.FORGET_START, _F.DO),
-    _row(_E.CLEAR_WAITING, _F.FORGET_START, _F.DO),
+    _row(_E.UNQUEUE, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO),
+    _row(_E.CLEAR_WAITING, _F.FORGET_GO_TO, _F.FORGET_START, _F.DO),
     _row(_E.SKIP, _F.DO, _F.REVOKE, _F.WAKE),
     _row(_E.DRIVING_ENDS, driver=(Driver.NOBODY, Driver.OTHERS)),
     _row(_E.DRIVING_ENDS, _F.REVOKE, grip=NOT_FREE),

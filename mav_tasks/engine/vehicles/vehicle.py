@@ -381,5 +381,7 @@ class Vehicle:
         if self._was_heard:  # a silent vehicle cannot answer: ask it nothing
             self.requests.ask_which(now=now)
             if self.tasks.terms.uid and self.requests.has_not_said_which(now=now):
+                if not self.tasks.is_empty:  # they are paused, which is a halt
+                    self.joint.on(Event.DRIVING_ENDS, Word(), now=now)
                 self.tasks.unidentified(now=now)
             self.requests.ask_for_rates(now=now)
