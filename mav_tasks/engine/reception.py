@@ -163,7 +163,9 @@ class Reception:
             if isinstance(message, m.CommandCancel):
                 self.control.cancel_latest(client, vehicle, packet.source, message.command, now=now)
             else:
-                asked = MessageRequest.of(client, vehicle, packet, int(message.custom_mode))
+                asked = MessageRequest.of(
+                    client, vehicle, packet, int(message.custom_mode), now=now
+                )
                 self.modes.heard(asked, now=now)
         elif isinstance(message, m.RequestDataStream):
             self.displays.set_streams(client, message)

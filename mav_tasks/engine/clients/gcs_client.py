@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 from math import inf
 
 from mav_tasks.engine.clients.rights import NOTHING, SUBMITTER, Rights
-from mav_tasks.engine.clients.sender import Memory, Sender
+from mav_tasks.engine.clients.sender import OBSERVED, Memory, Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
 from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.engine.packet_sender import PacketSender
@@ -174,9 +174,12 @@ class GcsClient:
         return task_id in self._followed
 
     def sender(self, source: Address) -> Sender:
-        """Return the ``Sender`` of the address of the packet in hand; one for all observers."""
+        """Return the ``Sender`` of the address of the packet in hand; one for all observers.
+
+        Nothing of theirs lets a rover go, so that neither their numbers nor their words matter.
+        """
         if not self.rights.reach(SUBMITTER):
-            self._observers = self._observers or Sender.of_observers()
+            self._observers = self._observers or Sender(Memory(OBSERVED))
             return self._observers
         sender = self._senders.get(source)
         if sender is None:

@@ -1,111 +1,100 @@
-"""What one MAVLink address at a client's endpoint has sent, and in which order."""
+"""What the MAVLink addresses at a client's endpoint have said, and in which order.
+
+One memory of packets serves everything that asks for an earlier one: a copy gets the first one's
+answer, and a request to go on counts from when its first copy came (``commands/ordering.py``).
+"""
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
 from math import inf
-from typing import NamedTuple
 
+from mav_tasks.mavlink.address import Address
+from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.number_line import NumberLine
-from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import COPIED, DOUBLED, CommandReceiver, Pending
+from mav_tasks.services.command_receiver import SAME_PACKET, Answer, Command
 
-REMEMBERED = 1024  # commands of one endpoint; a gimbal in motion gets 20 a second
-COPIES = 32  # of one command
+REMEMBERED = 512  # packets of one endpoint; a gimbal in motion gets 20 a second
 OBSERVED = 16  # packets of observers at one endpoint
 
 
-class _Said(NamedTuple):
-    life: int  # of the sender, by its restarts: after one, an equal command is a new one
-    epoch: int  # halt epoch of the vehicle when the first copy came
-    at: float  # s, of the last copy
-    packets: dict[bytes, float]  # the latest copies, and when each came, s
-    copies: int  # confirmation of the last one
+@dataclass(slots=True, eq=False)
+class Said:
+    """A command's packet that was taken in; ``answer`` is None until it has been answered."""
 
-    def has(self, packet: Packet, now: float) -> bool:
-        """Return whether this very packet came lately: numbers go round after 256 packets."""
-        return now - self.packets.get(packet.raw, -inf) <= DOUBLED
+    command: Command
+    raw: bytes
+    content: Hashable  # of the sender, the same for each copy of the command
+    at: float  # s, when it came
+    life: int  # of the sender, by its restarts: after one, an equal command is a new one
+    twin_at: float  # s, when this very packet came before; -inf: it did not
+    #: the vehicle's halt epoch when the first copy came; None: nobody has asked for it
+    epoch: int | None = None
+    answer: Answer | None = None
+    is_held: bool = False  # the answer is known, and waits until the halt is kept
+    words: tuple[str, Address] | None = None  # that follow the answer
+
+    @property
+    def is_accepted(self) -> bool:
+        return self.answer is not None and self.answer.result == MavResult.ACCEPTED
+
+    @property
+    def is_refused(self) -> bool:
+        return self.answer is not None and self.answer.result != MavResult.ACCEPTED
 
 
 class Memory:
-    """What one endpoint has sent: of bounded size, however many addresses are there."""
+    """The latest packets of one endpoint: so many, however many addresses are there."""
 
-    def __init__(self) -> None:
-        self.packets: OrderedDict[bytes, Pending] = OrderedDict()
-        self.words: OrderedDict[Hashable, _Said] = OrderedDict()
+    def __init__(self, most: int = REMEMBERED) -> None:
+        self._most = most
+        self.packets: OrderedDict[bytes, Said] = OrderedDict()
+        self.contents: dict[Hashable, list[Said]] = {}
+
+    def add(self, said: Said) -> None:
+        """Remember a packet, in place of the same one before."""
+        if said.raw in self.packets:
+            self._forget(self.packets.pop(said.raw))
+        self.packets[said.raw] = said
+        self.contents.setdefault(said.content, []).append(said)
+        if len(self.packets) > self._most:
+            self._forget(self.packets.popitem(last=False)[1])
+
+    def _forget(self, said: Said) -> None:
+        equal = self.contents[said.content]
+        equal.remove(said)
+        if not equal:
+            del self.contents[said.content]
 
 
 class Sender:
     """The commands and sequence numbers of one address."""
 
     def __init__(self, memory: Memory) -> None:
-        self.commands = CommandReceiver(memory.packets)
         self.line = NumberLine()
-        self._said = memory.words
+        self._memory = memory
 
     def __repr__(self) -> str:
         return f"Sender({self.line!r})"
 
-    @classmethod
-    def of_observers(cls) -> "Sender":
-        """Return what stands for all observers at an endpoint: nothing of theirs lets a rover go,
-        so that neither their numbers nor their words are remembered."""
-        it = cls(Memory())
-        it.commands = CommandReceiver(most=OBSERVED)
-        return it
+    def same_packet(self, raw: bytes, *, now: float) -> Said | None:
+        """Return this very packet, if it came just before: it is given the same answer."""
+        said = self._memory.packets.get(raw)
+        return said if said is not None and now - said.at <= SAME_PACKET else None
 
-    def first_epoch(
-        self,
-        content: Hashable,
-        packet: Packet,
-        *,
-        is_counted: bool,
-        now: float,
-        is_anothers: bool = False,
-    ) -> int | None:
-        """Return the halt epoch at which a command's first copy came, None if this is no copy.
+    def take_in(self, command: Command, raw: bytes, *, now: float) -> Said:
+        """Remember a command; return the same packet's before if its answer is held still."""
+        known = self._memory.packets.get(raw)
+        if known is not None and known.is_held:
+            return known
+        content = self, command.target, command.command, command.frame, repr(command.params)
+        twin_at = -inf if known is None else known.at
+        said = Said(command, raw, content, now, self.line.lives, twin_at)
+        self._memory.add(said)
+        return said
 
-        ``is_counted``: the packet itself says that it is a copy. ``is_anothers``: another sender
-        has halted the vehicle. An identical packet is then a copy even if its sender seems to have
-        restarted, because the network may deliver all its packets a second time.
-        """
-        said = self._said.get((self, content))
-        if said is None:
-            return None
-        is_same = said.has(packet, now)
-        if said.life != self.line.lives and not (is_anothers and is_same):
-            return None
-        within = DOUBLED if is_counted or is_same else COPIED
-        return said.epoch if now - said.at <= within else None
-
-    def counts_on(self, content: Hashable, packet: Packet, copies: int, *, within: float) -> bool:
-        """Return whether a command's ``confirmation``, ``copies``, makes it a copy of another.
-
-        It is one if the last copy that came says another number: it may be late. Otherwise the
-        first may be lost, unless each of the sender's packets ``within`` so many seconds came:
-        mavros always says 1.
-        """
-        said = self._said.get((self, content))
-        if said is not None and said.life == self.line.lives and copies != said.copies:
-            return copies > 0
-        return copies > 0 and not self.line.has_all(packet.seq, within=within)
-
-    def has_said(self, content: Hashable, packet: Packet, *, now: float) -> bool:
-        """Return whether this very packet came before, since the sender last restarted."""
-        said = self._said.get((self, content))
-        return said is not None and said.life == self.line.lives and said.has(packet, now)
-
-    def last_copy_at(self, content: Hashable) -> float:
-        """Return when the last copy of this command came, s; -inf: none came."""
-        said = self._said.get((self, content))
-        return -inf if said is None or said.life != self.line.lives else said.at
-
-    def says(
-        self, content: Hashable, packet: Packet, copies: int, *, epoch: int, now: float
-    ) -> None:
-        """Remember a command, or one more copy of it; ``copies`` is its confirmation."""
-        before = self._said.pop((self, content), None)
-        packets = {} if before is None or len(before.packets) >= COPIES else before.packets
-        packets[packet.raw] = now
-        self._said[self, content] = _Said(self.line.lives, epoch, now, packets, copies)
-        if len(self._said) > REMEMBERED:
-            self._said.popitem(last=False)
+    def earlier(self, said: Said, *, within: float = inf, now: float) -> Iterator[Said]:
+        """Yield the equal commands of the last so many seconds but this one, the latest first."""
+        for each in reversed(self._memory.contents.get(said.content, ())):
+            if each is not said and now - each.at <= within:
+                yield each

@@ -16,6 +16,7 @@ from functools import partial
 from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.message_requests import MessageRequests
+from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands.assignments import Assignments, check_any, driven_by
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import GOALS, parse_command
@@ -32,7 +33,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Answer, Command, Pending
+from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, reused
 from mav_tasks.tasks.events import SubmissionRefused
@@ -53,10 +54,10 @@ class AnyRequest(CommandRequest):
     """A submission for any rover, once its rover is known; answered by the server's address."""
 
     def __init__(
-        self, client: GcsClient, vehicle: Vehicle, packet: Packet, pending: Pending, ours: Address
+        self, client: GcsClient, vehicle: Vehicle, packet: Packet, said: Said, ours: Address
     ) -> None:
-        super().__init__(client, vehicle, packet, pending)
-        self._ours = _addressed(pending.command, ours)
+        super().__init__(client, vehicle, packet, said)
+        self._ours = _addressed(said.command, ours)
 
     @property
     def answering(self) -> Address:
@@ -71,8 +72,8 @@ class AnyRequest(CommandRequest):
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Send the COMMAND_ACK; an accepting one names the rover in result_param1."""
         rover = self.vehicle.system_id if result is MavResult.ACCEPTED else 0
-        self.pending.answer = Answer(self.command.command, result, result_param2, self._ours, rover)
-        self.client.answer(self.pending.answer, self.packet.source)
+        self.said.answer = Answer(self.command.command, result, result_param2, self._ours, rover)
+        self.client.answer(self.said.answer, self.packet.source)
 
 
 class AnyRover:
@@ -113,19 +114,19 @@ class AnyRover:
             return
         if command.target.component_id not in (0, self._vehicles.our_address.component_id):
             return
-        receiver = client.sender(packet.source).commands
-        if known := receiver.same_packet(packet.raw, now=now):
+        sender = client.sender(packet.source)
+        if known := sender.same_packet(packet.raw, now=now):
             if known.answer is not None:
                 client.answer(known.answer, packet.source)
             return
-        pending = receiver.remember(command, packet.raw, now=now)
+        said = sender.take_in(command, packet.raw, now=now)
         try:
             if is_shown:
-                self._show(client, packet, pending, now=now)
+                self._show(client, packet, said, now=now)
             else:
-                self._submit(client, packet, pending, now=now)
+                self._submit(client, packet, said, now=now)
         except Rejection as refusal:
-            self._refuse(client, packet, pending, refusal, now=now)
+            self._refuse(client, packet, said, refusal, now=now)
 
     def nonce_taken(self, taken: NonceTaken, *, now: float) -> None:
         """Answer with the task that the fleet had with this nonce, and undo ours."""
@@ -140,8 +141,8 @@ class AnyRover:
             else:
                 self._registry.record(asked.refuse(reused(task.marks.nonce), now=now))
 
-    def _submit(self, client: GcsClient, packet: Packet, pending: Pending, *, now: float) -> None:
-        command = pending.command
+    def _submit(self, client: GcsClient, packet: Packet, said: Said, *, now: float) -> None:
+        command = said.command
         if command.command not in SUBMITTED:
             raise Rejection(R.BAD_PARAMETER, f"command {command.command} must name one rover")
         row = row_said(command)
@@ -156,15 +157,15 @@ class AnyRover:
         confirmation = command.confirmation
         known = self._submissions.known(draft, confirmation=confirmation, origin=None, now=now)
         if known is not None:
-            self._answer_repeat(client, packet, pending, known, now=now)
+            self._answer_repeat(client, packet, said, known, now=now)
             return
         copied = client.key, packet.source, draft.marks.nonce, draft.marks.payload
         if gateway := self._passed_on_to(copied, now=now):
             self._passed_on[copied] = now, gateway
             self._elsewhere.pass_to(gateway, client, packet)
             return
-        again = partial(self._submit, client, packet, pending)
-        refuse = partial(self._refuse, client, packet, pending)
+        again = partial(self._submit, client, packet, said)
+        refuse = partial(self._refuse, client, packet, said)
         if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
             return
         self._submissions.check_open()
@@ -179,7 +180,7 @@ class AnyRover:
             return
         vehicle = self._vehicles.get(choice.vehicle)
         assert vehicle is not None, "it was chosen among them"
-        asked = AnyRequest(client, vehicle, packet, pending, self._vehicles.our_address)
+        asked = AnyRequest(client, vehicle, packet, said, self._vehicles.our_address)
         if has_left_before_halt(asked, anybodys=True):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
         goal = driven_by(vehicle, wish.goal)
@@ -195,45 +196,45 @@ class AnyRover:
         return gateway
 
     def _answer_repeat(
-        self, client: GcsClient, packet: Packet, pending: Pending, known: Known, *, now: float
+        self, client: GcsClient, packet: Packet, said: Said, known: Known, *, now: float
     ) -> None:
         task = self._registry.get(known.task_id)
         vehicle = None if task is None else self._vehicles.look_at(task.vehicle)
         if vehicle is not None:
-            asked = AnyRequest(client, vehicle, packet, pending, self._vehicles.our_address)
+            asked = AnyRequest(client, vehicle, packet, said, self._vehicles.our_address)
             self._submissions.answer_repeat(asked, known, now=now)
             return
         rover = 0 if task is None else task.vehicle  # of an earlier run, not heard yet
-        self._answer(client, packet, pending, MavResult.ACCEPTED, known.task_id, rover)
+        self._answer(client, packet, said, MavResult.ACCEPTED, known.task_id, rover)
 
-    def _show(self, client: GcsClient, packet: Packet, pending: Pending, *, now: float) -> None:
+    def _show(self, client: GcsClient, packet: Packet, said: Said, *, now: float) -> None:
         """Send the status of a task, whichever rover has it."""
-        self._displays.show_task(client, packet, task_id_of(pending.command), now=now)
-        self._answer(client, packet, pending, MavResult.ACCEPTED, 0, 0)
+        self._displays.show_task(client, packet, task_id_of(said.command), now=now)
+        self._answer(client, packet, said, MavResult.ACCEPTED, 0, 0)
 
     def _refuse(
-        self, client: GcsClient, packet: Packet, pending: Pending, refusal: Rejection, *, now: float
+        self, client: GcsClient, packet: Packet, said: Said, refusal: Rejection, *, now: float
     ) -> None:
-        self._answer(client, packet, pending, result_of(refusal.reason), int(refusal.reason), 0)
+        self._answer(client, packet, said, result_of(refusal.reason), int(refusal.reason), 0)
         if not client.may_be_refused(now=now):  # a flood of refusals fills no disk and no network
             return
         client.tell_refusal(refusal.text, self._vehicles.our_address, now=now)
         reason, actor = TaskReason(refusal.reason), str(client.who)
-        number = pending.command.command
+        number = said.command.command
         self._registry.record(SubmissionRefused(ANY, number, reason, refusal.text, actor, now))
 
     def _answer(
         self,
         client: GcsClient,
         packet: Packet,
-        pending: Pending,
+        said: Said,
         result: MavResult,
         result_param2: int,
         rover: int,
     ) -> None:
-        ours = _addressed(pending.command, self._vehicles.our_address)
-        pending.answer = Answer(pending.command.command, result, result_param2, ours, rover)
-        client.answer(pending.answer, packet.source)
+        ours = _addressed(said.command, self._vehicles.our_address)
+        said.answer = Answer(said.command.command, result, result_param2, ours, rover)
+        client.answer(said.answer, packet.source)
 
 
 def _addressed(command: Command, ours: Address) -> Address:

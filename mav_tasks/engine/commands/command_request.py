@@ -1,9 +1,10 @@
 """A client's command while the server handles it: sender, vehicle, content, and its answer."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 from typing import Self
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
+from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.goals import CHANGE_MODE, marks_of, reposition_flags
 from mav_tasks.engine.commands.words import kind_of, row_said
@@ -13,13 +14,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import (
-    NO_MESSAGE,
-    Answer,
-    Command,
-    CommandReceiver,
-    Pending,
-)
+from mav_tasks.services.command_receiver import NO_MESSAGE, Answer, Command
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.task import Marks, Submitter
@@ -28,13 +23,11 @@ from mav_tasks.tasks.task import Marks, Submitter
 class CommandRequest:
     """One command of one client to one vehicle, to be answered exactly once."""
 
-    def __init__(
-        self, client: GcsClient, vehicle: Vehicle, packet: Packet, pending: Pending
-    ) -> None:
+    def __init__(self, client: GcsClient, vehicle: Vehicle, packet: Packet, said: Said) -> None:
         self.client = client
         self.vehicle = vehicle
         self.packet = packet
-        self.pending = pending
+        self.said = said
         #: submitter and rights at arrival: later the endpoint may sign with another key
         self.submitter: Submitter = client.who
         self.rights = client.rights
@@ -43,7 +36,7 @@ class CommandRequest:
         #: the sender's earlier commands and sequence numbers
         self.sender = client.sender(packet.source)
         #: the parsed message
-        self.command = command = pending.command
+        self.command = command = said.command
         #: its row in the policy table
         self.row = row_said(command)
         self.kind = kind_of(command, self.row, vehicle.parts.persona)
@@ -56,10 +49,9 @@ class CommandRequest:
         """The submitter, as text."""
         return str(self.submitter)
 
-    @property
-    def receiver(self) -> CommandReceiver:
-        """The receiver that knows this sender's earlier commands."""
-        return self.sender.commands
+    def earlier(self, *, within: float, now: float) -> Iterator[Said]:
+        """Yield the sender's equal commands of the last so many seconds, the latest first."""
+        return self.sender.earlier(self.said, within=within, now=now)
 
     @property
     def answering(self) -> Address:
@@ -100,9 +92,9 @@ class CommandRequest:
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Send the COMMAND_ACK, unless the halt must be kept first."""
-        self.pending.answer = Answer(self.command.command, result, result_param2, self.answering)
+        self.said.answer = Answer(self.command.command, result, result_param2, self.answering)
         if not self.is_held(result):
-            self.client.answer(self.pending.answer, self.packet.source)
+            self.client.answer(self.said.answer, self.packet.source)
 
     def refuse(
         self, refusal: Rejection, *, now: float, result: MavResult | None = None
@@ -115,7 +107,7 @@ class CommandRequest:
             result = translate.result_of(refusal.reason)
         self.answer(result, refusal.reason)
         if self.is_held(result):
-            self.pending.words = refusal.text, self.refusing
+            self.said.words = refusal.text, self.refusing
         else:
             self.client.tell_refusal(refusal.text, self.refusing, now=now)
         reason = TaskReason(refusal.reason)
@@ -132,12 +124,15 @@ class MessageRequest(CommandRequest):
     """A mode request by the message SET_MODE, which has no acknowledgement."""
 
     @classmethod
-    def of(cls, client: GcsClient, vehicle: Vehicle, packet: Packet, mode: int) -> Self:
+    def of(
+        cls, client: GcsClient, vehicle: Vehicle, packet: Packet, mode: int, *, now: float
+    ) -> Self:
         """Return the request for a mode, by its number."""
         target = Address(vehicle.system_id, AUTOPILOT)
         params = (*vehicle.persona.mode_params(mode), 0.0, 0.0, 0.0, 0.0)
         command = Command(target, MavCmd.DO_SET_MODE, params, 0, None, NO_MESSAGE)
-        return cls(client, vehicle, packet, Pending(command, 0.0))
+        said = client.sender(packet.source).take_in(command, packet.raw, now=now)
+        return cls(client, vehicle, packet, said)
 
     @property
     def marks(self) -> Marks:

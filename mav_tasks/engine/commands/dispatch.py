@@ -35,7 +35,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import Answer, Command
+from mav_tasks.services.command_receiver import COPIED, Answer, Command
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
@@ -71,15 +71,14 @@ class Commands:
         if vehicle is None:
             self._of_unheard(client, packet, command, now=now)
             return
-        receiver = client.sender(packet.source).commands
-        known = receiver.same_packet(packet.raw, now=now)
+        sender = client.sender(packet.source)
+        known = sender.same_packet(packet.raw, now=now)
         if known is not None and not halts_again(command, vehicle.persona, after=now - known.at):
             if known.answer is not None and not known.is_held:
                 client.answer(known.answer, packet.source)
             return
-        asked = CommandRequest(
-            client, vehicle, packet, receiver.remember(command, packet.raw, now=now)
-        )
+        said = sender.take_in(command, packet.raw, now=now)
+        asked = CommandRequest(client, vehicle, packet, said)
         epoch = vehicle.tasks.halts.epoch
         try:
             if asked.kind is Kind.GO:
@@ -91,8 +90,8 @@ class Commands:
             else:
                 self._submissions.refuse(asked, refusal, now=now)
         note_halt(asked, before=epoch)
-        if asked.kind is Kind.HALT and asked.pending.answer is not None:  # else the rover answers
-            self._submissions.answer_halt(client, asked.pending, packet.source, now=now)
+        if asked.kind is Kind.HALT and asked.said.answer is not None:  # else the rover answers
+            self._submissions.answer_halt(client, asked.said, packet.source, now=now)
 
     def _of_unheard(
         self, client: GcsClient, packet: Packet, command: Command, *, now: float
@@ -138,8 +137,8 @@ class Commands:
         QGroundControl asks three times, and shows a dialog for each refusal; none for CANCELLED.
         """
         is_mode = asked.command.command == MavCmd.DO_SET_MODE
-        return is_mode and asked.receiver.is_refused_again(
-            asked.command, within=MODE_TRIED_AGAIN, now=now
+        return is_mode and any(
+            each.is_refused for each in asked.earlier(within=MODE_TRIED_AGAIN, now=now)
         )
 
     def _dispatch(self, asked: CommandRequest, *, now: float) -> None:
@@ -262,7 +261,10 @@ class Commands:
         held_at = asked.vehicle.hold_before.since
         # a "go to" from before the HOLD, or a copy of one, does not undo it
         is_older = has_left_before_halt(asked)
-        is_older |= asked.receiver.older_copy(asked.command, before=held_at, now=now)
+        is_older |= any(
+            each.at < held_at and not each.is_refused
+            for each in asked.earlier(within=COPIED, now=now)
+        )
         self._submissions.submit(asked, now=now)
         if not is_older:
             self._undo_hold_before(asked, now=now)
@@ -313,9 +315,9 @@ class Commands:
         if is_to_clear and not clear and client.may_be_refused(now=now):
             words = f"stopped, but role {client.rights.role} may not clear a queue; {OPERATOR} may"
             client.tell(words, MavSeverity.WARNING, source, now=now)
-        pending = sender.commands.remember(command, packet.raw, now=now)
-        pending.answer = Answer(command.command, result, param2, source)
-        self._submissions.answer_halt(client, pending, packet.source, now=now)
+        said = sender.take_in(command, packet.raw, now=now)
+        said.answer = Answer(command.command, result, param2, source)
+        self._submissions.answer_halt(client, said, packet.source, now=now)
 
     def _pause_continue(self, asked: CommandRequest, *, now: float) -> int | None:
         vehicle = asked.vehicle

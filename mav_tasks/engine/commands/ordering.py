@@ -8,7 +8,7 @@ A packet arrives when the kernel gets it, on whatever link. When the server read
 it may read old packets of one link after newer ones of another.
 """
 
-from math import isfinite
+from math import inf, isfinite
 
 from mav_tasks.engine.clients.rights import SUBMITTER
 from mav_tasks.engine.commands.command_request import CommandRequest
@@ -43,23 +43,29 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     """
     if not asked.rights.reach(SUBMITTER):
         return ""
-    halts, sender, packet = asked.vehicle.tasks.halts, asked.sender, asked.packet
+    halts, sender, packet, said = asked.vehicle.tasks.halts, asked.sender, asked.packet, asked.said
     is_old = asked.client.is_late
     halts.was_asked_to_go_on()
     number = sender.line.number_of(packet.seq)
     sent_after = sender.line.sent_after(number, now=asked.arrived)
     named = _epoch_in(asked.command)
-    content = (asked.command.target, asked.command.command, repr(asked.command.params))
+    earlier = sender.earlier(said, now=now)
+    before = next((each for each in earlier if each.epoch is not None), None)
+    is_of_this_life = before is not None and before.life == said.life
+    is_same = now - said.twin_at <= DOUBLED  # numbers go round after 256 packets
     copies = asked.command.confirmation
     window = min(copies * COPIED, DOUBLED)
-    is_counted = sender.counts_on(content, packet, copies, within=window)
-    first = sender.first_epoch(
-        content,
-        packet,
-        is_counted=is_counted,
-        is_anothers=halts.by is not sender,
-        now=now,
-    )
+    # It says that it is a copy if the last one says another number: it may be late. Otherwise the
+    # first may be lost, unless each of the sender's packets in that time came: mavros always says 1
+    is_counted = copies > 0
+    if before is None or not is_of_this_life or copies == before.command.confirmation:
+        is_counted = is_counted and not sender.line.has_all(packet.seq, within=window)
+    # If another sender has halted the vehicle, an identical packet is a copy even if its sender
+    # seems to have restarted: the network may deliver all its packets a second time.
+    may_be_copy = is_of_this_life or (is_same and halts.by is not sender)
+    within = DOUBLED if is_counted or is_same else COPIED
+    is_copy = before is not None and may_be_copy and now - before.at <= within
+    first = before.epoch if before is not None and is_copy else None
     elsewhere = asked.vehicle.go_words.first_epoch(packet.raw, sender, now=now)
     if elsewhere is not None:
         first = elsewhere if first is None else min(first, elsewhere)
@@ -70,8 +76,9 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
     # number under way), or if no copy came for REPEATED s.
     follows = halts.by is sender and number > halts.number
     is_over = halts.is_undone or halts.command == asked.command.command
-    is_repeated = is_counted or sender.has_said(content, packet, now=now)
-    if follows and not is_repeated and (is_over or now - sender.last_copy_at(content) > REPEATED):
+    is_repeated = is_counted or (is_of_this_life and is_same)
+    last_at = before.at if before is not None and is_of_this_life else -inf
+    if follows and not is_repeated and (is_over or now - last_at > REPEATED):
         epoch = halts.epoch
     else:
         epoch = halts.epoch if halts.at < sent_after else halts.epoch - 1
@@ -83,7 +90,7 @@ def why_older(asked: CommandRequest, *, now: float) -> str:
         epoch = halts.epoch if named == halts.epoch % EPOCHS else halts.epoch - 1
     if is_old or (sender.line.jumped_to(number) and not named):
         epoch = min(epoch, halts.epoch - 1)
-    sender.says(content, packet, copies, epoch=epoch, now=now)
+    said.epoch = epoch
     asked.vehicle.go_words.says(packet.raw, sender, epoch=epoch, now=now)
     if epoch == halts.epoch:
         return ""

@@ -4,6 +4,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
+from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import CHANGE_MODE, reposition_flags
 from mav_tasks.engine.commands.motion_gate import why_not_sent
@@ -16,7 +17,7 @@ from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.messages import CommandInt, CommandLong, Message
-from mav_tasks.services.command_receiver import Answer, Pending
+from mav_tasks.services.command_receiver import Answer
 from mav_tasks.services.command_sender import Answered, Standing
 from mav_tasks.settings import ROLES
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
@@ -33,7 +34,7 @@ class _Asker(NamedTuple):
     client: Place
     source: Address
     answering: Address
-    halt: Pending | None
+    halt: Said | None
 
 
 def check_relay(asked: CommandRequest, row: Row, *, now: float) -> None:
@@ -59,7 +60,7 @@ def relay(asked: CommandRequest, *, now: float) -> None:
     """Forward a command; ``deliver`` brings its answer to the client."""
     command = asked.command
     answering = Address(asked.vehicle.system_id, command.target.component_id or AUTOPILOT)
-    halt = asked.pending if asked.kind is Kind.HALT else None
+    halt = asked.said if asked.kind is Kind.HALT else None
     asker = _Asker(asked.client.key, asked.packet.source, answering, halt)
     asked.vehicle.relay(
         asked.packet,

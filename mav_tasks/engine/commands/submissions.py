@@ -6,6 +6,7 @@ from functools import partial
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import OPERATOR, Rights
+from mav_tasks.engine.clients.sender import Said
 from mav_tasks.engine.commands.ability import driven
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
@@ -25,7 +26,6 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
-from mav_tasks.services.command_receiver import Pending
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, Rule, SubmissionDeduplicator
 from mav_tasks.tasks.forecast import Forecast
@@ -321,34 +321,34 @@ class Submissions:
         """Return the task that a submission repeats, or None: see ``SubmissionDeduplicator``."""
         return self._deduplicator.known(draft, confirmation=confirmation, origin=origin, now=now)
 
-    def answer_halt(self, client: GcsClient, pending: Pending, to: Address, *, now: float) -> None:
+    def answer_halt(self, client: GcsClient, said: Said, to: Address, *, now: float) -> None:
         """Send the answer to a command that has halted a vehicle once a restart would know that.
 
         The record of halts knows no tasks: one that was cancelled would come back and drive.
         """
-        assert pending.answer is not None, "it was decided"
-        if pending.answer.result not in IN_FORCE or pending.is_held:  # the latter: a copy
+        assert said.answer is not None, "it was decided"
+        if said.answer.result not in IN_FORCE or said.is_held:  # the latter: a copy
             return
-        pending.is_held = True
+        said.is_held = True
 
         def accept(*, now: float) -> None:
-            pending.is_held = False
-            assert pending.answer is not None, "what is held has one"
-            client.answer(pending.answer, to)
-            if pending.words is not None:
-                client.tell_refusal(*pending.words, now=now)
+            said.is_held = False
+            assert said.answer is not None, "what is held has one"
+            client.answer(said.answer, to)
+            if said.words is not None:
+                client.tell_refusal(*said.words, now=now)
 
         def give_up(*, now: float) -> None:
-            answer, pending.is_held = pending.answer, False
+            answer, said.is_held = said.answer, False
             assert answer is not None, "what is held has one"
             reason = int(R.STORE_UNAVAILABLE)
-            pending.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
-            client.answer(pending.answer, to)
+            said.answer = answer._replace(result=MavResult.FAILED, result_param2=reason)
+            client.answer(said.answer, to)
             what = "STOP" if answer.command == MavCmd.TASK_STOP else f"Command {answer.command}"
             words = f"{what} in force but not stored: a server restart loses it. See its log"
             self._gcs.tell(words, MavSeverity.ERROR, answer.source, now=now)
 
-        number, first = pending.command.command, pending.command.params[0]
+        number, first = said.command.command, said.command.params[0]
         ends_tasks = number in OF_ONE_TASK or (number, first) == (MavCmd.TASK_STOP, 1.0)
         self.gate.hold(accept, give_up, now=now, is_halt=not ends_tasks)
 

@@ -17,7 +17,7 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity, TaskProperty
 from mav_tasks.mavlink.label import MAX_LABEL, Piece, with_piece
 from mav_tasks.mavlink.messages import CommandCancel
-from mav_tasks.services.command_receiver import Command
+from mav_tasks.services.command_receiver import COPIED, REPEATED, Command
 from mav_tasks.tasks.lifecycle import TERMINAL, WAITING, TaskReason, TaskState
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
@@ -74,7 +74,9 @@ class TaskControl:
 
         The id of any run names its series, whose present run is cancelled, too.
         """
-        first = asked.receiver.answer_to_counted_copy(asked.command, now=now)
+        is_counted = asked.command.confirmation > 0
+        earlier = asked.earlier(within=COPIED, now=now) if is_counted else ()
+        first = next((each.answer for each in earlier if each.answer is not None), None)
         if first is not None and first.result == MavResult.ACCEPTED:
             return first.result_param2
         if first is not None:
@@ -117,7 +119,8 @@ class TaskControl:
 
     def _release(self, asked: CommandRequest, *, now: float) -> int:
         """Release or skip a held task. A copy has no effect on a task held since the first."""
-        copy = asked.receiver.answer_to_copy(asked.command, now=now)
+        copies = asked.earlier(within=REPEATED, now=now)
+        copy = next((each.answer for each in copies if each.is_accepted), None)
         if copy is not None:
             done = "skipped" if asked.command.params[1] == SKIP else "released"
             asked.tell(f"task {copy.result_param2}: already {done}", MavSeverity.INFO, now=now)

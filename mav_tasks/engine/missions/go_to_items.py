@@ -16,7 +16,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavMissionResult, MavMissionType, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services.command_receiver import NO_MESSAGE, Command, Pending
+from mav_tasks.services.command_receiver import NO_MESSAGE, Command
 from mav_tasks.services.mission_item import item_of
 from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import TaskReason
@@ -72,7 +72,9 @@ class GoToItems:
         now: float,
     ) -> None:
         """Submit a "go to". An item that only changes the altitude is accepted without effect."""
-        asked = GuidedItemRequest(client, vehicle, packet, Pending(_command_of(message), now))
+        sender = client.sender(packet.source)
+        said = sender.take_in(_command_of(message), packet.raw, now=now)
+        asked = GuidedItemRequest(client, vehicle, packet, said)
         try:
             if message.current == ONLY_HIGHER:
                 asked.answer(MavResult.ACCEPTED)
