@@ -12,7 +12,7 @@ from math import inf
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavResult
 from mav_tasks.mavlink.number_line import NumberLine
-from mav_tasks.services.command_receiver import SAME_PACKET, Answer, Command
+from mav_tasks.services.command_receiver import DOUBLED, SAME_PACKET, Answer, Command
 
 REMEMBERED = 512  # packets of one endpoint; a gimbal in motion gets 20 a second
 OBSERVED = 16  # packets of observers at one endpoint
@@ -44,7 +44,7 @@ class Said:
 
 
 class Memory:
-    """The latest packets of one endpoint: so many, however many addresses are there."""
+    """The packets of one endpoint, as long as copies may come, but not more than ``most``."""
 
     def __init__(self, most: int = REMEMBERED) -> None:
         self._most = most
@@ -57,8 +57,11 @@ class Memory:
             self._forget(self.packets.pop(said.raw))
         self.packets[said.raw] = said
         self.contents.setdefault(said.content, []).append(said)
-        if len(self.packets) > self._most:
+        while len(self.packets) > self._most or self._is_over(now=said.at):
             self._forget(self.packets.popitem(last=False)[1])
+
+    def _is_over(self, *, now: float) -> bool:
+        return now - next(iter(self.packets.values())).at > DOUBLED
 
     def _forget(self, said: Said) -> None:
         equal = self.contents[said.content]

@@ -132,8 +132,8 @@ def test_times_that_are_moved_for_ever_take_no_memory(growth: Callable[[], int],
     ((_, ack),) = rig.acks
     assert ack.result == 0, ack
     task = ack.result_param2
-    for change in range(700):
-        if change == 300:  # the lists that have an upper limit are full
+    for change in range(1_000):
+        if change == 700:  # the lists that have an upper limit are full
             growth()
         message = command(MODIFY, task, what, 5000.0 + change % 1000 + change / 3000)
         rig.passes(0.02)
