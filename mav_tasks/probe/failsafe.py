@@ -11,11 +11,11 @@ from mav_tasks.probe.parameters import (
     BYTEWISE,
     FORMATS,
     ask_parameters,
-    loss_failsafe_of,
+    own_parameters_of,
     value_of,
 )
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services.loss_failsafe import STANDING
+from mav_tasks.services.loss_failsafe import STANDING, fault_in, what_it_does
 
 ASKS, ASK_AGAIN = 5, 0.5  # s
 
@@ -27,15 +27,16 @@ class NotSet(Exception):
 def set_failsafe(talk: Conversation, findings: Findings) -> Steps[None]:
     """Have it stand when setpoints stop, and change nothing where it does already."""
     yield from ask_parameters(talk, findings)
-    if talk.persona is None or not talk.persona.has_loss_failsafe:
+    persona = talk.persona
+    if persona is None or not persona.has_loss_failsafe:
         findings.failsafe_set = "nothing to set"
         return
     done: list[str] = []
-    while name := loss_failsafe_of(talk).to_be_set:
+    while name := fault_in(own_parameters_of(talk, persona).values)[0]:
         before, wanted = findings.parameters[name], STANDING[name]
         yield from _set(talk, findings, name, wanted)
         done.append(f"{name} {before:g}, now {wanted:g}")
-    findings.loss_by_parameters = loss_failsafe_of(talk).what_it_does
+    findings.loss_by_parameters = what_it_does(own_parameters_of(talk, persona).values)
     if not findings.loss_by_parameters:
         raise NotSet("the rover does not report what it does when setpoints stop")
     findings.failsafe_set = "; ".join(done) or "nothing to change"

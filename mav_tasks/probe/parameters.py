@@ -10,8 +10,9 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.probe.conversation import Conversation
 from mav_tasks.probe.findings import Findings
 from mav_tasks.probe.steps import Steps, Wait
-from mav_tasks.services.loss_failsafe import AFTER, LossFailsafe
-from mav_tasks.services.turning_kind import TurningKind
+from mav_tasks.services.loss_failsafe import AFTER, what_it_does
+from mav_tasks.services.own_parameters import OwnParameters
+from mav_tasks.services.persona import Persona
 
 BYTEWISE = 16  # MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 FORMATS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}  # by MAV_PARAM_TYPE
@@ -42,18 +43,11 @@ def ask_parameters(talk: Conversation, findings: Findings) -> Steps[None]:
         else:
             findings.parameters[name] = value_of(value, is_bytewise=is_bytewise)
     findings.loss_by_parameters = FIXED
+    said = own_parameters_of(talk, persona)
     if persona.has_loss_failsafe:
-        says = loss_failsafe_of(talk).what_it_does
-        findings.loss_by_parameters = says or UNREPORTED
-    kind = TurningKind(
-        talk.target,
-        persona.turning_parameters,
-        is_bytewise=persona.has_bytewise_parameters,
-    )
-    for message in talk.parameters.values():
-        kind.receive(message)
-    findings.turning = "" if kind.turning is None else kind.turning.value
-    findings.turning_radius = kind.radius
+        findings.loss_by_parameters = what_it_does(said.values) or UNREPORTED
+    findings.turning = "" if said.turning is None else said.turning.value
+    findings.turning_radius = said.turning_radius
 
 
 def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:
@@ -64,14 +58,12 @@ def value_of(message: m.ParamValue, *, is_bytewise: bool) -> float:
     return float(number)
 
 
-def loss_failsafe_of(talk: Conversation) -> LossFailsafe:
-    """Return what is known of the failsafe on which the server looks, too."""
-    persona = talk.persona
-    is_by_parameters = persona is not None and persona.has_loss_failsafe
-    failsafe = LossFailsafe(talk.target, is_by_parameters=is_by_parameters)
+def own_parameters_of(talk: Conversation, persona: Persona) -> OwnParameters:
+    """Return what the server, too, reads in the parameters."""
+    said = OwnParameters(talk.target, persona)
     for message in talk.parameters.values():
-        failsafe.receive(message)
-    return failsafe
+        said.receive(message)
+    return said
 
 
 def loss_time_of(findings: Findings) -> float:

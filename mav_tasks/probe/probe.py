@@ -9,7 +9,7 @@ from mav_tasks.probe.drive_controller import DriveController, DriveEnded
 from mav_tasks.probe.driving_area import DrivingArea
 from mav_tasks.probe.failsafe import NotSet, set_failsafe
 from mav_tasks.probe.findings import Drive, Findings
-from mav_tasks.probe.parameters import loss_failsafe_of, loss_time_of
+from mav_tasks.probe.parameters import loss_time_of, own_parameters_of
 from mav_tasks.probe.questions import (
     ask_everything,
     ask_rates,
@@ -20,6 +20,7 @@ from mav_tasks.probe.questions import (
 )
 from mav_tasks.probe.steps import Steps, Wait, Walk
 from mav_tasks.probe.trials import Trials
+from mav_tasks.services.loss_failsafe import fault_in
 from mav_tasks.settings import Identity, Turning, Watch
 
 FRESH_ENOUGH = 5.0  # Hz of position and attitude, below which it is not driven
@@ -164,7 +165,7 @@ class Probe:
         found = self.findings
         area = DrivingArea.about(motion.pose, turning=found.turning, radius=found.turning_radius)
         controller = DriveController(talk, persona, drive, area)
-        keeps_moving = loss_failsafe_of(talk).why_off
+        _, keeps_moving = fault_in(own_parameters_of(talk, persona).values)
         if keeps_moving:  # the server reads that itself: no profile is to outlive its cure
             drive.loss_note = f"not tried: {keeps_moving}"
         self.stage = f"driving within {area.half:g} m of its place: keep clear; Ctrl-C stops it"

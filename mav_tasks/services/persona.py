@@ -9,12 +9,12 @@ from math import isnan
 
 from mav_tasks.mavlink.enums import MavAutopilot, MavFrame, MavModeFlag, PositionTargetTypemask
 from mav_tasks.mavlink.messages import Heartbeat
-from mav_tasks.services import turning_kind
 from mav_tasks.settings import Turning
 
 T = PositionTargetTypemask
 
 NO_MODE = -1
+SERVO = "SERVO"  # how the names of ArduPilot's outputs begin
 MAIN_BITS, SUB_BITS = 16, 24  # where PX4's custom_mode has its main and its sub mode
 VELOCITY_ONLY = int(T.X_IGNORE | T.Y_IGNORE | T.Z_IGNORE | T.AX_IGNORE | T.AY_IGNORE | T.AZ_IGNORE)
 WITH_YAW_RATE = VELOCITY_ONLY | int(T.YAW_IGNORE)
@@ -60,7 +60,7 @@ class Persona:
     #: an integer's bytes stand in a PARAM_VALUE's float; else the integer is cast
     has_bytewise_parameters: bool
     cruise_parameters: tuple[str, ...]  # m/s, of what names no speed
-    turning_parameters: tuple[str, ...]  # those that TurningKind reads
+    turning_parameters: tuple[str, ...]  # what says how it turns
     probed_parameters: tuple[str, ...]  # others that the probe reads: failsafes and limits
     setpoint_mask: int  # POSITION_TARGET_TYPEMASK of our velocity setpoints
     setpoint_frame: int  # MAV_FRAME of our velocity setpoints
@@ -163,7 +163,10 @@ ARDUPILOT = Persona(
     heeds_throttle_stick=True,  # 4.6.3
     has_bytewise_parameters=False,
     cruise_parameters=("WP_SPEED", "CRUISE_SPEED"),
-    turning_parameters=turning_kind.ARDUPILOT,
+    turning_parameters=(
+        *(f"{SERVO}{number}_FUNCTION" for number in range(1, 9)),  # a rover's are among these
+        "TURN_RADIUS",
+    ),
     probed_parameters=(  # the newest names too (4.7); a rover has either the one or the other
         *("SYSID_MYGCS", "SYSID_ENFORCE", "MAV_GCS_SYSID", "MAV_OPTIONS"),
         *("FS_ACTION", "FS_TIMEOUT", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_THR_ENABLE"),
@@ -218,7 +221,7 @@ PX4 = Persona(
     heeds_throttle_stick=False,
     has_bytewise_parameters=True,
     cruise_parameters=("RO_SPEED_LIM",),
-    turning_parameters=turning_kind.PX4,
+    turning_parameters=("CA_AIRFRAME", "SYS_AUTOSTART", "RA_WHEEL_BASE", "RA_MAX_STR_ANG"),
     probed_parameters=(
         *("COM_OF_LOSS_T", "COM_OBL_RC_ACT", "COM_RC_IN_MODE", "COM_RC_LOSS_T", "COM_DL_LOSS_T"),
         *("NAV_RCL_ACT", "COM_RCL_EXCEPT", "NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_FAIL_ACT_T"),

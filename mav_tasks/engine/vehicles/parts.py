@@ -20,7 +20,7 @@ from mav_tasks.services.heartbeat import HeartbeatMonitor
 from mav_tasks.services.offboard import OffboardControl, Refused
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import VehicleNoted
+from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
@@ -96,6 +96,10 @@ class Parts:
         """Report a text about the vehicle."""
         self.registry.record(VehicleNoted(self.system_id, text, now))
 
+    def tell(self, text: str, *, now: float) -> None:
+        """Report a text about the vehicle on which nobody has to act."""
+        self.registry.record(VehicleSeen(self.system_id, text, now))
+
     def withdraw_arming(self, *, now: float) -> None:
         """Withdraw the permission to arm, also across a restart of the server."""
         self.authority.withdraw_arming()
@@ -112,8 +116,7 @@ class Parts:
     def forget_firmware(self) -> None:
         """Forget what belongs to the vehicle's firmware: it is asked again."""
         self.requests.intervals.ask_all_again()
-        for asked in self.requests.asked:
-            asked.forget()
+        self.requests.parameters.forget()
 
     def forget_start(self) -> None:
         """Forget that a mission starts with the arming: it changed, or is unwanted."""

@@ -148,7 +148,7 @@ class Pilot:
 
     def _may_be_a_car(self, *, now: float) -> bool:
         """Return whether it was met driving just now, and has not said yet how it turns."""
-        is_known = self._parts.requests.turning.turning is not None
+        is_known = self._parts.requests.parameters.turning is not None
         return now - self._regained_at <= BRAKES_FOR and not is_known
 
     def brakes_against_stick(self, *, now: float) -> bool:

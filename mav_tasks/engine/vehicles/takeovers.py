@@ -16,7 +16,6 @@ from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.motion_guard import NEARLY_STANDS
 from mav_tasks.engine.vehicles.own_failsafes import News
 from mav_tasks.engine.vehicles.parts import Parts
-from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import TAKEN, TaskReason
 
@@ -164,8 +163,7 @@ class Takeovers:
         if news.is_outside:
             parts.note("is outside its own fence: tasks wait", now=now)
         elif news.is_outside is not None:
-            words = "is inside its own fence again"
-            parts.registry.record(VehicleSeen(parts.system_id, words, now))
+            parts.tell("is inside its own fence again", now=now)
         if news.cause and parts.tasks.paused is R.TAKEOVER:
             words = f"was taken over by its failsafe: {news.cause}"
             if parts.tasks.halts.by_somebody.reason is R.TAKEOVER:

@@ -36,7 +36,6 @@ from mav_tasks.services.heartbeat import HeartbeatMonitor, kind_of
 from mav_tasks.services.identity import identity_of, uid_of
 from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
-from mav_tasks.tasks.events import VehicleSeen
 from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
@@ -96,7 +95,7 @@ class Vehicle:
         self.tasks, self.requests, self.control = tasks, requests, requests.control
         self.where, self.shown = parts.where, parts.shown
         self.hold_before, self.start_mark = parts.hold_before, parts.start_mark
-        self._registry, self._monitor = registry, monitor
+        self._monitor = monitor
         self.pilot = Pilot(parts, self.view)
         self.joint = JointControl(parts, self.pilot, self.view)
         self._takeovers = Takeovers(parts, self.joint)
@@ -291,7 +290,7 @@ class Vehicle:
     def _heard_again(self, *, now: float) -> None:
         self._was_heard = True
         self.requests.ask_which_again()
-        self._registry.record(VehicleSeen(self.system_id, "heard again", now))
+        self.parts.tell("heard again", now=now)
         self.joint.on(Event.HEARD_AGAIN, Word(), now=now)
 
     def _note_component(self, component_id: int, *, now: float) -> None:

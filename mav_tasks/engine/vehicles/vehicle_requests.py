@@ -14,18 +14,16 @@ from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.codec import target_of
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import statustext
+from mav_tasks.services import loss_failsafe, statustext
 from mav_tasks.services.command_sender import Answered, CommandSender, Standing
-from mav_tasks.services.cruise_speed import CruiseSpeed
 from mav_tasks.services.interval_requester import IntervalRequester
-from mav_tasks.services.loss_failsafe import LossFailsafe
 from mav_tasks.services.mission_item import Item
 from mav_tasks.services.mission_uploader import Done, MissionUploader
 from mav_tasks.services.offboard import OffboardControl, is_request_of
 from mav_tasks.services.orders import moves
+from mav_tasks.services.own_parameters import OwnParameters
 from mav_tasks.services.persona import Persona
 from mav_tasks.services.phase import Phase
-from mav_tasks.services.turning_kind import TurningKind
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.halts import Halts
 
@@ -65,12 +63,8 @@ class VehicleRequests:
         self._unperformed: list[Answered] = []
         self.control = OffboardControl(target, persona, self._sender, watch)
         self.intervals = IntervalRequester(now=now)
-        is_bytewise = persona.has_bytewise_parameters
-        self.cruise = CruiseSpeed(target, persona.cruise_parameters, is_bytewise=is_bytewise)
-        self.loss_failsafe = LossFailsafe(target, is_by_parameters=persona.has_loss_failsafe)
-        self.turning = TurningKind(target, persona.turning_parameters, is_bytewise=is_bytewise)
         #: what the vehicle is asked for, how it stops by itself, turns and drives
-        self.asked = self.loss_failsafe, self.turning, self.cruise
+        self.parameters = OwnParameters(target, persona)
         self._shows = ASK_TO_SHOW  # how many more times it is asked for a heartbeat
         #: home may have moved since the vehicle said it last: by an arming or a DO_SET_HOME
         self.is_home_old = False
@@ -219,9 +213,8 @@ class VehicleRequests:
 
     def ask_for_parameters(self) -> None:
         """Ask how it stops by itself, how it turns and how fast it drives, until it answers."""
-        for asked in self.asked:
-            for request in asked.requests():
-                self._outlet.send(request, self._source)
+        for request in self.parameters.requests():
+            self._outlet.send(request, self._source)
 
     def has_not_said_which(self, *, now: float) -> bool:
         """Return whether it was asked for its identity often enough, and did not answer."""
@@ -345,7 +338,8 @@ class VehicleRequests:
         1.17.0, SITL). One that follows none, as in a client's "go to", gets HOLD.
         """
         rolls_in_hold = self._persona.brakes_by_setpoints and self.control.follows
-        if rolls_in_hold and self.loss_failsafe.stands:
+        said = self.parameters.values
+        if rolls_in_hold and loss_failsafe.is_said(said) and not loss_failsafe.fault_in(said)[1]:
             return self._last_words[1:]  # all but HOLD, which comes first for one with a failsafe
         return self._last_words
 
