@@ -258,23 +258,24 @@ class Commands:
         if not has_place(asked.command):
             asked.answer(MavResult.ACCEPTED, self._pause(asked, now=now) or 0)
             return
-        held_at = asked.vehicle.hold_before.since
+        parts = asked.vehicle.parts
+        held = parts.hold_before.holder(now=now)
         # a "go to" from before the HOLD, or a copy of one, does not undo it
         is_older = has_left_before_halt(asked)
-        is_older |= any(
-            each.at < held_at and not each.is_refused
+        is_older |= held is not None and any(
+            each.at < held.since and not each.is_refused
             for each in asked.earlier(within=COPIED, now=now)
         )
         self._submissions.submit(asked, now=now)
-        if not is_older:
-            self._undo_hold_before(asked, now=now)
-
-    def _undo_hold_before(self, asked: CommandRequest, *, now: float) -> None:
-        """Undo a HOLD just before a "go to": MAVSDK, and no person, has sent that HOLD."""
-        number = asked.vehicle.hold_before.undoing(asked.sender, now=now)
-        if number is not None and asked.rights.reach(OPERATOR):
-            undo = partial(asked.vehicle.joint.go_to_follows, number, actor=asked.actor)
-            self._submissions.gate.hold(undo, _leave_hold, now=now)
+        # MAVSDK, and no person, has sent the HOLD just before
+        if held is None or held.sender != asked.sender or is_older:
+            return
+        if held is parts.hold_before.holder(now=now):
+            parts.forget_go_to()
+            if held.has_paused and asked.rights.reach(OPERATOR):
+                parts.undone.give(held)
+                undo = partial(asked.vehicle.joint.go_to_follows, held, actor=asked.actor)
+                self._submissions.gate.hold(undo, _leave_hold, now=now)
 
     # STOP, pause, modes
 

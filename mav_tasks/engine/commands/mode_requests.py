@@ -14,8 +14,7 @@ from mav_tasks.engine.commands.ordering import note_halt, require_newer
 from mav_tasks.engine.commands.submissions import Submissions, give_back
 from mav_tasks.engine.missions.plans import MISSION, Plans
 from mav_tasks.engine.policy import Kind, row_of_command
-from mav_tasks.engine.vehicles.start_mark import WAITS as START_WAITS
-from mav_tasks.engine.vehicles.start_mark import Marker
+from mav_tasks.engine.vehicles.parts import Starter
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -27,6 +26,7 @@ from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
 
 R = TaskReason
 
+START_WITHIN = 10.0  # s, in which the arming must come that starts a mission
 SHOWN_FOR = 1.2  # s, in which heartbeats at 1 Hz show a mode at least once
 CRUISING = Terms(is_cruising=True)
 STOPPED = Rejection(R.STOPPED, CONTINUE_FIRST)
@@ -125,21 +125,19 @@ class ModeRequests:
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Start the mission of a vehicle that was to be armed first and is armed now."""
-        armings = vehicle.parts.armings
-        mark = vehicle.start_mark
-        if mark.marker is None or not mark.is_put(now=now) or not vehicle.parts.is_armed(now=now):
+        parts = vehicle.parts
+        starter = parts.start.holder(now=now)
+        if starter is None or not parts.is_armed(now=now):
             return
         if vehicle.control.is_engaged or vehicle.control.we_armed:
             return  # armed by the server, for a task
-        marker = vehicle.start_mark.take()
-        vehicle.shown.forget()
-        plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
-        if marker is None or marker.plan_id != plan_id:
+        parts.forget_start()
+        if starter.plan_id != self._plans.stored(vehicle.system_id, MISSION).plan_id:
             return
-        if vehicle.parts.is_manual and not armings.are_by_client(now=now):
+        if parts.is_manual and not parts.armings.are_by_client(now=now):
             return  # armed by a person who means to drive
         try:
-            self._start_unasked(vehicle, marker.submitter, marker.rights, now=now)
+            self._start_unasked(vehicle, starter.submitter, starter.rights, now=now)
         except Rejection as refusal:
             self._gcs.tell(refusal.text, MavSeverity.WARNING, vehicle.server_address, now=now)
 
@@ -156,15 +154,16 @@ class ModeRequests:
     def _mark(self, asked: CommandRequest, *, now: float) -> None:
         vehicle = asked.vehicle
         plan_id = self._plans.stored(vehicle.system_id, MISSION).plan_id
-        vehicle.start_mark.put(Marker(asked.submitter, asked.rights, plan_id), now=now)
+        starter = Starter(asked.submitter, asked.rights, plan_id)
+        vehicle.parts.start.give(starter, until=now + START_WITHIN)
         asked.tell("The mission starts when the rover is armed", MavSeverity.INFO, now=now)
         self._show(vehicle, vehicle.persona.mission_mode, now=now)
 
     def _show(self, vehicle: Vehicle, mode: int, *, now: float) -> None:
         """Show clients a mode at once: SET_MODE has no other answer."""
-        lasts = START_WAITS if vehicle.start_mark.is_put(now=now) else SHOWN_FOR
-        vehicle.shown.show(mode, until=now + lasts)
-        heartbeat = vehicle.shown.in_message(vehicle.parts.monitor.latest)
+        lasts = SHOWN_FOR if vehicle.parts.start.holder(now=now) is None else START_WITHIN
+        vehicle.shown.mode.give(mode, until=now + lasts)
+        heartbeat = vehicle.shown.in_message(vehicle.parts.monitor.latest, mode)
         source = Address(vehicle.system_id, AUTOPILOT)
         for client in self._gcs.clients:
             if vehicle.system_id in client.introduced:

@@ -147,7 +147,7 @@ class Submissions:
         in which no task starts. A halt of somebody else it does not end.
         """
         vehicle, tasks = asked.vehicle, asked.vehicle.tasks
-        if tasks.is_stopped or vehicle.hold_before.is_open(now=now):
+        if tasks.is_stopped or vehicle.parts.hold_before.holder(now=now):
             return False
         if not asked.rights.reach(OPERATOR):
             return False

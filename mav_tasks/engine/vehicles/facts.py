@@ -80,8 +80,8 @@ def _driver(parts: Parts, *, now: float) -> Driver:
 
 
 def _waits(parts: Parts, *, now: float) -> Waits:
-    waits = Waits.GO_TO if parts.hold_before.is_open(now=now) else NOTHING
-    if parts.start_mark.is_put(now=now):
+    waits = NOTHING if parts.hold_before.holder(now=now) is None else Waits.GO_TO
+    if parts.start.holder(now=now) is not None:
         waits |= Waits.START
     if parts.tasks.released is not None:
         waits |= Waits.RELEASE

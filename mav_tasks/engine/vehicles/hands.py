@@ -72,7 +72,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             requests.end_performing()
         # earlier requests must not take effect later
         case Effect.FORGET_GO_TO:
-            parts.hold_before.forget()
+            parts.forget_go_to()
         case Effect.FORGET_START:
             parts.forget_start()
         case Effect.FORGET_RELEASE:
@@ -117,7 +117,7 @@ def carry_out(effect: Effect, on: Reach, word: Word, *, now: float) -> Any:
             control.disarm_now(now=now)
             requests.flush(now=now)
         case Effect.LINGER:
-            parts.hold_before.note(word.sender, has_paused=word.pauses, now=now)
+            parts.held_by(word.sender, has_paused=word.pauses, now=now)
         case Effect.HAND_OVER:
             control.hand_over()
         case Effect.KEEP_ARMED:

@@ -14,7 +14,7 @@ from mav_tasks.engine.vehicles.control import Event, effects_of
 from mav_tasks.engine.vehicles.facts import client_driving, state_of
 from mav_tasks.engine.vehicles.hands import Reach, Word, carry_out
 from mav_tasks.engine.vehicles.joint_state import State
-from mav_tasks.engine.vehicles.parts import Parts
+from mav_tasks.engine.vehicles.parts import HoldBefore, Parts
 from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import Address
@@ -199,9 +199,9 @@ class JointControl:
 
         self.on(Event.GO_ON, Word(R.NONE, actor, do=go_on), now=now)
 
-    def go_to_follows(self, number: int, *, actor: str, now: float) -> None:
+    def go_to_follows(self, held: HoldBefore, *, actor: str, now: float) -> None:
         """Undo the pause by the HOLD just before a client's "go to", which is durable now."""
-        is_still = self._parts.hold_before.is_still(number)
+        is_still = self._parts.undone.holder(now=now) is held
         if not is_still or self._parts.tasks.paused is not R.OPERATOR:
             return
         try:

@@ -1,17 +1,17 @@
 """What the parts of one vehicle share: its state, its tasks, and the way to send to it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from math import inf
+from typing import NamedTuple
 
+from mav_tasks.engine.clients.rights import Rights
 from mav_tasks.engine.vehicles.armings import Armings
 from mav_tasks.engine.vehicles.authority import Authority
-from mav_tasks.engine.vehicles.hold_before import HoldBefore
 from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.own_failsafes import OwnFailsafes
 from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
-from mav_tasks.engine.vehicles.start_mark import StartMark
 from mav_tasks.engine.vehicles.stick_watch import StickWatch
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
@@ -22,7 +22,9 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import VehicleNoted, VehicleSeen
 from mav_tasks.tasks.lifecycle import TaskReason
+from mav_tasks.tasks.permit import Permit
 from mav_tasks.tasks.registry import TaskRegistry
+from mav_tasks.tasks.task import Submitter
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
 
@@ -31,6 +33,33 @@ REFUSALS = {
     Refused.MODE: TaskReason.MODE_REFUSED,
     Refused.ARM: TaskReason.ARM_REFUSED,
 }
+
+
+GO_TO_WITHIN = 1.0  # s after a HOLD, in which the "go to" must come that undoes it
+
+
+class HoldBefore(NamedTuple):
+    """A HOLD that nobody may have meant: some clients silently send one before each "go to".
+
+    MAVSDK does so to a PX4 whenever the mode is another one. The vehicle still stops at once. But
+    its mode is left alone for a while, and a "go to" in that time undoes the pause.
+    """
+
+    sender: Hashable
+    has_paused: bool  # it paused what was running
+    since: float  # s, when the first of a client's repeated HOLDs came
+
+
+class Starter(NamedTuple):
+    """The client whose mission starts when the vehicle is armed: PX4's way, in two steps.
+
+    A ground station asks for the mission mode, waits until a heartbeat shows it, and arms. If it
+    arms first, the mode alone starts the mission, and there is nothing to remember.
+    """
+
+    submitter: Submitter
+    rights: Rights
+    plan_id: int  # as clients knew it at that time
 
 
 @dataclass(slots=True)
@@ -49,9 +78,11 @@ class Parts:
     #: of this gateway on its vehicles
     lease: LeaseWatch
     #: the last HOLD that a "go to" may undo
-    hold_before: HoldBefore
-    #: whether its mission starts when it is armed
-    start_mark: StartMark
+    hold_before: Permit[HoldBefore]
+    #: the one that a "go to" undoes once that is durable
+    undone: Permit[HoldBefore]
+    #: who wants its mission to start when it is armed
+    start: Permit[Starter]
     #: its heartbeats as clients see them
     shown: ShownHeartbeat
     armings: Armings = field(default_factory=Armings)
@@ -118,15 +149,32 @@ class Parts:
         self.requests.intervals.ask_all_again()
         self.requests.parameters.forget()
 
+    def forget_go_to(self) -> None:
+        """Note another request: a "go to" undoes no earlier HOLD any more."""
+        self.hold_before.end()
+        self.undone.end()
+
+    def held_by(self, sender: Hashable, *, has_paused: bool, now: float) -> None:
+        """Note a client's HOLD, which is a halt.
+
+        Repetitions by the same client count as one HOLD, if nothing else came between.
+        """
+        held = HoldBefore(sender, has_paused, now)
+        before = self.hold_before.holder(now=now, halts=1)
+        if before is not None and before.sender == sender:
+            held = HoldBefore(sender, has_paused or before.has_paused, before.since)
+        self.undone.end()
+        self.hold_before.give(held, until=now + GO_TO_WITHIN)
+
     def forget_start(self) -> None:
         """Forget that a mission starts with the arming: it changed, or is unwanted."""
-        self.start_mark.remove()
-        self.shown.forget()
+        self.start.end()
+        self.shown.mode.end()
 
-    def forget_start_of(self, keys: AbstractSet[str]) -> None:
+    def forget_start_of(self, keys: AbstractSet[str], *, now: float) -> None:
         """Forget that a mission starts with the arming if one of these keys asked for it."""
-        marker = self.start_mark.marker
-        if marker is not None and marker.submitter.key in keys:
+        starter = self.start.holder(now=now)
+        if starter is not None and starter.submitter.key in keys:
             self.forget_start()
 
     def check_not_manual(self, *, now: float) -> None:

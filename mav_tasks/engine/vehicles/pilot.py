@@ -195,7 +195,7 @@ class Pilot:
                 control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 is_deaf, disarm = self._is_deaf(now=now), self._is_back_home
-                still = seen.still and not is_deaf and not parts.hold_before.is_open(now=now)
+                still = seen.still and not is_deaf and parts.hold_before.holder(now=now) is None
                 slows = is_deaf or self.guard.ladder.is_slowing(now=now)
                 control.release(
                     still=still, disarm=disarm, now=now, is_slowing=slows, is_deaf=is_deaf

@@ -12,13 +12,13 @@ QGroundControl then hides "Start mission". The server drives one wherever PX4 co
 """
 
 from copy import copy
-from math import inf
 
 from mav_tasks.mavlink.address import AUTOPILOT
 from mav_tasks.mavlink.enums import MavModeFlag, MavState
 from mav_tasks.mavlink.messages import Event, Heartbeat
 from mav_tasks.mavlink.packet import Packet, with_payload
 from mav_tasks.tasks.halts import Halts
+from mav_tasks.tasks.permit import Permit
 
 #: offsets in the payload of HEARTBEAT
 CUSTOM_MODE, BASE_MODE, SYSTEM_STATUS = 0, 6, 7
@@ -33,26 +33,16 @@ class ShownHeartbeat:
     """Rewrites the heartbeats of one vehicle for clients."""
 
     def __init__(self, halts: Halts) -> None:
-        self._halts = halts
-        self._term = -1  # in which the mode was to be shown
-        self._mode = 0
-        self._until = -inf
+        #: the custom_mode to be shown in place of the vehicle's own
+        self.mode = Permit[int](halts)
 
     def __repr__(self) -> str:
-        return f"ShownHeartbeat({self._mode}, until={self._until:.2f})"
+        return f"ShownHeartbeat({self.mode!r})"
 
-    def show(self, mode: int, *, until: float) -> None:
-        """Show a custom_mode until then, or until a halt."""
-        self._mode, self._until, self._term = mode, until, self._halts.term
-
-    def forget(self) -> None:
-        """Show the vehicle's own mode again."""
-        self._until = -inf
-
-    def in_message(self, heartbeat: Heartbeat) -> Heartbeat:
+    def in_message(self, heartbeat: Heartbeat, mode: int) -> Heartbeat:
         """Return a copy of a heartbeat message with the mode to be shown."""
         shown = copy(heartbeat)
-        shown.custom_mode = self._mode
+        shown.custom_mode = mode
         shown.system_status = _status(heartbeat.base_mode, heartbeat.system_status)
         return shown
 
@@ -67,8 +57,8 @@ class ShownHeartbeat:
             status = _status(payload[BASE_MODE], payload[SYSTEM_STATUS])
             if status != payload[SYSTEM_STATUS]:
                 packet = with_payload(packet, SYSTEM_STATUS, bytes((status,)))
-        if now < self._until and self._term == self._halts.term:
-            packet = with_payload(packet, CUSTOM_MODE, self._mode.to_bytes(BYTES, "little"))
+        if (mode := self.mode.holder(now=now)) is not None:
+            packet = with_payload(packet, CUSTOM_MODE, mode.to_bytes(BYTES, "little"))
         return packet
 
 

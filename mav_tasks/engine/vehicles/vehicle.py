@@ -14,7 +14,6 @@ from mav_tasks.engine.vehicles.components import Components
 from mav_tasks.engine.vehicles.control import Event
 from mav_tasks.engine.vehicles.go_words import GoWords
 from mav_tasks.engine.vehicles.hands import Word
-from mav_tasks.engine.vehicles.hold_before import HoldBefore
 from mav_tasks.engine.vehicles.joint_control import JointControl
 from mav_tasks.engine.vehicles.lease_watch import LeaseWatch
 from mav_tasks.engine.vehicles.parts import Parts
@@ -22,7 +21,6 @@ from mav_tasks.engine.vehicles.pilot import Pilot
 from mav_tasks.engine.vehicles.self_description import SelfDescription
 from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.engine.vehicles.shown_heartbeat import ShownHeartbeat
-from mav_tasks.engine.vehicles.start_mark import StartMark
 from mav_tasks.engine.vehicles.takeovers import Takeovers
 from mav_tasks.engine.vehicles.vehicle_position import VehiclePosition
 from mav_tasks.engine.vehicles.vehicle_requests import VehicleRequests
@@ -38,6 +36,7 @@ from mav_tasks.services.persona import Persona
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.halts import LastHalt
 from mav_tasks.tasks.lifecycle import RUNNING, TaskReason
+from mav_tasks.tasks.permit import Permit
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 from mav_tasks.tasks.view import VehicleView
@@ -87,14 +86,14 @@ class Vehicle:
             Authority(persona, tasks.halts, may_arm=may_arm),
             settings,
             lease,
-            HoldBefore(tasks.halts),
-            StartMark(tasks.halts),
+            Permit(tasks.halts),
+            Permit(tasks.halts),
+            Permit(tasks.halts),
             ShownHeartbeat(tasks.halts),
         )
         self.system_id = system_id
         self.tasks, self.requests, self.control = tasks, requests, requests.control
         self.where, self.shown = parts.where, parts.shown
-        self.hold_before, self.start_mark = parts.hold_before, parts.start_mark
         self._monitor = monitor
         self.pilot = Pilot(parts, self.view)
         self.joint = JointControl(parts, self.pilot, self.view)

@@ -244,7 +244,7 @@ class VehicleSide:
         Only an operator can say whether the requests of that key are still wanted.
         """
         for each in self.all if keys else ():
-            each.parts.forget_start_of(keys)
+            each.parts.forget_start_of(keys, now=now)
         for tasks in self._fleet if keys else ():
             theirs = [task for task in tasks.unfinished if task.submitter.key in keys]
             if not theirs:
