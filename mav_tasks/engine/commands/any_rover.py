@@ -22,8 +22,7 @@ from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.commands.goals import GOALS, parse_command
 from mav_tasks.engine.commands.ordering import AGAIN, has_left_before_halt
 from mav_tasks.engine.commands.submissions import GIVEN_UP, NONCE, Submissions, acknowledge
-from mav_tasks.engine.commands.translate import message_id_of, result_of, task_id_of
-from mav_tasks.engine.commands.words import row_said
+from mav_tasks.engine.commands.translate import message_id_of, task_id_of
 from mav_tasks.engine.inputs import NonceTaken
 from mav_tasks.engine.policy import is_task_command
 from mav_tasks.engine.vehicles.vehicle import Vehicle
@@ -36,7 +35,6 @@ from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Answer, Command
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.deduplicator import Known, reused
-from mav_tasks.tasks.events import SubmissionRefused
 from mav_tasks.tasks.lifecycle import WAITING, TaskReason
 from mav_tasks.tasks.pending_tasks import PendingTasks
 from mav_tasks.tasks.registry import TaskRegistry
@@ -51,13 +49,14 @@ SUBMITTED = frozenset(GOALS) - frozenset(_OF_ONE_ROVER)
 
 
 class AnyRequest(CommandRequest):
-    """A submission for any rover, once its rover is known; answered by the server's address."""
+    """A submission for any rover, or a question for a task; answered by the server's address."""
 
-    def __init__(
-        self, client: GcsClient, vehicle: Vehicle, packet: Packet, said: Said, ours: Address
-    ) -> None:
-        super().__init__(client, vehicle, packet, said)
-        self._ours = _addressed(said.command, ours)
+    def __init__(self, client: GcsClient, packet: Packet, said: Said, ours: Address) -> None:
+        super().__init__(client, None, packet, said)
+        component = said.command.target.component_id or ours.component_id
+        self._ours = Address(ours.system_id, component)
+        #: the system id of the rover once it is known
+        self.chosen = ANY
 
     @property
     def answering(self) -> Address:
@@ -69,9 +68,18 @@ class AnyRequest(CommandRequest):
         """The same: a refusal is no rover's."""
         return self._ours
 
+    @property
+    def rover(self) -> int:
+        """The rover's system id; ANY until it is chosen."""
+        return self.chosen
+
+    def choose(self, vehicle: Vehicle) -> None:
+        """Note the rover that is chosen."""
+        self.vehicle, self.chosen = vehicle, vehicle.system_id
+
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Send the COMMAND_ACK; an accepting one names the rover in result_param1."""
-        rover = self.vehicle.system_id if result is MavResult.ACCEPTED else 0
+        rover = self.chosen if result is MavResult.ACCEPTED else ANY
         self.said.answer = Answer(self.command.command, result, result_param2, self._ours, rover)
         self.client.answer(self.said.answer, self.packet.source)
 
@@ -120,13 +128,15 @@ class AnyRover:
                 client.answer(known.answer, packet.source)
             return
         said = sender.take_in(command, packet.raw, now=now)
+        asked = AnyRequest(client, packet, said, self._vehicles.our_address)
         try:
             if is_shown:
-                self._show(client, packet, said, now=now)
+                self._displays.show_task(client, packet, task_id_of(command), now=now)
+                asked.answer(MavResult.ACCEPTED)
             else:
-                self._submit(client, packet, said, now=now)
+                self._submit(asked, now=now)
         except Rejection as refusal:
-            self._refuse(client, packet, said, refusal, now=now)
+            self._submissions.refuse(asked, refusal, now=now)
 
     def nonce_taken(self, taken: NonceTaken, *, now: float) -> None:
         """Answer with the task that the fleet had with this nonce, and undo ours."""
@@ -141,31 +151,29 @@ class AnyRover:
             else:
                 self._registry.record(asked.refuse(reused(task.marks.nonce), now=now))
 
-    def _submit(self, client: GcsClient, packet: Packet, said: Said, *, now: float) -> None:
-        command = said.command
+    def _submit(self, asked: AnyRequest, *, now: float) -> None:
+        client, packet, command = asked.client, asked.packet, asked.command
         if command.command not in SUBMITTED:
             raise Rejection(R.BAD_PARAMETER, f"command {command.command} must name one rover")
-        row = row_said(command)
-        client.rights.require(row.role, f"send {row.name}")
+        asked.rights.require(asked.row.role, f"send {asked.row.name}")
         if client.waited > GIVEN_UP:
             raise Rejection(R.STALE, "delayed by the server: send it again")
         wish = parse_command(command, packet.raw, self._driving, now=now)
         client.uses_dialect |= is_task_command(command.command) and command.params[NONCE] != 0.0
         check_any(wish.goal)
-        draft = Draft(ANY, command.command, wish.goal, client.who, wish.terms, wish.marks)
-        client.rights.check_content(draft)
+        draft = Draft(ANY, command.command, wish.goal, asked.submitter, wish.terms, wish.marks)
+        asked.rights.check_content(draft)
         confirmation = command.confirmation
         known = self._submissions.known(draft, confirmation=confirmation, origin=None, now=now)
         if known is not None:
-            self._answer_repeat(client, packet, said, known, now=now)
+            self._answer_repeat(asked, known, now=now)
             return
         copied = client.key, packet.source, draft.marks.nonce, draft.marks.payload
         if gateway := self._passed_on_to(copied, now=now):
             self._passed_on[copied] = now, gateway
             self._elsewhere.pass_to(gateway, client, packet)
             return
-        again = partial(self._submit, client, packet, said)
-        refuse = partial(self._refuse, client, packet, said)
+        again, refuse = partial(self._submit, asked), partial(self._submissions.refuse, asked)
         if self._submissions.questions.hold(draft.terms.after, again, refuse, now=now):
             return
         self._submissions.check_open()
@@ -180,7 +188,7 @@ class AnyRover:
             return
         vehicle = self._vehicles.get(choice.vehicle)
         assert vehicle is not None, "it was chosen among them"
-        asked = AnyRequest(client, vehicle, packet, said, self._vehicles.our_address)
+        asked.choose(vehicle)
         if has_left_before_halt(asked, anybodys=True):
             raise Rejection(R.STALE, f"{vehicle.tasks.halts.words} came later: {AGAIN}")
         goal = driven_by(vehicle, wish.goal)
@@ -195,48 +203,12 @@ class AnyRover:
         _, gateway = self._passed_on.get(copied, (now, ""))
         return gateway
 
-    def _answer_repeat(
-        self, client: GcsClient, packet: Packet, said: Said, known: Known, *, now: float
-    ) -> None:
+    def _answer_repeat(self, asked: AnyRequest, known: Known, *, now: float) -> None:
         task = self._registry.get(known.task_id)
         vehicle = None if task is None else self._vehicles.look_at(task.vehicle)
         if vehicle is not None:
-            asked = AnyRequest(client, vehicle, packet, said, self._vehicles.our_address)
+            asked.choose(vehicle)
             self._submissions.answer_repeat(asked, known, now=now)
             return
-        rover = 0 if task is None else task.vehicle  # of an earlier run, not heard yet
-        self._answer(client, packet, said, MavResult.ACCEPTED, known.task_id, rover)
-
-    def _show(self, client: GcsClient, packet: Packet, said: Said, *, now: float) -> None:
-        """Send the status of a task, whichever rover has it."""
-        self._displays.show_task(client, packet, task_id_of(said.command), now=now)
-        self._answer(client, packet, said, MavResult.ACCEPTED, 0, 0)
-
-    def _refuse(
-        self, client: GcsClient, packet: Packet, said: Said, refusal: Rejection, *, now: float
-    ) -> None:
-        self._answer(client, packet, said, result_of(refusal.reason), int(refusal.reason), 0)
-        if not client.may_be_refused(now=now):  # a flood of refusals fills no disk and no network
-            return
-        client.tell_refusal(refusal.text, self._vehicles.our_address, now=now)
-        reason, actor = TaskReason(refusal.reason), str(client.who)
-        number = said.command.command
-        self._registry.record(SubmissionRefused(ANY, number, reason, refusal.text, actor, now))
-
-    def _answer(
-        self,
-        client: GcsClient,
-        packet: Packet,
-        said: Said,
-        result: MavResult,
-        result_param2: int,
-        rover: int,
-    ) -> None:
-        ours = _addressed(said.command, self._vehicles.our_address)
-        said.answer = Answer(said.command.command, result, result_param2, ours, rover)
-        client.answer(said.answer, packet.source)
-
-
-def _addressed(command: Command, ours: Address) -> Address:
-    """Return the address that answers a command: the one that it named."""
-    return Address(ours.system_id, command.target.component_id or ours.component_id)
+        asked.chosen = ANY if task is None else task.vehicle  # of an earlier run, not heard yet
+        asked.answer(MavResult.ACCEPTED, known.task_id)

@@ -23,9 +23,13 @@ from mav_tasks.tasks.task import Marks, Submitter
 class CommandRequest:
     """One command of one client to one vehicle, to be answered exactly once."""
 
-    def __init__(self, client: GcsClient, vehicle: Vehicle, packet: Packet, said: Said) -> None:
+    vehicle: Vehicle
+
+    def __init__(
+        self, client: GcsClient, vehicle: Vehicle | None, packet: Packet, said: Said
+    ) -> None:
+        """``vehicle``: None if it is still to be chosen."""
         self.client = client
-        self.vehicle = vehicle
         self.packet = packet
         self.said = said
         #: submitter and rights at arrival: later the endpoint may sign with another key
@@ -39,7 +43,10 @@ class CommandRequest:
         self.command = command = said.command
         #: its row in the policy table
         self.row = row_said(command)
-        self.kind = kind_of(command, self.row, vehicle.parts.persona)
+        self.kind = self.row.kind
+        if vehicle is not None:
+            self.vehicle = vehicle
+            self.kind = kind_of(command, self.row, vehicle.parts.persona)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.command}, by {self.submitter})"
@@ -65,6 +72,11 @@ class CommandRequest:
     def refusing(self) -> Address:
         """The component in whose name the text of a refusal is sent."""
         return self.vehicle.server_address
+
+    @property
+    def rover(self) -> int:
+        """The vehicle's system id."""
+        return self.vehicle.system_id
 
     @property
     def answers_to(self) -> Hashable:
@@ -112,7 +124,7 @@ class CommandRequest:
             self.client.tell_refusal(refusal.text, self.refusing, now=now)
         reason = TaskReason(refusal.reason)
         return SubmissionRefused(
-            self.vehicle.system_id, self.command.command, reason, refusal.text, self.actor, now
+            self.rover, self.command.command, reason, refusal.text, self.actor, now
         )
 
     def tell(self, text: str, severity: MavSeverity, *, now: float) -> None:
