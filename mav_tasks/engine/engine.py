@@ -116,7 +116,7 @@ class Engine:
         self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
         displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
         refusals = Refusals(registry, vehicles)
-        modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
+        modes = self._modes = ModeRequests(gcs, submissions, plans, refusals)
         control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
         assignments = self._assignments = Assignments(
             vehicles, self._fleet, registry, timers, settings, is_open=lambda: submissions.is_open
@@ -144,9 +144,7 @@ class Engine:
             door=self._door,
             elsewhere=self._elsewhere,
             broadcasts=Broadcasts(vehicles, packer),
-            commands=Commands(
-                vehicles, registry, submissions, plans, modes, control, displays, self._any
-            ),
+            commands=Commands(vehicles, submissions, plans, modes, control, displays, self._any),
             control=control,
             modes=modes,
             displays=displays,

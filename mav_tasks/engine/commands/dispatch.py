@@ -23,7 +23,7 @@ from mav_tasks.engine.commands.goals import (
 from mav_tasks.engine.commands.mode_requests import ModeRequests
 from mav_tasks.engine.commands.ordering import has_left_before_halt, note_halt, require_newer
 from mav_tasks.engine.commands.relays import check_relay, relay
-from mav_tasks.engine.commands.submissions import Submissions
+from mav_tasks.engine.commands.submissions import Submissions, leave_it
 from mav_tasks.engine.commands.task_control import TaskControl, sets_repetition
 from mav_tasks.engine.commands.translate import message_id_of, result_of
 from mav_tasks.engine.commands.words import halts_again
@@ -37,7 +37,6 @@ from mav_tasks.mavlink.enums import MavCmd, MavComponent, MavResult, MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import COPIED, Answer, Command
 from mav_tasks.tasks.lifecycle import TaskReason
-from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 
 R = TaskReason
@@ -50,7 +49,6 @@ class Commands:
     """The dispatcher of client commands."""
 
     _vehicles: VehicleSide
-    _registry: TaskRegistry
     _submissions: Submissions
     _plans: Plans
     _modes: ModeRequests
@@ -186,7 +184,8 @@ class Commands:
             ):
                 task_id = self._control.act(asked, now=now)
                 if sets_repetition(asked.command):  # a crash must not leave a task that runs once
-                    self._answer_repeats(asked, task_id, now=now)
+                    words = f"task {task_id}: not stored in time that it repeats: send it again"
+                    self._submissions.answer_once_durable(asked, TaskId(task_id), words, now=now)
                 else:
                     asked.answer(MavResult.ACCEPTED, task_id)
             case MavCmd.NAV_TAKEOFF if claims:  # examples for every kind of vehicle send it
@@ -223,18 +222,6 @@ class Commands:
                 return False
         return True
 
-    def _answer_repeats(self, asked: CommandRequest, task_id: int, *, now: float) -> None:
-        """Acknowledge a request that a task repeats once that is durable."""
-
-        def accept(*, now: float) -> None:  # noqa: ARG001
-            asked.answer(MavResult.ACCEPTED, task_id)
-
-        def give_up(*, now: float) -> None:
-            words = f"task {task_id}: not stored in time that it repeats: send it again"
-            self._registry.record(asked.refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now))
-
-        self._submissions.gate.hold(accept, give_up, now=now)
-
     def _check_question(self, asked: CommandRequest, *, now: float) -> None:
         """Raise Rejection if an observer's question is too much for the rover's link."""
         if asked.row.kind is Kind.QUESTION and not asked.rights.reach(SUBMITTER):
@@ -246,12 +233,9 @@ class Commands:
                 raise asked.rights.refusal(why_not, R.RATE_LIMITED)
 
     def _refuse_unknown(self, asked: CommandRequest, *, now: float) -> None:
-        result, reason = MavResult.UNSUPPORTED, R.NOT_SUPPORTED_BY_VEHICLE
-        if not asked.client.may_be_refused(now=now):
-            asked.answer(result, reason)
-            return
         words = f"command {asked.command.command}: not supported in this version"
-        self._registry.record(asked.refuse(Rejection(reason, words), result=result, now=now))
+        refusal = Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+        self._submissions.refuse(asked, refusal, result=MavResult.UNSUPPORTED, now=now)
 
     def _reposition(self, asked: CommandRequest, *, now: float) -> None:
         """DO_REPOSITION: submit a "go to"; without a place, pause."""
@@ -275,7 +259,7 @@ class Commands:
             if held.has_paused and asked.rights.reach(OPERATOR):
                 parts.undone.give(held)
                 undo = partial(asked.vehicle.joint.go_to_follows, held, actor=asked.actor)
-                self._submissions.gate.hold(undo, _leave_hold, now=now)
+                self._submissions.gate.hold(undo, leave_it, now=now)  # not stored: the HOLD stays
 
     # STOP, pause, modes
 
@@ -342,10 +326,6 @@ class Commands:
 def _looks_for_servers(command: Command) -> bool:
     is_request = command.command == MavCmd.REQUEST_MESSAGE
     return is_request and message_id_of(command) == m.TaskQueueStatus.id
-
-
-def _leave_hold(*, now: float) -> None:
-    """Do nothing: the "go to" was not stored in time, so the HOLD stays."""
 
 
 def _is_of_what_nobody_sends(asked: CommandRequest) -> bool:

@@ -5,6 +5,7 @@ acknowledgement: its sender waits until a heartbeat shows the mode.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.refusals import Refusals
@@ -21,8 +22,7 @@ from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavCmd, MavResult, MavSeverity
 from mav_tasks.tasks.goal import GoTo, Plan
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason
-from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Draft, Submitter, Task, Terms
+from mav_tasks.tasks.task import Draft, Submitter, Terms
 
 R = TaskReason
 
@@ -37,7 +37,6 @@ class ModeRequests:
     """The handler of mode requests and mission starts of all clients."""
 
     _gcs: GcsSide
-    _registry: TaskRegistry
     _submissions: Submissions
     _plans: Plans
     _refusals: Refusals
@@ -107,21 +106,10 @@ class ModeRequests:
             task = self._submissions.submit_draft(asked, started, now=now)
             self._plans.restarted(vehicle, task, now=now)
         else:
-            self._answer_started(asked, started, now=now)
+            undo = partial(self._plans.stage_again, vehicle, started)
+            words = "not stored in time: not started"
+            self._submissions.answer_once_durable(asked, started.id, words, undo=undo, now=now)
         give_back(asked, now=now)
-
-    def _answer_started(self, asked: CommandRequest, task: Task, *, now: float) -> None:
-        """Answer the start of a mission once that is durable."""
-
-        def accept(*, now: float) -> None:  # noqa: ARG001
-            asked.answer(MavResult.ACCEPTED, task.id)
-
-        def give_up(*, now: float) -> None:
-            self._plans.stage_again(asked.vehicle, task, now=now)
-            refusal = Rejection(R.STORE_UNAVAILABLE, "not stored in time: not started")
-            self._registry.record(asked.refuse(refusal, now=now))
-
-        self._submissions.gate.hold(accept, give_up, now=now)
 
     def look_for_arming(self, vehicle: Vehicle, *, now: float) -> None:
         """Start the mission of a vehicle that was to be armed first and is armed now."""

@@ -21,7 +21,7 @@ from mav_tasks.engine.commands.translate import IN_FORCE, result_of
 from mav_tasks.engine.commands.words import OF_ONE_TASK
 from mav_tasks.engine.commit_gate import CommitGate
 from mav_tasks.engine.policy import TASK_COMMANDS
-from mav_tasks.engine.timers import Timers
+from mav_tasks.engine.timers import Effect, Timers
 from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink.address import AUTOPILOT, Address
@@ -46,6 +46,10 @@ PAUSED = {
 }
 GIVEN_UP = 3.5  # s, after which a client has stopped waiting for an answer
 NONCE = 3  # its index among the parameters
+
+
+def leave_it(*, now: float) -> None:
+    """Do nothing about what was not stored in time."""
 
 
 class Submissions:
@@ -155,12 +159,43 @@ class Submissions:
             return tasks.halts.by is asked.sender
         return vehicle.joint.state(now=now).is_led and vehicle.armed
 
-    def refuse(self, asked: CommandRequest, refusal: Rejection, *, now: float) -> None:
-        """Answer a refused command; record it, and tell the client the words."""
+    def refuse(
+        self,
+        asked: CommandRequest,
+        refusal: Rejection,
+        *,
+        now: float,
+        result: MavResult | None = None,
+    ) -> None:
+        """Answer a refused command; record it, and tell the client the words.
+
+        ``result``: None for the result that follows from the reason.
+        """
+        result = result_of(refusal.reason) if result is None else result
         if asked.client.may_be_refused(now=now):
-            self._registry.record(asked.refuse(refusal, now=now))
+            self._registry.record(asked.refuse(refusal, result=result, now=now))
         else:  # a flood of refusals fills neither disk nor network
-            asked.answer(result_of(refusal.reason), refusal.reason)
+            asked.answer(result, refusal.reason)
+
+    def answer_once_durable(
+        self,
+        asked: CommandRequest,
+        task_id: TaskId,
+        words: str,
+        *,
+        now: float,
+        undo: Effect = leave_it,
+    ) -> None:
+        """Accept a request once what it has changed is durable, else undo it; ``words``: why."""
+
+        def accept(*, now: float) -> None:  # noqa: ARG001
+            asked.answer(MavResult.ACCEPTED, task_id)
+
+        def give_up(*, now: float) -> None:
+            undo(now=now)
+            self._registry.record(asked.refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now))
+
+        self.gate.hold(accept, give_up, now=now)
 
     def run_now(self, asked: CommandRequest, draft: Draft, *, now: float) -> None:
         """Submit an immediate task. Raise Rejection if it is refused."""
