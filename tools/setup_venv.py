@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -260,9 +261,11 @@ def main() -> int:
         is_done = is_current(arguments.wanted) and not (arguments.browser and lacks_browser())
         return 0 if is_done else 1
     try:
-        set_up(arguments.wanted)
-        if arguments.browser:
-            install_browser()
+        with ThreadPoolExecutor(1) as beside:
+            browser = beside.submit(install_browser) if arguments.browser else None
+            set_up(arguments.wanted)
+            if browser is not None:
+                browser.result()
     except SetupError as error:
         print(f"setup: {error}", file=sys.stderr)
         return 1

@@ -126,8 +126,7 @@ def test_why_a_task_waits_and_what_helps(page: Web, check: Check) -> None:
         "action": "resume",
         "words": "To let it run, press Resume.",
     }
-    rover = page.get("/vehicles/1")
-    assert rover["control"] == "paused"
+    wait_until(lambda: page.get("/vehicles/1")["control"] == "paused", within=5)
     line = 'mav_tasks_tasks{vehicle="1",state="queued",reason="queue_paused"} 1'
     wait_until(lambda: line in page.client.get("/metrics").text, within=10, what=line)
     page.resume()

@@ -15,7 +15,7 @@ from typing import Any
 from mav_tasks.cli.app import main
 from tests.kit.processes import wait_until
 
-LIMIT = 40.0  # s
+LIMIT = 100.0  # s
 
 
 @dataclass(frozen=True, slots=True)

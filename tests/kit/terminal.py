@@ -49,7 +49,7 @@ class Terminal:
         """The screen as one text."""
         return "\n".join(self.lines)
 
-    def wait_for(self, condition: Callable[[str], object], *, within: float = 20.0) -> None:
+    def wait_for(self, condition: Callable[[str], object], *, within: float = 60.0) -> None:
         """Wait until the screen's text meets a condition."""
         end = time.monotonic() + within
         while not condition(self.text):
@@ -65,7 +65,7 @@ class Terminal:
         self._screen.resize(rows, columns)
         termios.tcsetwinsize(self._own_side, (rows, columns))
 
-    def end(self, *, within: float = 20.0) -> int:
+    def end(self, *, within: float = 60.0) -> int:
         """Read to the end; return the exit status."""
         end = time.monotonic() + within
         while self._read(end - time.monotonic()):

@@ -107,7 +107,7 @@ def web(
     command += options
     with process(*command, folder=folder, name=name) as running:
         url = running.wait_for(r"web page: (http://\S+)/\n")[1]
-        with httpx.Client(base_url=url, timeout=15) as client:
+        with httpx.Client(base_url=url, timeout=45) as client:
             yield Web(running, url, client)
 
 

@@ -17,7 +17,7 @@ from tests.kit.processes import wait_until
 
 HOST = "127.0.0.1"
 REFUSED = """a b 127.0.0.1: a name has up to 40 letters
-a 127.0.0.1: the database has not ended the lost session yet
+a 127.0.0.1: the (database has not ended the lost session yet|gateway name a is in use)
 b nowhere: fleet.address must be an IP address of this machine
 b 192.0.2.1: fleet.address must be an IP address of this machine"""
 
