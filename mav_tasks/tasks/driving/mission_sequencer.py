@@ -5,6 +5,7 @@ to the way to the second one, as in autopilots: they are ``pending`` when it beg
 while it is driven.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from mav_tasks.tasks.goal import (
@@ -16,6 +17,7 @@ from mav_tasks.tasks.goal import (
     Plan,
     SetReverse,
     SingleGoal,
+    Step,
     Wait,
     steps_of,
 )
@@ -35,7 +37,7 @@ def present_goal(goal: Goal, progress: Progress) -> SingleGoal:
     """Return the goal that is being driven, or that will be first."""
     if not isinstance(goal, Plan):
         return goal
-    progress = progress if progress.step >= 0 else started(goal, progress)
+    progress = begun(goal, progress)
     driven = _driven(goal, progress.step) or END
     if progress.backwards and isinstance(driven, GoTo) and driven.place and not driven.turns:
         return replace(driven, backwards=True)  # a return and a circle are driven forwards
@@ -50,6 +52,13 @@ def goal_of(task: Task) -> SingleGoal:
 def started(plan: Plan, progress: Progress) -> Progress:
     """Return the progress with which a plan starts."""
     return _at(plan, replace(progress, jumps=(), speed=None, backwards=False), plan.first)
+
+
+def begun(goal: Goal, progress: Progress) -> Progress:
+    """Return the progress of a goal that has started, which a plan does with its first step."""
+    if isinstance(goal, Plan) and progress.step < 0:
+        return started(goal, progress)
+    return progress
 
 
 def following(plan: Plan, progress: Progress) -> Progress | None:
@@ -97,7 +106,7 @@ def loops_in_vain(plan: Plan) -> int | None:
             elif step not in done and step < len(plan.steps) and _takes_no_time(plan, step):
                 path.append(step)
                 on_path.add(step)
-                waiting += [~step, *_ways_on(plan, step)]
+                waiting += [~step, *ways_on(plan.steps, step)]
     return None
 
 
@@ -106,8 +115,9 @@ def _takes_no_time(plan: Plan, step: int) -> bool:
     return goal is None or (isinstance(goal, Wait) and goal.duration < SHORT)
 
 
-def _ways_on(plan: Plan, step: int) -> list[int]:
-    present = plan.steps[step]
+def ways_on(steps: Sequence[Step], step: int) -> list[int]:
+    """Return the steps that may follow another, whichever jumps are taken."""
+    present = steps[step]
     return [step + 1, present.to] if isinstance(present, Jump) else [step + 1]
 
 

@@ -5,12 +5,12 @@ Errors that are cheap to correct on the way are left to steering.
 """
 
 from dataclasses import replace
-from math import copysign, cos, inf, radians, sin
+from math import copysign, inf, radians
 
-from mav_tasks.tasks.driving.guidance import Motion, cross_track, done_so_far, wrap
-from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, distance, leg_of, length_of
+from mav_tasks.tasks.driving.guidance import Motion, wrap
+from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
-from mav_tasks.tasks.driving.path import Follow, forward_of, nearest, pose_on
+from mav_tasks.tasks.driving.path import Follow, distance, moved, nearest, pose_on, seen_from
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering, set_out_to, way_to_pose
 from mav_tasks.tasks.goal import GoTo, LocalPlace, Move, Rotate, SingleGoal
@@ -34,12 +34,11 @@ def is_off_line(task: Task, pose: Pose) -> bool:
         return False
     leg = leg_of(goal_of(task), progress)
     match leg:
-        case Follow():
-            along = nearest(anchor, leg.path, pose, around=progress.done, window=inf)
-            return distance(pose, pose_on(anchor, leg.path, along)) > OFF_TRACK
+        case Follow(path=path):
+            along = nearest(anchor, path, pose, around=progress.done, window=inf)
+            return distance(pose, pose_on(anchor, path, along)) > OFF_TRACK
         case Move():
-            along = done_so_far(leg, anchor, pose, before=progress.done)
-            beside = abs(cross_track(anchor, pose))
+            along, beside = _place_at(leg, anchor, pose)
             return beside > OFF_TRACK or not -OFF_TRACK <= along <= length_of(leg) + PAST_END
         case Rotate():
             return distance(pose, anchor) > OFF_TRACK
@@ -53,13 +52,11 @@ def was_handled(task: Task, before: Pose, after: Pose) -> bool:
     On a straight line a vehicle rolls on by itself, but does not turn or come back. Before its task
     drove it, it stays where it is.
     """
+    has_turned = _is_turned(before, after, TURNED)
     if task.progress.anchor is None:
-        return distance(before, after) > PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
+        return has_turned or distance(before, after) > PUT_BACK
     leg = leg_of(goal_of(task), task.progress)
-    if not isinstance(leg, Move):
-        return False
-    ahead = copysign(1.0, leg.distance) * forward_of(before, after)
-    return ahead < -PUT_BACK or abs(wrap(after.yaw - before.yaw)) > TURNED
+    return isinstance(leg, Move) and (has_turned or _place_at(leg, before, after)[0] < -PUT_BACK)
 
 
 def resumed(
@@ -75,31 +72,26 @@ def resumed(
     The way to a place begins again here if the vehicle is far off it; ``turns_first``: with a turn
     on the spot.
     """
-    anchor, pose = progress.anchor, motion.pose
-    if not isinstance(goal, GoTo) or anchor is None or progress.target is None:
+    anchor, pose, target = progress.anchor, motion.pose, progress.target
+    if not isinstance(goal, GoTo) or anchor is None or target is None:
         return progress
-    leg = leg_of(goal, progress)
-    if isinstance(leg, Follow):
-        is_near = steering is not None and _is_on_path(leg, anchor, pose, done=progress.done)
-    elif progress.leg == WAY:
-        along = done_so_far(leg, anchor, pose, before=progress.done)
-        is_near = abs(cross_track(anchor, pose)) <= OFF_TRACK and 0 <= along <= length_of(leg)
-    else:
-        near_enough = max(goal.radius or 0.0, 2 * ON_SPOT)
-        is_near = progress.leg > WAY and distance(pose, progress.target) <= near_enough
+    leg, is_near = leg_of(goal, progress), False
+    if isinstance(leg, Follow):  # steering can return to a path by itself, near where it was left
+        there = pose_on(anchor, leg.path, nearest(anchor, leg.path, pose, around=progress.done))
+        is_turned = _is_turned(pose, there, TURNED)
+        is_near = distance(pose, there) <= BESIDE_PATH and not is_turned and steering is not None
+    elif isinstance(leg, Move):
+        along, beside = _place_at(leg, anchor, pose)
+        is_near = beside <= OFF_TRACK and 0 <= along <= length_of(leg)
+    elif progress.leg > WAY:
+        is_near = distance(pose, target) <= max(goal.radius or 0.0, 2 * ON_SPOT)
     if is_near:
         return progress
     if steering is not None:
-        return set_out_to(goal, progress, pose, progress.target, steering)
+        return set_out_to(goal, progress, pose, target, steering)
     leg_again = FACE if turns_first else WAY
-    again = anchor_of(goal, leg_again, pose, progress.target)
+    again = anchor_of(goal, leg_again, pose, target)
     return replace(progress, leg=leg_again, anchor=again, done=0.0, path=())
-
-
-def _is_on_path(leg: Follow, anchor: Pose, pose: Pose, *, done: float) -> bool:
-    """Return whether steering can return to a path by itself, near where it was left."""
-    there = pose_on(anchor, leg.path, nearest(anchor, leg.path, pose, around=done))
-    return distance(pose, there) <= BESIDE_PATH and abs(wrap(there.yaw - pose.yaw)) <= TURNED
 
 
 def recovery_path(
@@ -117,94 +109,52 @@ def recovery_path(
     anchor, pose = progress.anchor, motion.pose
     assert anchor is not None, "what has begun has an anchor"
     leg = leg_of(goal, progress)
-    match leg:
-        case Move():
-            place = _entry(anchor, pose, leg, progress.done)
-            if steering is not None and not honours_yaw_rate and _is_beside(anchor, pose, leg):
-                return None
-            if steering is not None:
-                return _drive_back(
-                    place,
-                    leg,
-                    progress,
-                    motion,
-                    steering=steering,
-                    by_course=not honours_yaw_rate,
-                )
-            if not honours_yaw_rate:
-                return None if place is None else _course_there(place, pose)
-            if place is None and abs(wrap(anchor.yaw - pose.yaw)) > ALIGNED:
-                place = LocalPlace(pose.north, pose.east)  # turn here, or it would leave the line
-            return None if place is None else _course(place, anchor.yaw, pose)
-        case Rotate(angle=angle):
-            yaw = wrap(anchor.yaw + copysign(progress.done, angle))
-            spot = LocalPlace(anchor.north, anchor.east)
-            if distance(pose, spot) <= ON_SPOT and abs(wrap(yaw - pose.yaw)) <= TURNED:
-                return None
-            return _course(spot, yaw, pose)
-        case _:
+    if isinstance(leg, Rotate):
+        there = replace(anchor, yaw=wrap(anchor.yaw + copysign(progress.done, leg.angle)))
+        if distance(pose, there) <= ON_SPOT and not _is_turned(pose, there, TURNED):
             return None
-
-
-def _entry(anchor: Pose, pose: Pose, leg: Move, done: float) -> LocalPlace | None:
-    """Return where a move resumes on its line, or None if steering gets there by itself."""
-    length = abs(leg.distance)
-    along = done_so_far(leg, anchor, pose, before=done)
-    beside = abs(cross_track(anchor, pose))
-    on_line = -ON_SPOT <= along <= length + PAST_END
-    if on_line and beside <= OFF_TRACK:
-        if beside <= ON_SPOT or beside * CONVERGES <= length - along:
+        return _way_back(there, pose, by_course=False, steering=None)
+    if not isinstance(leg, Move):
+        return None
+    along, beside = _place_at(leg, anchor, pose)
+    by_course, is_car, length = not honours_yaw_rate, steering is not None, length_of(leg)
+    at, steers_back = min(max(progress.done, 0.0), length), False
+    if -ON_SPOT <= along <= length + PAST_END and beside <= OFF_TRACK:
+        steers_back = beside <= ON_SPOT or beside * CONVERGES <= length - along
+        at = at if steers_back else min(along, length)
+        if is_car and by_course and along <= leg.distance and not _is_turned(pose, anchor, TURNED):
+            return None  # it would drive a circle
+    if steers_back:
+        if not _is_turned(pose, anchor, ALIGNED) or (by_course and not is_car):
             return None
-        at = min(along, length)
-    else:
-        at = min(max(done, 0.0), length)
-    return _on_line(anchor, leg, at)
+        if not is_car:  # turn here, or it would leave the line
+            return _way_back(replace(pose, yaw=anchor.yaw), pose, by_course=False, steering=None)
+    there = moved(anchor, 0.0, copysign(at, leg.distance))
+    return _way_back(there, pose, by_course=by_course, steering=steering)
 
 
-def _is_beside(anchor: Pose, pose: Pose, leg: Move) -> bool:
-    """Return whether a car that does not reverse should go on from here, not drive a circle."""
-    along = done_so_far(leg, anchor, pose, before=0.0)
-    is_near = abs(cross_track(anchor, pose)) <= OFF_TRACK and -ON_SPOT <= along <= leg.distance
-    return is_near and abs(wrap(anchor.yaw - pose.yaw)) <= TURNED
-
-
-def _on_line(anchor: Pose, leg: Move, along: float) -> LocalPlace:
-    signed = copysign(along, leg.distance)
-    return LocalPlace(
-        anchor.north + signed * cos(anchor.yaw), anchor.east + signed * sin(anchor.yaw)
-    )
-
-
-def _drive_back(
-    place: LocalPlace | None,
-    leg: Move,
-    progress: Progress,
-    motion: Motion,
-    *,
-    steering: Steering,
-    by_course: bool,
-) -> PathFollower | None:
-    """Return a car's way to its line, on which it arrives with the heading of the line."""
-    anchor, pose = progress.anchor, motion.pose
-    assert anchor is not None, "what has begun has an anchor"
-    if place is None:
-        if abs(wrap(anchor.yaw - pose.yaw)) <= ALIGNED:
-            return None
-        place = _on_line(anchor, leg, min(max(progress.done, 0.0), length_of(leg)))
-    entry = Pose(place.north, place.east, anchor.yaw)
-    everywhere = replace(steering, fence=None)  # the fence still stops it on the way
-    path = way_to_pose(pose, entry, steering) or way_to_pose(pose, entry, everywhere)
-    assert path is not None, "there is a way to every pose"
-    started = Progress(anchor=pose, target=place, leg=WAY, path=path)
-    return PathFollower(GoTo(place), started, by_course=by_course, steering=steering)
-
-
-def _course_there(place: LocalPlace, pose: Pose) -> PathFollower:
+def _way_back(
+    there: Pose, pose: Pose, *, by_course: bool, steering: Steering | None
+) -> PathFollower:
+    """Return the way to a pose. A car arrives with its heading; another one turns there."""
+    place = LocalPlace(there.north, there.east)
+    if steering is None and not by_course:
+        return PathFollower(GoTo(place, yaw=there.yaw), Progress(anchor=pose, target=place))
     goal = GoTo(place)
-    started = Progress(anchor=anchor_of(goal, WAY, pose, place), target=place, leg=WAY)
-    return PathFollower(goal, started, by_course=True)
+    begun = Progress(anchor=anchor_of(goal, WAY, pose, place), target=place, leg=WAY)
+    if steering is not None:
+        path = way_to_pose(pose, there, steering)
+        if path is None:  # the fence still stops it on the way
+            path = way_to_pose(pose, there, replace(steering, fence=None)) or ()
+        begun = replace(begun, anchor=pose, path=path)
+    return PathFollower(goal, begun, by_course=by_course, steering=steering)
 
 
-def _course(place: LocalPlace, yaw: float, pose: Pose) -> PathFollower:
-    goal = GoTo(place, yaw=yaw)
-    return PathFollower(goal, Progress(anchor=anchor_of(goal, 0, pose, place), target=place))
+def _place_at(line: Move, anchor: Pose, pose: Pose) -> tuple[float, float]:
+    """Return the metres of a pose along the line of a move, and to either side of it."""
+    there = seen_from(anchor, pose)
+    return copysign(1.0, line.distance) * there.real, abs(there.imag)
+
+
+def _is_turned(pose: Pose, other: Pose, most: float) -> bool:
+    return abs(wrap(other.yaw - pose.yaw)) > most
