@@ -11,7 +11,7 @@ from mav_tasks.settings import Driving, Settings, Turning
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.estimate import Known, time_left
+from mav_tasks.tasks.driving.estimate import Estimate, Known, time_left
 from mav_tasks.tasks.driving.guidance import ZERO, Motion
 from mav_tasks.tasks.driving.limits import limited, within_fence
 from mav_tasks.tasks.driving.mission_sequencer import (
@@ -25,7 +25,6 @@ from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.recovery_path import recovery_path
 from mav_tasks.tasks.driving.stage import (
-    OnTheWay,
     lead_on,
     look_on_the_way,
     may_go_on_rolling,
@@ -176,10 +175,10 @@ class Drive:
             course.progress = here
         if (course.metres_to_place(motion) or 0.0) > driving.max_distance:
             return Becomes(S.FAILED, R.BAD_PARAMETER)
-        if task.terms.max_distance is not None:
-            left = time_left(plan, here, self._known(tick))
-            if end := self._end_of_way(tick, left.metres):
-                return end
+        if task.terms.max_distance is not None and (
+            end := self._end_of_way(tick, self._left(tick, here).metres)
+        ):
+            return end
         metres = self._bounds.metres_to_leave(goal, here, motion.pose, seen.origin)
         if metres is not None:
             self._note(tick, f"would leave the fence in task {task.id} after {metres:.1f} m")
@@ -197,14 +196,11 @@ class Drive:
         task = tick.task
         if not self._registry.is_durable(task.id):
             return progress, True
-        if isinstance(task.goal, Plan):
-            progress = begun(task.goal, progress)
-            looked = look_on_the_way(task.goal, progress, to_place=inf, elapsed=0.0)
-            self._note_done(tick, looked)
-            if looked.performs:
-                return looked.progress, True
-            progress = looked.progress
-        return progress, tick.seen.is_home_old
+        if not isinstance(task.goal, Plan):
+            return progress, tick.seen.is_home_old
+        progress = begun(task.goal, progress)
+        progress, waits = self._look_on_the_way(tick, progress, to_place=inf, elapsed=0.0)
+        return progress, waits or tick.seen.is_home_old
 
     def _end_of_way(self, tick: Tick, left: float) -> Becomes | None:
         """Return the end of a task that drives farther than its submitter may, and say so."""
@@ -246,12 +242,9 @@ class Drive:
         course.look(motion, elapsed=elapsed)
         if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
             if course.progress.pending:
-                to_place = course.metres_to_place(motion)
-                looked = look_on_the_way(
-                    task.goal, course.progress, to_place=to_place, elapsed=elapsed
+                course.progress, _ = self._look_on_the_way(
+                    tick, course.progress, to_place=course.metres_to_place(motion), elapsed=elapsed
                 )
-                course.progress = looked.progress
-                self._note_done(tick, looked)
             if course.has_passed(motion):
                 after = self._leave_step(task, task.goal, now=now)
                 if isinstance(after, Becomes):
@@ -347,13 +340,19 @@ class Drive:
             return after if isinstance(after, Becomes) else self._go_on(tick, after)
         return None
 
-    def _note_done(self, tick: Tick, looked: OnTheWay) -> None:
-        task_id, now = tick.task.id, tick.now
+    def _look_on_the_way(
+        self, tick: Tick, progress: Progress, *, to_place: float | None, elapsed: float
+    ) -> tuple[Progress, bool]:
+        """Do the steps on the way that are due; return whether one is a command to the vehicle."""
+        task, now = tick.task, tick.now
+        assert isinstance(task.goal, Plan), "only a plan has steps"
+        looked = look_on_the_way(task.goal, progress, to_place=to_place, elapsed=elapsed)
         for step in looked.done:
             performs = looked.performs and step == looked.done[-1]
-            self._registry.reached(task_id, step, performs=performs, now=now)
+            self._registry.reached(task.id, step, performs=performs, now=now)
         if looked.done:
-            self._registry.advance(task_id, looked.progress, now=now)
+            self._registry.advance(task.id, looked.progress, now=now)
+        return looked.progress, looked.performs
 
     def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
         """End the current step. Return the progress of the next one, or COMPLETED."""
@@ -378,16 +377,17 @@ class Drive:
         self._registry.advance(task_id, here, now=tick.now)
         return None
 
-    def _known(self, tick: Tick) -> Known:
-        seen = tick.seen
-        return Known(self._driving_of(tick.task), tick.motion.pose, seen.home, seen.origin)
+    def _left(self, tick: Tick, progress: Progress) -> Estimate:
+        task, seen, motion, _ = tick
+        known = Known(self._driving_of(task), motion.pose, seen.home, seen.origin)
+        return time_left(task.goal, progress, known)
 
     def _note_progress(self, tick: Tick, *, executed: float) -> None:
         assert self._course is not None
         progress, registry, now = self._course.progress, self._registry, tick.now
         if now - self._shared_at >= SHARE_EACH:
             self._shared_at = now
-            left = time_left(tick.task.goal, progress, self._known(tick)).seconds
+            left = self._left(tick, progress).seconds
             if not isnan(left):
                 share = max(progress.share, executed / max(executed + left, SHARE_EACH))
                 progress = replace(progress, share=share)

@@ -44,6 +44,12 @@ def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None)
     return pose
 
 
+def begun_leg(goal: SingleGoal, progress: Progress, leg: int, pose: Pose) -> Progress:
+    """Return the progress with which a leg begins at a pose."""
+    anchor = anchor_of(goal, leg, pose, progress.target)
+    return replace(progress, leg=leg, anchor=anchor, done=0.0, path=())
+
+
 def heading_to(goal: GoTo, pose: Pose, target: LocalPlace) -> float:
     """Return the heading of the vehicle when it drives straight to a place."""
     return bearing(pose, target) + pi * goal.backwards

@@ -7,6 +7,7 @@ while it is driven.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 
 from mav_tasks.tasks.goal import (
     Goal,
@@ -51,7 +52,7 @@ def goal_of(task: Task) -> SingleGoal:
 
 def started(plan: Plan, progress: Progress) -> Progress:
     """Return the progress with which a plan starts."""
-    return _at(plan, replace(progress, jumps=(), speed=None, backwards=False), plan.first)
+    return skipped_to(plan, replace(progress, jumps=(), speed=None, backwards=False), plan.first)
 
 
 def begun(goal: Goal, progress: Progress) -> Progress:
@@ -63,12 +64,7 @@ def begun(goal: Goal, progress: Progress) -> Progress:
 
 def following(plan: Plan, progress: Progress) -> Progress | None:
     """Return the progress with which the next step begins; None if the plan is over."""
-    return None if is_over(plan, progress) else _at(plan, progress, progress.step + 1)
-
-
-def skipped_to(plan: Plan, progress: Progress, step: int) -> Progress:
-    """Return the progress with which a plan continues at another step."""
-    return _at(plan, progress, step)
+    return None if is_over(plan, progress) else skipped_to(plan, progress, progress.step + 1)
 
 
 def is_over(plan: Plan, progress: Progress) -> bool:
@@ -87,26 +83,17 @@ def goes_on_to_a_place(plan: Plan, progress: Progress) -> GoTo | None:
 
 
 def loops_in_vain(plan: Plan) -> int | None:
-    """Return the step that closes a loop in which nothing is driven, or None.
+    """Return the jump that closes a loop in which nothing is driven, or None.
 
     It assumes that every jump may be taken, or not taken, at any time.
     """
-    done: set[int] = set()
-    for start in range(len(plan.steps)):
-        path: list[int] = []  # from ``start``: the steps that are not fully explored
-        on_path: set[int] = set()
-        waiting = [start]
-        while waiting:
-            step = waiting.pop()
-            if step < 0:  # everything after this step is explored
-                on_path.discard(path.pop())
-                done.add(~step)
-            elif step in on_path:
-                return path[-1]
-            elif step not in done and step < len(plan.steps) and _takes_no_time(plan, step):
-                path.append(step)
-                on_path.add(step)
-                waiting += [~step, *ways_on(plan.steps, step)]
+    steps = range(len(plan.steps))
+    ways = {step: ways_on(plan.steps, step) for step in steps if _takes_no_time(plan, step)}
+    try:
+        TopologicalSorter(ways).prepare()
+    except CycleError as why:
+        loop: list[int] = why.args[1]
+        return max(loop)
     return None
 
 
@@ -126,8 +113,8 @@ def _driven(plan: Plan, step: int) -> SingleGoal | None:
     return goal if isinstance(goal, SingleGoal) else None
 
 
-def _at(plan: Plan, progress: Progress, step: int) -> Progress:
-    """Return the progress at the next step that drives, or past the end."""
+def skipped_to(plan: Plan, progress: Progress, step: int) -> Progress:
+    """Return the progress at a step, or at the next one that drives, or past the end."""
     made = dict(zip(progress.jumps[::2], progress.jumps[1::2], strict=True))
     pending = dict.fromkeys(progress.pending)  # each once, or a loop would add ever more
     backwards = progress.backwards

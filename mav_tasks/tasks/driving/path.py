@@ -5,11 +5,11 @@ anchor, the pieces and one number say how far a vehicle has come. Within one pat
 in one direction, forwards or backwards.
 """
 
-from cmath import rect
+from cmath import phase, rect
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
-from math import atan2, copysign, cos, hypot, pi, sin, tau
+from math import atan2, copysign, hypot, pi, tau
 
 from mav_tasks.tasks.goal import LocalPlace
 from mav_tasks.tasks.task import Bend, Pose
@@ -71,14 +71,11 @@ def cross_track(start: Pose, pose: Pose) -> float:
 def moved(pose: Pose, curvature: float, length: float) -> Pose:
     """Return the pose after ``length`` metres on a circle, or straight on; negative: backwards."""
     if abs(curvature) < STRAIGHT:
-        north, east = length * cos(pose.yaw), length * sin(pose.yaw)
-        return Pose(pose.north + north, pose.east + east, pose.yaw)
-    yaw = pose.yaw + curvature * length
-    return Pose(
-        pose.north + (sin(yaw) - sin(pose.yaw)) / curvature,
-        pose.east - (cos(yaw) - cos(pose.yaw)) / curvature,
-        yaw,
-    )
+        yaw, way = pose.yaw, rect(length, pose.yaw)
+    else:
+        yaw = pose.yaw + curvature * length
+        way = (rect(1.0, yaw) - rect(1.0, pose.yaw)) / (1j * curvature)
+    return Pose(pose.north + way.real, pose.east + way.imag, yaw)
 
 
 def path_length(path: Path) -> float:
@@ -174,9 +171,8 @@ def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Itera
 
 def _on_circle(start: Pose, curvature: float, ahead: float, pose: Pose, *, around: float) -> float:
     """Return how far along a circle a pose is, in the turn that is nearest to ``around``."""
-    north = start.north - sin(start.yaw) / curvature
-    east = start.east + cos(start.yaw) / curvature
-    yaw = atan2(curvature * (pose.north - north), -curvature * (pose.east - east))
+    centre = point_of(start) + 1j * rect(1.0, start.yaw) / curvature
+    yaw = phase(1j * curvature * (point_of(pose) - centre))
     round_once = tau / abs(curvature)
     along = ahead * (yaw - start.yaw) / curvature
     return along + round_once * round((around - along) / round_once)
@@ -194,13 +190,15 @@ ONCE_ROUND = 31  # arcs; what follows on a circle is there already
 
 
 def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pose]:
-    """Yield the corners of a way along a path, moved ``outside`` m outwards in its bends."""
+    """Yield the corners of a way along a path, moved ``outside`` m outwards in its bends.
+
+    Their yaw is to the right of the way.
+    """
     start = anchor
     for bend in path:
         parts = 1 + int(abs(bend.curvature * bend.length) / CHORD)
         out = 0.0 if abs(bend.curvature) < STRAIGHT else -outside if bend.curvature > 0 else outside
         for part in range(min(parts, ONCE_ROUND) + 1):
             pose = moved(start, bend.curvature, bend.length * part / parts)
-            north, east = -out * sin(pose.yaw), out * cos(pose.yaw)
-            yield Pose(pose.north + north, pose.east + east, pose.yaw)
+            yield moved(replace(pose, yaw=pose.yaw + pi / 2), 0.0, out)
         start = moved(start, bend.curvature, bend.length)

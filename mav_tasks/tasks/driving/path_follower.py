@@ -6,7 +6,7 @@ from math import copysign
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving import guidance
 from mav_tasks.tasks.driving.guidance import USUAL, Leg, Motion, Slowest, Velocity
-from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, leg_count, leg_of, length_of
+from mav_tasks.tasks.driving.legs import FACE, WAY, begun_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.path import Follow, distance
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
 from mav_tasks.tasks.goal import GoTo, Head, Move, SingleGoal
@@ -148,8 +148,7 @@ class PathFollower:
             self.misses += 1
         if following >= leg_count(goal):
             return False
-        anchor = anchor_of(goal, following, motion.pose, target)
-        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=())
+        self.progress = begun_leg(goal, self.progress, following, motion.pose)
         return True
 
     def steer(

@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import copysign, inf, radians
 
 from mav_tasks.tasks.driving.guidance import Motion, wrap
-from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, leg_of, length_of
+from mav_tasks.tasks.driving.legs import FACE, WAY, begun_leg, leg_of, length_of
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
 from mav_tasks.tasks.driving.path import Follow, distance, moved, nearest, pose_on, seen_from
 from mav_tasks.tasks.driving.path_follower import PathFollower
@@ -89,9 +89,7 @@ def resumed(
         return progress
     if steering is not None:
         return set_out_to(goal, progress, pose, target, steering)
-    leg_again = FACE if turns_first else WAY
-    again = anchor_of(goal, leg_again, pose, target)
-    return replace(progress, leg=leg_again, anchor=again, done=0.0, path=())
+    return begun_leg(goal, progress, FACE if turns_first else WAY, pose)
 
 
 def recovery_path(
@@ -141,7 +139,7 @@ def _way_back(
     if steering is None and not by_course:
         return PathFollower(GoTo(place, yaw=there.yaw), Progress(anchor=pose, target=place))
     goal = GoTo(place)
-    begun = Progress(anchor=anchor_of(goal, WAY, pose, place), target=place, leg=WAY)
+    begun = begun_leg(goal, Progress(target=place), WAY, pose)
     if steering is not None:
         path = way_to_pose(pose, there, steering)
         if path is None:  # the fence still stops it on the way

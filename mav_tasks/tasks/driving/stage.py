@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mav_tasks.settings import Driving, Turning
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.guidance import Motion, bend_speed, corner_speed, wrap
-from mav_tasks.tasks.driving.legs import FACE, WAY, anchor_of, begun_from, heading_to
+from mav_tasks.tasks.driving.legs import FACE, WAY, begun_from, begun_leg, heading_to
 from mav_tasks.tasks.driving.mission_sequencer import goes_on_to_a_place
 from mav_tasks.tasks.driving.path import bearing, distance, path_length, pose_on
 from mav_tasks.tasks.driving.path_follower import PathFollower
@@ -61,9 +61,7 @@ def set_out(
         here = set_out_to(goal, fresh, pose, target, steering)
     else:
         is_rolling = motion.speed > ROLLING and _bends_gently(goal, pose, target)
-        leg = FACE if turns_first and not is_rolling else WAY
-        anchor = anchor_of(goal, leg, pose, target)
-        here = replace(fresh, anchor=anchor, leg=leg, done=0.0, path=())
+        here = begun_leg(goal, fresh, FACE if turns_first and not is_rolling else WAY, pose)
     return PathFollower(goal, here, by_course=not seen.honours_yaw_rate, steering=steering)
 
 
