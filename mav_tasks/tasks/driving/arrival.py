@@ -99,14 +99,8 @@ class Arrival:
         self.in_one_try = Creeping(
             least=LEAST_OF_ONE_TRY, lag=LAG_OF_ONE_TRY, most=MOST_COAST_OF_CAR, telling=TELLING
         )
-        self._is_settling = False  # zero is commanded until it stands
-        self._gives_up = False  # accept the error, if the end is near
-        self._corrections = 0
-        self._left_at_zero: tuple[float, float] | None = None  # what remained, at which speed
         self._best = 0.0  # the least that remained
-        self._best_at: float | None = None
-        #: since when a slow speed is commanded, what remained then, and the least speed since
-        self._crept: tuple[float, float, float] | None = None
+        self.begin_leg()
 
     def __repr__(self) -> str:
         return f"Arrival({self.along}, {self.around}, corrected {self._corrections} times)"
@@ -118,9 +112,13 @@ class Arrival:
 
     def begin_leg(self) -> None:
         """Reset for another leg."""
-        self._is_settling = self._gives_up = False
+        self._is_settling = False  # zero is commanded until it stands
+        self._gives_up = False  # accept the error, if the end is near
         self._corrections = 0
-        self._left_at_zero = self._best_at = self._crept = None
+        self._left_at_zero: tuple[float, float] | None = None  # what remained, at which speed
+        self._best_at: float | None = None  # when the least remained
+        #: since when a slow speed is commanded, what remained then, and the least speed since
+        self._crept: tuple[float, float, float] | None = None
         for creeping in (self.along, self.around, self.as_car, self.in_one_try):
             creeping.begins_again()
 

@@ -13,7 +13,6 @@ from mav_tasks.tasks.goal import (
     GlobalPlace,
     GoTo,
     Head,
-    LocalPlace,
     Move,
     MoveTurned,
     SingleGoal,
@@ -77,10 +76,12 @@ class Bounds:
         fence = self.local(origin)
         if fence is None:
             return None
-        for number, step in enumerate(steps):
-            start = _place_of(step, origin)
+        places = [
+            local_place(step.place, origin) if isinstance(step, GoTo) else None for step in steps
+        ]
+        for number, start in enumerate(places):
             for following in _next_places(steps, number) if start else ():
-                end = _place_of(steps[following], origin)
+                end = places[following]
                 if start and end and not fence.allows_way(start, end):
                     return following
         return None
@@ -102,10 +103,6 @@ def _end_of(goal: SingleGoal, progress: Progress) -> Spot | None:
     if isinstance(goal, MoveTurned) and progress.leg != WAY:
         way = -way if progress.leg < WAY else 0.0  # it has not turned round yet, or is there
     return moved(anchor, 0.0, way)
-
-
-def _place_of(step: Step, origin: GlobalPlace | None) -> LocalPlace | None:
-    return local_place(step.place, origin) if isinstance(step, GoTo) else None
 
 
 def _next_places(steps: Sequence[Step], number: int) -> list[int]:

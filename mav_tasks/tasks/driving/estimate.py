@@ -56,27 +56,24 @@ UNKNOWN = Estimate(nan, None, nan)
 
 def time_left(goal: Goal, progress: Progress, known: Known) -> Estimate:
     """Return how long a task still takes; all of it if it has not started."""
-    if isinstance(goal, Plan):
-        return _time_of_plan(goal, progress, known)
-    return _time_of_goal(goal, progress, known, known.driving.speed)
-
-
-def _time_of_plan(plan: Plan, progress: Progress, known: Known) -> Estimate:
-    progress = begun(plan, progress)
-    speed = progress.speed or known.driving.speed
+    speed = known.driving.speed
+    if not isinstance(goal, Plan):
+        return _time_of_goal(goal, progress, known, speed)
+    progress = begun(goal, progress)
+    speed = progress.speed or speed
     seconds, pose, metres = 0.0, known.pose, 0.0
     for _ in range(MOST_STEPS):
-        for step in progress.pending:
-            present = plan.steps[step]
-            if isinstance(present, SetSpeed):
-                speed = present.speed or known.driving.speed
-        if is_over(plan, progress):
+        for number in progress.pending:
+            step = goal.steps[number]
+            if isinstance(step, SetSpeed):
+                speed = step.speed or known.driving.speed
+        if is_over(goal, progress):
             return Estimate(seconds, pose, metres)
-        goal = present_goal(plan, progress)
-        took, pose, way = _time_of_goal(goal, progress, known._replace(pose=pose), speed)
+        present = present_goal(goal, progress)
+        took, pose, way = _time_of_goal(present, progress, known._replace(pose=pose), speed)
         seconds += took
         metres += way
-        after = following(plan, progress)
+        after = following(goal, progress)
         if after is None or took != took:  # from an unknown place the rest is unknown, too
             break
         progress = after

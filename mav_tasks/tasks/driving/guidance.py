@@ -13,6 +13,7 @@ from mav_tasks.tasks.driving.path import (
     Follow,
     cross_track,
     curvature_at,
+    direction_of,
     forward_of,
     nearest,
     path_length,
@@ -303,7 +304,7 @@ def steer_along(
         there = pose_on(anchor, leg.path, along + max(LOOKAHEAD, LOOKAHEAD_TIME * motion.speed))
         here = motion.pose
         return Velocity(speed, 0.0, atan2(there.east - here.east, there.north - here.north))
-    forward = copysign(speed, -remaining if leg.is_reverse else remaining)
+    forward = copysign(speed, direction_of(leg.path) * remaining)
     curvature = clamped(_curvature(leg, anchor, motion, along, forward), MORE_CURVATURE / radius)
     rolling = min(max(abs(motion.forward), min(speed, SLOWEST)), 2 * speed)
     return Velocity(forward, clamped(curvature * copysign(rolling, forward), driving.max_turn_rate))

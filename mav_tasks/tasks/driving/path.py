@@ -30,11 +30,6 @@ class Follow:
     path: Path
     speed: float | None = None
 
-    @property
-    def is_reverse(self) -> bool:
-        """Whether it is driven backwards."""
-        return self.path[0].length < 0
-
 
 def distance(here: Spot, there: Spot) -> float:
     """Return the metres from one place to another."""
@@ -85,7 +80,7 @@ def path_length(path: Path) -> float:
 
 def pose_on(anchor: Pose, path: Path, along: float) -> Pose:
     """Return the pose ``along`` metres on a path; it extends straight before and beyond."""
-    pose, ahead = anchor, _direction(path)
+    pose, ahead = anchor, direction_of(path)
     for bend in path if along > 0 else ():
         length = abs(bend.length)
         if along <= length:
@@ -150,13 +145,14 @@ def runs_of(path: Path) -> list[Path]:
     return [tuple(run) for _, run in groupby(path, lambda bend: bend.length < 0)]
 
 
-def _direction(path: Path) -> float:
+def direction_of(path: Path) -> float:
+    """Return -1.0 for a path that is driven backwards, otherwise 1.0."""
     return -1.0 if path and path[0].length < 0 else 1.0
 
 
 def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Iterator[float]:
     """Yield the nearest place to a pose for each piece, and for both extensions."""
-    start, begins, ahead = anchor, 0.0, _direction(path)
+    start, begins, ahead = anchor, 0.0, direction_of(path)
     yield min(0.0, ahead * forward_of(anchor, pose))
     for bend in path:
         length = abs(bend.length)

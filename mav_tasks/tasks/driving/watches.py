@@ -85,22 +85,18 @@ class StuckWatch:
     """
 
     def __init__(self) -> None:
-        self._best_remaining = inf
-        self._progress_at = 0.0
-        self._commanded = 0.0  # m or rad, since the last progress
-        self._last = (0.0, 0.0)
         self._course: float | None = None  # the commanded course, if there is one
-        self._turned = 0.0  # rad turned by itself since the last progress
-        self._yaw: float | None = None  # at the last update of that
         self._pose: Pose | None = None  # at the last look
+        self.begin(now=0.0)
 
     def begin(self, *, now: float) -> None:
         """Reset: another leg begins, or nothing has been commanded yet."""
         self._best_remaining = inf
         self._progress_at = now
-        self._commanded = 0.0
-        self._last = (0.0, 0.0)
-        self._turned, self._yaw = 0.0, None
+        self._commanded = 0.0  # m or rad, since the last progress
+        self._last = (0.0, 0.0)  # m and rad, commanded until the next look
+        self._turned = 0.0  # rad turned by itself since the last progress
+        self._yaw: float | None = None  # at the last update of that
 
     def commanded(self, velocity: Velocity, *, seconds: float) -> None:
         """Note the velocity that is commanded for the next ``seconds``."""
