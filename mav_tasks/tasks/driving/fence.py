@@ -149,24 +149,20 @@ class _Way:
         self.start, self.end, way = start, end, end - start
         self.length = hypot(way.real, way.imag)
         self.ahead = way / (self.length or 1.0)
-        self.back = self.ahead.conjugate()  # a product with it is seen from the way
 
-    def along(self, point: complex) -> float:
-        """Return how far along the way, or its extension, a point is."""
-        return ((point - self.start) * self.back).real
+    def seen(self, points: Iterable[complex]) -> list[complex]:
+        """Return points as seen from the start: metres ahead, and imaginary ones to the right."""
+        start, back = self.start, self.ahead.conjugate()
+        return [(point - start) * back for point in points]
 
-    def rights(self, points: Iterable[complex]) -> list[float]:
-        """Return how far each point is to the right of the way or its extension."""
-        here, back = (self.start * self.back).imag, self.back
-        return [(point * back).imag - here for point in points]
 
-    def crosses(self, centre: complex, radius: float) -> Iterable[float]:
-        """Return how far along the way, or its extension, a circle is entered and left."""
-        [right], along = self.rights([centre]), self.along(centre)
-        if abs(right) >= radius:
-            return ()
-        half = sqrt((radius - right) * (radius + right))
-        return along - half, along + half
+def _crossed(centre: complex, radius: float) -> Iterable[float]:
+    """Return how far along a way, or its extension, a circle that it sees is entered and left."""
+    along, right = centre.real, centre.imag
+    if abs(right) >= radius:
+        return ()
+    half = sqrt((radius - right) * (radius + right))
+    return along - half, along + half
 
 
 # Both kinds of zones have ``inwards``, which is positive inside, negative outside, and 0 within
@@ -178,9 +174,9 @@ class _Way:
 class _LocalPolygon:
     def __init__(self, corners: list[complex]) -> None:
         self._corners = corners
-        self._ends = list(pairwise((*corners, corners[0])))
         self._box = _box(corners)
-        self._edges = [(*_box(ends), _Way(*ends)) for ends in self._ends]
+        ends = pairwise((*corners, corners[0]))
+        self._edges = [(*_box(edge), _Way(*edge)) for edge in ends]
 
     def inwards(self, point: complex) -> float:
         north, east = point.real, point.imag
@@ -192,8 +188,8 @@ class _LocalPolygon:
             if not (low_north <= north <= high_north and east <= high_east):
                 continue
             if east >= low_east:
-                [right], along = edge.rights([point]), edge.along(point)
-                if hypot(along - max(0.0, min(edge.length, along)), right) <= EDGE:
+                [seen] = edge.seen([point])
+                if hypot(seen.real - max(0.0, min(edge.length, seen.real)), seen.imag) <= EDGE:
                     return 0
             # half open: a corner counts once if the ray passes through it, else twice or never
             begin = edge.start
@@ -204,16 +200,16 @@ class _LocalPolygon:
         return side
 
     def marks(self, way: _Way) -> Iterator[float]:
-        rights = way.rights(self._corners)
-        for ends, right, end_right in zip(self._ends, rights, rights[1:] + rights[:1], strict=True):
+        seen = way.seen(self._corners)
+        for here, there in pairwise((*seen, seen[0])):
+            right, end_right = here.imag, there.imag
             if (right > EDGE and end_right > EDGE) or (right < -EDGE and end_right < -EDGE):
                 continue
-            yield from way.crosses(ends[0], EDGE)  # near the corner, where the boundary is rounded
+            yield from _crossed(here, EDGE)  # near the corner, where the boundary is rounded
             if right != end_right:  # near the straight part: the flatter the crossing, the longer
-                along, end_along = map(way.along, ends)
-                slope = (end_along - along) / (end_right - right)
-                half = EDGE * hypot(1.0, slope)
-                yield from (along - right * slope - half, along - right * slope + half)
+                slope = (there.real - here.real) / (end_right - right)
+                middle, half = here.real - right * slope, EDGE * hypot(1.0, slope)
+                yield from (middle - half, middle + half)
 
 
 class _LocalCircle:
@@ -226,8 +222,9 @@ class _LocalCircle:
         return 0.0 if abs(inwards) <= EDGE else inwards
 
     def marks(self, way: _Way) -> Iterator[float]:
+        [centre] = way.seen([self._centre])
         for radius in (self._radius - EDGE, self._radius + EDGE):
-            yield from way.crosses(self._centre, radius)
+            yield from _crossed(centre, radius)
 
 
 def _points(places: Iterable[GlobalPlace], origin: GlobalPlace) -> list[complex]:

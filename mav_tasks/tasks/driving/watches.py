@@ -48,30 +48,26 @@ class Follows:
     """Early warning that a vehicle does not follow, long before it counts as stuck."""
 
     def __init__(self) -> None:
-        self._since: float | None = None
-        self._from = Pose(0.0, 0.0, 0.0)
-        self._way = 0.0  # m commanded since then
+        #: since when it has not followed, where it was then, and the metres commanded from there
+        self._waits: tuple[float, Pose, float] | None = None
         self._is_said = False
 
     def begin(self) -> None:
         """Reset for another leg."""
-        self._since, self._is_said = None, False
+        self._waits, self._is_said = None, False
 
     def look(self, velocity: Velocity, motion: Motion, *, seconds: float, now: float) -> str:
         """Return a warning that the vehicle does not move, once for each leg; "" otherwise."""
         speed, here = abs(velocity.forward), motion.pose
         if speed < LEAST_ASKED:
-            self._since = None
+            self._waits = None
             return ""
-        if self._since is None:
-            self._since, self._from, self._way = now, here, 0.0
-        self._way += speed * seconds
-        is_long = now - self._since >= SAID_AFTER
-        has_turned = abs(wrap(here.yaw - self._from.yaw)) > TURNED
-        if has_turned or distance(here, self._from) > LEAST_PART * self._way:
-            self._since = now if now - self._since > SAID_AFTER else self._since
-            return ""
-        if self._is_said or not is_long:
+        since, there, way = self._waits or (now, here, 0.0)
+        way += speed * seconds
+        is_long, has_turned = now - since >= SAID_AFTER, abs(wrap(here.yaw - there.yaw)) > TURNED
+        follows = has_turned or distance(here, there) > LEAST_PART * way
+        self._waits = now if follows and now - since > SAID_AFTER else since, there, way
+        if follows or self._is_said or not is_long:
             return ""
         self._is_said = True
         return f"does not move (told {speed:.1f} m/s): check brake, speed gains, minimum speed"
