@@ -107,11 +107,11 @@ def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
 def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
     if progress.leg <= WAY:
         assert progress.target is not None, "the place was found before the task began"
-        way = distance(anchor, progress.target)
         if progress.path:
             return Follow(progress.path, goal.speed)
         if progress.leg == FACE:
             return Rotate(wrap(heading_to(goal, anchor, progress.target) - anchor.yaw))
+        way = distance(anchor, progress.target)
         if goal.turns:  # only to estimate it: the way onto it is planned when it begins
             return Move(way + tau * goal.turns * abs(goal.around), goal.speed)
         return Move(-way if goal.backwards else way, goal.speed)
