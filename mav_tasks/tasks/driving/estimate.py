@@ -85,9 +85,8 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
     if target is None and isinstance(goal, GoTo):
         target = local_place(known.home if goal.place is None else goal.place, known.origin)
     pose = known.pose
-    if progress.anchor is None and isinstance(goal, GoTo) and target is None:
-        return UNKNOWN
-    if pose is None and progress.anchor is None and isinstance(goal, GoTo | Face):
+    is_unknown = pose is None or (isinstance(goal, GoTo) and target is None)
+    if is_unknown and progress.anchor is None and isinstance(goal, GoTo | Face):
         return UNKNOWN
     at, seconds, metres, driving = pose or SOMEWHERE, SETTLING, 0.0, known.driving
     for number in range(progress.leg, leg_count(goal)):

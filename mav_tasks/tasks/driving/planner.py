@@ -99,7 +99,7 @@ def way_round(
         place = moved(Pose(centre.north, centre.east, out), 0.0, radius)
         way = way_to_pose(pose, replace(place, yaw=out + side * pi / 2), anyhow)
         ways.append((*(way or ()), arc))
-    return _boldest(pose, ways, steering.fence)
+    return _best(pose, ways, steering.fence) or _best(pose, ways, None) or (arc,)
 
 
 def set_out_to(
@@ -116,7 +116,8 @@ def set_out_to(
     if distance(pose, place) <= THERE:
         return replace(here, path=(Bend(0.0, HERE),))
     start = _turned(pose) if goal.backwards else pose
-    way = _boldest(start, list(_ways_to(start, place, steering)), steering.fence)
+    anyhow = replace(steering, fence=None)
+    way = way_to(start, place, steering) or way_to(start, place, anyhow) or ()
     first, *others = runs_of(_reversed(way) if goal.backwards else way)
     return replace(here, leg=FACE if others else WAY, path=first)
 
@@ -139,13 +140,6 @@ def _best(pose: Pose, ways: Iterable[Path], fence: LocalFence | None) -> Path | 
         return next(iter(cheapest), None)
     all_ways = product((CLEARANCE, 0.0), cheapest)
     return next((way for clear, way in all_ways if is_allowed(pose, way, fence, clear=clear)), None)
-
-
-def _boldest(pose: Pose, ways: list[Path], fence: LocalFence | None) -> Path:
-    """Return the best way; if none is allowed, the cheapest one."""
-    way = _best(pose, ways, fence) or _best(pose, ways, None)
-    assert way is not None, "a car can drive to every place and pose"
-    return way
 
 
 def _cost(way: Path) -> float:
