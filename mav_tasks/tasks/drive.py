@@ -12,7 +12,7 @@ from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.estimate import Estimate, Known, time_left
-from mav_tasks.tasks.driving.guidance import ZERO, Motion
+from mav_tasks.tasks.driving.guidance import ZERO, Ending, Motion
 from mav_tasks.tasks.driving.limits import limited, within_fence
 from mav_tasks.tasks.driving.mission_sequencer import (
     begun,
@@ -21,7 +21,6 @@ from mav_tasks.tasks.driving.mission_sequencer import (
     is_over,
     present_goal,
 )
-from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.recovery_path import recovery_path
 from mav_tasks.tasks.driving.stage import (
@@ -35,7 +34,6 @@ from mav_tasks.tasks.events import VehicleNoted
 from mav_tasks.tasks.goal import (
     Face,
     GoTo,
-    Move,
     MoveTurned,
     Near,
     Plan,
@@ -288,7 +286,7 @@ class Drive:
         top = task.terms.top_speed
         if top is not None and abs(wish.forward) > top:
             wish = replace(wish, forward=copysign(top, wish.forward))
-        if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
+        if self._is_coming_back and isinstance(course.leg, Ending):
             self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
             if self._is_coming_back:  # from outside the fence it may drive in
                 return Demand(DemandKind.DRIVE, wish)

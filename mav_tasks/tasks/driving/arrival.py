@@ -16,11 +16,11 @@ from mav_tasks.tasks.driving.guidance import (
     CREEP_RATE,
     CREEP_SPEED,
     TURN_GAIN,
+    Ending,
     Motion,
     Slowest,
     Velocity,
 )
-from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.goal import Move, Rotate
 
@@ -137,7 +137,7 @@ class Arrival:
         ``last`` is the last velocity commanded. If the rover also ``stands``, it has arrived.
         """
         leg, left = course.leg, abs(course.remaining)
-        if not isinstance(leg, Move | Rotate | Follow):
+        if not isinstance(leg, Ending):
             return course.has_arrived(stands=stands, driving=driving)
         is_turn = isinstance(leg, Rotate)
         creeping = self.around if is_turn else self._driven(course)

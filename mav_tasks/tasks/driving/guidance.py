@@ -24,6 +24,8 @@ from mav_tasks.tasks.task import Pose
 
 #: the goals that can be steered; ``legs`` splits every goal into these
 Leg = Move | Rotate | Drive | Head | Wait | Follow
+Line = Move | Follow  # metres of line, straight or not
+Ending = Line | Rotate  # those with an end to come nearer to; the others last for a time
 
 APPROACH_GAIN = 1.2  # 1/s, in the last centimetres: speed = gain * remaining
 #: m/s, the least setpoint; half of it moved no ArduPilot reliably (its PWM is then 1500)
@@ -160,7 +162,7 @@ def is_settled(leg: Leg, remaining: float, *, driving: Driving) -> bool:
 
 def _is_within(leg: Leg, remaining: float, metres: float, angle: float) -> bool:
     """Return whether the end of a leg is this near; a time has to be over."""
-    if isinstance(leg, Move | Follow | Rotate):
+    if isinstance(leg, Ending):
         return abs(remaining) <= (angle if isinstance(leg, Rotate) else metres)
     return remaining <= 0.0
 

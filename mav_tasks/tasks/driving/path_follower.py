@@ -5,11 +5,11 @@ from math import copysign
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving import guidance
-from mav_tasks.tasks.driving.guidance import USUAL, Leg, Motion, Slowest, Velocity
+from mav_tasks.tasks.driving.guidance import USUAL, Leg, Line, Motion, Slowest, Velocity
 from mav_tasks.tasks.driving.legs import FACE, WAY, begun_leg, leg_count, leg_of, length_of
 from mav_tasks.tasks.driving.path import Follow, distance
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
-from mav_tasks.tasks.goal import GoTo, Head, Move, SingleGoal
+from mav_tasks.tasks.goal import GoTo, Head, SingleGoal
 from mav_tasks.tasks.task import Pose, Progress
 
 BESIDE = 0.15  # m from a place, at the end of the way there; farther off has missed it
@@ -74,7 +74,7 @@ class PathFollower:
     @property
     def _to_correct(self) -> float:
         """Rest of the leg; steered by course, a vehicle cannot drive back from beyond the end."""
-        is_one_way = self.by_course and isinstance(self.leg, Move | Follow)
+        is_one_way = self.by_course and isinstance(self.leg, Line)
         return max(self.remaining, 0.0) if is_one_way else self.remaining
 
     def metres_to_place(self, motion: Motion) -> float | None:
@@ -161,7 +161,7 @@ class PathFollower:
     ) -> Velocity:
         """Return the velocity towards the leg's end; ``speed`` in m/s overrides the leg's own."""
         leg, remaining = self.leg, self.remaining
-        if speed is not None and isinstance(leg, Move | Follow):
+        if speed is not None and isinstance(leg, Line):
             leg = replace(leg, speed=speed)
         elif speed is not None and isinstance(leg, Head):
             leg = replace(leg, forward=copysign(speed, leg.forward) if leg.forward else 0.0)

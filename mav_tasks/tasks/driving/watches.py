@@ -10,7 +10,7 @@ from dataclasses import replace
 from math import copysign, inf, pi, radians
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import Motion, Velocity, is_far_off, wrap
+from mav_tasks.tasks.driving.guidance import Ending, Motion, Velocity, is_far_off, wrap
 from mav_tasks.tasks.driving.path import Follow, beside, cross_track, distance, forward_of
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.recovery_path import OFF_TRACK, is_off_line
@@ -106,7 +106,7 @@ class StuckWatch:
         leg, (forward, turned) = course.leg, self._last
         lives = self._lives(seen, has_one_try=course.has_one_try)
         turns = self._turns_by_itself(seen) and not seen.still and self._turned < FULL_TURNS
-        if isinstance(leg, Move | Rotate | Follow):
+        if isinstance(leg, Ending):
             asked, left = turned if isinstance(leg, Rotate) else forward, abs(course.remaining)
             moves = left < self._best_remaining - PROGRESS
             if moves:
