@@ -19,14 +19,14 @@ from mav_tasks.tasks.driving.mission_sequencer import (
     following,
     goal_of,
     is_over,
+    look_on_the_way,
     present_goal,
 )
 from mav_tasks.tasks.driving.path_follower import PathFollower
-from mav_tasks.tasks.driving.recovery_path import recovery_path
 from mav_tasks.tasks.driving.stage import (
     lead_on,
-    look_on_the_way,
     may_go_on_rolling,
+    recovery_path,
     set_out,
 )
 from mav_tasks.tasks.driving.watches import AstrayWatch, Follows, StuckWatch

@@ -8,15 +8,21 @@ while it is driven.
 from collections.abc import Sequence
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
+from math import inf
+from typing import NamedTuple
 
 from mav_tasks.tasks.goal import (
+    Delay,
     Goal,
     GoTo,
     Jump,
     LocalPlace,
+    Near,
     OnTheWay,
+    Perform,
     Plan,
     SetReverse,
+    SetSpeed,
     SingleGoal,
     Step,
     Wait,
@@ -26,6 +32,14 @@ from mav_tasks.tasks.task import Progress, Task
 
 SHORT = 1.0  # s; a loop of shorter waits would only keep the server busy
 END = Wait(0.0)  # past the last step: pending steps are still done
+
+
+class Looked(NamedTuple):
+    """The steps on the way that one look has done."""
+
+    progress: Progress
+    done: tuple[int, ...]
+    performs: bool  # whether the last of them is a command to the vehicle
 
 
 def has_local_place(goal: Goal) -> bool:
@@ -95,6 +109,40 @@ def loops_in_vain(plan: Plan) -> int | None:
         loop: list[int] = why.args[1]
         return max(loop)
     return None
+
+
+def look_on_the_way(
+    plan: Plan, progress: Progress, *, to_place: float | None, elapsed: float
+) -> Looked:
+    """Do those pending steps that are due.
+
+    ``to_place`` is the metres to the place that is driven to, None without one; ``elapsed`` the
+    seconds since the last look.
+    """
+    done: list[int] = []
+    performs = False
+    left_to_place = -inf if to_place is None else to_place
+    for number in progress.pending:
+        match plan.steps[number]:
+            case Delay(seconds=seconds):
+                waited = progress.pending_for + elapsed
+                if waited < seconds:
+                    progress = replace(progress, pending_for=waited)
+                    break
+                elapsed = waited - seconds
+                progress = replace(progress, pending_for=0.0)
+            case Near(distance=near) if left_to_place > near:
+                break
+            case SetSpeed(speed=speed):
+                progress = replace(progress, speed=speed)
+            case Perform():
+                performs = True
+        done.append(number)
+        if performs:  # one at a time: the vehicle answers each
+            break
+    if done:
+        progress = replace(progress, pending=progress.pending[len(done) :])
+    return Looked(progress, tuple(done), performs)
 
 
 def _takes_no_time(plan: Plan, step: int) -> bool:

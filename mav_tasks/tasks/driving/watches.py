@@ -13,7 +13,7 @@ from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import Ending, Motion, Velocity, is_far_off, wrap
 from mav_tasks.tasks.driving.path import Follow, beside, cross_track, distance, forward_of
 from mav_tasks.tasks.driving.path_follower import PathFollower
-from mav_tasks.tasks.driving.recovery_path import OFF_TRACK, is_off_line
+from mav_tasks.tasks.driving.stage import OFF_TRACK, is_off_line
 from mav_tasks.tasks.goal import Move, Rotate
 from mav_tasks.tasks.task import Pose, Task, TaskId
 from mav_tasks.tasks.view import VehicleView
