@@ -15,7 +15,7 @@ from mav_tasks.services.offboard import OffboardControl, Refused
 from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import Persona
 from mav_tasks.tasks.driving.guidance import Motion
-from mav_tasks.tasks.driving.legs import distance
+from mav_tasks.tasks.driving.path import distance
 
 TAKE_WITHIN = 12.0  # s; PX4 takes four heartbeats
 STAND_WITHIN = 4.0  # s of zeros

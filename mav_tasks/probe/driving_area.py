@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from math import cos, inf, sin
 
 from mav_tasks.settings import Turning
-from mav_tasks.tasks.driving.guidance import Motion, cross_track
-from mav_tasks.tasks.driving.path import forward_of
+from mav_tasks.tasks.driving.guidance import Motion
+from mav_tasks.tasks.driving.path import cross_track, forward_of
 from mav_tasks.tasks.task import Pose
 
 HALF = 1.0  # m, from the middle to each side: the area measures 2 m

@@ -11,8 +11,7 @@ from mav_tasks.probe.steps import Steps
 from mav_tasks.services.orders import STANDING, Speeds
 from mav_tasks.services.persona import BY_COURSE, WITH_YAW_RATE, Persona
 from mav_tasks.tasks.driving.guidance import wrap
-from mav_tasks.tasks.driving.legs import distance
-from mav_tasks.tasks.driving.path import forward_of
+from mav_tasks.tasks.driving.path import distance, forward_of
 
 TRIAL_SPEED = 0.2  # m/s
 TRIAL_WAY = 0.1  # m; further a trial need not go

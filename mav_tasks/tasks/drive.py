@@ -7,30 +7,39 @@ from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
-from mav_tasks.settings import Driving, Settings
+from mav_tasks.settings import Driving, Settings, Turning
 from mav_tasks.tasks import view
 from mav_tasks.tasks.driving.arrival import Arrival
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.estimate import Known, time_left
-from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
-from mav_tasks.tasks.driving.legs import distance
+from mav_tasks.tasks.driving.estimate import Estimate, Known, time_left
+from mav_tasks.tasks.driving.guidance import ZERO, Ending, Motion
 from mav_tasks.tasks.driving.limits import limited, within_fence
-from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal, started
-from mav_tasks.tasks.driving.path import Follow
-from mav_tasks.tasks.driving.path_divergence import AstrayWatch
-from mav_tasks.tasks.driving.path_follower import PathFollower
-from mav_tasks.tasks.driving.recovery_path import recovery_path
-from mav_tasks.tasks.driving.stage import (
-    OnTheWay,
-    course_of,
+from mav_tasks.tasks.driving.mission_sequencer import (
+    begun,
+    following,
+    goal_of,
+    is_over,
     look_on_the_way,
-    may_go_on_rolling,
-    set_out,
-    steering_of,
+    present_goal,
 )
-from mav_tasks.tasks.driving.stuck import Follows, StuckWatch
+from mav_tasks.tasks.driving.path_follower import PathFollower
+from mav_tasks.tasks.driving.stage import (
+    lead_on,
+    may_go_on_rolling,
+    recovery_path,
+    set_out,
+)
+from mav_tasks.tasks.driving.watches import AstrayWatch, Follows, StuckWatch
 from mav_tasks.tasks.events import VehicleNoted
-from mav_tasks.tasks.goal import Face, GoTo, Move, MoveTurned, Near, Plan, Rotate, Wait
+from mav_tasks.tasks.goal import (
+    Face,
+    GoTo,
+    MoveTurned,
+    Near,
+    Plan,
+    Rotate,
+    Wait,
+)
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import Progress, Task
@@ -52,6 +61,15 @@ class Becomes(NamedTuple):
 
     state: TaskState
     reason: TaskReason = R.NONE
+
+
+class Tick(NamedTuple):
+    """The driven task and its vehicle, as they are now."""
+
+    task: Task
+    seen: VehicleView
+    motion: Motion
+    now: float
 
 
 class Drive:
@@ -119,80 +137,77 @@ class Drive:
         """Plan the path of a task that starts or resumes where the vehicle stands."""
         self._driven = task.progress.driven
         self._way_back = None
-        here = self._set_out(task, task.progress, seen, motion, now=now)
-        if isinstance(here, Becomes) or self._course is None:
+        here = self._set_out(Tick(task, seen, motion, now), task.progress)
+        course = self._course
+        if isinstance(here, Becomes) or course is None:
             return here
-        self._way_back, self._astray = None, AstrayWatch()
+        self._astray = AstrayWatch()
         if task.progress.anchor is not None:
             self._way_back = recovery_path(
-                present_goal(task.goal, here),
+                course.goal,
                 here,
                 motion,
                 honours_yaw_rate=seen.honours_yaw_rate,
-                steering=steering_of(present_goal(task.goal, here), seen, self._bounds),
+                steering=course.steering,
             )
         return here
 
-    def _set_out(
-        self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
-    ) -> Progress | Becomes:
+    def _set_out(self, tick: Tick, progress: Progress) -> Progress | Becomes:
         """Plan the path of a stage that begins here, if it can begin; without one, it waits."""
-        single = present_goal(task.goal, progress)
-        if isinstance(single, GoTo) and single.place is None:
-            progress, waits = self._before_return(task, progress, seen, now=now)
+        task, seen, motion, now = tick
+        plan, driving = task.goal, self._settings.driving
+        goal = present_goal(plan, progress)
+        if isinstance(goal, GoTo) and goal.place is None:
+            progress, waits = self._before_return(tick, progress)
             if waits:
                 self._course = None
                 return progress
-        steering = steering_of(single, seen, self._bounds)
-        if steering is not None and isinstance(single, Rotate | Face | MoveTurned):
+        if seen.turning is Turning.STEERED and isinstance(goal, Rotate | Face | MoveTurned):
             return Becomes(S.FAILED, R.NOT_SUPPORTED_BY_VEHICLE)
-        here = set_out(task.goal, progress, seen, motion, steering=steering)
-        if here is None:
+        course = set_out(goal, begun(plan, progress), seen, motion, self._bounds)
+        if course is None:
             return Becomes(S.PAUSED, R.POSITION_LOST)
-        if isinstance(single, Wait):
-            utc = now + self._times.wall_offset
-            here = replace(here, done=waited(single, here.done, utc=utc))
-        longest = self._settings.driving.max_distance
-        if here.target is not None and distance(motion.pose, here.target) > longest:
+        here = course.progress
+        if isinstance(goal, Wait):
+            here = replace(here, done=waited(goal, here.done, utc=now + self._times.wall_offset))
+            course.progress = here
+        if (course.metres_to_place(motion) or 0.0) > driving.max_distance:
             return Becomes(S.FAILED, R.BAD_PARAMETER)
-        if task.terms.max_distance is not None:
-            left = time_left(task.goal, here, self._known(task, seen, motion))
-            if end := self._end_of_way(task, left.metres, now=now):
-                return end
-        metres = self._bounds.metres_to_leave(single, here, motion.pose, seen.origin)
+        if task.terms.max_distance is not None and (
+            end := self._end_of_way(tick, self._left(tick, here).metres)
+        ):
+            return end
+        metres = self._bounds.metres_to_leave(goal, here, motion.pose, seen.origin)
         if metres is not None:
-            words = f"would leave the fence in task {task.id} after {metres:.1f} m"
-            self._note(task, words, now=now)
-            return _refused(task)
+            self._note(tick, f"would leave the fence in task {task.id} after {metres:.1f} m")
+            is_new = task.progress.anchor is None and task.progress.step < 0
+            return Becomes(S.FAILED, R.OUTSIDE_FENCE) if is_new else Becomes(S.HELD, R.FENCE)
         self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
-        driving = self._settings.driving
-        self._course = course_of(task.goal, here, seen, driving=driving, steering=steering)
+        if isinstance(plan, Plan):
+            lead_on(course, plan, seen, driving=driving)
+        self._course = course
         self._begin_leg(now=now)
         return here
 
-    def _before_return(
-        self, task: Task, progress: Progress, seen: VehicleView, *, now: float
-    ) -> tuple[Progress, bool]:
+    def _before_return(self, tick: Tick, progress: Progress) -> tuple[Progress, bool]:
         """Do the steps before a return, one of which may set home; return whether it waits."""
+        task = tick.task
         if not self._registry.is_durable(task.id):
             return progress, True
-        if isinstance(task.goal, Plan):
-            if progress.step < 0:
-                progress = started(task.goal, progress)
-            looked = look_on_the_way(task.goal, progress, to_place=inf, elapsed=0.0)
-            progress = looked.progress
-            self._note_done(task, looked, now=now)
-            if looked.performed:
-                return progress, True
-        return progress, seen.is_home_old
+        if not isinstance(task.goal, Plan):
+            return progress, tick.seen.is_home_old
+        progress = begun(task.goal, progress)
+        progress, waits = self._look_on_the_way(tick, progress, to_place=inf, elapsed=0.0)
+        return progress, waits or tick.seen.is_home_old
 
-    def _end_of_way(self, task: Task, left: float, *, now: float) -> Becomes | None:
+    def _end_of_way(self, tick: Tick, left: float) -> Becomes | None:
         """Return the end of a task that drives farther than its submitter may, and say so."""
+        task = tick.task
         most, way = task.terms.max_distance, self._driven + left
         if most is None or way <= most * CORRECTIONS + SLACK:
             return None
         long = "unknown" if isnan(way) else f"{way:.1f} m"
-        self._note(task, f"task {task.id} may drive {most:g} m: its way is {long}", now=now)
+        self._note(tick, f"task {task.id} may drive {most:g} m: its way is {long}")
         return Becomes(S.FAILED, R.NOT_ALLOWED)
 
     def go_on(
@@ -206,17 +221,17 @@ class Drive:
         now: float,
     ) -> Demand | Becomes:
         """Return this tick's demand, or the outcome; ``executed`` is the s of EXECUTING so far."""
+        tick, watch = Tick(task, seen, motion, now), self._settings.watch
         self._driven += abs(self._last_velocity.forward) * elapsed
-        if end := self._end_of_way(task, 0.0, now=now):
+        if end := self._end_of_way(tick, 0.0):
             return end
         if self._course is None:  # another step of a plan begins
-            single = present_goal(task.goal, task.progress)
-            steering = steering_of(single, seen, self._bounds)
+            goal = goal_of(task)
             if not seen.still and not may_go_on_rolling(
-                task.goal, task.progress, seen, motion, steering=steering
+                goal, task.progress, seen, motion, self._bounds
             ):
                 return view.STAND
-            if waits := self._go_on(task, task.progress, seen, motion, now=now):
+            if waits := self._go_on(tick, task.progress):
                 return waits
         course = self._way_back or self._course
         assert course is not None, "EXECUTING begins by setting the course"
@@ -224,7 +239,10 @@ class Drive:
         elapsed = 0.0 if is_held_back else elapsed
         course.look(motion, elapsed=elapsed)
         if isinstance(task.goal, Plan) and course is self._course and not is_held_back:
-            self._look_on_the_way(task, task.goal, course, motion, elapsed=elapsed, now=now)
+            if course.progress.pending:
+                course.progress, _ = self._look_on_the_way(
+                    tick, course.progress, to_place=course.metres_to_place(motion), elapsed=elapsed
+                )
             if course.has_passed(motion):
                 after = self._leave_step(task, task.goal, now=now)
                 if isinstance(after, Becomes):
@@ -232,9 +250,9 @@ class Drive:
                 self._registry.note_progress(task.id, after)
                 self._course = None
                 return Demand(DemandKind.DRIVE, self._last_velocity)
-        self._note_progress(task, seen, motion, executed=executed, now=now)
+        self._note_progress(tick, executed=executed)
         # zeros were commanded for long enough to call slowness a standstill
-        stands = seen.still and now - self._moved_at >= self._settings.watch.still_time
+        stands = seen.still and now - self._moved_at >= watch.still_time
         if self._arrival.stands_here(
             course,
             motion,
@@ -245,33 +263,49 @@ class Drive:
         ):
             if not stands and not isinstance(course.leg, Wait):
                 return view.STAND
-            return self._arrive(task, course, seen, motion, now) or view.STAND
+            return self._arrive(tick, course) or view.STAND
         if is_held_back:
             self._stuck.begin(now=now)
             return view.STAND
-        if self._stuck.is_stuck(course, seen, limit=self._settings.watch.stuck, now=now):
+        if self._stuck.is_stuck(course, seen, limit=watch.stuck, now=now):
             return Becomes(S.FAILED, R.STUCK)
-        period = self._settings.watch.setpoint_period
-        news = self._follows.look(self._last_velocity, motion, seconds=period, now=now)
+        news = self._follows.look(
+            self._last_velocity, motion, seconds=watch.setpoint_period, now=now
+        )
         if news:
-            self._note(task, news, now=now)
+            self._note(tick, news)
         if self._astray.is_astray(course, motion):
-            self._note(task, "does not follow its setpoints: check its heading", now=now)
+            self._note(tick, "does not follow its setpoints: check its heading")
             return Becomes(S.HELD, R.OFF_TRACK)
-        speed = None if course is self._way_back else course.progress.speed
-        driving, slowest = self._driving_of(task), self._arrival.slowest(course)
-        wish = course.steer(motion, driving=driving, speed=speed, slowest=slowest)
+        wish = course.steer(
+            motion,
+            driving=self._driving_of(task),
+            speed=None if course is self._way_back else course.progress.speed,
+            slowest=self._arrival.slowest(course),
+        )
         top = task.terms.top_speed
         if top is not None and abs(wish.forward) > top:
             wish = replace(wish, forward=copysign(top, wish.forward))
-        velocity = self._within_fence(course, wish, motion, seen, now=now)
+        if self._is_coming_back and isinstance(course.leg, Ending):
+            self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
+            if self._is_coming_back:  # from outside the fence it may drive in
+                return Demand(DemandKind.DRIVE, wish)
+        fence = self._bounds.local(seen.origin)
+        velocity = within_fence(wish, motion, fence, driving=self._settings.driving, now=now)
         if velocity is None:
             return Becomes(S.HELD, R.FENCE)
         return Demand(DemandKind.DRIVE, velocity)
 
-    def _note(self, task: Task, words: str, *, now: float) -> None:
+    def rest(self, task: Task, motion: Motion, *, now: float) -> None:
+        """Record how far the vehicle rolled since the task was paused; it stands now."""
+        course = self._course
+        if course is not None and self._way_back is None:
+            course.look(motion, elapsed=0.0)
+            self._registry.advance(task.id, course.progress, now=now)
+
+    def _note(self, tick: Tick, words: str) -> None:
         """Report a text about the vehicle of a task."""
-        self._registry.record(VehicleNoted(task.vehicle, words, now))
+        self._registry.record(VehicleNoted(tick.task.vehicle, words, tick.now))
 
     def _driving_of(self, task: Task) -> Driving:
         """Return the settings for a task; a task that is cruising has the vehicle's own speed."""
@@ -286,21 +320,9 @@ class Drive:
         self._follows.begin()
         self._arrival.begin_leg()
 
-    def _within_fence(
-        self, course: PathFollower, wish: Velocity, motion: Motion, seen: VehicleView, *, now: float
-    ) -> Velocity | None:
-        """Return the velocity slowed before the fence; None: stop. Outside, let it drive in."""
-        if self._is_coming_back and isinstance(course.leg, Move | Rotate | Follow):
-            self._is_coming_back = not self._bounds.allows(motion.pose, seen.origin)
-            if self._is_coming_back:
-                return wish
-        fence = self._bounds.local(seen.origin)
-        return within_fence(wish, motion, fence, driving=self._settings.driving, now=now)
-
-    def _arrive(
-        self, task: Task, course: PathFollower, seen: VehicleView, motion: Motion, now: float
-    ) -> Demand | Becomes | None:
+    def _arrive(self, tick: Tick, course: PathFollower) -> Demand | Becomes | None:
         """End a leg: begin the next leg or step, leave the recovery path, or complete the task."""
+        task, _, motion, now = tick
         self._begin_leg(now=now)
         if course.advance(motion):
             if (course.by_course or course.steering) and course.misses > MISSES:
@@ -313,34 +335,22 @@ class Drive:
             return Becomes(S.COMPLETED)
         elif not (is_over(task.goal, course.progress) and course.progress.pending):
             after = self._leave_step(task, task.goal, now=now)
-            if isinstance(after, Becomes):
-                return after
-            return self._go_on(task, after, seen, motion, now=now)
+            return after if isinstance(after, Becomes) else self._go_on(tick, after)
         return None
 
     def _look_on_the_way(
-        self,
-        task: Task,
-        plan: Plan,
-        course: PathFollower,
-        motion: Motion,
-        *,
-        elapsed: float,
-        now: float,
-    ) -> None:
-        if not course.progress.pending:
-            return
-        target = course.progress.target
-        to_place = None if target is None else distance(motion.pose, target)
-        looked = look_on_the_way(plan, course.progress, to_place=to_place, elapsed=elapsed)
-        course.progress = looked.progress
-        self._note_done(task, looked, now=now)
-
-    def _note_done(self, task: Task, looked: OnTheWay, *, now: float) -> None:
+        self, tick: Tick, progress: Progress, *, to_place: float | None, elapsed: float
+    ) -> tuple[Progress, bool]:
+        """Do the steps on the way that are due; return whether one is a command to the vehicle."""
+        task, now = tick.task, tick.now
+        assert isinstance(task.goal, Plan), "only a plan has steps"
+        looked = look_on_the_way(task.goal, progress, to_place=to_place, elapsed=elapsed)
         for step in looked.done:
-            self._registry.reached(task.id, step, performs=step in looked.performed, now=now)
+            performs = looked.performs and step == looked.done[-1]
+            self._registry.reached(task.id, step, performs=performs, now=now)
         if looked.done:
             self._registry.advance(task.id, looked.progress, now=now)
+        return looked.progress, looked.performs
 
     def _leave_step(self, task: Task, plan: Plan, *, now: float) -> Progress | Becomes:
         """End the current step. Return the progress of the next one, or COMPLETED."""
@@ -352,53 +362,37 @@ class Drive:
         after = following(plan, replace(progress, pending=left))  # unmet Near conditions lapse
         return Becomes(S.COMPLETED) if after is None else after
 
-    def _go_on(
-        self, task: Task, progress: Progress, seen: VehicleView, motion: Motion, *, now: float
-    ) -> Demand | Becomes | None:
+    def _go_on(self, tick: Tick, progress: Progress) -> Demand | Becomes | None:
         """Begin the next step where the vehicle is, moving or not. Return why not, or None."""
-        self._registry.note_progress(task.id, progress)  # in any case the last step is done
-        here = self._set_out(task, progress, seen, motion, now=now)
+        task_id = tick.task.id
+        self._registry.note_progress(task_id, progress)  # in any case the last step is done
+        here = self._set_out(tick, progress)
         if isinstance(here, Becomes):
             return here
         if self._course is None:
-            self._registry.note_progress(task.id, here)
+            self._registry.note_progress(task_id, here)
             return view.STAND
-        self._registry.advance(task.id, here, now=now)
+        self._registry.advance(task_id, here, now=tick.now)
         return None
 
-    def _known(self, task: Task, seen: VehicleView, motion: Motion) -> Known:
-        return Known(self._driving_of(task), motion.pose, seen.home, seen.origin)
+    def _left(self, tick: Tick, progress: Progress) -> Estimate:
+        task, seen, motion, _ = tick
+        known = Known(self._driving_of(task), motion.pose, seen.home, seen.origin)
+        return time_left(task.goal, progress, known)
 
-    def _note_progress(
-        self, task: Task, seen: VehicleView, motion: Motion, *, executed: float, now: float
-    ) -> None:
+    def _note_progress(self, tick: Tick, *, executed: float) -> None:
         assert self._course is not None
-        progress = self._course.progress
+        progress, registry, now = self._course.progress, self._registry, tick.now
         if now - self._shared_at >= SHARE_EACH:
             self._shared_at = now
-            left = time_left(task.goal, progress, self._known(task, seen, motion)).seconds
+            left = self._left(tick, progress).seconds
             if not isnan(left):
                 share = max(progress.share, executed / max(executed + left, SHARE_EACH))
                 progress = replace(progress, share=share)
         progress = replace(progress, execution_time=executed, driven=self._driven)
         self._course.progress = progress
-        self._registry.note_progress(task.id, progress)
-        is_written = self._registry.durable >= self._kept_as  # no backlog for a store that is away
+        registry.note_progress(tick.task.id, progress)
+        is_written = registry.durable >= self._kept_as  # no backlog for a store that is away
         if now - self._kept_at >= KEEP_EACH and is_written:
-            self._registry.keep_progress(task.id, now=now)
-            self._kept_at, self._kept_as = now, self._registry.recorded
-
-    def rest(self, task: Task, motion: Motion, *, now: float) -> None:
-        """Record how far the vehicle rolled since the task was paused; it stands now."""
-        course = self._course
-        if course is None or self._way_back:
-            return
-        course.look(motion, elapsed=0.0)
-        self._registry.advance(task.id, course.progress, now=now)
-
-
-def _refused(task: Task) -> Becomes:
-    """Return the outcome of a way that crosses the fence; none of it is driven."""
-    if task.progress.anchor is None and task.progress.step < 0:
-        return Becomes(S.FAILED, R.OUTSIDE_FENCE)
-    return Becomes(S.HELD, R.FENCE)
+            registry.keep_progress(tick.task.id, now=now)
+            self._kept_at, self._kept_as = now, registry.recorded

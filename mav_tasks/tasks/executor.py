@@ -12,7 +12,7 @@ from mav_tasks.tasks import view
 from mav_tasks.tasks.drive import Becomes, Drive
 from mav_tasks.tasks.driving.bounds import Bounds
 from mav_tasks.tasks.driving.mission_sequencer import goal_of
-from mav_tasks.tasks.driving.recovery_path import is_off_line, was_handled
+from mav_tasks.tasks.driving.stage import is_off_line, was_handled
 from mav_tasks.tasks.events import SERVER, TaskWaits
 from mav_tasks.tasks.lifecycle import LOSSES, TAKEN, TERMINAL, TaskReason, TaskState
 from mav_tasks.tasks.registry import TaskRegistry

@@ -10,7 +10,7 @@ from math import inf
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import SET_FAILSAFE, Settings
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.displacement import LedAway
+from mav_tasks.tasks.driving.watches import LedAway
 from mav_tasks.tasks.events import QueuePaused, VehicleHalted
 from mav_tasks.tasks.executor import Executor
 from mav_tasks.tasks.goal import SingleGoal

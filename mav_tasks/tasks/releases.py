@@ -5,7 +5,7 @@ from dataclasses import replace
 from mav_tasks.errors import Rejection
 from mav_tasks.tasks.driving.legs import leg_of
 from mav_tasks.tasks.driving.mission_sequencer import goal_of, has_local_place
-from mav_tasks.tasks.driving.recovery_path import is_off_line
+from mav_tasks.tasks.driving.stage import is_off_line
 from mav_tasks.tasks.events import TaskWaits, VehicleNoted
 from mav_tasks.tasks.goal import MoveTurned, Rotate
 from mav_tasks.tasks.lifecycle import CONTINUE_FIRST, TaskReason, TaskState, words_of

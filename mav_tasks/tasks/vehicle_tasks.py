@@ -10,8 +10,8 @@ from math import inf
 from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks import view
-from mav_tasks.tasks.driving.jump import JumpWatch
 from mav_tasks.tasks.driving.mission_sequencer import goal_of, present_goal, skipped_to
+from mav_tasks.tasks.driving.watches import JumpWatch
 from mav_tasks.tasks.events import SERVER, QueueContinued
 from mav_tasks.tasks.executor import has_moved
 from mav_tasks.tasks.goal import Plan

@@ -20,8 +20,8 @@ from mav_tasks.errors import Rejection
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.choice import Candidate, Choice, choose, is_low
 from mav_tasks.tasks.driving.estimate import Estimate
-from mav_tasks.tasks.driving.legs import distance
 from mav_tasks.tasks.driving.mission_sequencer import present_goal
+from mav_tasks.tasks.driving.path import distance
 from mav_tasks.tasks.events import Event, TaskSubmitted
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.forecast import Forecast

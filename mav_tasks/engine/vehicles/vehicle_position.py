@@ -8,7 +8,7 @@ from mav_tasks.engine.vehicles.sender_clock import Heard, Stamped
 from mav_tasks.mavlink.messages import GlobalPositionInt
 from mav_tasks.settings import Watch
 from mav_tasks.tasks.driving.bounds import Bounds
-from mav_tasks.tasks.driving.legs import distance
+from mav_tasks.tasks.driving.path import distance
 from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import GlobalPlace, GoTo, LocalPlace, Step
 

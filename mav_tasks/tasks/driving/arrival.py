@@ -16,11 +16,11 @@ from mav_tasks.tasks.driving.guidance import (
     CREEP_RATE,
     CREEP_SPEED,
     TURN_GAIN,
+    Ending,
     Motion,
     Slowest,
     Velocity,
 )
-from mav_tasks.tasks.driving.path import Follow
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.goal import Move, Rotate
 
@@ -99,14 +99,8 @@ class Arrival:
         self.in_one_try = Creeping(
             least=LEAST_OF_ONE_TRY, lag=LAG_OF_ONE_TRY, most=MOST_COAST_OF_CAR, telling=TELLING
         )
-        self._is_settling = False  # zero is commanded until it stands
-        self._gives_up = False  # accept the error, if the end is near
-        self._corrections = 0
-        self._left_at_zero: tuple[float, float] | None = None  # what remained, at which speed
         self._best = 0.0  # the least that remained
-        self._best_at: float | None = None
-        #: since when a slow speed is commanded, what remained then, and the least speed since
-        self._crept: tuple[float, float, float] | None = None
+        self.begin_leg()
 
     def __repr__(self) -> str:
         return f"Arrival({self.along}, {self.around}, corrected {self._corrections} times)"
@@ -118,13 +112,15 @@ class Arrival:
 
     def begin_leg(self) -> None:
         """Reset for another leg."""
-        self._is_settling = self._gives_up = False
+        self._is_settling = False  # zero is commanded until it stands
+        self._gives_up = False  # accept the error, if the end is near
         self._corrections = 0
-        self._left_at_zero = self._best_at = self._crept = None
-        self.along.begins_again()
-        self.around.begins_again()
-        self.as_car.begins_again()
-        self.in_one_try.begins_again()
+        self._left_at_zero: tuple[float, float] | None = None  # what remained, at which speed
+        self._best_at: float | None = None  # when the least remained
+        #: since when a slow speed is commanded, what remained then, and the least speed since
+        self._crept: tuple[float, float, float] | None = None
+        for creeping in (self.along, self.around, self.as_car, self.in_one_try):
+            creeping.begins_again()
 
     def stands_here(
         self,
@@ -140,52 +136,50 @@ class Arrival:
 
         ``last`` is the last velocity commanded. If the rover also ``stands``, it has arrived.
         """
-        if not isinstance(course.leg, Move | Rotate | Follow):
+        leg, left = course.leg, abs(course.remaining)
+        if not isinstance(leg, Ending):
             return course.has_arrived(stands=stands, driving=driving)
+        is_turn = isinstance(leg, Rotate)
+        creeping = self.around if is_turn else self._driven(course)
         if stands:
-            return self._judge(course, driving=driving)
-        self._watch(course, driving=driving, now=now)
-        self._look_for_effect(course, motion, last, now=now)
-        speed = max(self._asked(course, last), self._measured(course, motion))
-        coast = self._creeping(course).coast(speed)
+            return self._judge(course, creeping, driving=driving)
+        if self._best_at is None or left < self._best - NEARER:
+            self._best, self._best_at = left, now
+        is_stalled = self._gives_up or now - self._best_at > STALLED
+        self._gives_up = is_stalled and course.is_settled(driving=driving)
+        asked = abs(last.yaw_rate if is_turn else last.forward)
+        turns_to_heading = isinstance(leg, Move) and abs(motion.yaw_rate) > TURNS
+        is_slow = 0.0 < asked <= MOST_CREEP and not turns_to_heading and left <= NEAR
+        self._look_for_effect(course, creeping, asked if is_slow else None, now=now)
         if self._is_settling or self._gives_up:
             return True
-        if course.has_arrived(stands=False, driving=driving, coast=coast):
+        # measured, too: a rover slows down later than commanded
+        speed = max(asked, abs(motion.yaw_rate if is_turn else motion.forward))
+        if course.has_arrived(stands=False, driving=driving, coast=creeping.coast(speed)):
             self._is_settling = True
             self._left_at_zero = (course.remaining, speed) if speed else None
-            return True
-        return False
+        return self._is_settling
 
-    def _judge(self, course: PathFollower, *, driving: Driving) -> bool:
+    def _judge(self, course: PathFollower, creeping: Creeping, *, driving: Driving) -> bool:
         """Return whether a rover that stands has arrived; learn from its stop."""
         if self._is_settling and self._left_at_zero is not None:
             left, speed = self._left_at_zero
-            self._creeping(course).rolled_on(left - course.remaining, speed)
+            creeping.rolled_on(left - course.remaining, speed)
         was_settling, self._is_settling, self._left_at_zero = self._is_settling, False, None
         if course.has_arrived(stands=True, driving=driving):
             return True
         if was_settling:
             self._corrections += 1
             if course.remaining < 0.0:
-                self._creeping(course).overshot()
+                creeping.overshot()
         most = 0 if course.has_one_try else CORRECTIONS
         return (self._gives_up or self._corrections > most) and course.is_settled(driving=driving)
 
-    def _watch(self, course: PathFollower, *, driving: Driving, now: float) -> None:
-        """Note whether the rover still makes progress."""
-        left = abs(course.remaining)
-        if self._best_at is None or left < self._best - NEARER:
-            self._best, self._best_at = left, now
-        is_near = course.is_settled(driving=driving)
-        self._gives_up = is_near and (self._gives_up or now - self._best_at > STALLED)
-
     def _look_for_effect(
-        self, course: PathFollower, motion: Motion, last: Velocity, *, now: float
+        self, course: PathFollower, creeping: Creeping, asked: float | None, *, now: float
     ) -> None:
-        """Raise the least speed if a slow setpoint near the end has no effect; not in a turn."""
-        asked = self._asked(course, last)
-        is_turning = isinstance(course.leg, Move) and abs(motion.yaw_rate) > TURNS
-        if not 0.0 < asked <= MOST_CREEP or is_turning or abs(course.remaining) > NEAR:
+        """Raise the least speed if a slow setpoint near the end has no effect."""
+        if asked is None:
             self._crept = None
             return
         since, before, slowest = self._crept or (now, course.remaining, asked)
@@ -193,22 +187,10 @@ class Arrival:
         self._crept = since, before, slowest
         if now - since >= ASKED:
             if abs(before - course.remaining) < EFFECT * slowest * (now - since):
-                self._creeping(course).had_no_effect(slowest)
+                creeping.had_no_effect(slowest)
             self._crept = None
-
-    def _creeping(self, course: PathFollower) -> Creeping:
-        if isinstance(course.leg, Rotate):
-            return self.around
-        return self._driven(course)
 
     def _driven(self, course: PathFollower) -> Creeping:
         if course.has_one_try:
             return self.in_one_try
         return self.along if course.steering is None else self.as_car
-
-    def _measured(self, course: PathFollower, motion: Motion) -> float:
-        """Return the measured speed: a rover slows down later than commanded."""
-        return abs(motion.yaw_rate if isinstance(course.leg, Rotate) else motion.forward)
-
-    def _asked(self, course: PathFollower, last: Velocity) -> float:
-        return abs(last.yaw_rate if isinstance(course.leg, Rotate) else last.forward)

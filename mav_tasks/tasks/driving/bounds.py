@@ -1,11 +1,11 @@
 """Where one vehicle may drive, and which rally point it returns to."""
 
 from collections.abc import Sequence
-from math import cos, sin
 
 from mav_tasks.tasks.driving.fence import Fence, LocalFence
-from mav_tasks.tasks.driving.legs import WAY, distance
-from mav_tasks.tasks.driving.path import pose_on, rest_of
+from mav_tasks.tasks.driving.legs import WAY
+from mav_tasks.tasks.driving.mission_sequencer import ways_on
+from mav_tasks.tasks.driving.path import Spot, distance, moved, pose_on, rest_of
 from mav_tasks.tasks.driving.planner import is_allowed
 from mav_tasks.tasks.frames import local_place, to_local
 from mav_tasks.tasks.goal import (
@@ -13,8 +13,6 @@ from mav_tasks.tasks.goal import (
     GlobalPlace,
     GoTo,
     Head,
-    Jump,
-    LocalPlace,
     Move,
     MoveTurned,
     SingleGoal,
@@ -50,7 +48,7 @@ class Bounds:
     def allows(self, pose: Pose, origin: GlobalPlace | None) -> bool:
         """Return whether the vehicle may be at a pose."""
         fence = self.local(origin)
-        return fence is None or fence.allows(LocalPlace(pose.north, pose.east))
+        return fence is None or fence.allows(pose)
 
     def metres_to_leave(
         self, goal: SingleGoal, progress: Progress, pose: Pose, origin: GlobalPlace | None
@@ -61,16 +59,14 @@ class Bounds:
         From outside, the way may lead back in. A goal without a place to end at is allowed, and
         watched while it drives.
         """
-        fence = self.local(origin)
-        end = _end_of(goal, progress)
+        fence, end = self.local(origin), _end_of(goal, progress)
         if fence is None or end is None:
             return None
-        start = LocalPlace(pose.north, pose.east)
         if progress.path and progress.anchor is not None:
             left = rest_of(progress.path, progress.done)
             there = pose_on(progress.anchor, progress.path, progress.done)
             return None if is_allowed(there, left, fence) else 0.0
-        return None if fence.escapes(start, end) else fence.first_forbidden(start, end)
+        return None if fence.escapes(pose, end) else fence.first_forbidden(pose, end)
 
     def forbidden_leg(self, steps: Sequence[Step], origin: GlobalPlace | None) -> int | None:
         """Return a step to which the straight way from the place before crosses the fence, or None.
@@ -80,10 +76,12 @@ class Bounds:
         fence = self.local(origin)
         if fence is None:
             return None
-        for number, step in enumerate(steps):
-            start = _place_of(step, origin)
+        places = [
+            local_place(step.place, origin) if isinstance(step, GoTo) else None for step in steps
+        ]
+        for number, start in enumerate(places):
             for following in _next_places(steps, number) if start else ():
-                end = _place_of(steps[following], origin)
+                end = places[following]
                 if start and end and not fence.allows_way(start, end):
                     return following
         return None
@@ -95,7 +93,7 @@ class Bounds:
         return min(self.rally, key=lambda place: distance(pose, to_local(place, origin)))
 
 
-def _end_of(goal: SingleGoal, progress: Progress) -> LocalPlace | None:
+def _end_of(goal: SingleGoal, progress: Progress) -> Spot | None:
     if isinstance(goal, GoTo):
         return progress.target
     anchor = progress.anchor
@@ -104,11 +102,7 @@ def _end_of(goal: SingleGoal, progress: Progress) -> LocalPlace | None:
     way = goal.distance
     if isinstance(goal, MoveTurned) and progress.leg != WAY:
         way = -way if progress.leg < WAY else 0.0  # it has not turned round yet, or is there
-    return LocalPlace(anchor.north + way * cos(anchor.yaw), anchor.east + way * sin(anchor.yaw))
-
-
-def _place_of(step: Step, origin: GlobalPlace | None) -> LocalPlace | None:
-    return local_place(step.place, origin) if isinstance(step, GoTo) else None
+    return moved(anchor, 0.0, way)
 
 
 def _next_places(steps: Sequence[Step], number: int) -> list[int]:
@@ -121,13 +115,8 @@ def _next_places(steps: Sequence[Step], number: int) -> list[int]:
         if step in seen or not 0 <= step < len(steps):
             continue
         seen.add(step)
-        match steps[step]:
-            case GoTo():
-                found.append(step)
-            case Move() | MoveTurned() | Drive() | Head():
-                pass  # its end is not known
-            case Jump(to=to):
-                waiting += [step + 1, to]
-            case _:
-                waiting.append(step + 1)
+        if isinstance(steps[step], GoTo):
+            found.append(step)
+        elif not isinstance(steps[step], Move | MoveTurned | Drive | Head):  # its end is not known
+            waiting += ways_on(steps, step)
     return found

@@ -4,14 +4,15 @@ A goal is followed leg by leg from where the vehicle is. The estimate ignores ot
 corrections near the end, pauses, and a car's bends, but for those of the run that it drives.
 """
 
-from math import cos, nan, sin, sqrt
+from dataclasses import replace
+from math import nan, sqrt
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.guidance import Leg, wrap
+from mav_tasks.tasks.driving.guidance import wrap
 from mav_tasks.tasks.driving.legs import WAY, anchor_of, leg_count, leg_of, length_of
-from mav_tasks.tasks.driving.mission_sequencer import following, is_over, present_goal, started
-from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.mission_sequencer import begun, following, is_over, present_goal
+from mav_tasks.tasks.driving.path import Follow, moved
 from mav_tasks.tasks.frames import local_place
 from mav_tasks.tasks.goal import (
     Drive,
@@ -20,13 +21,11 @@ from mav_tasks.tasks.goal import (
     Goal,
     GoTo,
     Head,
-    LocalPlace,
     Move,
     Plan,
     Rotate,
     SetSpeed,
     SingleGoal,
-    Wait,
 )
 from mav_tasks.tasks.task import Pose, Progress
 
@@ -57,27 +56,24 @@ UNKNOWN = Estimate(nan, None, nan)
 
 def time_left(goal: Goal, progress: Progress, known: Known) -> Estimate:
     """Return how long a task still takes; all of it if it has not started."""
-    if isinstance(goal, Plan):
-        return _time_of_plan(goal, progress, known)
-    return _time_of_goal(goal, progress, known, known.driving.speed)
-
-
-def _time_of_plan(plan: Plan, progress: Progress, known: Known) -> Estimate:
-    progress = progress if progress.step >= 0 else started(plan, progress)
-    speed = progress.speed or known.driving.speed
+    speed = known.driving.speed
+    if not isinstance(goal, Plan):
+        return _time_of_goal(goal, progress, known, speed)
+    progress = begun(goal, progress)
+    speed = progress.speed or speed
     seconds, pose, metres = 0.0, known.pose, 0.0
     for _ in range(MOST_STEPS):
-        for step in progress.pending:
-            present = plan.steps[step]
-            if isinstance(present, SetSpeed):
-                speed = present.speed or known.driving.speed
-        if is_over(plan, progress):
+        for number in progress.pending:
+            step = goal.steps[number]
+            if isinstance(step, SetSpeed):
+                speed = step.speed or known.driving.speed
+        if is_over(goal, progress):
             return Estimate(seconds, pose, metres)
-        goal = present_goal(plan, progress)
-        took, pose, way = _time_of_goal(goal, progress, known._replace(pose=pose), speed)
+        present = present_goal(goal, progress)
+        took, pose, way = _time_of_goal(present, progress, known._replace(pose=pose), speed)
         seconds += took
         metres += way
-        after = following(plan, progress)
+        after = following(goal, progress)
         if after is None or took != took:  # from an unknown place the rest is unknown, too
             break
         progress = after
@@ -89,67 +85,38 @@ def _time_of_goal(goal: SingleGoal, progress: Progress, known: Known, speed: flo
     if target is None and isinstance(goal, GoTo):
         target = local_place(known.home if goal.place is None else goal.place, known.origin)
     pose = known.pose
-    if progress.anchor is None and isinstance(goal, GoTo) and target is None:
+    is_unknown = pose is None or (isinstance(goal, GoTo) and target is None)
+    if is_unknown and progress.anchor is None and isinstance(goal, GoTo | Face):
         return UNKNOWN
-    if pose is None and progress.anchor is None and isinstance(goal, GoTo | Face):
-        return UNKNOWN
-    at, seconds, metres = pose or SOMEWHERE, SETTLING, 0.0
+    at, seconds, metres, driving = pose or SOMEWHERE, SETTLING, 0.0, known.driving
     for number in range(progress.leg, leg_count(goal)):
         if number == progress.leg and progress.anchor is not None:
-            anchor, done, leg = progress.anchor, progress.done, leg_of(goal, progress)
+            present, at = progress, progress.anchor
         else:
-            anchor, done = anchor_of(goal, number, at, target), 0.0
-            leg = leg_of(goal, Progress(anchor=anchor, leg=number, target=target))
-        left = max(0.0, length_of(leg) - done)
-        seconds += _seconds(leg, left, known.driving, speed)
-        metres += _way(leg, left)
-        at = _end_of(leg, anchor, target if number == WAY else None)
+            at = anchor_of(goal, number, at, target)
+            present = Progress(anchor=at, leg=number, target=target)
+        leg = leg_of(goal, present)
+        left = max(0.0, length_of(leg) - present.done)
+        took, way = left, 0.0
+        match leg:
+            case Move(speed=own) | Follow(speed=own):
+                took, way = _ramped(left, own or speed, driving.acceleration), left
+                at = moved(at, 0.0, leg.distance) if isinstance(leg, Move) else at
+            case Rotate(angle=angle, rate=rate):
+                took = _ramped(left, rate or driving.turn_rate, driving.turn_acceleration)
+                at = replace(at, yaw=wrap(at.yaw + angle))
+            case Head(yaw=heading, forward=forward, duration=duration):
+                way = abs(forward) * left
+                at = moved(replace(at, yaw=heading), 0.0, forward * duration)
+            case Drive(forward=forward, yaw_rate=turn, duration=duration):
+                way = abs(forward) * left
+                there = moved(at, turn / forward if forward else 0.0, forward * duration)
+                at = replace(there, yaw=wrap(at.yaw + turn * duration))
+        if number == WAY and target is not None:
+            at = replace(at, north=target.north, east=target.east)
+        seconds += took
+        metres += way
     return Estimate(seconds, None if pose is None and progress.anchor is None else at, metres)
-
-
-def _end_of(leg: Leg, anchor: Pose, place: LocalPlace | None) -> Pose:
-    """Return the end of a leg that begins at ``anchor``; ``place`` is the end of a go-to."""
-    north, east, yaw = anchor.north, anchor.east, anchor.yaw
-    if place is not None:
-        return Pose(place.north, place.east, yaw)
-    match leg:
-        case Move(distance=way):
-            return Pose(north + way * cos(yaw), east + way * sin(yaw), yaw)
-        case Rotate(angle=angle):
-            return Pose(north, east, wrap(yaw + angle))
-        case Head(yaw=heading, forward=forward, duration=duration):
-            way = forward * duration
-            return Pose(north + way * cos(heading), east + way * sin(heading), heading)
-        case Drive(forward=forward, yaw_rate=rate, duration=duration):
-            end = yaw + rate * duration
-            chord = forward * duration
-            if abs(rate * duration) > 1e-6:
-                chord = 2 * forward / rate * sin(rate * duration / 2)
-            middle = (yaw + end) / 2
-            return Pose(north + chord * cos(middle), east + chord * sin(middle), wrap(end))
-        case _:
-            return anchor
-
-
-def _way(leg: Leg, left: float) -> float:
-    """Return the metres of what is left of a leg."""
-    match leg:
-        case Move() | Follow():
-            return left
-        case Drive(forward=forward) | Head(forward=forward):
-            return abs(forward) * left
-        case Rotate() | Wait():
-            return 0.0
-
-
-def _seconds(leg: Leg, left: float, driving: Driving, speed: float) -> float:
-    match leg:
-        case Move(speed=own) | Follow(speed=own):
-            return _ramped(left, own or speed, driving.acceleration)
-        case Rotate(rate=rate):
-            return _ramped(left, rate or driving.turn_rate, driving.turn_acceleration)
-        case _:
-            return left
 
 
 def _ramped(way: float, top: float, acceleration: float) -> float:

@@ -1,20 +1,31 @@
-"""Guidance: (leg, where the vehicle is) → the velocity to command, or arrival. Stateless.
+"""Guidance: (leg or path, where the vehicle is) → the velocity to command. Stateless.
 
 The loop is closed on the measured pose. Nothing is integrated, so that a lost setpoint, a pause or
 a pre-emption leaves no error behind. ``limits`` bounds the velocity before it is sent.
 """
 
 from dataclasses import dataclass
-from math import atan, atan2, copysign, cos, hypot, pi, radians, sin, sqrt, tan
+from math import atan, atan2, copysign, cos, hypot, inf, pi, radians, sin, sqrt, tan
 from typing import NamedTuple
 
 from mav_tasks.settings import Driving
-from mav_tasks.tasks.driving.path import Follow, forward_of, nearest
+from mav_tasks.tasks.driving.path import (
+    Follow,
+    cross_track,
+    curvature_at,
+    direction_of,
+    forward_of,
+    nearest,
+    path_length,
+    pose_on,
+)
 from mav_tasks.tasks.goal import Drive, Head, Move, Rotate, Wait
 from mav_tasks.tasks.task import Pose
 
 #: the goals that can be steered; ``legs`` splits every goal into these
 Leg = Move | Rotate | Drive | Head | Wait | Follow
+Line = Move | Follow  # metres of line, straight or not
+Ending = Line | Rotate  # those with an end to come nearer to; the others last for a time
 
 APPROACH_GAIN = 1.2  # 1/s, in the last centimetres: speed = gain * remaining
 #: m/s, the least setpoint; half of it moved no ArduPilot reliably (its PWM is then 1500)
@@ -34,6 +45,21 @@ BOW_SPEED = 0.2
 #: factor on a car's known curvature that may be commanded: with default gains ArduPilot's steering
 #: reaches half of it (4.6.3, SITL)
 MORE_CURVATURE = 2.0
+#: m/s², lateral acceleration in bends. ArduPilot's own limit is 0.6 g (ATC_TURN_MAX_G), at which
+#: its simulated car (4.6.3) is far outside a bend before its wheels have turned
+ACROSS = 0.5
+#: m/s, limit for a bend that ends just before the path does. With 0.15 s of delay, 30 % overspeed
+#: and half the commanded curvature, a place is then reached within 6 cm (p95), otherwise 13 cm
+SLOW_BEND = 0.35
+SETTLING = 2.5  # s until a vehicle is back on its path after a bend: five times REACH_TIME
+PREVIEW = 0.2  # s until the wheels point as commanded
+LEAST_REACH = 0.25  # m in which a heading error is corrected
+REACH_TIME = 0.5  # s, the same for a fast vehicle, which reacts 0.2 s late
+SLOWEST = 0.1  # m/s; a measured speed below it is too vague to compute a turn rate
+#: m ahead on the path, the aim of a vehicle that is steered by course; metre-class GPS is off by
+#: 0.2 m from one moment to the next
+LOOKAHEAD = 1.0
+LOOKAHEAD_TIME = 1.0  # s, the same for a fast vehicle
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +120,11 @@ def wrap(angle: float) -> float:
     return atan2(sin(angle), cos(angle))
 
 
+def clamped(value: float, most: float) -> float:
+    """Return the value that is nearest to this one and within ±``most``."""
+    return max(-most, min(most, value))
+
+
 def done_so_far(
     leg: Leg, anchor: Pose, pose: Pose, *, before: float, elapsed: float = 0.0
 ) -> float:
@@ -116,33 +147,24 @@ def done_so_far(
             return before + elapsed
 
 
-def cross_track(anchor: Pose, pose: Pose) -> float:
-    """Return the metres to the right of the line from the anchor along its yaw."""
-    return (pose.east - anchor.east) * cos(anchor.yaw) - (pose.north - anchor.north) * sin(
-        anchor.yaw
-    )
-
-
 def has_arrived(leg: Leg, remaining: float, *, within: float, driving: Driving) -> bool:
     """Return whether ``remaining`` is within tolerance; ``within`` is a factor on the tolerance."""
-    match leg:
-        case Move() | Follow():
-            return abs(remaining) <= within * driving.arrival_distance
-        case Rotate():
-            return abs(remaining) <= within * driving.arrival_angle
-        case Drive() | Head() | Wait():
-            return remaining <= 0.0
+    return _is_within(
+        leg, remaining, within * driving.arrival_distance, within * driving.arrival_angle
+    )
 
 
 def is_settled(leg: Leg, remaining: float, *, driving: Driving) -> bool:
     """Return whether the end is near enough for a rover that can come no nearer."""
-    match leg:
-        case Move() | Follow():
-            return abs(remaining) <= max(driving.settle_distance, driving.arrival_distance)
-        case Rotate():
-            return abs(remaining) <= max(driving.settle_angle, driving.arrival_angle)
-        case Drive() | Head() | Wait():
-            return remaining <= 0.0
+    metres = max(driving.settle_distance, driving.arrival_distance)
+    return _is_within(leg, remaining, metres, max(driving.settle_angle, driving.arrival_angle))
+
+
+def _is_within(leg: Leg, remaining: float, metres: float, angle: float) -> bool:
+    """Return whether the end of a leg is this near; a time has to be over."""
+    if isinstance(leg, Ending):
+        return abs(remaining) <= (angle if isinstance(leg, Rotate) else metres)
+    return remaining <= 0.0
 
 
 def steer(
@@ -157,7 +179,7 @@ def steer(
     radius: float | None = None,
     slowest: Slowest = USUAL,
 ) -> Velocity:
-    """Return the velocity towards the leg's end; ``follow.steer_along`` does so for a path.
+    """Return the velocity towards the leg's end; ``steer_along`` does so for a path.
 
     ``remaining`` is negative beyond the end; the vehicle then drives back slowly. ``passing`` is
     the speed of a move at its end, m/s, if another follows. ``by_course``: the vehicle is steered
@@ -175,7 +197,6 @@ def steer(
             )
             forward = copysign(towards_end, distance * remaining)
             error = _heading_error(anchor, pose, forward=forward)
-            return _towards(error, forward, pose=pose, by_course=by_course, radius=radius)
         case Rotate(angle=angle, rate=rate):
             towards_end = approach(
                 remaining,
@@ -185,36 +206,28 @@ def steer(
                 creep=slowest.rate,
             )
             turn = copysign(towards_end, angle * remaining)
-            if by_course:  # it turns by itself at its full rate: keep the lead small
-                ahead = max(LEAST_AHEAD, AHEAD * abs(turn))
-                lead = copysign(min(abs(remaining), ahead), turn)
-                return Velocity(0.0, 0.0, wrap(pose.yaw + lead))
-            return Velocity(0.0, turn)
+            if not by_course:
+                return Velocity(0.0, turn)
+            # it turns by itself at its full rate: keep the lead small
+            ahead = max(LEAST_AHEAD, AHEAD * abs(turn))
+            lead = copysign(min(abs(remaining), ahead), turn)
+            return Velocity(0.0, 0.0, wrap(pose.yaw + lead))
         case Drive(forward=forward, yaw_rate=yaw_rate):
             return Velocity(forward, yaw_rate, anchor.yaw if by_course else None)
         case Head(yaw=yaw, forward=forward):
             error = wrap(yaw - pose.yaw)
-            return _towards(error, forward, pose=pose, by_course=by_course, radius=radius)
         case Wait() | Follow():
             return ZERO
-
-
-def _towards(
-    heading_error: float, forward: float, *, pose: Pose, by_course: bool, radius: float | None
-) -> Velocity:
-    """Return a velocity that drives if the heading is about right, and first turns otherwise.
-
-    A car, or a vehicle steered by course, drives slowly meanwhile instead of turning on the spot.
-    """
+    # it drives if its heading is about right, and turns otherwise; a car, or a vehicle that is
+    # steered by course, drives slowly meanwhile instead of turning on the spot
     if by_course:
-        slow = min(forward, BOW_SPEED) if is_far_off(heading_error) else forward
-        return Velocity(max(slow, 0.0), 0.0, wrap(pose.yaw + heading_error))
-    rate = max(-MAX_STEER_RATE, min(MAX_STEER_RATE, HEADING_GAIN * heading_error))
-    if radius is not None:
-        slow = min(abs(forward), BOW_SPEED) if is_far_off(heading_error) else abs(forward)
-        most = MORE_CURVATURE * slow / radius
-        return Velocity(copysign(slow, forward), max(-most, min(most, rate)))
-    return Velocity(0.0 if is_far_off(heading_error) else forward, rate)
+        slow = min(forward, BOW_SPEED) if is_far_off(error) else forward
+        return Velocity(max(slow, 0.0), 0.0, wrap(pose.yaw + error))
+    turn = clamped(HEADING_GAIN * error, MAX_STEER_RATE)
+    if radius is None:
+        return Velocity(0.0 if is_far_off(error) else forward, turn)
+    slow = min(abs(forward), BOW_SPEED) if is_far_off(error) else abs(forward)
+    return Velocity(copysign(slow, forward), clamped(turn, MORE_CURVATURE * slow / radius))
 
 
 def is_far_off(heading_error: float) -> bool:
@@ -252,6 +265,92 @@ def _heading_error(anchor: Pose, pose: Pose, *, forward: float) -> float:
     """Return the angle to turn by to get back to the line; smaller at low speed."""
     ahead = copysign(1.0, forward)
     speed_share = min(1.0, abs(forward) / 0.2)  # below 0.2 m/s only the heading counts
-    approach = atan(CROSS_TRACK_GAIN * cross_track(anchor, pose)) * speed_share
-    approach = max(-MAX_APPROACH_ANGLE, min(MAX_APPROACH_ANGLE, approach))
-    return wrap(anchor.yaw - ahead * approach - pose.yaw)
+    back = atan(CROSS_TRACK_GAIN * cross_track(anchor, pose)) * speed_share
+    return wrap(anchor.yaw - ahead * clamped(back, MAX_APPROACH_ANGLE) - pose.yaw)
+
+
+def steer_along(
+    leg: Follow,
+    anchor: Pose,
+    motion: Motion,
+    *,
+    along: float,
+    remaining: float,
+    driving: Driving,
+    radius: float,
+    passing: float = 0.0,
+    by_course: bool = False,
+    settles: bool = True,
+    slowest: Slowest = USUAL,
+) -> Velocity:
+    """Return the velocity that drives the vehicle along its path, and back to it.
+
+    ``along`` is its place on the path, ``remaining`` the rest, negative beyond the end. ``passing``
+    is its speed at the end, m/s, if it goes on there. ``radius`` is its minimum turning radius, m.
+    ``settles``: it shall be exact at the end, and not only on the way.
+    """
+    # a vehicle that is steered by course is less exact, and may not move at all at low speed: PX4's
+    # simulated one does not at 0.5 m/s (1.17, factory gains)
+    settles = settles and passing == 0.0 and not by_course
+    bends = _speed_in_bends(leg, along, driving, settles=settles)
+    top = min(leg.speed or driving.speed, bends)
+    speed = approach(
+        remaining,
+        top=top,
+        braking=driving.acceleration,
+        gain=slowest.gain,
+        creep=slowest.speed,
+        at_end=passing,
+    )
+    if by_course:
+        there = pose_on(anchor, leg.path, along + max(LOOKAHEAD, LOOKAHEAD_TIME * motion.speed))
+        here = motion.pose
+        return Velocity(speed, 0.0, atan2(there.east - here.east, there.north - here.north))
+    forward = copysign(speed, direction_of(leg.path) * remaining)
+    curvature = clamped(_curvature(leg, anchor, motion, along, forward), MORE_CURVATURE / radius)
+    rolling = min(max(abs(motion.forward), min(speed, SLOWEST)), 2 * speed)
+    return Velocity(forward, clamped(curvature * copysign(rolling, forward), driving.max_turn_rate))
+
+
+def bend_speed(curvature: float, driving: Driving) -> float:
+    """Return the highest speed in m/s for a circle of this curvature."""
+    bend = abs(curvature)
+    if bend == 0.0:
+        return inf
+    return min(driving.turn_rate / bend, sqrt(ACROSS / bend))
+
+
+def _speed_in_bends(leg: Follow, along: float, driving: Driving, *, settles: bool) -> float:
+    """Return the highest speed that still lets it slow down for every bend ahead.
+
+    ``settles``: it leaves the last bend slowly enough to be back on its path at the end.
+    """
+    fastest, begins = inf, 0.0
+    left = path_length(leg.path)
+    for bend in leg.path:
+        ends = begins + abs(bend.length)
+        left -= abs(bend.length)
+        if ends >= along:
+            there = bend_speed(bend.curvature, driving)
+            if there < inf and settles:
+                there = min(there, max(SLOW_BEND, left / SETTLING))
+            ahead = max(0.0, begins - along)
+            fastest = min(fastest, sqrt(there * there + driving.acceleration * ahead))
+        begins = ends
+    return fastest
+
+
+def _curvature(leg: Follow, anchor: Pose, motion: Motion, along: float, forward: float) -> float:
+    """Return the path's curvature, corrected for heading error and cross-track error.
+
+    Cross-track error e and heading error h change, for each metre, by d*h and d*(k - path's k),
+    with d 1 forwards and -1 backwards. With reach r, k - path's k = -(h + d*e/2r) * d/r damps both.
+    """
+    path, d = leg.path, copysign(1.0, forward)
+    reach = max(LEAST_REACH, REACH_TIME * motion.speed)
+    on_path = min(max(along, 0.0), path_length(path))
+    there = pose_on(anchor, path, along)
+    error = wrap(motion.pose.yaw - there.yaw)
+    back = clamped(cross_track(there, motion.pose) / (2 * reach), MAX_APPROACH_ANGLE)
+    soon = min(on_path + PREVIEW * motion.speed, path_length(path))
+    return curvature_at(path, soon) - d * (error + d * back) / reach

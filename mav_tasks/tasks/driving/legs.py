@@ -6,10 +6,10 @@ task drives the very same ones.
 """
 
 from dataclasses import replace
-from math import atan2, copysign, cos, hypot, pi, sin, tau
+from math import copysign, pi, tau
 
 from mav_tasks.tasks.driving.guidance import Leg, wrap
-from mav_tasks.tasks.driving.path import Follow, Path, path_length
+from mav_tasks.tasks.driving.path import Follow, bearing, distance, moved, path_length
 from mav_tasks.tasks.goal import (
     Drive,
     Face,
@@ -44,17 +44,15 @@ def anchor_of(goal: SingleGoal, leg: int, pose: Pose, target: LocalPlace | None)
     return pose
 
 
+def begun_leg(goal: SingleGoal, progress: Progress, leg: int, pose: Pose) -> Progress:
+    """Return the progress with which a leg begins at a pose."""
+    anchor = anchor_of(goal, leg, pose, progress.target)
+    return replace(progress, leg=leg, anchor=anchor, done=0.0, path=())
+
+
 def heading_to(goal: GoTo, pose: Pose, target: LocalPlace) -> float:
     """Return the heading of the vehicle when it drives straight to a place."""
     return bearing(pose, target) + pi * goal.backwards
-
-
-def circling(goal: GoTo, path: Path, *, done: float) -> float:
-    """Return the radians of a circle that are still to be driven, after the way onto it."""
-    if not path:
-        return tau * goal.turns
-    left = min(path[-1].length, path_length(path) - done)
-    return max(0.0, left * abs(path[-1].curvature))
 
 
 def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
@@ -62,20 +60,16 @@ def leg_of(goal: SingleGoal, progress: Progress) -> Leg:
     anchor = progress.anchor
     assert anchor is not None, "a leg is driven from its anchor"
     match goal:
-        case Move() | Rotate() | Drive() | Wait():
-            return goal
-        case MoveTurned(distance=distance, speed=speed):
-            return Move(distance, speed) if progress.leg == WAY else Rotate(pi)
-        case Head():
-            return (
-                replace(goal, yaw=wrap(anchor.yaw + goal.yaw), is_relative=False)
-                if (goal.is_relative)
-                else goal
-            )
+        case MoveTurned(distance=metres, speed=speed):
+            return Move(metres, speed) if progress.leg == WAY else Rotate(pi)
+        case Head(yaw=yaw, is_relative=True):
+            return replace(goal, yaw=wrap(anchor.yaw + yaw), is_relative=False)
         case Face(yaw=yaw, direction=direction, rate=rate):
             return Rotate(_turn(anchor.yaw, yaw, direction), rate)
         case GoTo():
             return _leg_of_way(goal, progress, anchor)
+        case _:
+            return goal
 
 
 def first_leg(goal: SingleGoal) -> Leg | None:
@@ -86,8 +80,8 @@ def first_leg(goal: SingleGoal) -> Leg | None:
 def length_of(leg: Leg) -> float:
     """Return the whole length of a leg, unsigned: metres, radians or seconds."""
     match leg:
-        case Move(distance=distance):
-            return abs(distance)
+        case Move(distance=metres):
+            return abs(metres)
         case Rotate(angle=angle):
             return abs(angle)
         case Follow(path=path):
@@ -102,39 +96,22 @@ def begun_from(goal: SingleGoal, pose: Pose, done: float) -> Pose:
     It is for a task that resumes from here because its own anchor is lost.
     """
     match goal:
-        case Move(distance=distance):
-            back = -copysign(done, distance)
-            return replace(
-                pose,
-                north=pose.north + back * cos(pose.yaw),
-                east=pose.east + back * sin(pose.yaw),
-            )
+        case Move(distance=metres):
+            return moved(pose, 0.0, -copysign(done, metres))
         case Rotate(angle=angle):
             return replace(pose, yaw=wrap(pose.yaw - copysign(done, angle)))
         case _:
             return pose
 
 
-def bearing(pose: Pose, place: LocalPlace) -> float:
-    """Return the direction of a place, or the vehicle's heading if it is already there."""
-    if distance(pose, place) < 1e-6:
-        return pose.yaw
-    return atan2(place.east - pose.east, place.north - pose.north)
-
-
-def distance(pose: Pose, place: LocalPlace | Pose) -> float:
-    """Return the metres from a pose to a place, or to another pose."""
-    return hypot(place.north - pose.north, place.east - pose.east)
-
-
 def _leg_of_way(goal: GoTo, progress: Progress, anchor: Pose) -> Leg:
     if progress.leg <= WAY:
         assert progress.target is not None, "the place was found before the task began"
-        way = distance(anchor, progress.target)
         if progress.path:
             return Follow(progress.path, goal.speed)
         if progress.leg == FACE:
             return Rotate(wrap(heading_to(goal, anchor, progress.target) - anchor.yaw))
+        way = distance(anchor, progress.target)
         if goal.turns:  # only to estimate it: the way onto it is planned when it begins
             return Move(way + tau * goal.turns * abs(goal.around), goal.speed)
         return Move(-way if goal.backwards else way, goal.speed)

@@ -8,7 +8,7 @@ from math import ceil, copysign, isfinite, sqrt
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import LocalFence
-from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, wrap
+from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity, clamped, wrap
 
 MARGIN = 0.05  # m left between a vehicle and its fence
 LATENCY = 0.3  # s until a vehicle does what it is told, including the age of its telemetry
@@ -63,23 +63,13 @@ def limited(wish: Velocity, last: Velocity, *, driving: Driving, elapsed: float)
     Acceleration is ramped as the settings say, deceleration is not. A number that is not finite
     becomes a stop: NaN in a velocity setpoint aborts an ArduPilot SITL.
     """
-    if wish.is_zero or not (isfinite(wish.forward) and isfinite(wish.yaw_rate)):
+    numbers = wish.forward, wish.yaw_rate, wish.course or 0.0
+    if wish.is_zero or not all(map(isfinite, numbers)):
         return ZERO
-    if wish.course is not None and not isfinite(wish.course):
-        return ZERO
+    step, turn_step = driving.acceleration * elapsed, driving.turn_acceleration * elapsed
     return Velocity(
-        _ramped(
-            wish.forward,
-            last.forward,
-            top=driving.max_speed,
-            step=driving.acceleration * elapsed,
-        ),
-        _ramped(
-            wish.yaw_rate,
-            last.yaw_rate,
-            top=driving.max_turn_rate,
-            step=driving.turn_acceleration * elapsed,
-        ),
+        _ramped(clamped(wish.forward, driving.max_speed), last.forward, step),
+        _ramped(clamped(wish.yaw_rate, driving.max_turn_rate), last.yaw_rate, turn_step),
         wish.course,
     )
 
@@ -97,8 +87,7 @@ def safe_braking(driving: Driving, speed: float, distance: float) -> float:
     return min(planned, speed * speed / (2 * distance))
 
 
-def _ramped(wish: float, last: float, *, top: float, step: float) -> float:
-    wish = max(-top, min(top, wish))
+def _ramped(wish: float, last: float, step: float) -> float:
     if wish >= 0:
         return min(wish, max(last, 0.0) + step)
     return max(wish, min(last, 0.0) - step)

@@ -5,17 +5,26 @@ to the way to the second one, as in autopilots: they are ``pending`` when it beg
 while it is driven.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
+from math import inf
+from typing import NamedTuple
 
 from mav_tasks.tasks.goal import (
+    Delay,
     Goal,
     GoTo,
     Jump,
     LocalPlace,
+    Near,
     OnTheWay,
+    Perform,
     Plan,
     SetReverse,
+    SetSpeed,
     SingleGoal,
+    Step,
     Wait,
     steps_of,
 )
@@ -23,6 +32,14 @@ from mav_tasks.tasks.task import Progress, Task
 
 SHORT = 1.0  # s; a loop of shorter waits would only keep the server busy
 END = Wait(0.0)  # past the last step: pending steps are still done
+
+
+class Looked(NamedTuple):
+    """The steps on the way that one look has done."""
+
+    progress: Progress
+    done: tuple[int, ...]
+    performs: bool  # whether the last of them is a command to the vehicle
 
 
 def has_local_place(goal: Goal) -> bool:
@@ -35,7 +52,7 @@ def present_goal(goal: Goal, progress: Progress) -> SingleGoal:
     """Return the goal that is being driven, or that will be first."""
     if not isinstance(goal, Plan):
         return goal
-    progress = progress if progress.step >= 0 else started(goal, progress)
+    progress = begun(goal, progress)
     driven = _driven(goal, progress.step) or END
     if progress.backwards and isinstance(driven, GoTo) and driven.place and not driven.turns:
         return replace(driven, backwards=True)  # a return and a circle are driven forwards
@@ -49,17 +66,19 @@ def goal_of(task: Task) -> SingleGoal:
 
 def started(plan: Plan, progress: Progress) -> Progress:
     """Return the progress with which a plan starts."""
-    return _at(plan, replace(progress, jumps=(), speed=None, backwards=False), plan.first)
+    return skipped_to(plan, replace(progress, jumps=(), speed=None, backwards=False), plan.first)
+
+
+def begun(goal: Goal, progress: Progress) -> Progress:
+    """Return the progress of a goal that has started, which a plan does with its first step."""
+    if isinstance(goal, Plan) and progress.step < 0:
+        return started(goal, progress)
+    return progress
 
 
 def following(plan: Plan, progress: Progress) -> Progress | None:
     """Return the progress with which the next step begins; None if the plan is over."""
-    return None if is_over(plan, progress) else _at(plan, progress, progress.step + 1)
-
-
-def skipped_to(plan: Plan, progress: Progress, step: int) -> Progress:
-    """Return the progress with which a plan continues at another step."""
-    return _at(plan, progress, step)
+    return None if is_over(plan, progress) else skipped_to(plan, progress, progress.step + 1)
 
 
 def is_over(plan: Plan, progress: Progress) -> bool:
@@ -78,27 +97,52 @@ def goes_on_to_a_place(plan: Plan, progress: Progress) -> GoTo | None:
 
 
 def loops_in_vain(plan: Plan) -> int | None:
-    """Return the step that closes a loop in which nothing is driven, or None.
+    """Return the jump that closes a loop in which nothing is driven, or None.
 
     It assumes that every jump may be taken, or not taken, at any time.
     """
-    done: set[int] = set()
-    for start in range(len(plan.steps)):
-        path: list[int] = []  # from ``start``: the steps that are not fully explored
-        on_path: set[int] = set()
-        waiting = [start]
-        while waiting:
-            step = waiting.pop()
-            if step < 0:  # everything after this step is explored
-                on_path.discard(path.pop())
-                done.add(~step)
-            elif step in on_path:
-                return path[-1]
-            elif step not in done and step < len(plan.steps) and _takes_no_time(plan, step):
-                path.append(step)
-                on_path.add(step)
-                waiting += [~step, *_ways_on(plan, step)]
+    steps = range(len(plan.steps))
+    ways = {step: ways_on(plan.steps, step) for step in steps if _takes_no_time(plan, step)}
+    try:
+        TopologicalSorter(ways).prepare()
+    except CycleError as why:
+        loop: list[int] = why.args[1]
+        return max(loop)
     return None
+
+
+def look_on_the_way(
+    plan: Plan, progress: Progress, *, to_place: float | None, elapsed: float
+) -> Looked:
+    """Do those pending steps that are due.
+
+    ``to_place`` is the metres to the place that is driven to, None without one; ``elapsed`` the
+    seconds since the last look.
+    """
+    done: list[int] = []
+    performs = False
+    left_to_place = -inf if to_place is None else to_place
+    for number in progress.pending:
+        match plan.steps[number]:
+            case Delay(seconds=seconds):
+                waited = progress.pending_for + elapsed
+                if waited < seconds:
+                    progress = replace(progress, pending_for=waited)
+                    break
+                elapsed = waited - seconds
+                progress = replace(progress, pending_for=0.0)
+            case Near(distance=near) if left_to_place > near:
+                break
+            case SetSpeed(speed=speed):
+                progress = replace(progress, speed=speed)
+            case Perform():
+                performs = True
+        done.append(number)
+        if performs:  # one at a time: the vehicle answers each
+            break
+    if done:
+        progress = replace(progress, pending=progress.pending[len(done) :])
+    return Looked(progress, tuple(done), performs)
 
 
 def _takes_no_time(plan: Plan, step: int) -> bool:
@@ -106,8 +150,9 @@ def _takes_no_time(plan: Plan, step: int) -> bool:
     return goal is None or (isinstance(goal, Wait) and goal.duration < SHORT)
 
 
-def _ways_on(plan: Plan, step: int) -> list[int]:
-    present = plan.steps[step]
+def ways_on(steps: Sequence[Step], step: int) -> list[int]:
+    """Return the steps that may follow another, whichever jumps are taken."""
+    present = steps[step]
     return [step + 1, present.to] if isinstance(present, Jump) else [step + 1]
 
 
@@ -116,8 +161,8 @@ def _driven(plan: Plan, step: int) -> SingleGoal | None:
     return goal if isinstance(goal, SingleGoal) else None
 
 
-def _at(plan: Plan, progress: Progress, step: int) -> Progress:
-    """Return the progress at the next step that drives, or past the end."""
+def skipped_to(plan: Plan, progress: Progress, step: int) -> Progress:
+    """Return the progress at a step, or at the next one that drives, or past the end."""
     made = dict(zip(progress.jumps[::2], progress.jumps[1::2], strict=True))
     pending = dict.fromkeys(progress.pending)  # each once, or a loop would add ever more
     backwards = progress.backwards

@@ -1,16 +1,20 @@
-"""Paths of bounded curvature: arcs and straights, one after another. Geometry only.
+"""Poses, and paths of bounded curvature: arcs and straights, one after another. Geometry only.
 
 A path begins at a pose, its anchor, and a place on it is given in metres along it. Hence the
 anchor, the pieces and one number say how far a vehicle has come. Within one path a vehicle drives
 in one direction, forwards or backwards.
 """
 
+from cmath import phase, rect
 from collections.abc import Iterator
-from dataclasses import dataclass
-from math import atan2, copysign, cos, hypot, inf, pi, sin, tau
+from dataclasses import dataclass, replace
+from itertools import groupby
+from math import atan2, copysign, hypot, pi, tau
 
+from mav_tasks.tasks.goal import LocalPlace
 from mav_tasks.tasks.task import Bend, Pose
 
+Spot = LocalPlace | Pose
 Path = tuple[Bend, ...]
 
 #: m along a path, to either side of a vehicle's last place, in which it is searched: where a path
@@ -26,23 +30,47 @@ class Follow:
     path: Path
     speed: float | None = None
 
-    @property
-    def is_reverse(self) -> bool:
-        """Whether it is driven backwards."""
-        return self.path[0].length < 0
+
+def distance(here: Spot, there: Spot) -> float:
+    """Return the metres from one place to another."""
+    return hypot(there.north - here.north, there.east - here.east)
+
+
+def point_of(place: Spot) -> complex:
+    """Return a place as a number: metres north, and imaginary ones east."""
+    return complex(place.north, place.east)
+
+
+def bearing(pose: Pose, place: Spot) -> float:
+    """Return the direction of a place, or the vehicle's heading if it is already there."""
+    if distance(pose, place) < 1e-6:
+        return pose.yaw
+    return atan2(place.east - pose.east, place.north - pose.north)
+
+
+def seen_from(start: Pose, pose: Pose) -> complex:
+    """Return how many metres a pose is ahead of another, and as imaginary ones to its right."""
+    return (point_of(pose) - point_of(start)) * rect(1.0, -start.yaw)
+
+
+def forward_of(start: Pose, pose: Pose) -> float:
+    """Return how many metres a pose is ahead of another, along the yaw of that."""
+    return seen_from(start, pose).real
+
+
+def cross_track(start: Pose, pose: Pose) -> float:
+    """Return how many metres a pose is to the right of the line from another along its yaw."""
+    return seen_from(start, pose).imag
 
 
 def moved(pose: Pose, curvature: float, length: float) -> Pose:
     """Return the pose after ``length`` metres on a circle, or straight on; negative: backwards."""
     if abs(curvature) < STRAIGHT:
-        north, east = length * cos(pose.yaw), length * sin(pose.yaw)
-        return Pose(pose.north + north, pose.east + east, pose.yaw)
-    yaw = pose.yaw + curvature * length
-    return Pose(
-        pose.north + (sin(yaw) - sin(pose.yaw)) / curvature,
-        pose.east - (cos(yaw) - cos(pose.yaw)) / curvature,
-        yaw,
-    )
+        yaw, way = pose.yaw, rect(length, pose.yaw)
+    else:
+        yaw = pose.yaw + curvature * length
+        way = (rect(1.0, yaw) - rect(1.0, pose.yaw)) / (1j * curvature)
+    return Pose(pose.north + way.real, pose.east + way.imag, yaw)
 
 
 def path_length(path: Path) -> float:
@@ -52,11 +80,8 @@ def path_length(path: Path) -> float:
 
 def pose_on(anchor: Pose, path: Path, along: float) -> Pose:
     """Return the pose ``along`` metres on a path; it extends straight before and beyond."""
-    pose = anchor
-    ahead = _direction(path)
-    if along <= 0:
-        return moved(pose, 0.0, ahead * along)
-    for bend in path:
+    pose, ahead = anchor, direction_of(path)
+    for bend in path if along > 0 else ():
         length = abs(bend.length)
         if along <= length:
             return moved(pose, bend.curvature, ahead * along)
@@ -78,24 +103,16 @@ def nearest(
     anchor: Pose, path: Path, pose: Pose, *, around: float, window: float = WINDOW
 ) -> float:
     """Return the place on a path that is nearest to a pose, within ``window`` of ``around``."""
-    best, least = around, inf
-    for along in _candidates(anchor, path, pose, around=around):
-        if abs(along - around) > window:
-            continue
-        there = pose_on(anchor, path, along)
-        away = hypot(there.north - pose.north, there.east - pose.east)
-        if away < least:
-            best, least = along, away
-    if least == inf:  # no place in the window: stay at the last one
+    places = _candidates(anchor, path, pose, around=around)
+    near = [along for along in places if abs(along - around) <= window]
+    if not near:  # stay at the last one
         return min(max(around, 0.0), path_length(path))
-    return best
+    return min(near, key=lambda along: distance(pose_on(anchor, path, along), pose))
 
 
 def beside(anchor: Pose, path: Path, pose: Pose, along: float) -> float:
     """Return how many metres a pose is to the right of a place on a path."""
-    there = pose_on(anchor, path, along)
-    east, north = pose.east - there.east, pose.north - there.north
-    return east * cos(there.yaw) - north * sin(there.yaw)
+    return cross_track(pose_on(anchor, path, along), pose)
 
 
 def joined(first: Path, second: Path) -> Path:
@@ -125,22 +142,17 @@ def rest_of(path: Path, done: float) -> Path:
 
 def runs_of(path: Path) -> list[Path]:
     """Return the runs of a way, between which a vehicle changes its direction."""
-    runs: list[list[Bend]] = []
-    for bend in path:
-        if runs and (runs[-1][0].length < 0) == (bend.length < 0):
-            runs[-1].append(bend)
-        else:
-            runs.append([bend])
-    return [tuple(run) for run in runs]
+    return [tuple(run) for _, run in groupby(path, lambda bend: bend.length < 0)]
 
 
-def _direction(path: Path) -> float:
+def direction_of(path: Path) -> float:
+    """Return -1.0 for a path that is driven backwards, otherwise 1.0."""
     return -1.0 if path and path[0].length < 0 else 1.0
 
 
 def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Iterator[float]:
     """Yield the nearest place to a pose for each piece, and for both extensions."""
-    start, begins, ahead = anchor, 0.0, _direction(path)
+    start, begins, ahead = anchor, 0.0, direction_of(path)
     yield min(0.0, ahead * forward_of(anchor, pose))
     for bend in path:
         length = abs(bend.length)
@@ -153,17 +165,10 @@ def _candidates(anchor: Pose, path: Path, pose: Pose, *, around: float) -> Itera
     yield begins + max(0.0, ahead * forward_of(start, pose))
 
 
-def forward_of(start: Pose, pose: Pose) -> float:
-    """Return how many metres a pose is ahead of another, along the yaw of that."""
-    north, east = pose.north - start.north, pose.east - start.east
-    return north * cos(start.yaw) + east * sin(start.yaw)
-
-
 def _on_circle(start: Pose, curvature: float, ahead: float, pose: Pose, *, around: float) -> float:
     """Return how far along a circle a pose is, in the turn that is nearest to ``around``."""
-    north = start.north - sin(start.yaw) / curvature
-    east = start.east + cos(start.yaw) / curvature
-    yaw = atan2(curvature * (pose.north - north), -curvature * (pose.east - east))
+    centre = point_of(start) + 1j * rect(1.0, start.yaw) / curvature
+    yaw = phase(1j * curvature * (point_of(pose) - centre))
     round_once = tau / abs(curvature)
     along = ahead * (yaw - start.yaw) / curvature
     return along + round_once * round((around - along) / round_once)
@@ -181,13 +186,15 @@ ONCE_ROUND = 31  # arcs; what follows on a circle is there already
 
 
 def places_on(anchor: Pose, path: Path, *, outside: float = 0.0) -> Iterator[Pose]:
-    """Yield the corners of a way along a path, moved ``outside`` m outwards in its bends."""
+    """Yield the corners of a way along a path, moved ``outside`` m outwards in its bends.
+
+    Their yaw is to the right of the way.
+    """
     start = anchor
     for bend in path:
         parts = 1 + int(abs(bend.curvature * bend.length) / CHORD)
         out = 0.0 if abs(bend.curvature) < STRAIGHT else -outside if bend.curvature > 0 else outside
         for part in range(min(parts, ONCE_ROUND) + 1):
             pose = moved(start, bend.curvature, bend.length * part / parts)
-            north, east = -out * sin(pose.yaw), out * cos(pose.yaw)
-            yield Pose(pose.north + north, pose.east + east, pose.yaw)
+            yield moved(replace(pose, yaw=pose.yaw + pi / 2), 0.0, out)
         start = moved(start, bend.curvature, bend.length)

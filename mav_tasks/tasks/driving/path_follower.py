@@ -5,21 +5,12 @@ from math import copysign
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving import guidance
-from mav_tasks.tasks.driving.follow import steer_along
-from mav_tasks.tasks.driving.guidance import USUAL, ZERO, Leg, Motion, Slowest, Velocity
-from mav_tasks.tasks.driving.legs import (
-    FACE,
-    WAY,
-    anchor_of,
-    distance,
-    leg_count,
-    leg_of,
-    length_of,
-)
-from mav_tasks.tasks.driving.path import Follow
+from mav_tasks.tasks.driving.guidance import USUAL, Leg, Line, Motion, Slowest, Velocity
+from mav_tasks.tasks.driving.legs import FACE, WAY, begun_leg, leg_count, leg_of, length_of
+from mav_tasks.tasks.driving.path import Follow, distance
 from mav_tasks.tasks.driving.planner import Steering, set_out_to
-from mav_tasks.tasks.goal import GoTo, Head, LocalPlace, Move, SingleGoal, Wait
-from mav_tasks.tasks.task import Progress
+from mav_tasks.tasks.goal import GoTo, Head, SingleGoal
+from mav_tasks.tasks.task import Pose, Progress
 
 BESIDE = 0.15  # m from a place, at the end of the way there; farther off has missed it
 #: m, the same for a car that cannot reverse: to come nearer it would drive a full circle
@@ -75,26 +66,33 @@ class PathFollower:
         return self.passing > 0.0 and self.progress.leg == WAY
 
     @property
-    def _near_enough(self) -> float:
-        """Metres from a place within which it is reached."""
-        radius = self.goal.radius if isinstance(self.goal, GoTo) else None
-        return max(radius or 0.0, BESIDE_OF_LOOP if self.has_one_try else BESIDE)
+    def anchor(self) -> Pose:
+        """Pose at which the current leg began."""
+        assert self.progress.anchor is not None, "a course has an anchor"
+        return self.progress.anchor
+
+    @property
+    def _to_correct(self) -> float:
+        """Rest of the leg; steered by course, a vehicle cannot drive back from beyond the end."""
+        is_one_way = self.by_course and isinstance(self.leg, Line)
+        return max(self.remaining, 0.0) if is_one_way else self.remaining
+
+    def metres_to_place(self, motion: Motion) -> float | None:
+        """Return how far the place is that it drives to; None without one."""
+        target = self.progress.target
+        return None if target is None else distance(motion.pose, target)
 
     def has_passed(self, motion: Motion) -> bool:
         """Return whether a place to pass is near enough to go on to the next."""
-        target = self.progress.target
-        return (
-            self.is_passing
-            and target is not None
-            and (distance(motion.pose, target) <= self.within)
-        )
+        away = self.metres_to_place(motion) if self.is_passing else None
+        return away is not None and away <= self.within
 
     def look(self, motion: Motion, *, elapsed: float) -> None:
         """Update the progress from the motion, ``elapsed`` seconds after the last look."""
-        anchor = self.progress.anchor
-        assert anchor is not None, "a course has an anchor"
         before = self.progress.done
-        done = guidance.done_so_far(self.leg, anchor, motion.pose, before=before, elapsed=elapsed)
+        done = guidance.done_so_far(
+            self.leg, self.anchor, motion.pose, before=before, elapsed=elapsed
+        )
         self.progress = replace(self.progress, done=done)
         if self.is_passing and self.remaining <= 0.0 and not self.has_passed(motion):
             self.passing = 0.0  # missed: it stops, and tries again from there
@@ -104,71 +102,53 @@ class PathFollower:
 
         ``coast`` is how far the vehicle will roll on, m or rad.
         """
-        within = 1.0 if stands else MOVING_TOLERANCE
-        remaining = self.remaining
+        leg, remaining = self.leg, self.remaining
         if self.is_passing:
             return False
-        if self.progress.leg == FACE and isinstance(self.leg, Follow):
+        if self.progress.leg == FACE and isinstance(leg, Follow):
             return remaining <= TURNED_ROUND
         if isinstance(self.goal, GoTo) and self.progress.leg == WAY:
             if remaining < -BESIDE:
                 return True  # it stops, and faces the place again from there
             if self.goal.radius:
                 return abs(remaining) <= self.goal.radius
-        if self.by_course and isinstance(self.leg, Move | Follow):
-            remaining = max(remaining, 0.0)  # it cannot drive back from beyond the end
+        remaining = self._to_correct
         if not stands and 0.0 <= remaining <= coast:
             return True
-        return guidance.has_arrived(self.leg, remaining, within=within, driving=driving)
+        within = 1.0 if stands else MOVING_TOLERANCE
+        return guidance.has_arrived(leg, remaining, within=within, driving=driving)
 
     def is_settled(self, *, driving: Driving) -> bool:
         """Return whether the end is near enough for a rover that can come no nearer.
 
         A wider limit holds for a car that is steered by course: it has one try only.
         """
-        remaining = self.remaining
-        if self.by_course and isinstance(self.leg, Move | Follow):
-            remaining = max(remaining, 0.0)
         if self.has_one_try:
             driving = replace(driving, settle_distance=ONE_TRY * driving.settle_distance)
-        return guidance.is_settled(self.leg, remaining, driving=driving)
+        return guidance.is_settled(self.leg, self._to_correct, driving=driving)
 
     def advance(self, motion: Motion) -> bool:
         """Begin the next leg where the vehicle stands. Return False if there is none.
 
         If the vehicle stands beside the place, because its position was corrected meanwhile, it
-        drives there again.
+        drives there again. A car begins its next run to the place until it is reached.
         """
-        following = self.progress.leg + 1
-        target = self.progress.target
-        if self.steering is not None and target is not None and following <= WAY + 1:
-            if self._sets_out_again(motion, target, self.steering):
+        goal, before, target = self.goal, self.progress.leg, self.progress.target
+        following, has_missed = before + 1, False
+        if isinstance(goal, GoTo) and target is not None and before <= WAY:
+            near = max(goal.radius or 0.0, BESIDE_OF_LOOP if self.has_one_try else BESIDE)
+            is_reached = self.is_circle or distance(motion.pose, target) <= near
+            has_missed = before == WAY and not is_reached
+            if self.steering is not None and (has_missed or before < WAY):
+                self.progress = set_out_to(goal, self.progress, motion.pose, target, self.steering)
+                self.misses += self.progress.leg <= before  # this run should have been the last
                 return True
-        elif self._has_missed(motion):
+        if has_missed:
             following = WAY if self.by_course else FACE
             self.misses += 1
-        if following >= leg_count(self.goal):
+        if following >= leg_count(goal):
             return False
-        anchor = anchor_of(self.goal, following, motion.pose, self.progress.target)
-        self.progress = replace(self.progress, leg=following, anchor=anchor, done=0.0, path=())
-        return True
-
-    def _has_missed(self, motion: Motion) -> bool:
-        """Return whether the vehicle stands beside the place that it drove to."""
-        target = self.progress.target
-        if target is None or self.progress.leg != WAY or self.is_circle:
-            return False
-        return distance(motion.pose, target) > self._near_enough
-
-    def _sets_out_again(self, motion: Motion, target: LocalPlace, steering: Steering) -> bool:
-        """Begin a car's next run to a place, unless it is reached. Return whether it began."""
-        before = self.progress.leg
-        if before == WAY and not self._has_missed(motion):
-            return False
-        assert isinstance(self.goal, GoTo), "only that has a place"
-        self.progress = set_out_to(self.goal, self.progress, motion.pose, target, steering)
-        if self.progress.leg <= before:  # this run should have been the last one
-            self.misses += 1
+        self.progress = begun_leg(goal, self.progress, following, motion.pose)
         return True
 
     def steer(
@@ -180,40 +160,36 @@ class PathFollower:
         slowest: Slowest = USUAL,
     ) -> Velocity:
         """Return the velocity towards the leg's end; ``speed`` in m/s overrides the leg's own."""
-        anchor = self.progress.anchor
-        assert anchor is not None, "a course has an anchor"
-        leg = self.leg
-        if speed is not None and isinstance(leg, Move | Follow):
+        leg, remaining = self.leg, self.remaining
+        if speed is not None and isinstance(leg, Line):
             leg = replace(leg, speed=speed)
         elif speed is not None and isinstance(leg, Head):
             leg = replace(leg, forward=copysign(speed, leg.forward) if leg.forward else 0.0)
-        if isinstance(leg, Wait):
-            return ZERO
-        remaining = self.remaining
-        if self.is_passing and remaining > 0:
+        passing = self.passing if self.is_passing else 0.0
+        if passing and remaining > 0:
             remaining = max(remaining - self.within, 0.0)
         if isinstance(leg, Follow):
             assert self.steering is not None, "a path is driven with a turning circle"
-            return steer_along(
+            return guidance.steer_along(
                 leg,
-                anchor,
+                self.anchor,
                 motion,
                 along=self.progress.done,
                 remaining=remaining,
                 driving=driving,
                 radius=self.steering.radius,
-                passing=self.passing if self.is_passing else 0.0,
+                passing=passing,
                 by_course=self.by_course,
                 settles=not self.is_circle,
                 slowest=slowest,
             )
         return guidance.steer(
             leg,
-            anchor,
+            self.anchor,
             motion.pose,
             remaining=remaining,
             driving=driving,
-            passing=self.passing if self.is_passing else 0.0,
+            passing=passing,
             by_course=self.by_course,
             radius=None if self.steering is None else self.steering.radius,
             slowest=slowest,

@@ -13,14 +13,17 @@ from itertools import pairwise, product
 from math import atan2, copysign, pi, remainder, sqrt, tau
 
 from mav_tasks.tasks.driving.fence import LocalFence
-from mav_tasks.tasks.driving.legs import FACE, WAY, bearing, circling, distance
+from mav_tasks.tasks.driving.legs import FACE, WAY
 from mav_tasks.tasks.driving.path import (
     STRAIGHT,
     Path,
+    bearing,
+    distance,
     joined,
     moved,
     path_length,
     places_on,
+    point_of,
     runs_of,
     turn_of,
 )
@@ -68,21 +71,14 @@ def way_to(pose: Pose, place: LocalPlace, steering: Steering) -> Path | None:
     return _best(pose, _ways_to(pose, place, steering), steering.fence)
 
 
-def boldest_way_to(pose: Pose, place: LocalPlace, steering: Steering) -> Path:
-    """Return the way to a place without regard to the fence."""
-    way = way_to(pose, place, Steering(steering.radius, steering.reverses))
-    assert way is not None, "a place is never inside both turning circles"
-    return way
-
-
 def way_to_pose(pose: Pose, goal: Pose, steering: Steering) -> Path | None:
     """Return the way to a pose, in one direction; None if none stays within the fence."""
-    if _is_at(pose, goal):
+    if distance(pose, goal) < HERE and abs(remainder(goal.yaw - pose.yaw, tau)) < HERE:
         return (Bend(0.0, HERE),)
     ways = list(_dubins(pose, goal, steering.planned_radius))
     if steering.reverses:
         mirrored = _dubins(_turned(pose), _turned(goal), steering.planned_radius)
-        ways += [_reversed(way) for way in mirrored]
+        ways += map(_reversed, mirrored)
     return _best(pose, ways, steering.fence)
 
 
@@ -91,7 +87,11 @@ def way_round(
 ) -> Path:
     """Return the way onto a circle and round it, forwards, no narrower than can be driven."""
     side, radius = copysign(1.0, goal.around), max(abs(goal.around), steering.planned_radius)
-    arc = Bend(side / radius, circling(goal, progress.path, done=progress.done) * radius)
+    left = tau * goal.turns
+    if path := progress.path:  # it has driven part of it
+        metres = min(path[-1].length, path_length(path) - progress.done)
+        left = max(0.0, metres * abs(path[-1].curvature))
+    arc = Bend(side / radius, left * radius)
     anyhow = replace(steering, reverses=False, fence=None)
     outwards, ways = bearing(pose, centre) + pi, list[Path]()
     for number in range(ENTRIES):
@@ -110,23 +110,24 @@ def set_out_to(
     If no way stays within the fence, it ignores the fence. A car that is as near to the
     place as it can get stays there.
     """
+    here = replace(progress, leg=WAY, anchor=pose, done=0.0)
     if goal.turns:
-        path = way_round(goal, progress, pose, place, steering)
-        return replace(progress, leg=WAY, anchor=pose, path=path, done=0.0)
+        return replace(here, path=way_round(goal, progress, pose, place, steering))
     if distance(pose, place) <= THERE:
-        return replace(progress, leg=WAY, anchor=pose, path=(Bend(0.0, HERE),), done=0.0)
+        return replace(here, path=(Bend(0.0, HERE),))
     start = _turned(pose) if goal.backwards else pose
-    way = way_to(start, place, steering) or boldest_way_to(start, place, steering)
+    anyhow = replace(steering, fence=None)
+    way = way_to(start, place, steering) or way_to(start, place, anyhow) or ()
     first, *others = runs_of(_reversed(way) if goal.backwards else way)
-    return replace(progress, leg=FACE if others else WAY, anchor=pose, path=first, done=0.0)
+    return replace(here, leg=FACE if others else WAY, path=first)
 
 
 def is_allowed(pose: Pose, path: Path, fence: LocalFence | None, *, clear: float = 0.0) -> bool:
     """Return whether a way from a pose stays within a fence, or leads back in and stays there."""
     if fence is None:
         return True
-    corners = [LocalPlace(p.north, p.east) for p in places_on(pose, path, outside=clear)]
-    if fence.allows(LocalPlace(pose.north, pose.east)):
+    corners = list(places_on(pose, path, outside=clear))
+    if fence.allows(pose):
         return all(fence.allows_way(here, there) for here, there in pairwise(corners))
     states = [fence.allows(corner) for corner in corners]
     return states[-1] and states == sorted(states)
@@ -136,12 +137,9 @@ def _best(pose: Pose, ways: Iterable[Path], fence: LocalFence | None) -> Path | 
     """Return the cheapest allowed way, if possible one with room beside its bends; None if none."""
     cheapest = sorted((way for way in ways if way), key=_cost)
     if fence is None:
-        return cheapest[0] if cheapest else None
-    for clear in (CLEARANCE, 0.0):
-        for way in cheapest:
-            if is_allowed(pose, way, fence, clear=clear):
-                return way
-    return None
+        return next(iter(cheapest), None)
+    all_ways = product((CLEARANCE, 0.0), cheapest)
+    return next((way for clear, way in all_ways if is_allowed(pose, way, fence, clear=clear)), None)
 
 
 def _cost(way: Path) -> float:
@@ -175,7 +173,7 @@ def _beginnings(radius: float, *, reverses: bool) -> Iterator[Path]:
 def _turns_to(pose: Pose, place: LocalPlace, radius: float) -> Iterator[Path]:
     """Yield an arc and a straight to a place, for each side that has such a way."""
     for side in (1.0, -1.0):
-        centre = _point(pose) + side * radius * 1j * rect(1.0, pose.yaw)
+        centre = point_of(pose) + side * radius * 1j * rect(1.0, pose.yaw)
         to_place = complex(place.north, place.east) - centre
         if abs(to_place) < radius:
             continue
@@ -188,8 +186,8 @@ def _turns_to(pose: Pose, place: LocalPlace, radius: float) -> Iterator[Path]:
 def _dubins(pose: Pose, goal: Pose, radius: float) -> Iterator[Path]:
     """Yield an arc, a straight and an arc, for each pair of sides that has such a way."""
     for first, last in product((1.0, -1.0), repeat=2):
-        start = _point(pose) + first * radius * 1j * rect(1.0, pose.yaw)
-        end = _point(goal) + last * radius * 1j * rect(1.0, goal.yaw)
+        start = point_of(pose) + first * radius * 1j * rect(1.0, pose.yaw)
+        end = point_of(goal) + last * radius * 1j * rect(1.0, goal.yaw)
         between, across = end - start, (last - first) * radius
         if abs(between) < abs(across):
             continue
@@ -205,10 +203,6 @@ def _dubins(pose: Pose, goal: Pose, radius: float) -> Iterator[Path]:
         )
 
 
-def _is_at(pose: Pose, goal: Pose) -> bool:
-    return distance(pose, goal) < HERE and abs(remainder(goal.yaw - pose.yaw, tau)) < HERE
-
-
 def _turned(pose: Pose) -> Pose:
     return replace(pose, yaw=pose.yaw + pi)
 
@@ -216,7 +210,3 @@ def _turned(pose: Pose) -> Pose:
 def _reversed(way: Path) -> Path:
     """Return a way in reverse, given the way forwards between the poses turned by pi."""
     return tuple(Bend(-bend.curvature, -bend.length) for bend in way)
-
-
-def _point(pose: Pose) -> complex:
-    return complex(pose.north, pose.east)

@@ -6,10 +6,9 @@ import pytest
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import ZERO, Motion, Velocity
-from mav_tasks.tasks.driving.jump import JumpWatch
-from mav_tasks.tasks.driving.path_divergence import WRONG_WAY, AstrayWatch
 from mav_tasks.tasks.driving.path_follower import PathFollower
-from mav_tasks.tasks.driving.recovery_path import OFF_TRACK
+from mav_tasks.tasks.driving.stage import OFF_TRACK
+from mav_tasks.tasks.driving.watches import WRONG_WAY, AstrayWatch, JumpWatch
 from mav_tasks.tasks.goal import Drive, Move, SingleGoal
 from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN

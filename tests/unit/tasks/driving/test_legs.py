@@ -8,11 +8,11 @@ from mav_tasks.tasks.driving.legs import (
     FACE,
     WAY,
     anchor_of,
-    bearing,
     begun_from,
     leg_count,
     leg_of,
 )
+from mav_tasks.tasks.driving.path import bearing
 from mav_tasks.tasks.goal import Face, GoTo, LocalPlace, Move, Rotate, SingleGoal, Wait
 from mav_tasks.tasks.task import Pose, Progress
 from tests.unit.tasks.samples import ORIGIN

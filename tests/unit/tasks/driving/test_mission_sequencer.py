@@ -9,11 +9,11 @@ from mav_tasks.tasks.driving.mission_sequencer import (
     END,
     following,
     is_over,
+    look_on_the_way,
     loops_in_vain,
     present_goal,
     started,
 )
-from mav_tasks.tasks.driving.stage import look_on_the_way
 from mav_tasks.tasks.goal import (
     Delay,
     GoTo,

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.fence import Circle, Fence, LocalFence, Polygon
-from mav_tasks.tasks.driving.follow import bend_speed, steer_along
-from mav_tasks.tasks.driving.guidance import wrap
+from mav_tasks.tasks.driving.guidance import bend_speed, steer_along, wrap
 from mav_tasks.tasks.driving.path import (
     Follow,
     Path,

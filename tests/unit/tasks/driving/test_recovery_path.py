@@ -11,7 +11,7 @@ from mav_tasks.settings import Driving
 from mav_tasks.tasks.driving.guidance import Motion, wrap
 from mav_tasks.tasks.driving.path_follower import PathFollower
 from mav_tasks.tasks.driving.planner import Steering
-from mav_tasks.tasks.driving.recovery_path import (
+from mav_tasks.tasks.driving.stage import (
     OFF_TRACK,
     ON_SPOT,
     PAST_END,
