@@ -29,26 +29,26 @@ class TurningKind(AskedParameters):
     @property
     def turning(self) -> Turning | None:
         """Return how it turns; None: it has not said so."""
-        functions = {int(self._values[name]) for name in FUNCTIONS if name in self._values}
-        if {LEFT, RIGHT} <= functions:
+        values = self._values
+        functions = {values.get(name) for name in FUNCTIONS}
+        if functions >= {LEFT, RIGHT}:
             return Turning.ON_SPOT
-        return Turning.STEERED if STEERING in functions else self._by_airframe()
+        if STEERING in functions:
+            return Turning.STEERED
+        if AIRFRAME in values:
+            return BY_AIRFRAME.get(int(values[AIRFRAME]))
+        return BY_AUTOSTART.get(int(values.get(AUTOSTART, 0)) // 1000)
 
     @property
     def radius(self) -> float | None:
         """Return its least turning radius, m; None: no more than is taken for granted."""
-        radius = self._values.get(RADIUS)
-        if BASE in self._values and 0.0 < self._values.get(ANGLE, 0.0) < pi / 2:
-            radius = self._values[BASE] / tan(self._values[ANGLE])
+        radius, angle = self._values.get(RADIUS, 0.0), self._values.get(ANGLE, 0.0)
+        if BASE in self._values and 0.0 < angle < pi / 2:
+            radius = self._values[BASE] / tan(angle)
         # asked for less it swings beyond: its steering takes its time (ArduPilot 4.6.3)
-        return radius if radius is not None and radius > DEFAULT_TURNING_RADIUS else None
+        return radius if radius > DEFAULT_TURNING_RADIUS else None
 
     def forget(self) -> None:
         """The vehicle has restarted, or is another one: it is asked again."""
         super().forget()
         self._values.clear()
-
-    def _by_airframe(self) -> Turning | None:
-        if AIRFRAME in self._values:
-            return BY_AIRFRAME.get(int(self._values[AIRFRAME]))
-        return BY_AUTOSTART.get(int(self._values.get(AUTOSTART, 0)) // 1000)
