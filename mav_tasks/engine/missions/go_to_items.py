@@ -8,9 +8,8 @@ from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.missions.plan_items import result_of
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType, MavResult, MavSeverity
+from mav_tasks.mavlink.enums import MavMissionResult, MavMissionType, MavResult
 from mav_tasks.tasks.events import SubmissionRefused
-from mav_tasks.tasks.lifecycle import TaskReason
 
 
 class GuidedItemRequest(CommandRequest):
@@ -23,21 +22,16 @@ class GuidedItemRequest(CommandRequest):
 
     def answer(self, result: MavResult, result_param2: int = 0) -> None:
         """Send the MISSION_ACK of an accepted item; ``refuse`` sends all others."""
-        assert result is MavResult.ACCEPTED, "refusals have a result of their own"
-        self._ack(MavMissionResult.ACCEPTED, opaque_id=result_param2)
+        if result is MavResult.ACCEPTED:
+            self._ack(MavMissionResult.ACCEPTED, result_param2)
 
     def refuse(
         self, refusal: Rejection, *, now: float, result: MavResult | None = None
     ) -> SubmissionRefused:
         """Answer with the result and a text; return the event for the audit log."""
-        del result
         self._ack(result_of(refusal))
-        self.tell(refusal.text, MavSeverity.ERROR, now=now)
-        reason, number = TaskReason(refusal.reason), self.command.command
-        return SubmissionRefused(
-            self.vehicle.system_id, number, reason, refusal.text, self.actor, now
-        )
+        return super().refuse(refusal, result=result, now=now)
 
-    def _ack(self, result: MavMissionResult, *, opaque_id: int = 0) -> None:
+    def _ack(self, result: MavMissionResult, opaque_id: int = 0) -> None:
         ack = m.MissionAck(*self.packet.source, result, MavMissionType.MISSION, opaque_id)
         self.client.outlet.send(ack, self.answering)

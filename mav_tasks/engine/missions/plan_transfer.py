@@ -200,37 +200,33 @@ class PlanTransfer(Transfer):
 
     def decide(self, upload: Upload, *, now: float) -> None:
         """Submit or store a whole upload, and ``finish`` it. Raise Rejection if it is refused."""
-        parts, vehicle, sender = self.parts, self.vehicle, upload.sender
-        parts.submissions.check_open()
+        vehicle, sender, items = self.vehicle, upload.sender, tuple(upload.items)
+        self.parts.submissions.check_open()
         client = self.client(sender)
         if client is None:
             raise Rejection(R.WRONG_STATE, "the client has gone")
-        if vehicle is not None:
-            parts.vehicles.mark_dirty(vehicle)
-            items = tuple(upload.items)
-            if self.kind == MISSION and len(items) <= (
-                vehicle.persona.has_home_item and self.is_staged
-            ):
-                task = parts.plans.task(vehicle)
-                if task is not None and task.state in ACTIVE:
-                    words = f"task {task.id} has started: cancel it first"
-                    raise Rejection(R.NOT_ALLOWED, words)
-                self._check_replaced(client, vehicle, client.submitter(sender.address))
-                items = ()
-            if self.kind != MISSION or not items:
-                self._store([self.kind], items, sender, self.finish, now=now)
+        if self.kind == MISSION:
+            only_home = vehicle.persona.has_home_item and self.is_staged if vehicle else -1
+            if len(items) > only_home:
+                self._submit(client, upload, now=now)
                 return
-        self._submit(client, upload, now=now)
+            items = ()
+            task = self.parts.plans.task(self._vehicle)
+            if task is not None and task.state in ACTIVE:
+                raise Rejection(R.NOT_ALLOWED, f"task {task.id} has started: cancel it first")
+            self._check_own(client, client.submitter(sender.address))
+        self._store([self.kind], items, sender, self.finish, now=now)
 
-    def _check_replaced(self, client: GcsClient, vehicle: Vehicle, submitter: Submitter) -> None:
+    def _check_own(self, client: GcsClient, submitter: Submitter) -> None:
         """Raise Rejection if a client may not replace, or remove, the staged mission."""
-        task = self.parts.plans.task(vehicle)
+        task = self.parts.plans.task(self._vehicle)
         if task is not None and task.state not in TERMINAL:
             client.rights.require_own(task, submitter, "replace that plan")
 
     def _submit(self, client: GcsClient, upload: Upload, *, now: float) -> None:
         """Submit a mission as a task, staged or queued."""
-        parts, vehicle, is_staged = self.parts, self.vehicle, self.is_staged
+        parts, is_staged = self.parts, self.is_staged
+        vehicle = self._vehicle if self.vehicle else None
         submissions, plans, address = parts.submissions, parts.plans, upload.sender.address
         plan, terms, nonce = self._parsed(upload, now=now)
         draft = Draft(
@@ -267,7 +263,7 @@ class PlanTransfer(Transfer):
             raise Rejection(R.STALE, f"{halts.words} came during the upload: upload it again")
         before, actor = plans.stored(vehicle.system_id, MISSION), str(address)
         if is_staged:
-            self._check_replaced(client, vehicle, draft.submitter)
+            self._check_own(client, draft.submitter)
         task = submissions.submit_plan(client.rights, vehicle, draft, now=now)
         if is_staged:
             plans.keep(vehicle, MISSION, Stored(task.id, plan.source), actor=actor, now=now)
@@ -367,54 +363,50 @@ class PlanTransfer(Transfer):
         *,
         now: float,
     ) -> None:
-        """Store plans of these types, one after the other: missions are empty ones here.
+        """Store one plan for each of these types: an empty mission, fence or rally points.
 
-        Fence and rally points go to the vehicle first, which enforces them without the server. If
-        it does not support them, they are stored; if it refuses them or does not answer, they are
-        not. Raise Rejection if they are no valid fence: the one before stays in force.
+        The vehicle gets the bounds first, which it enforces without the server. If it does not
+        support them, they are stored; if it refuses them or does not answer, nothing is. Raise
+        Rejection if they are no valid fence: the one before stays in force.
         """
-        parts, actor, source = self.parts, str(sender.address), packed(items)
-        plans, vehicle, plan = parts.plans, self._vehicle, Stored(crc32(source.encode()), source)
-        for_vehicle, left, before = items, list(kinds), dict[int, Stored]()
-        task = plans.task(vehicle) if MISSION in kinds else None
+        parts, vehicle, actor = self.parts, self._vehicle, str(sender.address)
+        plans, source, for_vehicle = parts.plans, packed(items), items
+        plan = Stored(crc32(source.encode()), source)
+        left = [kind for kind in kinds if kind != MISSION]
         if MavMissionType.FENCE in kinds:
             fence_of(items)
             for_vehicle = fence_for_vehicle(items)
 
-        def store_next(*, now: float) -> None:
-            if not left:
-                parts.submissions.gate.hold(accept, give_up, now=now)
-            elif left[0] == MISSION:
-                written(MavMissionResult.ACCEPTED, opaque_id=0, now=now)
-            else:
-                vehicle.requests.write_plan(left[0], for_vehicle, written, now=now)
-
-        def written(result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:  # noqa: ARG001  # the vehicle's
-            if result in (MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED):
-                kind = left.pop(0)
-                before[kind] = plans.stored(vehicle.system_id, kind)
-                plans.keep(vehicle, kind, plan, actor=actor, now=now)
-                store_next(now=now)
-            elif result is None:
+        def write_next(result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:  # noqa: ARG001  # the vehicle's
+            if result is None:
                 words = f"rover {vehicle.system_id} did not answer: not stored"
-                refuse(Rejection(R.VEHICLE_SILENT, words), now=now)
-            else:
+                answer(Rejection(R.VEHICLE_SILENT, words), now=now)
+            elif result not in (MavMissionResult.ACCEPTED, MavMissionResult.UNSUPPORTED):
                 words = f"rover {vehicle.system_id} refused it: {result.name}"
-                refuse(Rejection(R.NOT_ALLOWED, words), now=now)
+                answer(Rejection(R.NOT_ALLOWED, words), now=now)
+            elif left:
+                vehicle.requests.write_plan(left.pop(0), for_vehicle, write_next, now=now)
+            else:
+                store(now=now)
 
-        def accept(*, now: float) -> None:
-            parts.vehicles.mark_dirty(vehicle)
-            if MISSION in kinds:
-                plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
-            answer(plan.plan_id, now=now)
+        def store(*, now: float) -> None:
+            task = plans.task(vehicle)
+            before = {kind: plans.stored(vehicle.system_id, kind) for kind in kinds}
+            for kind in kinds:
+                plans.keep(vehicle, kind, plan, actor=actor, now=now)
 
-        def give_up(*, now: float) -> None:
-            words = "not stored in time: nothing changed"
-            refuse(Rejection(R.STORE_UNAVAILABLE, words), now=now)
+            def accept(*, now: float) -> None:
+                parts.vehicles.mark_dirty(vehicle)
+                if MISSION in kinds:
+                    plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+                answer(plan.plan_id, now=now)
 
-        def refuse(refusal: Rejection, *, now: float) -> None:
-            for kind, stored in before.items():
-                plans.keep(vehicle, kind, stored, actor=actor, now=now)
-            answer(refusal, now=now)
+            def give_up(*, now: float) -> None:
+                for kind, stored in before.items():
+                    plans.keep(vehicle, kind, stored, actor=actor, now=now)
+                words = "not stored in time: nothing changed"
+                answer(Rejection(R.STORE_UNAVAILABLE, words), now=now)
 
-        store_next(now=now)
+            parts.submissions.gate.hold(accept, give_up, now=now)
+
+        write_next(MavMissionResult.ACCEPTED, opaque_id=0, now=now)

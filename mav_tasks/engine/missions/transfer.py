@@ -159,7 +159,7 @@ class Transfer:
         self.vehicle = vehicle
         self.address = address
         self.kind = kind
-        self.is_staged = address.component_id == AUTOPILOT
+        self.is_staged = vehicle is not None and address.component_id == AUTOPILOT
         self.upload: Upload | None = None
         #: requests an item again, or ends the upload after its time-out
         self.timer = parts.timers.timer(Turn.UPLOADS, self._ask_again)
@@ -267,24 +267,24 @@ class Transfer:
             why = "belongs to one rover: name it" if is_known else "is not supported"
             words = f"upload: mission type {self.kind} {why}"
             raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
-        upload = self.upload
-        if upload is not None and not upload.is_whole and not self.client(upload.sender):
-            self._leave(upload, now=now)  # its client is gone: it keeps nobody out
-            upload = None
-        if upload is not None and upload.sender != sender:
-            if upload.is_whole or upload.rank >= rank:
-                raise Rejection(R.WRONG_STATE, TAKEN)
-            self._end(upload, Rejection(R.WRONG_STATE, DISPLACED), None, now=now)
-            upload = None
-        if upload is not None and upload.is_whole:
-            return
-        if message.count > CAPACITY:
-            self.upload = None
-            raise Rejection(R.QUEUE_FULL, TOO_MANY)
-        # Also a count that only seems to come again may be of another plan of that length: never
-        # items of one upload with those of another.
+        upload, over_at = self.upload, now + LONGEST
         if upload is not None:
-            self._leave(upload, now=now)
+            is_gone = self.client(upload.sender) is None
+            if upload.sender == sender:
+                if upload.is_whole:
+                    return
+                # Also a count that only seems to come again may be of another plan of that length:
+                # never items of one upload with those of another.
+                over_at = upload.over_at
+                self._leave(upload, now=now)
+            elif upload.is_whole or (upload.rank >= rank and not is_gone):
+                raise Rejection(R.WRONG_STATE, TAKEN)
+            elif is_gone:  # it keeps nobody out
+                self._leave(upload, now=now)
+            else:
+                self._end(upload, Rejection(R.WRONG_STATE, DISPLACED), now=now)
+        if message.count > CAPACITY:
+            raise Rejection(R.QUEUE_FULL, TOO_MANY)
         before = self._past.get(sender, _Past())
         if now - before.ended_at > ANOTHER_TRY:
             before = _Past()
@@ -293,7 +293,7 @@ class Transfer:
             rank,
             message.count,
             counted_at=now,
-            over_at=now + LONGEST if upload is None else upload.over_at,
+            over_at=over_at,
             # after the upload before its items may still come
             ask_at=max(now, min(now + QUIET, before.ended_at + LATE)),
             before=before,
@@ -306,25 +306,20 @@ class Transfer:
         self, message: m.MissionItemInt | m.MissionItem, sender: Sender, *, now: float
     ) -> None:
         """Take an item; one of no upload changes nothing."""
-        upload, seq = self.upload, message.seq
+        upload, seq, item = self.upload, message.seq, item_of(message)
         if upload is None or upload.sender != sender:
             past = self._past.get(sender, _Past())
-            is_last = seq in (past.taken - 1, past.taken) and item_of(message) == past.last
+            is_last = seq in (past.taken - 1, past.taken) and item == past.last
             if past.ack and is_last and now - past.ended_at <= REPEATED:
                 self.send(sender, past.ack)  # it has not heard what became of the plan
             return
-        if upload.is_whole or not upload.asked:
+        if upload.is_whole or not upload.asked or seq > len(upload.items):
             return  # left from before
-        if seq == len(upload.items):
-            self._take_next(upload, message, now=now)
-        elif upload.asked >= STEP_BACK and seq < len(upload.items):  # one that was asked for twice
-            upload.ask_at = now + ASK_AGAIN
-            self._request(upload, seq + 1)
-
-    def _take_next(
-        self, upload: Upload, message: m.MissionItemInt | m.MissionItem, *, now: float
-    ) -> None:
-        item = item_of(message)
+        if seq < len(upload.items):
+            if upload.asked >= STEP_BACK:  # it was asked for twice
+                upload.ask_at = now + ASK_AGAIN
+                self._request(upload, seq + 1)
+            return
         try:
             if item is None:
                 raise bad("upload: an item cannot be read", param=5)
@@ -352,7 +347,7 @@ class Transfer:
         """Answer a whole upload, which has been decided about: with a plan's id, or a refusal."""
         upload = self.upload
         if upload is not None and upload.is_whole:
-            self._end(upload, answer, upload.items[-1] if upload.items else None, now=now)
+            self._end(upload, answer, *upload.items[-1:], now=now)
             self.plan_timer()
 
     def decide_or_refuse(self, upload: Upload, *, now: float) -> None:
@@ -366,9 +361,10 @@ class Transfer:
         """Ask again, and give up in the end."""
         upload = self.upload
         if upload is not None and not upload.is_whole:
-            if now >= min(upload.give_up_at, upload.over_at):
-                why = SILENT if now >= upload.give_up_at else TOO_SLOW
-                self._end(upload, Rejection(R.WRONG_STATE, why), None, now=now)
+            if now >= upload.give_up_at:
+                self._end(upload, Rejection(R.WRONG_STATE, SILENT), now=now)
+            elif now >= upload.over_at:
+                self._end(upload, Rejection(R.WRONG_STATE, TOO_SLOW), now=now)
             else:
                 self._advance(upload, now=now)
         self.plan_timer()
@@ -406,7 +402,7 @@ class Transfer:
         self.send(upload.sender, form(*upload.sender.address, seq, self.kind))
 
     def _end(
-        self, upload: Upload, answer: Rejection | int, last: Item | None, *, now: float
+        self, upload: Upload, answer: Rejection | int, last: Item | None = None, *, now: float
     ) -> None:
         ack = self.answer(upload.sender, answer, now=now)
         self._leave(upload, last, ack, now=now)
@@ -424,11 +420,11 @@ class Transfer:
         past = {key: each for key, each in self._past.items() if now - each.ended_at <= ANOTHER_TRY}
         source, begun_at = "", inf
         if ack is None or ack.type:
-            is_last_refused = last is not None and not upload.is_whole
-            source = packed([*upload.items, last] if last and is_last_refused else upload.items)
+            begun_at = upload.begun_at
+            refused = [last] if last and not upload.is_whole else []
+            source = packed(upload.items + refused)
             if _begin_alike(source, upload.before.source):
                 source = max(source, upload.before.source, key=len)
-            begun_at = upload.begun_at
         past[upload.sender] = _Past(source, begun_at, now, len(upload.items), last, ack)
         self._past = past
 
