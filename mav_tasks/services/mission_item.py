@@ -5,7 +5,7 @@ place in the plan.
 """
 
 from collections.abc import Iterable
-from math import isfinite, isnan, nan
+from math import isnan, nan
 from operator import attrgetter
 from struct import Struct
 from typing import NamedTuple
@@ -54,8 +54,11 @@ def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
     item = Item(*_fields(message))
     if isinstance(message, m.MissionItemInt):
         return item
-    x, y = (_whole(value, _scale(item.frame)) for value in (message.x, message.y))
-    return None if x is None or y is None else item._replace(x=x, y=y)
+    scale = _scale(item.frame)
+    x, y = (NOT_GIVEN if isnan(value) else value * scale for value in (message.x, message.y))
+    if max(abs(x), abs(y)) > LARGEST:
+        return None
+    return item._replace(x=round(x), y=round(y))
 
 
 def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItemInt:
@@ -64,7 +67,8 @@ def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.Mis
 
 def float_message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItem:
     """Return the message that carries an item to a client that asks with MISSION_REQUEST."""
-    x, y = (nan if n == NOT_GIVEN else n / _scale(item.frame) for n in (item.x, item.y))
+    scale = _scale(item.frame)
+    x, y = (nan if value == NOT_GIVEN else value / scale for value in (item.x, item.y))
     return m.MissionItem(to.system_id, to.component_id, seq, *item[:-3], x, y, item.z, mission_type)
 
 
@@ -92,10 +96,3 @@ def _scale(frame: int) -> float:
     if frame == MavFrame.MISSION:
         return 1.0
     return METRES_TO_LOCAL if frame in LOCAL_FRAMES else DEGREES_TO_DEGE7
-
-
-def _whole(value: float, scale: float) -> int | None:
-    if isnan(value):
-        return NOT_GIVEN
-    scaled = value * scale
-    return round(scaled) if isfinite(scaled) and abs(scaled) <= LARGEST else None

@@ -20,7 +20,7 @@ class MissionServers:
 
     def __init__(self, parts: MissionParts) -> None:
         self._parts = parts
-        self._transfers: dict[tuple[int, int, int], PlanTransfer] = {}
+        self._transfers: dict[tuple[int, Address, int], PlanTransfer] = {}
 
     def apply(self, settings: Settings) -> None:
         self._parts.settings = settings
@@ -60,7 +60,7 @@ class MissionServers:
 
     def _transfer(self, vehicle: Vehicle | None, address: Address, kind: int) -> PlanTransfer:
         """Return the transfers of plans of a type; those of an unknown one are not remembered."""
-        key = 0 if vehicle is None else vehicle.system_id, address.component_id, kind
+        key = 0 if vehicle is None else vehicle.system_id, address, kind
         transfer = self._transfers.get(key)
         if transfer is None:
             transfer = PlanTransfer(self._parts, vehicle, address, kind)

@@ -68,8 +68,12 @@ class MissionParseOptions(NamedTuple):
     is_px4: bool = False  # an item means what it means to a PX4
 
     @classmethod
-    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "MissionParseOptions":
-        """Return the options of a vehicle; ``is_staged``: the plan is for the autopilot."""
+    def of(
+        cls, persona: Persona | None, *, is_staged: bool, driving: Driving
+    ) -> "MissionParseOptions":
+        """Return the options of a vehicle, or of any; ``is_staged``: of its autopilot's plans."""
+        if persona is None:
+            return cls(has_home=False, ability=Ability(), driving=driving)
         is_px4 = persona.autopilot == MavAutopilot.PX4
         return cls(persona.has_home_item and is_staged, Ability.of(persona), driving, is_px4)
 

@@ -16,7 +16,6 @@ from typing import Protocol
 from zlib import crc32
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
-from mav_tasks.engine.commands.ability import Ability
 from mav_tasks.engine.commands.assignments import check_any, driven_by
 from mav_tasks.engine.commands.reach import check_reach
 from mav_tasks.engine.commands.submissions import chosen_words
@@ -159,15 +158,9 @@ class PlanTransfer(Transfer):
 
     def _manner_of(self, upload: Upload) -> MissionParseOptions:
         """Return how the items are parsed; parse them again if that has changed meanwhile."""
-        vehicle = self.vehicle
-        if vehicle is None:
-            driving = self.parts.settings.driving
-            manner = MissionParseOptions(has_home=False, ability=Ability(), driving=driving)
-        else:
-            driving = vehicle.parts.settings.driving
-            manner = MissionParseOptions.of(
-                vehicle.persona, is_staged=self.is_staged, driving=driving
-            )
+        persona = self.vehicle.persona if self.vehicle else None
+        driving = self.parts.settings.driving
+        manner = MissionParseOptions.of(persona, is_staged=self.is_staged, driving=driving)
         if manner != upload.parsed_by:
             upload.parsed_by = manner
             upload.steps = steps_of(upload.items, count=upload.count, manner=manner)
@@ -390,7 +383,6 @@ class PlanTransfer(Transfer):
                 store(now=now)
 
         def store(*, now: float) -> None:
-            task = plans.task(vehicle)
             before = {kind: plans.stored(vehicle.system_id, kind) for kind in kinds}
             for kind in kinds:
                 plans.keep(vehicle, kind, plan, actor=actor, now=now)
@@ -398,7 +390,7 @@ class PlanTransfer(Transfer):
             def accept(*, now: float) -> None:
                 parts.vehicles.mark_dirty(vehicle)
                 if MISSION in kinds:
-                    plans.let_go(vehicle, task, R.CLEARED, actor=actor, now=now)
+                    plans.let_go(vehicle, before[MISSION].plan_id, actor=actor, now=now)
                 answer(plan.plan_id, now=now)
 
             def give_up(*, now: float) -> None:

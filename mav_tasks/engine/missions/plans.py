@@ -132,13 +132,11 @@ class Plans:
             if ends and is_of_autopilot(task) and task.id != last:
                 vehicle.joint.cancel(task, kill=False, reason=R.REPLACED, actor=actor, now=now)
 
-    def let_go(
-        self, vehicle: Vehicle, task: Task | None, reason: TaskReason, *, actor: str, now: float
-    ) -> None:
+    def let_go(self, vehicle: Vehicle, plan_id: int, *, actor: str, now: float) -> None:
         """Drop a removed mission: cancel it unless it drives; nobody could resume it."""
-        current = None if task is None else self._registry.get(task.id)
-        if current is not None and current.state in WAITING | AT_REST:
-            vehicle.joint.cancel(current, kill=False, reason=reason, actor=actor, now=now)
+        task = self._registry.get(TaskId(plan_id))
+        if task is not None and task.state in WAITING | AT_REST:
+            vehicle.joint.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
         self._first.pop(vehicle.system_id, None)
 
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
