@@ -37,6 +37,7 @@ from mav_tasks.engine.inputs import Input, LinkSide, Outgoing, Peer
 from mav_tasks.engine.missions.mission_reports import MissionReports
 from mav_tasks.engine.missions.mission_server import MissionServers
 from mav_tasks.engine.missions.plans import Plans
+from mav_tasks.engine.missions.transfer import MissionParts
 from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.engine.reception import Reception
 from mav_tasks.engine.snapshot import Reach, Snapshot, VehicleSnapshot
@@ -113,7 +114,6 @@ class Engine:
             gcs, vehicles, registry, submissions, settings=configured, kept=earlier.parameters
         )
         plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
-        self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
         displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
         refusals = Refusals(registry, vehicles)
         modes = self._modes = ModeRequests(gcs, submissions, plans, refusals)
@@ -127,9 +127,10 @@ class Engine:
         self._any = AnyRover(
             vehicles, registry, room, submissions, assignments, displays, elsewhere, settings
         )
-        self._desks = MissionServers(
+        parts = MissionParts(
             gcs, vehicles, registry, submissions, assignments, plans, timers, settings
         )
+        self._desks, self._reports = MissionServers(parts), MissionReports(parts, now=now)
         self._publisher = Publisher(
             gcs, vehicles, registry, displays, submissions, rates, timers, now=now
         )

@@ -5,7 +5,8 @@ place in the plan.
 """
 
 from collections.abc import Iterable
-from math import isfinite, isnan, nan
+from math import isnan, nan
+from operator import attrgetter
 from struct import Struct
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
 from mav_tasks.mavlink.enums import MavFrame
 
+CAPACITY = 6_000  # items of one plan; to look at more would hold up a setpoint
 NOT_GIVEN = 0x7FFFFFFF  # of x and y, which have no NaN
 LARGEST = 0x7FFFFFFF
 DEGREES_TO_DEGE7 = 1e7
@@ -20,6 +22,7 @@ METRES_TO_LOCAL = 1e4
 LOCAL_FRAMES = frozenset({MavFrame.LOCAL_NED, MavFrame.LOCAL_ENU})
 
 _WIRE = Struct("<BHBB4fiif")
+_LENGTH = 2 * _WIRE.size  # of an item's text
 
 
 class Item(NamedTuple):
@@ -37,29 +40,25 @@ class Item(NamedTuple):
     y: int
     z: float
 
+    @property
+    def params(self) -> tuple[float, float, float, float, float, float, float]:
+        """The seven parameters that a command has."""
+        return self[4:]
+
+
+_fields = attrgetter(*Item._fields)
+
 
 def item_of(message: m.MissionItemInt | m.MissionItem) -> Item | None:
     """Return the item that a message carries; None if its place is beyond all numbers."""
-    if isinstance(message, m.MissionItem):
-        scale = _scale(message.frame)
-        x, y = _whole(message.x, scale), _whole(message.y, scale)
-        if x is None or y is None:
-            return None
-    else:
-        x, y = message.x, message.y
-    return Item(
-        message.frame,
-        message.command,
-        message.current,
-        message.autocontinue,
-        message.param1,
-        message.param2,
-        message.param3,
-        message.param4,
-        x,
-        y,
-        message.z,
-    )
+    item = Item(*_fields(message))
+    if isinstance(message, m.MissionItemInt):
+        return item
+    scale = _scale(item.frame)
+    x, y = (NOT_GIVEN if isnan(value) else value * scale for value in (message.x, message.y))
+    if max(abs(x), abs(y)) > LARGEST:
+        return None
+    return item._replace(x=round(x), y=round(y))
 
 
 def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItemInt:
@@ -69,8 +68,7 @@ def message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.Mis
 def float_message_of(item: Item, seq: int, mission_type: int, *, to: Address) -> m.MissionItem:
     """Return the message that carries an item to a client that asks with MISSION_REQUEST."""
     scale = _scale(item.frame)
-    x = nan if item.x == NOT_GIVEN else item.x / scale
-    y = nan if item.y == NOT_GIVEN else item.y / scale
+    x, y = (nan if value == NOT_GIVEN else value / scale for value in (item.x, item.y))
     return m.MissionItem(to.system_id, to.component_id, seq, *item[:-3], x, y, item.z, mission_type)
 
 
@@ -84,20 +82,17 @@ def unpacked(text: str) -> tuple[Item, ...]:
     return tuple(Item(*fields) for fields in _WIRE.iter_unpack(bytes.fromhex(text)))
 
 
+def count_of(text: str) -> int:
+    """Return the number of these items, without looking at them."""
+    return len(text) // _LENGTH
+
+
 def item_at(text: str, number: int) -> Item:
     """Return one of these items, without looking at the others."""
-    start = 2 * _WIRE.size * number
-    return Item(*_WIRE.unpack(bytes.fromhex(text[start : start + 2 * _WIRE.size])))
+    return unpacked(text[_LENGTH * number : _LENGTH * (number + 1)])[0]
 
 
 def _scale(frame: int) -> float:
     if frame == MavFrame.MISSION:
         return 1.0
     return METRES_TO_LOCAL if frame in LOCAL_FRAMES else DEGREES_TO_DEGE7
-
-
-def _whole(value: float, scale: float) -> int | None:
-    if isnan(value):
-        return NOT_GIVEN
-    scaled = value * scale
-    return round(scaled) if isfinite(scaled) and abs(scaled) <= LARGEST else None

@@ -6,8 +6,8 @@ vehicle asks for decides what is sent, whichever of the two requests it asks wit
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from math import inf
+from typing import NamedTuple, Protocol
 
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -15,15 +15,14 @@ from mav_tasks.mavlink.enums import MavMissionResult
 from mav_tasks.services.mission_item import Item, message_of
 
 
-@dataclass(frozen=True, slots=True)
-class Patience:
+class Patience(NamedTuple):
     """How long an upload goes on; seconds."""
 
     count_again: float  # until the other end asks for something
     give_up: float  # without a request
     at_most: float  # in all
-    #: without an answer to the last item, after which it is sent once more; None: never
-    last_again: float | None = None
+    #: without an answer to the last item, after which it is sent once more; inf: never
+    last_again: float = inf
 
 
 #: ArduPilot asks again after 1.0 s; MAVSDK waits 2.5 s for our own answer
@@ -37,19 +36,6 @@ class Done(Protocol):
     """
 
     def __call__(self, result: MavMissionResult | None, *, opaque_id: int, now: float) -> None: ...
-
-
-@dataclass(slots=True)
-class _Upload:
-    mission_type: int
-    items: tuple[Item, ...]
-    done: Done
-    count_at: float = 0.0
-    give_up_at: float = 0.0
-    at_most_until: float = 0.0
-    is_asked: bool = False
-    is_sent: bool = False  # whole: its last item has been asked for and sent
-    last_at: float | None = None  # when the last item is sent once more
 
 
 class MissionUploader:
@@ -66,59 +52,53 @@ class MissionUploader:
         self._target = target
         self._patience = patience
         self._fits = fits
-        self._waiting: deque[_Upload] = deque()
+        self._waiting: deque[tuple[int, tuple[Item, ...], Done]] = deque()
         self._outgoing: list[m.Message] = []
+        # of the first one:
+        self._again_at = inf  # when the count, or the last item, is sent again
+        self._give_up_at = inf
+        self._over_at = inf
+        self._is_asked = False
+        self._is_sent = False  # whole: its last item has been asked for and sent
 
     def __repr__(self) -> str:
         return f"MissionUploader({len(self._waiting)} to do)"
 
     def begin(self, mission_type: int, items: tuple[Item, ...], done: Done, *, now: float) -> None:
         """Send a plan, after those that are under way; ``done`` is called once."""
-        self._waiting.append(_Upload(mission_type, items, done))
+        self._waiting.append((mission_type, items, done))
         if len(self._waiting) == 1:
             self._start(now=now)
 
     def receive(self, message: m.Message, *, now: float) -> None:
         """Take in what the vehicle says of an upload."""
-        if not self._waiting:
-            return
-        upload = self._waiting[0]
-        if getattr(message, "mission_type", upload.mission_type) != upload.mission_type:
+        mission_type, items, _ = self._waiting[0] if self._waiting else (None, (), None)
+        if getattr(message, "mission_type", None) != mission_type:
             return
         match message:
-            case m.MissionRequest() | m.MissionRequestInt() if message.seq < len(upload.items):
-                upload.is_asked = True
-                upload.give_up_at = min(now + self._patience.give_up, upload.at_most_until)
-                self._send(upload, message.seq, now=now)
-            case m.MissionAck() if self._is_answer(upload, message):
-                known = [result for result in MavMissionResult if result == message.type]
-                result = known[0] if known else MavMissionResult.ERROR
-                self._end(result, opaque_id=message.opaque_id, now=now)
-
-    def _is_answer(self, upload: _Upload, ack: m.MissionAck) -> bool:
-        """Whether an ack can be of this upload: not one of an earlier one that comes late."""
-        if ack.type != MavMissionResult.ACCEPTED:
-            return True
-        return (upload.is_sent or not upload.items) and self._fits(ack.opaque_id)
+            case m.MissionRequest() | m.MissionRequestInt() if message.seq < len(items):
+                self._is_asked = True
+                self._give_up_at = min(now + self._patience.give_up, self._over_at)
+                self._send(message.seq, now=now)
+            case m.MissionAck():
+                # one of an earlier upload may come late
+                is_answer = (self._is_sent or not items) and self._fits(message.opaque_id)
+                if is_answer or message.type != MavMissionResult.ACCEPTED:
+                    known = (result for result in MavMissionResult if result == message.type)
+                    result = next(known, MavMissionResult.ERROR)
+                    self._end(result, opaque_id=message.opaque_id, now=now)
 
     def next_deadline(self) -> float | None:
-        if not self._waiting:
-            return None
-        upload = self._waiting[0]
-        again = upload.last_at if upload.is_asked else upload.count_at
-        return upload.give_up_at if again is None else min(again, upload.give_up_at)
+        return min(self._again_at, self._give_up_at) if self._waiting else None
 
     def handle_deadline(self, *, now: float) -> None:
         """Offer it again, and give up in the end."""
-        if not self._waiting:
-            return
-        upload = self._waiting[0]
-        if now >= upload.give_up_at:
+        if now >= self._give_up_at:
             self._end(None, opaque_id=0, now=now)
-        elif upload.last_at is not None and now >= upload.last_at:
-            self._send(upload, len(upload.items) - 1, now=now)
-        elif not upload.is_asked and now >= upload.count_at:
-            self._offer(upload, now=now)
+        elif now >= self._again_at and self._is_asked:
+            self._send(-1, now=now)
+        elif now >= self._again_at:
+            self._offer(now=now)
 
     def take(self) -> list[m.Message]:
         """Return what is to be sent since the last call."""
@@ -126,25 +106,28 @@ class MissionUploader:
         return outgoing
 
     def _start(self, *, now: float) -> None:
-        upload = self._waiting[0]
-        upload.give_up_at = now + self._patience.give_up
-        upload.at_most_until = now + self._patience.at_most
-        self._offer(upload, now=now)
+        self._give_up_at = now + self._patience.give_up
+        self._over_at = now + self._patience.at_most
+        self._is_asked = self._is_sent = False
+        self._offer(now=now)
 
-    def _offer(self, upload: _Upload, *, now: float) -> None:
-        upload.count_at = now + self._patience.count_again
-        self._outgoing.append(m.MissionCount(*self._target, len(upload.items), upload.mission_type))
+    def _offer(self, *, now: float) -> None:
+        mission_type, items, _ = self._waiting[0]
+        self._again_at = now + self._patience.count_again
+        self._outgoing.append(m.MissionCount(*self._target, len(items), mission_type))
 
-    def _send(self, upload: _Upload, seq: int, *, now: float) -> None:
-        again = self._patience.last_again
-        is_last = seq == len(upload.items) - 1
-        upload.is_sent = upload.is_sent or is_last
-        upload.last_at = now + again if again is not None and is_last else None
-        item = upload.items[seq]
-        self._outgoing.append(message_of(item, seq, upload.mission_type, to=self._target))
+    def _send(self, seq: int, *, now: float) -> None:
+        """Send an item; -1: the last one."""
+        mission_type, items, _ = self._waiting[0]
+        seq %= len(items)
+        self._again_at = inf
+        if seq == len(items) - 1:
+            self._is_sent, self._again_at = True, now + self._patience.last_again
+        self._outgoing.append(message_of(items[seq], seq, mission_type, to=self._target))
 
     def _end(self, result: MavMissionResult | None, *, opaque_id: int, now: float) -> None:
-        upload = self._waiting.popleft()
+        _, _, done = self._waiting.popleft()
+        self._again_at = self._give_up_at = inf
         if self._waiting:
             self._start(now=now)
-        upload.done(result, opaque_id=opaque_id, now=now)
+        done(result, opaque_id=opaque_id, now=now)

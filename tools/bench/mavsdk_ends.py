@@ -24,7 +24,7 @@ SIZES = (50, 500)  # items
 REPEATS = 30
 WARM_UP = 3
 #: s before each upload. Within 0.6 s of the previous upload, the server waits for late items
-#: (services/mission_receiver.py); the upload to the other end is in between
+#: (engine/missions/transfer.py); the upload to the other end is in between
 BETWEEN = 0.35
 FIND_WITHIN = 10.0  # s
 LATITUDE, LONGITUDE = -353632621, 1491652374  # degE7, the simulated rover's start

@@ -188,14 +188,14 @@ class Assignments:
         return known[1]
 
 
-def check_any(goal: Goal) -> None:
-    """Raise Rejection for a place that is another one for each vehicle."""
+def check_any(goal: Goal, *, name: str = "") -> None:
+    """Raise Rejection for a place that is another one for each vehicle; its text begins so."""
     for step in steps_of(goal):
         if isinstance(step, GoTo) and isinstance(step.place, LocalPlace):
-            words = "metres from a local origin are another place for each rover: name the rover"
-            raise Rejection(R.BAD_FRAME, f"{words}, or give latitude and longitude")
+            words = f"{name}metres from a local origin are another place for each rover:"
+            raise Rejection(R.BAD_FRAME, f"{words} name the rover, or give latitude and longitude")
         if isinstance(step, GoTo) and step.place is None:
-            raise Rejection(R.BAD_PARAMETER, "each rover has its own home: name the rover")
+            raise Rejection(R.BAD_PARAMETER, f"{name}each rover has its own home: name the rover")
 
 
 def driven_by(vehicle: Vehicle, goal: Goal) -> Goal:

@@ -165,7 +165,7 @@ class ModeRequests:
     def _is_mission(self, vehicle: Vehicle, mode: int) -> bool:
         """Whether the server drives this mode itself, as the mission uploaded to it."""
         active = vehicle.tasks.active
-        has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).items)
+        has_plan = bool(self._plans.stored(vehicle.system_id, MISSION).source)
         has_plan = has_plan or (active is not None and isinstance(active.goal, Plan))
         return mode == vehicle.persona.mission_mode and has_plan and vehicle.parts.settings.claim
 

@@ -20,41 +20,36 @@ R = TaskReason
 MAX_LATITUDE, MAX_LONGITUDE = 900_000_000, 1_800_000_000  # degE7
 MAX_RADIUS = 1e6  # m
 MAX_GROUP = 255
-CORNERS = {
+#: whether a zone is an inclusion, by command
+CORNERS: dict[int, bool] = {
     MavCmd.NAV_FENCE_POLYGON_VERTEX_INCLUSION: True,
     MavCmd.NAV_FENCE_POLYGON_VERTEX_EXCLUSION: False,
 }
-CIRCLES = {
+CIRCLES: dict[int, bool] = {
     MavCmd.NAV_FENCE_CIRCLE_INCLUSION: True,
     MavCmd.NAV_FENCE_CIRCLE_EXCLUSION: False,
 }
+OF_FENCE = (*CORNERS, *CIRCLES, MavCmd.NAV_FENCE_RETURN_POINT)
 
 
 def check_fence_item(item: Item, seq: int, *, count: int) -> None:
     """Raise Rejection if an item of a fence with ``count`` items is bad."""
-    if item.command == MavCmd.NAV_FENCE_RETURN_POINT:
-        _place(item)
-    elif item.command in CORNERS:
-        _place(item)
-        if not (3 <= item.param1 <= count and item.param1 == int(item.param1)):
-            words = (
-                f"item {seq + 1}: param1 {item.param1:g} corners: not a whole number in 3..{count}"
-            )
-            raise bad(words, param=1)
-    elif item.command in CIRCLES:
-        _place(item)
-        if not 0.0 <= item.param1 <= MAX_RADIUS:
-            words = f"item {seq + 1}: param1 radius {item.param1:g} m not in 0..{MAX_RADIUS:g}"
-            raise bad(words, param=1)
-    else:
-        raise _unsupported(item, seq, "a fence")
-    _group(item, seq)
+    name, value = f"item {seq + 1}", item.param1
+    _check_command(item, name, OF_FENCE, "a fence")
+    _place(item)
+    if item.command in CORNERS and not (3 <= value <= count and value == int(value)):
+        words = f"{name}: param1 {value:g} corners: not a whole number in 3..{count}"
+        raise bad(words, param=1)
+    if item.command in CIRCLES and not 0.0 <= value <= MAX_RADIUS:
+        raise bad(f"{name}: param1 radius {value:g} m not in 0..{MAX_RADIUS:g}", param=1)
+    group = item.param2
+    if group == group and not (0 <= group <= MAX_GROUP and group == int(group)):
+        raise bad(f"{name}: param2 group {group:g} not in 0..{MAX_GROUP}", param=2)
 
 
 def check_rally_item(item: Item, seq: int) -> None:
     """Raise Rejection if a rally point is bad."""
-    if item.command != MavCmd.NAV_RALLY_POINT:
-        raise _unsupported(item, seq, "rally points")
+    _check_command(item, f"item {seq + 1}", (MavCmd.NAV_RALLY_POINT,), "rally points")
     _place(item)
 
 
@@ -63,23 +58,19 @@ def fence_of(items: Sequence[Item]) -> Fence:
     zones: list[Zone] = []
     seq = 0
     while seq < len(items):
-        item = items[seq]
-        if item.command in CORNERS:
-            number = int(item.param1)
+        item, number = items[seq], 1
+        code, size = item.command, item.param1
+        group = 0 if item.param2 != item.param2 else int(item.param2)  # NaN: not given
+        if code in CORNERS:
+            number = int(size)
             corners = items[seq : seq + number]
-            if len(corners) < number or any(
-                (corner.command, corner.param1) != (item.command, item.param1) for corner in corners
-            ):
+            if [(each.command, each.param1) for each in corners] != [(code, size)] * number:
                 words = f"item {seq + 1}: polygon of {number} corners is incomplete or mixed"
                 raise Rejection(R.BAD_PARAMETER, words)
-            places = tuple(_place(corner) for corner in corners)
-            zones.append(Polygon(places, CORNERS[MavCmd(item.command)], _group(item, seq)))
-            seq += number
-            continue
-        if item.command in CIRCLES and not _is_no_circle(item):
-            is_inclusion = CIRCLES[MavCmd(item.command)]
-            zones.append(Circle(_place(item), item.param1, is_inclusion, _group(item, seq)))
-        seq += 1
+            zones.append(Polygon(tuple(map(_place, corners)), CORNERS[code], group))
+        elif code in CIRCLES and not _is_no_circle(item):
+            zones.append(Circle(_place(item), size, CIRCLES[code], group))
+        seq += number
     fence = Fence(tuple(zones))
     wrong = check(fence)
     if wrong:
@@ -93,7 +84,7 @@ def fence_for_vehicle(items: Sequence[Item]) -> tuple[Item, ...]:
 
 
 def rally_of(items: Sequence[Item]) -> tuple[GlobalPlace, ...]:
-    return tuple(_place(item) for item in items)
+    return tuple(map(_place, items))
 
 
 def _is_no_circle(item: Item) -> bool:
@@ -110,15 +101,7 @@ def _place(item: Item) -> GlobalPlace:
     return GlobalPlace(item.x, item.y)
 
 
-def _group(item: Item, seq: int) -> int:
-    group = item.param2
-    if group != group:  # NaN: not given
-        return 0
-    if not (0 <= group <= MAX_GROUP and group == int(group)):
-        raise bad(f"item {seq + 1}: param2 group {group:g} not in 0..{MAX_GROUP}", param=2)
-    return int(group)
-
-
-def _unsupported(item: Item, seq: int, what: str) -> Rejection:
-    words = f"item {seq + 1}: command {item.command} is not supported in {what}"
-    return Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
+def _check_command(item: Item, name: str, commands: Sequence[int], what: str) -> None:
+    if item.command not in commands:
+        words = f"{name}: command {item.command} is not supported in {what}"
+        raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)

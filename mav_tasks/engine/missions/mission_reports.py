@@ -5,15 +5,12 @@ them from no other component. The vehicle's own messages of the mission protocol
 sources would contradict each other.
 """
 
-from dataclasses import dataclass
 from math import inf
 
-from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.missions.plan_items import performed
-from mav_tasks.engine.missions.plans import Plans
-from mav_tasks.engine.timers import Timers, Turn
+from mav_tasks.engine.missions.transfer import MissionParts
+from mav_tasks.engine.timers import Turn
 from mav_tasks.engine.vehicles.vehicle import Vehicle
-from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.packet import Packet
@@ -28,58 +25,33 @@ from mav_tasks.tasks.events import (
     VehicleNoted,
 )
 from mav_tasks.tasks.goal import Plan
-from mav_tasks.tasks.lifecycle import TaskState
-from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import TaskId
+from mav_tasks.tasks.lifecycle import TaskState as S
 
 INTERVAL = 1.0  # s, of MISSION_CURRENT
 ENDS_TOLD = 5  # repeats of the last item's MISSION_ITEM_REACHED; PX4 sends 10
 #: messages of the vehicle that are withheld while the server has its missions
-REPLACED = frozenset(
-    {
-        m.MissionAck.id,
-        m.MissionCount.id,
-        m.MissionCurrent.id,
-        m.MissionItem.id,
-        m.MissionItemInt.id,
-        m.MissionItemReached.id,
-        m.MissionRequest.id,
-        m.MissionRequestInt.id,
-    }
-)
-
-
-@dataclass(slots=True)
-class _Last:
-    """The last item that a mission reached."""
-
-    task_id: TaskId
-    step: int
-    left: int = ENDS_TOLD  # repeats left, after the mission's end
+REPLACED = {
+    m.MissionAck.id,
+    m.MissionCount.id,
+    m.MissionCurrent.id,
+    m.MissionItem.id,
+    m.MissionItemInt.id,
+    m.MissionItemReached.id,
+    m.MissionRequest.id,
+    m.MissionRequestInt.id,
+}
 
 
 class MissionReports:
     """The sender of mission progress to clients."""
 
-    def __init__(
-        self,
-        gcs: GcsSide,
-        vehicles: VehicleSide,
-        registry: TaskRegistry,
-        plans: Plans,
-        timers: Timers,
-        settings: Settings,
-        *,
-        now: float,
-    ) -> None:
-        self._gcs = gcs
-        self._vehicles = vehicles
-        self._registry = registry
-        self._plans = plans
+    def __init__(self, parts: MissionParts, *, now: float) -> None:
+        self._parts = parts
         self._next_at = now
-        self._timer = timers.timer(Turn.REPORTS, self._report)
-        self._last: dict[int, _Last] = {}  # by vehicle
-        self.apply(settings)
+        self._timer = parts.timers.timer(Turn.REPORTS, self._report)
+        #: by vehicle: the last item that a mission reached, and how often it is told again
+        self._last: dict[int, tuple[StepReached, int]] = {}
+        self.apply(parts.settings)
 
     def apply(self, settings: Settings) -> None:
         self._claims = settings.claim
@@ -104,38 +76,34 @@ class MissionReports:
                 case PlanStored():
                     changed.add(event.vehicle)
                 case TaskChanged() | TaskAdvanced():
-                    task = self._registry.get(event.task_id)
+                    task = self._parts.registry.get(event.task_id)
                     if task is not None and isinstance(task.goal, Plan):
                         changed.add(event.vehicle)
         for system_id in changed:
-            if vehicle := self._vehicles.get(system_id):
-                self._tell(vehicle, self._plans.current(vehicle), now=now)
+            if vehicle := self._parts.vehicles.get(system_id):
+                self._tell(vehicle, self._parts.plans.current(vehicle), now=now)
 
     def _report(self, *, now: float) -> None:
         self._next_at = now + INTERVAL
         self._timer.set(self._next_at)
-        for vehicle in self._vehicles.all:
-            if vehicle.is_heard(now=now):
-                self._tell(vehicle, self._plans.current(vehicle), now=now)
-                if vehicle.system_id in self._last:
-                    self._tell_end_again(vehicle, self._last[vehicle.system_id])
-
-    def _tell_end_again(self, vehicle: Vehicle, last: _Last) -> None:
-        """Repeat the last item: a client that missed it would never see the mission finished."""
-        task = self._plans.shown(vehicle)
-        if task is None or task.id != last.task_id or last.left == 0:
-            return
-        if task.state is TaskState.COMPLETED:
-            last.left -= 1
-            self._tell(vehicle, m.MissionItemReached(last.step))
+        for vehicle in self._parts.vehicles.all:
+            if not vehicle.is_heard(now=now):
+                continue
+            self._tell(vehicle, self._parts.plans.current(vehicle), now=now)
+            # a client that missed the last item would never see the mission finished
+            last, left = self._last.get(vehicle.system_id, (None, 0))
+            task = self._parts.plans.shown(vehicle)
+            if last and left and task and (task.id, task.state) == (last.task_id, S.COMPLETED):
+                self._last[vehicle.system_id] = last, left - 1
+                self._tell(vehicle, m.MissionItemReached(last.step))
 
     def _reached(self, event: StepReached, *, now: float) -> None:
-        vehicle = self._vehicles.get(event.vehicle)
+        vehicle = self._parts.vehicles.get(event.vehicle)
         if vehicle is None:
             return
         self._tell(vehicle, m.MissionItemReached(event.step))
-        self._last[event.vehicle] = _Last(event.task_id, event.step)
-        task = self._registry.get(event.task_id) if event.performs else None
+        self._last[event.vehicle] = event, ENDS_TOLD
+        task = self._parts.registry.get(event.task_id) if event.performs else None
         if task is not None:
             assert isinstance(task.goal, Plan), "only plans have steps"
             item = item_at(task.goal.source, event.step)
@@ -148,13 +116,15 @@ class MissionReports:
             words = f"did not answer command {command} of the plan"
             if ack is not None:
                 words = f"refused command {command} of the plan (result {ack.result})"
-            self._registry.record(VehicleNoted(vehicle.system_id, words, now))
+            self._parts.registry.record(VehicleNoted(vehicle.system_id, words, now))
 
     def _tell(self, vehicle: Vehicle, message: m.Message, *, now: float = inf) -> None:
         """Send a report to all clients but those that are to give up waiting for it ``now``."""
         source = Address(vehicle.system_id, AUTOPILOT)
-        for client in self._gcs.clients:
-            if now < client.gives_up_at:
-                continue
-            if client.is_heard and vehicle.system_id in client.introduced:
+        for client in self._parts.gcs.clients:
+            if (
+                now >= client.gives_up_at
+                and client.is_heard
+                and vehicle.system_id in client.introduced
+            ):
                 client.outlet.send(message, source)

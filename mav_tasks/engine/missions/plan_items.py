@@ -6,7 +6,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import hypot, isnan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mav_tasks.engine.commands.ability import as_driven
 from mav_tasks.engine.commands.goals import KNOWN_FRAMES, place_in, refuse_infinite
@@ -86,15 +86,13 @@ def step_of(item: Item, seq: int, *, count: int, manner: MissionParseOptions) ->
         raise Rejection(why.reason, f"item {name}: {why.text}", param=why.param) from None
 
 
-def steps_of(items: Sequence[Item], *, manner: MissionParseOptions) -> tuple[Step, ...]:
-    """Return the steps of all items of a plan."""
-    return tuple(
-        step_of(item, seq, count=len(items), manner=manner) for seq, item in enumerate(items)
-    )
+def steps_of(items: Sequence[Item], *, count: int, manner: MissionParseOptions) -> list[Step]:
+    """Return the steps of the first items of a plan of ``count``."""
+    return [step_of(item, seq, count=count, manner=manner) for seq, item in enumerate(items)]
 
 
 def plan_of(
-    items: Sequence[Item], steps: tuple[Step, ...], *, has_home: bool, now: float
+    items: Sequence[Item], steps: Sequence[Step], *, has_home: bool, now: float
 ) -> ParsedMission:
     """Return the plan of items and their steps. Raise Rejection if they make no plan."""
     has_options = bool(items) and items[-1].command == MavCmd.TASK_OPTIONS
@@ -137,23 +135,15 @@ def _apart(one: Place | None, other: Place) -> float:
 
 def performed(item: Item, target: Address) -> m.CommandLong | m.CommandInt:
     """Return the command of an item that the vehicle executes."""
-    first = (item.param1, item.param2, item.param3, item.param4)
-    p1, p2, p3, p4, p7 = map(_given, (*first, item.z))
-    x, y = item.x, item.y
+    # 0 for NaN, which makes some autopilots abort
+    params: list[Any] = [0.0 if isnan(value) else value for value in item.params]
     if item.frame == MavFrame.MISSION:
-        return m.CommandLong(*target, item.command, 0, p1, p2, p3, p4, float(x), float(y), p7)
-    return m.CommandInt(*target, item.frame, item.command, 0, 0, p1, p2, p3, p4, x, y, p7)
-
-
-def _given(value: float) -> float:
-    """Return a number for the vehicle: 0 for NaN, which makes some autopilots abort."""
-    return 0.0 if isnan(value) else value
+        return m.CommandLong(*target, item.command, 0, *params)
+    return m.CommandInt(*target, item.frame, item.command, 0, 0, *params)
 
 
 def _command_of(item: Item) -> Command:
-    first = (item.param1, item.param2, item.param3, item.param4)
-    params = (*first, float(item.x), float(item.y), item.z)
-    return Command(NOBODY, item.command, params, 0, item.frame, NO_MESSAGE)
+    return Command(NOBODY, item.command, item.params, 0, item.frame, NO_MESSAGE)
 
 
 def skipped(plan: Goal) -> str:

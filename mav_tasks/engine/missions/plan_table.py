@@ -7,7 +7,7 @@ dialects/README.md.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from dataclasses import replace
 from math import copysign, inf, isnan
 from typing import NamedTuple
 
@@ -56,6 +56,7 @@ NO_CHANGE, DEFAULT = (0.0, -1.0), -2.0  # DO_CHANGE_SPEED, param2
 GROUND_OR_AIR = 1  # the same, highest param1: airspeed counts as ground speed
 SENT, SKIPPED, REFUSED = "sends", "skips", "refuses"  # uses of commands
 HERE = (0, NOT_GIVEN)  # values of x and y that mean no place
+PLACES = (16, 17, 21, 22, 4501)  # commands of which 0/0 is where the vehicle is
 
 
 class MissionParseOptions(NamedTuple):
@@ -67,14 +68,14 @@ class MissionParseOptions(NamedTuple):
     is_px4: bool = False  # an item means what it means to a PX4
 
     @classmethod
-    def of(cls, persona: Persona, *, is_staged: bool, driving: Driving) -> "MissionParseOptions":
-        """Return the options of a vehicle; ``is_staged``: the plan is for the autopilot."""
+    def of(
+        cls, persona: Persona | None, *, is_staged: bool, driving: Driving
+    ) -> "MissionParseOptions":
+        """Return the options of a vehicle, or of any; ``is_staged``: of its autopilot's plans."""
+        if persona is None:
+            return cls(has_home=False, ability=Ability(), driving=driving)
         is_px4 = persona.autopilot == MavAutopilot.PX4
         return cls(persona.has_home_item and is_staged, Ability.of(persona), driving, is_px4)
-
-
-#: (command, number of the plan's items, how items are parsed) -> what it becomes
-Parser = Callable[[Command, int, MissionParseOptions], Step]
 
 
 class PlanRow(NamedTuple):
@@ -92,17 +93,75 @@ def row_of_item(command: int) -> PlanRow:
     return ROWS.get(str(command)) or ROWS[policy.kind.name + "-bound" * policy.is_bound]
 
 
-def step_of_command(command: Command, count: int, manner: MissionParseOptions) -> Step:
-    """Return the step that a command becomes. Raise Rejection for one that is not for a plan."""
-    number = command.command
-    row = row_of_item(number)
+def step_of_command(command: Command, count: int, how: MissionParseOptions) -> Step:
+    """Return the step that a command becomes in a plan of ``count`` items.
+
+    Raise Rejection for one that is not for a plan.
+    """
+    code, driving = command.command, how.driving
+    row = row_of_item(code)
     if row.use == SENT:
-        return Perform(row_of_command(number).role)
+        return Perform(row_of_command(code).role)
     if row.use == REFUSED:
-        words = f"command {name_of(number)} is not for a plan: {row.about}"
+        words = f"command {name_of(code)} is not for a plan: {row.about}"
         raise Rejection(R.NOT_SUPPORTED_BY_VEHICLE, words)
-    parse = PARSERS.get(number)
-    return Nothing() if parse is None else parse(command, count, manner)
+    place = _place(command) if code in PLACES else None
+    match code:
+        case 16 if place is None:
+            return Wait(number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0))
+        case 16:
+            goal = goal_of(command, driving)
+            assert isinstance(goal, GoTo), "a waypoint is a place"
+            return goal if goal.wait or goal.yaw is not None else replace(goal, passes=True)
+        case 17:
+            return GoTo(place, wait=FOR_EVER) if place else Wait(FOR_EVER)
+        case 18:
+            turns, most = (
+                number(command, 1, "turns", low=0.0, high=MOST_TURNS),
+                driving.max_distance,
+            )
+            radius = number(command, 3, "radius", low=-most, high=most, default=0.0)
+            around = copysign(max(abs(radius), LEAST_CIRCLE), radius)
+            # without a place it is round the place before, which ``plan_of`` knows
+            return GoTo(_place(command), turns=turns, around=around) if turns else Nothing()
+        case 21 | 22 if place and how.is_px4:
+            return GoTo(place)
+        case 19 | 20 | 93 | 115 | 213:
+            return goal_of(command, driving)
+        case 112:
+            return Delay(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
+        case 114:
+            return Near(number(command, 1, "distance", low=0.0, high=driving.max_distance))
+        case 4501:
+            return Near(0.0)  # ``plan_of`` knows from where to where
+        case 177 | 224 | 601:
+            # ``plan_of`` knows where a tag is
+            to = 0 if code == 601 else whole(command, 1, "item", high=count - 1, default=None)
+            if code == 224:
+                return Jump(to, -1)
+            times = whole(command, 2, "repeat", low=-1, high=MAX_JUMPS, default=None)
+            return Jump(to, times)
+        case 178:
+            whole(command, 1, "speed type", high=GROUND_OR_AIR)
+            wish = command.params[1]
+            if wish in NO_CHANGE or isnan(wish):
+                return SetSpeed(None) if how.is_px4 else Nothing()
+            if wish == DEFAULT:
+                return SetSpeed(None)
+            # planners leave speeds of aircraft there: bound them to the limit
+            speed = number(command, 2, "speed", low=MIN_SPEED, high=inf)
+            return SetSpeed(min(speed, driving.max_speed))
+        case 194:
+            return SetReverse(command.params[0] == 1.0)
+        case 54000 | 54001 | 54002:
+            for index, name in ((5, "run after"), (6, "start delay")):
+                if command.params[index - 1] not in HERE:
+                    words = f"param{index} {name}: not in a plan item, use TASK_OPTIONS"
+                    raise bad(words, param=index)
+            return goal_of(command, driving)
+        case 54014:
+            options_of(command, now=0.0)  # only to check them
+    return Nothing()
 
 
 def name_of(command: int) -> str:
@@ -122,124 +181,11 @@ def options_of(command: Command, *, now: float) -> Terms:
     )
 
 
-# what a command becomes
-
-
-def _as_command(command: Command, _count: int, how: MissionParseOptions) -> Step:
-    return goal_of(command, how.driving)
-
-
 def _place(command: Command) -> Place | None:
     """Return the place of an item, None if that is where the vehicle is."""
     is_here = all(part in HERE for part in command.params[4:6])
     return None if is_here and command.frame != MavFrame.LOCAL_NED else place_in(command)
 
-
-def _waypoint(command: Command, _count: int, how: MissionParseOptions) -> Step:
-    if _place(command) is None:
-        return Wait(number(command, 1, "hold", low=0.0, high=MAX_WAIT, default=0.0))
-    goal = goal_of(command, how.driving)
-    assert isinstance(goal, GoTo), "a waypoint is a place"
-    if goal.wait or goal.yaw is not None:
-        return goal
-    return GoTo(goal.place, goal.speed, goal.radius, passes=True)
-
-
-def _loiter(command: Command, _count: int, _how: MissionParseOptions) -> Step:
-    place = _place(command)
-    return GoTo(place, wait=FOR_EVER) if place else Wait(FOR_EVER)
-
-
-def _circle(command: Command, _count: int, how: MissionParseOptions) -> Step:
-    turns = number(command, 1, "turns", low=0.0, high=MOST_TURNS)
-    most = how.driving.max_distance
-    radius = number(command, 3, "radius", low=-most, high=most, default=0.0)
-    radius = copysign(max(abs(radius), LEAST_CIRCLE), radius)
-    # without a place it is round the place before, which ``plan_of`` knows
-    return GoTo(_place(command), turns=turns, around=radius) if turns else Nothing()
-
-
-def _land(command: Command, _count: int, how: MissionParseOptions) -> Step:
-    place = _place(command)
-    return GoTo(place) if place and how.is_px4 else Nothing()
-
-
-def _delay(command: Command, _count: int, _how: MissionParseOptions) -> Step:
-    return Delay(number(command, 1, "delay", low=0.0, high=MAX_WAIT))
-
-
-def _near(command: Command, _count: int, how: MissionParseOptions) -> Step:
-    return Near(number(command, 1, "distance", low=0.0, high=how.driving.max_distance))
-
-
-def _gate(command: Command, _count: int, _how: MissionParseOptions) -> Step:
-    _place(command)  # only to check it
-    return Near(0.0)  # ``plan_of`` knows from where to where
-
-
-def _jump(command: Command, count: int, _how: MissionParseOptions) -> Step:
-    to = whole(command, 1, "item", high=count - 1, default=None)
-    return Jump(to, _times(command))
-
-
-def _times(command: Command) -> int:
-    return whole(command, 2, "repeat", low=-1, high=MAX_JUMPS, default=None)
-
-
-def _jump_to_tag(command: Command, _count: int, _how: MissionParseOptions) -> Step:
-    return Jump(0, _times(command))  # ``plan_of`` knows where the tag is
-
-
-def _go_on_with(command: Command, count: int, _how: MissionParseOptions) -> Step:
-    return Jump(whole(command, 1, "item", high=count - 1, default=None), -1)
-
-
-def _speed(command: Command, _count: int, how: MissionParseOptions) -> Step:
-    whole(command, 1, "speed type", high=GROUND_OR_AIR)
-    wish = command.params[1]
-    if wish in NO_CHANGE or isnan(wish):
-        return SetSpeed(None) if how.is_px4 else Nothing()
-    if wish == DEFAULT:
-        return SetSpeed(None)
-    # planners leave speeds of aircraft there: bound them to the limit
-    top = how.driving.max_speed
-    return SetSpeed(min(number(command, 2, "speed", low=MIN_SPEED, high=inf), top))
-
-
-def _reverse(command: Command, _count: int, _how: MissionParseOptions) -> Step:
-    return SetReverse(command.params[0] == 1.0)
-
-
-def _own(command: Command, _count: int, how: MissionParseOptions) -> Step:
-    for index, name in ((5, "run after"), (6, "start delay")):
-        if command.params[index - 1] not in HERE:
-            raise bad(f"param{index} {name}: not in a plan item, use TASK_OPTIONS", param=index)
-    return goal_of(command, how.driving)
-
-
-def _options(command: Command, _count: int, _how: MissionParseOptions) -> Step:
-    options_of(command, now=0.0)  # only to check them
-    return Nothing()
-
-
-#: how a command becomes a step; without one it becomes Nothing
-PARSERS: Mapping[int, Parser] = {
-    16: _waypoint,
-    17: _loiter,
-    18: _circle,
-    **dict.fromkeys((19, 20, 93, 115, 213), _as_command),
-    **dict.fromkeys((21, 22), _land),
-    112: _delay,
-    114: _near,
-    177: _jump,
-    178: _speed,
-    194: _reverse,
-    224: _go_on_with,
-    601: _jump_to_tag,
-    4501: _gate,
-    **dict.fromkeys(range(54000, 54003), _own),
-    54014: _options,
-}
 
 #: numbers, or a kind of the policy table ("-bound" if it is) · what the server does with an item ·
 #: how, or why not and what to write · ArduPilot Rover 4.6.3 · PX4 1.17.0; "*": tried there

@@ -4,7 +4,8 @@ A mission at the autopilot's address is staged: a task that waits until it is st
 started again after its end, it becomes a new task.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.rights import OPERATOR, SUBMITTER, Rights
@@ -15,7 +16,7 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.enums import MavCmd, MavMissionType
-from mav_tasks.services.mission_item import Item, packed, unpacked
+from mav_tasks.services.mission_item import count_of, unpacked
 from mav_tasks.tasks.events import SERVER, PlanStored
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.goal import Plan, number_of
@@ -34,29 +35,31 @@ R, S = TaskReason, TaskState
 
 MISSION = MavMissionType.MISSION
 STORED = (MavMissionType.MISSION, MavMissionType.FENCE, MavMissionType.RALLY)
-NOT_STARTED = 2  # MISSION_STATE
+#: MISSION_STATE, and that of tasks; others have not started
+NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = range(1, 6)
+STATES = {
+    S.STARTING: ACTIVE,
+    S.EXECUTING: ACTIVE,
+    S.PAUSED: PAUSED,
+    S.HELD: PAUSED,
+    S.CANCELLING: PAUSED,
+    S.COMPLETED: COMPLETE,
+}
 NO_PLAN = "there is no mission: upload one first"
 STARTED_TWICE = 2.5  # s in which a second start counts as the first: MAVSDK sends two
 
 
-@dataclass(frozen=True, slots=True)
-class Stored:
-    """A plan as uploaded, and the id by which clients know it."""
+class Stored(NamedTuple):
+    """The id by which clients know a plan, and its items as uploaded, packed."""
 
     plan_id: int
-    items: tuple[Item, ...]
+    source: str
 
 
-NOTHING = Stored(0, ())
+NOTHING = Stored(0, "")
 #: active, but not being driven: a stock autopilot, too, clears a mission in HOLD
 AT_REST = frozenset({S.PAUSED, S.HELD})
 CALLED_OFF = TERMINAL - {S.COMPLETED}
-
-
-class _Started(NamedTuple):
-    by: Submitter
-    task_id: TaskId
-    at: float
 
 
 class Plans:
@@ -67,14 +70,14 @@ class Plans:
         self._fleet = fleet
         self._stored: dict[tuple[int, int], Stored] = {}
         self._first: dict[int, int] = {}  # by vehicle: the item at which the next start begins
-        self._started: dict[int, _Started] = {}  # the last start of each vehicle
+        #: the last start of each vehicle: by whom, of which task, and when
+        self._started: dict[int, tuple[Submitter, TaskId, float]] = {}
         self.restore(restored)
 
     def restore(self, plans: StoredPlans) -> None:
         """Load stored plans, (id, source) by system id and kind."""
-        for (system_id, kind), (plan_id, source) in plans.items():
-            stored = self._stored[system_id, kind] = Stored(plan_id, unpacked(source))
-            self._apply_bounds(system_id, kind, stored.items)
+        for (system_id, kind), stored in plans.items():
+            self._set(system_id, kind, Stored(*stored))
 
     def forget(self, vehicle: int) -> None:
         """Forget a vehicle's plans, which are stored."""
@@ -100,23 +103,21 @@ class Plans:
 
     def keep(self, vehicle: Vehicle, kind: int, stored: Stored, *, actor: str, now: float) -> None:
         """Store a plan in place of the one before; NOTHING removes it."""
-        if stored == self.stored(vehicle.system_id, kind):
+        before = self.stored(vehicle.system_id, kind)
+        if stored == before:
             return
-        if kind == MISSION and stored.items != self.stored(vehicle.system_id, MISSION).items:
+        if kind == MISSION and stored.source != before.source:
             vehicle.parts.forget_start()
-        self._stored[vehicle.system_id, kind] = stored
-        self._apply_bounds(vehicle.system_id, kind, stored.items)
-        source = packed(stored.items)
-        self._registry.record(
-            PlanStored(vehicle.system_id, kind, stored.plan_id, source, actor, now)
-        )
+        self._set(vehicle.system_id, kind, stored)
+        self._registry.record(PlanStored(vehicle.system_id, kind, *stored, actor, now))
 
-    def _apply_bounds(self, system_id: int, kind: int, items: tuple[Item, ...]) -> None:
+    def _set(self, system_id: int, kind: int, stored: Stored) -> None:
+        self._stored[system_id, kind] = stored
         bounds = self._fleet.of(system_id).bounds
         if kind == MavMissionType.FENCE:
-            bounds.fence = fence_of(items)
+            bounds.fence = fence_of(unpacked(stored.source))
         elif kind == MavMissionType.RALLY:
-            bounds.rally = rally_of(items)
+            bounds.rally = rally_of(unpacked(stored.source))
 
     def end_replaced(self, vehicle: Vehicle, *, is_started: bool, actor: str, now: float) -> None:
         """End the missions that the staged one has replaced, as on an autopilot.
@@ -131,13 +132,11 @@ class Plans:
             if ends and is_of_autopilot(task) and task.id != last:
                 vehicle.joint.cancel(task, kill=False, reason=R.REPLACED, actor=actor, now=now)
 
-    def let_go(
-        self, vehicle: Vehicle, task: Task | None, reason: TaskReason, *, actor: str, now: float
-    ) -> None:
+    def let_go(self, vehicle: Vehicle, plan_id: int, *, actor: str, now: float) -> None:
         """Drop a removed mission: cancel it unless it drives; nobody could resume it."""
-        current = None if task is None else self._registry.get(task.id)
-        if current is not None and current.state in WAITING | AT_REST:
-            vehicle.joint.cancel(current, kill=False, reason=reason, actor=actor, now=now)
+        task = self._registry.get(TaskId(plan_id))
+        if task is not None and task.state in WAITING | AT_REST:
+            vehicle.joint.cancel(task, kill=False, reason=R.CLEARED, actor=actor, now=now)
         self._first.pop(vehicle.system_id, None)
 
     def begin_at(self, vehicle: Vehicle, first: int) -> None:
@@ -173,33 +172,37 @@ class Plans:
         is_fresh = task is not None and task.state in WAITING and task.terms.is_staged
         is_other = active and active.id != stored.plan_id and isinstance(active.goal, Plan)
         if active and is_other and not is_fresh:
-            self._set_going(vehicle, active, actor=str(submitter), now=now)
+            self._set_going(vehicle, active, submitter, now=now)
             return active
         _check_state(task)
-        if not stored.items:
+        count = count_of(stored.source)
+        if not count:
             raise Rejection(R.NOT_FOUND, NO_PLAN)
-        if first >= len(stored.items):
-            words = f"param1 first item {first}: the plan has {len(stored.items)} items"
+        if first >= count:
+            words = f"param1 first item {first}: the plan has {count} items"
             raise Rejection(R.BAD_PARAMETER, words, param=1)
-        if task is not None and self._is_started_again(vehicle, submitter, task, now=now):
-            return task
+        if task is not None and task.state not in CALLED_OFF and not vehicle.tasks.paused:
+            # repeated, perhaps in another way: it is the start that was just requested
+            by, task_id, at = self._started.get(vehicle.system_id, (None, 0, -inf))
+            if (by, task_id) == (submitter, task.id) and now - at <= STARTED_TWICE:
+                return task
         chosen = self._first.pop(vehicle.system_id, 0)
         first = first or chosen
         if task is None or task.state in TERMINAL:
             return self._again(vehicle, stored, submitter, first=first, now=now)
         if first:
             vehicle.tasks.skip_to(task, first, now=now)
-        self._set_going(vehicle, self._registry[task.id], actor=str(submitter), now=now)
-        self._started[vehicle.system_id] = _Started(submitter, task.id, now)
+        self._set_going(vehicle, self._registry[task.id], submitter, now=now)
         return task
 
-    def _set_going(self, vehicle: Vehicle, task: Task, *, actor: str, now: float) -> None:
+    def _set_going(self, vehicle: Vehicle, task: Task, by: Submitter, *, now: float) -> None:
         """Resume an active mission and its queue; start a waiting one, even in a paused queue.
 
         A held one drives its remainder: who starts it has decided that it goes on.
         """
-        joint, tasks = vehicle.joint, vehicle.tasks
+        joint, tasks, actor = vehicle.joint, vehicle.tasks, str(by)
         _check_state(task)
+        self._started[vehicle.system_id] = by, task.id, now
         if task.state is S.HELD:
             joint.release(task, again=False, may_continue=True, actor=actor, now=now)
         if task == tasks.active or task.state is S.HELD:
@@ -224,20 +227,9 @@ class Plans:
 
     def restarted(self, vehicle: Vehicle, task: Task, *, now: float) -> None:
         """Start a mission that was submitted again; its plan id becomes the new task's id."""
-        stored = replace(self.stored(vehicle.system_id, MISSION), plan_id=task.id)
+        stored = self.stored(vehicle.system_id, MISSION)._replace(plan_id=task.id)
         self.keep(vehicle, MISSION, stored, actor=str(task.submitter), now=now)
-        self._set_going(vehicle, task, actor=str(task.submitter), now=now)
-        self._started[vehicle.system_id] = _Started(task.submitter, task.id, now)
-
-    def _is_started_again(
-        self, vehicle: Vehicle, submitter: Submitter, task: Task, *, now: float
-    ) -> bool:
-        """Whether a client repeats, perhaps in another way, the start that it just requested."""
-        started = self._started.get(vehicle.system_id)
-        if started is None or now - started.at > STARTED_TWICE:
-            return False
-        is_same = (started.by, started.task_id) == (submitter, task.id)
-        return is_same and task.state not in CALLED_OFF and not vehicle.tasks.paused
+        self._set_going(vehicle, task, task.submitter, now=now)
 
     def _again(
         self, vehicle: Vehicle, stored: Stored, submitter: Submitter, *, first: int, now: float
@@ -245,8 +237,9 @@ class Plans:
         manner = MissionParseOptions.of(
             vehicle.persona, is_staged=True, driving=vehicle.parts.settings.driving
         )
-        steps = steps_of(stored.items, manner=manner)
-        wanted = plan_of(stored.items, steps, has_home=manner.has_home, now=now)
+        items = unpacked(stored.source)
+        steps = steps_of(items, count=len(items), manner=manner)
+        wanted = plan_of(items, steps, has_home=manner.has_home, now=now)
         plan = replace(wanted.plan, first=first)
         command, terms = MavCmd.MISSION_START, replace(wanted.terms, is_cruising=True)
         return Draft(vehicle.system_id, command, plan, submitter, terms=terms)
@@ -256,58 +249,60 @@ class Plans:
 
         Raise Rejection if there is no such item.
         """
-        task = self.shown(vehicle)
-        count = len(self.stored(vehicle.system_id, MISSION).items)
-        if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
-            count = len(task.goal.steps)
+        going = self._going(vehicle)
+        stored = self.stored(vehicle.system_id, MISSION)
+        count = len(going[1].steps) if going else count_of(stored.source)
         if not count:
             raise Rejection(R.NOT_FOUND, NO_PLAN)
         if seq >= count:
-            has_home = self._has_home(vehicle)
-            number, last = (number_of(n, has_home=has_home) for n in (seq, count - 1))
-            if last < 1:
-                raise Rejection(R.BAD_PARAMETER, NO_PLAN, param=1)
-            raise Rejection(R.BAD_PARAMETER, f"item {number}: the last item is {last}", param=1)
-        if task is None or task.state in TERMINAL:
+            last = self._number_of(vehicle, count - 1)
+            words = f"item {self._number_of(vehicle, seq)}: the last item is {last}"
+            raise Rejection(R.BAD_PARAMETER, NO_PLAN if last < 1 else words, param=1)
+        if not going:
             self.begin_at(vehicle, seq)
             return None
-        vehicle.tasks.skip_to(task, seq, now=now)
-        return task
+        vehicle.tasks.skip_to(going[0], seq, now=now)
+        return going[0]
 
     def begins_with(self, vehicle: Vehicle, seq: int) -> str:
         """Return the text to a client that chose the item at which the next start begins."""
-        number = number_of(seq, has_home=self._has_home(vehicle))
-        return f"The mission will start with item {number}"
+        return f"The mission will start with item {self._number_of(vehicle, seq)}"
 
-    def _has_home(self, vehicle: Vehicle) -> bool:
+    def _going(self, vehicle: Vehicle) -> tuple[Task, Plan] | None:
+        """Return the mission that clients are shown, unless it is over."""
         task = self.shown(vehicle)
-        if task is not None and isinstance(task.goal, Plan) and task.state not in TERMINAL:
-            return task.goal.has_home
-        return vehicle.persona.has_home_item
+        if task is None or task.state in TERMINAL or not isinstance(task.goal, Plan):
+            return None
+        return task, task.goal
+
+    def _number_of(self, vehicle: Vehicle, seq: int) -> int:
+        """Return the number of an item in the file of the mission that clients are shown."""
+        going = self._going(vehicle)
+        has_home = going[1].has_home if going else vehicle.persona.has_home_item
+        return number_of(seq, has_home=has_home)
 
     # showing
 
     def current(self, vehicle: Vehicle, *, seq: int | None = None) -> m.MissionCurrent:
         """Return MISSION_CURRENT; ``seq`` replaces the number of the current item."""
-        task, system_id = self.shown(vehicle), vehicle.system_id
-        stored = self.stored(system_id, MISSION)
-        count = len(stored.items)
+        task, chosen = self.shown(vehicle), self._first.get(vehicle.system_id)
+        mission, fence, rally = (self.stored(vehicle.system_id, kind) for kind in STORED)
+        plan_id, count, at = mission.plan_id, count_of(mission.source), chosen or 0
+        state = NOT_STARTED
         if task is not None and isinstance(task.goal, Plan):
-            count = len(task.goal.steps)
-        chosen, state = self._first.get(system_id), _mission_state(task, has_plan=bool(count))
-        at = chosen or 0
-        if chosen is not None and task is not None and task.state in TERMINAL:
-            state = NOT_STARTED  # over, and an item was chosen for the next start
-        elif task is not None and task.progress.step >= 0:
-            at = min(task.progress.step, max(count - 1, 0))
+            plan_id, count = task.id, len(task.goal.steps)
+            if chosen is None or task.state not in TERMINAL:  # else that is for the next start
+                state = STATES.get(task.state, NOT_STARTED)
+                if task.progress.step >= 0:
+                    at = min(task.progress.step, max(count - 1, 0))
         return m.MissionCurrent(
             at if seq is None else seq,
             count,
-            state,
+            state if count else NO_MISSION,
             0,
-            stored.plan_id if task is None else task.id,
-            self.stored(system_id, MavMissionType.FENCE).plan_id,
-            self.stored(system_id, MavMissionType.RALLY).plan_id,
+            plan_id,
+            fence.plan_id,
+            rally.plan_id,
         )
 
 
@@ -320,17 +315,3 @@ def _check_state(task: Task | None) -> None:
     """Raise Rejection if a mission is being cancelled."""
     if task is not None and task.state is S.CANCELLING:
         raise Rejection(R.QUEUE_PAUSED, f"task {task.id} is being cancelled")
-
-
-def _mission_state(task: Task | None, *, has_plan: bool) -> int:
-    if not has_plan:
-        return 1  # NO_MISSION
-    match None if task is None else task.state:
-        case S.STARTING | S.EXECUTING:
-            return 3  # ACTIVE
-        case S.PAUSED | S.HELD | S.CANCELLING:
-            return 4  # PAUSED
-        case S.COMPLETED:
-            return 5  # COMPLETE
-        case _:
-            return NOT_STARTED
