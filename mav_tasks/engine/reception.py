@@ -7,10 +7,8 @@ from operator import attrgetter
 from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
 from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.elsewhere import Elsewhere
-from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
-from mav_tasks.engine.clients.operator_watch import OperatorWatch
 from mav_tasks.engine.clients.parameters import ParameterServer, ParamMessage
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.restart_watch import RestartWatch
@@ -38,7 +36,6 @@ class Reception:
 
     gcs: GcsSide
     vehicles: VehicleSide
-    gates: FloodGates
     intake: PacketReader
     door: Door
     elsewhere: Elsewhere
@@ -49,7 +46,6 @@ class Reception:
     displays: MessageRequests
     setup: SetupSigning
     desks: MissionServers
-    operator: OperatorWatch
     parameters: ParameterServer
     passing: Forwarder
     publisher: Publisher
@@ -83,7 +79,7 @@ class Reception:
                 self._receive_from_vehicles(item, now=now)
 
     def _received(self, item: Packets, *, now: float) -> list[Received]:
-        taken = self.intake.packets(self.gates.let_in(item, now=now), self.gcs.counts, now=now)
+        taken = self.intake.packets(self.gcs.let_in(item, now=now), self.gcs.counts, now=now)
         received: list[Received] = []
         for peer, packet, arrived in taken:
             if each := self.gcs.receive(item.link, peer, packet, arrived=arrived, now=now):
@@ -179,7 +175,7 @@ class Reception:
             if isinstance(message, m.Heartbeat) and packet.system_id in self.vehicles.by_id:
                 return  # of a rover's component: back by another link, it would be on its side
             if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
-                self.operator.receive(message, now=now)
+                self.publisher.hear_operator(message, now=now)
             elif isinstance(message, ParamMessage):
                 self.parameters.receive(client, packet, message, now=now)
             self.passing.forward(client, packet, message, now=now)

@@ -14,11 +14,10 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
 from struct import Struct
-from typing import TypeGuard
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
-from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets, Peer, Place
+from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets, Place
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -44,7 +43,6 @@ NOT_PASSED_ON = "STOP waits for the fleet's database. Use the rover's own gatewa
 TOWARDS, BACK = "to", "from"
 #: before each packet towards a gateway: when it arrived here, s, by which it counts as old there
 ARRIVED = Struct(">d")
-LENGTH = 3
 #: result and reason of a STOP that the other gateway could not store
 NOT_KEPT = (MavResult.FAILED, TaskReason.STORE_UNAVAILABLE)
 
@@ -147,8 +145,8 @@ class Elsewhere:
         return max(sorted(counts), key=lambda name: counts[name], default="")
 
     def pass_to(self, gateway: str, client: GcsClient, packet: Packet) -> None:
-        """Pass a client's packet on to a gateway, which answers it."""
-        self._send_on(gateway, client.key, packet.raw, arrived=client.arrived, is_first=False)
+        """Pass a client's packet in hand on to a gateway, which answers it."""
+        self._send_on(gateway, client, packet, arrived=client.arrived)
 
     def _target_of(self, received: Received) -> int | None:
         """Return whom a packet is for; a STOP to the server's own system is for all."""
@@ -158,13 +156,16 @@ class Elsewhere:
 
     def bring_back(self, item: Packets) -> Packets:
         """Send our clients what other gateways have for them; return the rest: their clients'."""
-        places = [place for place, (peer, _) in enumerate(item.datagrams) if not _is_back(peer)]
-        for peer, data in item.datagrams:
-            if _is_back(peer):
-                client = self._clients.get(peer[-1])
-                if client is not None and self._gcs.has(*client):
-                    self._note_answer(client, data, by=peer[1])
-                    self._queue.append(Outgoing(*client, data))
+        places: list[int] = []
+        for place, (peer, data) in enumerate(item.datagrams):
+            match peer:
+                case (word, str(gateway), int(number)) if word == BACK:
+                    client = self._clients.get(number)
+                    if client is not None and self._gcs.client(client):
+                        self._note_answer(client, data, by=gateway)
+                        self._queue.append(Outgoing(*client, data))
+                case _:
+                    places.append(place)
         return Packets(
             item.link,
             [item.datagrams[place] for place in places],
@@ -173,13 +174,12 @@ class Elsewhere:
 
     def _note_stop(self, received: Received, *, now: float) -> None:
         client, target = received.client, self._target_of(received)
-        owed: set[int] = set()
-        if client.key[0] != FLEET_LINK:  # its own gateway passes it on
-            owed = {
-                each
-                for each in self._had
-                if target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
-            }
+        is_of_ours = client.key[0] != FLEET_LINK  # of others, their own gateway passes it on
+        owed = {
+            each
+            for each in self._had
+            if is_of_ours and target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
+        }
         said = client.key, target
         kept = [each for each in self._stops if (each.received.client.key, each.target) != said]
         if len(kept) >= MOST_STOPS:  # those that nobody has to hear any more go first
@@ -205,22 +205,25 @@ class Elsewhere:
                         each.owed.difference_update(theirs if is_for_all else {packet.system_id})
 
     def _pass_on(self, gateway: str, received: Received) -> None:
-        key, raw, is_first = received.client.key, received.packet.raw, is_stop(received.message)
-        self._send_on(gateway, key, raw, arrived=received.arrived, is_first=is_first)
+        client, packet, is_first = received.client, received.packet, is_stop(received.message)
+        self._send_on(gateway, client, packet, arrived=received.arrived, is_first=is_first)
 
     def _send_on(
-        self, gateway: str, key: Place, raw: bytes, *, arrived: float, is_first: bool
+        self,
+        gateway: str,
+        client: GcsClient,
+        packet: Packet,
+        *,
+        arrived: float,
+        is_first: bool = False,
     ) -> None:
-        number = self._numbers.get(key)
+        number = self._numbers.get(client.key)
         if number is None:
             if len(self._clients) >= MOST:
                 oldest = next(iter(self._clients))
                 del self._numbers[self._clients.pop(oldest)]
             number = self._last = self._last + 1
-            self._numbers[key], self._clients[number] = number, key
+            self._numbers[client.key], self._clients[number] = number, client.key
         there = TOWARDS, gateway, number
-        self._queue.append(Outgoing(FLEET_LINK, there, ARRIVED.pack(arrived) + raw, is_first))
-
-
-def _is_back(peer: Peer) -> TypeGuard[tuple[str, str, int]]:
-    return isinstance(peer, tuple) and len(peer) == LENGTH and peer[0] == BACK
+        data = ARRIVED.pack(arrived) + packet.raw
+        self._queue.append(Outgoing(FLEET_LINK, there, data, is_first))

@@ -1,11 +1,13 @@
 """Serves REQUEST_MESSAGE and the requests about message intervals."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from math import isfinite
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import SUBMITTER
+from mav_tasks.engine.clients.vehicle_view import STOPPED
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
@@ -17,29 +19,26 @@ from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Task, TaskId
+from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
 
 PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
 EVERYBODY = Address(0, 0)
-NO_INTERVAL = -1  # of MESSAGE_INTERVAL: the message is not sent
 PAGE = 16  # waiting or finished tasks that one request returns
 MAX_INTERVAL_ID = 0xFFFF  # of MESSAGE_INTERVAL.message_id
 
 
+@dataclass(repr=False, eq=False)
 class MessageRequests:
     """The handler of REQUEST_MESSAGE and of message intervals."""
 
-    def __init__(
-        self, gcs: GcsSide, vehicles: VehicleSide, registry: TaskRegistry, gateway: str
-    ) -> None:
-        """``gateway``: the name of this server in its fleet, "" if it is in none."""
-        self._gateway = gateway.encode()
-        self._gcs = gcs
-        self._vehicles = vehicles
-        self._registry = registry
+    _gcs: GcsSide
+    _vehicles: VehicleSide
+    _registry: TaskRegistry
+    #: the name of this server in its fleet, "" if it is in none
+    _gateway: str
 
     def set_interval(self, asked: CommandRequest, *, now: float) -> None:
         """SET_MESSAGE_INTERVAL: set this client's rate; ``TelemetryRates`` asks the rover."""
@@ -52,19 +51,18 @@ class MessageRequests:
         if message_id == m.TaskStatus.id:
             client.uses_dialect = True
             interval = interval_us / 1e6 if interval_us > 0 else None
-            client.statuses.set_interval(vehicle.system_id, interval, now=now)
+            client.stream_statuses(vehicle.system_id, interval, now=now)
             return
         commands = asked.rights.reach(SUBMITTER)
-        client.thinner.set_interval(vehicle.system_id, message_id, interval_us, commands=commands)
+        client.view(vehicle.system_id).wish(message_id, interval_us, commands=commands)
 
     def set_streams(self, client: GcsClient, message: m.RequestDataStream) -> None:
         """REQUEST_DATA_STREAM: set the interval of each message of the group."""
         rate = message.req_message_rate if message.start_stop else 0
         commands = client.rights.reach(SUBMITTER)
         for vehicle in self._vehicles.addressed_by(message.target_system):
-            client.thinner.set_group(
-                vehicle.system_id, message.req_stream_id, rate, commands=commands
-            )
+            view = client.view(vehicle.system_id)
+            view.wish_group(message.req_stream_id, rate, commands=commands)
 
     def show_interval(self, asked: CommandRequest) -> None:
         """GET_MESSAGE_INTERVAL: send the interval at which this client gets a message."""
@@ -74,31 +72,26 @@ class MessageRequests:
             raise Rejection(R.BAD_PARAMETER, words)
         system_id = asked.vehicle.system_id
         if message_id == m.TaskStatus.id:
-            seconds = asked.client.statuses.interval(system_id)
-            interval = NO_INTERVAL if seconds is None else round(seconds * 1e6)
+            seconds = asked.client.status_interval(system_id)
+            interval = STOPPED if seconds is None else round(seconds * 1e6)
         else:
-            interval = asked.client.thinner.interval_us(system_id, message_id)
+            interval = asked.client.view(system_id).interval_us(message_id)
         asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
 
     def show(self, asked: CommandRequest, *, now: float) -> bool:
         """REQUEST_MESSAGE: send a message of the server itself. Return False if it is not one."""
-        client, vehicle = asked.client, asked.vehicle
-        match translate.message_id_of(asked.command):
-            case m.TaskStatus.id:
-                client.uses_dialect = True
-                self._show_tasks(asked, now=now)
+        client, packet, command, vehicle = asked.client, asked.packet, asked.command, asked.vehicle
+        match translate.message_id_of(command):
+            case m.TaskStatus.id if task_id := translate.task_id_of(command):
+                self.show_task(client, packet, task_id, now=now)
             case m.TaskTiming.id:
                 client.uses_dialect = True
                 self._show_timing(asked, now=now)
-            case m.TaskQueueStatus.id:
-                heard_at = vehicle.heard_at
-                self._show_queue(
-                    client, vehicle.tasks, vehicle.server_address, heard_at=heard_at, now=now
-                )
             case m.ProtocolVersion.id:
                 client.outlet.send(PROTOCOL_VERSION, asked.answering)
             case _:
-                return False
+                place, heard_at = (vehicle.tasks, vehicle.server_address), vehicle.heard_at
+                return self._show(client, packet, command, *place, heard_at=heard_at, now=now)
         return True
 
     def show_unheard(
@@ -112,21 +105,23 @@ class MessageRequests:
         now: float,
     ) -> bool:
         """REQUEST_MESSAGE about a rover not heard in this run. Return False if it is not for us."""
+        message_id, task_id = translate.message_id_of(command), translate.task_id_of(command)
         client.uses_dialect = True
-        match translate.message_id_of(command):
-            case m.TaskQueueStatus.id:
-                self._show_queue(client, tasks, address, heard_at=None, now=now)
-            case m.TaskStatus.id:
-                task_id = translate.task_id_of(command)
-                if task_id and self._registry.get(task_id) is None:
-                    raise Rejection(R.NOT_FOUND, f"no task {task_id}")
-                ids = [TaskId(task_id)] if task_id else self._page(tasks, command)
-                self._show_statuses(client, ids, tasks, address, reader=packet.source, now=now)
-            case m.TaskTiming.id:  # needs the rover's setpoint rate
-                raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
-            case _:
-                return False
-        return True
+        if message_id == m.TaskTiming.id:  # needs the rover's setpoint rate
+            raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
+        if message_id == m.TaskStatus.id and task_id:
+            self._send(client, [self._task(task_id)], tasks, address, packet.source, now=now)
+            return True
+        return self._show(client, packet, command, tasks, address, heard_at=None, now=now)
+
+    def show_task(self, client: GcsClient, packet: Packet, task_id: int, *, now: float) -> None:
+        """Send a task's TASK_STATUS, and each later change; raise Rejection if there is no task."""
+        client.uses_dialect = True
+        task = self._task(task_id)
+        client.follow(task_id)
+        if owner := self._vehicles.look_at(task.vehicle):
+            place = owner.tasks, owner.server_address
+            self._send(client, [task], *place, packet.source, now=now)
 
     def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
         """Send a task's TASK_STATUS without its queue position, which takes time to compute."""
@@ -136,88 +131,83 @@ class MessageRequests:
             to = task.submitter.system_id, task.submitter.component_id
             reader = address_of(*to) if client.submitted(task) else EVERYBODY
             tasks, address = vehicle.tasks, vehicle.server_address
-            self._send(client, task, tasks, address, reader=reader, forecast=None, now=now)
+            self._send_one(client, task, tasks, address, reader, forecast=None, now=now)
 
-    def _show_statuses(
+    def _task(self, task_id: int) -> Task:
+        task = self._registry.get(task_id)
+        if task is None:
+            raise Rejection(R.NOT_FOUND, f"no task {task_id}")
+        return task
+
+    def _show(
         self,
         client: GcsClient,
-        ids: Iterable[TaskId],
-        tasks: VehicleTasks,
-        address: Address,
-        *,
-        reader: Address,
-        now: float,
-    ) -> None:
-        """Send the TASK_STATUS of tasks, with their queue positions and estimated times."""
-        forecast = Forecast(tasks, self._registry, now=now)
-        for each in ids:
-            task = self._registry[each]
-            self._send(client, task, tasks, address, reader=reader, forecast=forecast, now=now)
-
-    def _send(
-        self,
-        client: GcsClient,
-        task: Task,
-        tasks: VehicleTasks,
-        address: Address,
-        *,
-        reader: Address,
-        forecast: Forecast | None,
-        now: float,
-    ) -> None:
-        status = translate.task_status(
-            task,
-            tasks,
-            reader=reader,
-            link_number=self._gcs.link_numbers.get(task.submitter.link, 0),
-            forecast=forecast,
-            now=now,
-        )
-        client.outlet.send(status, address)
-
-    def _show_queue(
-        self,
-        client: GcsClient,
+        packet: Packet,
+        command: Command,
         tasks: VehicleTasks,
         address: Address,
         *,
         heard_at: float | None,
         now: float,
-    ) -> None:
+    ) -> bool:
+        """Send a rover's queue, or the first of its tasks. Return False if neither is asked for."""
+        match translate.message_id_of(command):
+            case m.TaskQueueStatus.id:
+                status = translate.queue_status(
+                    tasks,
+                    self._registry.counts(tasks.vehicle),
+                    heard_at=heard_at,
+                    gateway=self._gateway.encode(),
+                    version=self._registry.recorded,
+                    now=now,
+                )
+                client.outlet.send(status, address)
+            case m.TaskStatus.id:  # waiting or finished ones
+                first = max(0, translate.first_index_of(command))
+                is_of_finished = translate.is_of_finished(command)
+                ids = (
+                    self._registry.finished(tasks.vehicle, first, PAGE)
+                    if is_of_finished
+                    else tasks.page(first, PAGE)
+                )
+                shown = [self._registry[each] for each in ids]
+                self._send(client, shown, tasks, address, packet.source, now=now)
+            case _:
+                return False
         client.uses_dialect = True
-        counts = self._registry.counts(tasks.vehicle)
-        version = self._registry.recorded
-        status = translate.queue_status(
-            tasks, counts, heard_at=heard_at, gateway=self._gateway, version=version, now=now
+        return True
+
+    def _send(
+        self,
+        client: GcsClient,
+        shown: Iterable[Task],
+        tasks: VehicleTasks,
+        address: Address,
+        reader: Address,
+        *,
+        now: float,
+    ) -> None:
+        """Send the TASK_STATUS of tasks, with their queue positions and estimated times."""
+        forecast = Forecast(tasks, self._registry, now=now)
+        for task in shown:
+            self._send_one(client, task, tasks, address, reader, forecast=forecast, now=now)
+
+    def _send_one(
+        self,
+        client: GcsClient,
+        task: Task,
+        tasks: VehicleTasks,
+        address: Address,
+        reader: Address,
+        *,
+        forecast: Forecast | None,
+        now: float,
+    ) -> None:
+        number = self._gcs.link_numbers.get(task.submitter.link, 0)
+        status = translate.task_status(
+            task, tasks, reader=reader, link_number=number, forecast=forecast, now=now
         )
         client.outlet.send(status, address)
-
-    def _show_tasks(self, asked: CommandRequest, *, now: float) -> None:
-        client, vehicle, reader = asked.client, asked.vehicle, asked.packet.source
-        task_id = translate.task_id_of(asked.command)
-        if task_id:
-            self.show_task(client, asked.packet, task_id, now=now)
-            return
-        ids, address = self._page(vehicle.tasks, asked.command), vehicle.server_address
-        self._show_statuses(client, ids, vehicle.tasks, address, reader=reader, now=now)
-
-    def show_task(self, client: GcsClient, packet: Packet, task_id: int, *, now: float) -> None:
-        """Send a task's TASK_STATUS, and each later change; raise Rejection if there is no task."""
-        client.uses_dialect = True
-        task = self._registry.get(task_id)
-        if task is None:
-            raise Rejection(R.NOT_FOUND, f"no task {task_id}")
-        client.follow(task_id)
-        if owner := self._vehicles.look_at(task.vehicle):
-            tasks, address = owner.tasks, owner.server_address
-            self._show_statuses(client, [task.id], tasks, address, reader=packet.source, now=now)
-
-    def _page(self, tasks: VehicleTasks, command: Command) -> list[TaskId]:
-        """Return the waiting or finished tasks for a request without a task id."""
-        first = max(0, translate.first_index_of(command))
-        if translate.is_of_finished(command):
-            return self._registry.finished(tasks.vehicle, first, PAGE)
-        return tasks.page(first, PAGE)
 
     def _show_timing(self, asked: CommandRequest, *, now: float) -> None:
         task_id = translate.task_id_of(asked.command)
