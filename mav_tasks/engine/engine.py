@@ -11,14 +11,12 @@ from typing import assert_never
 
 from mav_tasks.engine import inputs
 from mav_tasks.engine.clients.broadcasts import Broadcasts
-from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.elsewhere import Elsewhere
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.parameters import ParameterServer
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.commands.any_rover import AnyRover
 from mav_tasks.engine.commands.assignments import Assignments
@@ -106,8 +104,8 @@ class Engine:
         )
         plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
         self._reports = MissionReports(gcs, vehicles, registry, plans, timers, settings, now=now)
-        displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
-        refusals = Refusals(registry, vehicles)
+        displays = MessageRequests(gcs, vehicles, self.signatures, registry, earlier.gateway)
+        refusals = self._refusals = Refusals(registry, vehicles)
         modes = self._modes = ModeRequests(gcs, registry, submissions, plans, refusals)
         control = TaskControl(registry)
         assignments = self._assignments = Assignments(
@@ -126,12 +124,11 @@ class Engine:
             gcs, vehicles, registry, displays, submissions, timers, settings, now=now
         )
         self._passing = Forwarder(vehicles, refusals)
-        self._door = Door(vehicles, refusals)
         self._reception = Reception(
             gcs=gcs,
             vehicles=vehicles,
             intake=self._intake,
-            door=self._door,
+            refusals=refusals,
             elsewhere=self._elsewhere,
             broadcasts=Broadcasts(vehicles, packer),
             commands=Commands(
@@ -140,7 +137,6 @@ class Engine:
             control=control,
             modes=modes,
             displays=displays,
-            setup=SetupSigning(self.signatures, vehicles),
             desks=self._desks,
             parameters=self._parameters,
             passing=self._passing,
@@ -290,7 +286,7 @@ class Engine:
             decoded=(
                 f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
                 f" {self.signatures.counts}, dropped {self._gcs.left_out} datagrams,"
-                f" {self._door.left_out} requests"
+                f" {self._refusals.left_out} requests"
             ),
         )
 

@@ -1,12 +1,18 @@
-"""Serves REQUEST_MESSAGE and the requests about message intervals."""
+"""Serves REQUEST_MESSAGE, the requests about message intervals, and SETUP_SIGNING.
+
+SETUP_SIGNING makes the server sign its packets to a client, if the key is in the ring. It is never
+forwarded: a rover whose key changed without the server would accept no STOP from it any more.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import SUBMITTER
+from mav_tasks.engine.clients.signatures import Signatures
 from mav_tasks.engine.clients.vehicle_view import STOPPED
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.command_request import CommandRequest
@@ -14,6 +20,7 @@ from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, address_of
+from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.forecast import Forecast
@@ -30,12 +37,23 @@ PAGE = 16  # waiting or finished tasks that one request returns
 MAX_INTERVAL_ID = 0xFFFF  # of MESSAGE_INTERVAL.message_id
 
 
+class _Reader(NamedTuple):
+    """Who is sent messages about the tasks of one rover, and in whose name."""
+
+    client: GcsClient
+    address: Address
+    tasks: VehicleTasks
+    source: Address
+    now: float
+
+
 @dataclass(repr=False, eq=False)
 class MessageRequests:
     """The handler of REQUEST_MESSAGE and of message intervals."""
 
     _gcs: GcsSide
     _vehicles: VehicleSide
+    _signatures: Signatures
     _registry: TaskRegistry
     #: the name of this server in its fleet, "" if it is in none
     _gateway: str
@@ -64,6 +82,16 @@ class MessageRequests:
             view = client.view(vehicle.system_id)
             view.wish_group(message.req_stream_id, rate, commands=commands)
 
+    def set_up_signing(self, client: GcsClient, message: m.SetupSigning, *, now: float) -> None:
+        """SETUP_SIGNING: a text says why not; QGroundControl looks for it, or signed packets."""
+        for vehicle in self._vehicles.addressed_by(message.target_system)[:1]:
+            why_not = "disabled by signing.setup"
+            if vehicle.parts.settings.signing.setup == "known":
+                why_not = self._signatures.set_up(*client.key, bytes(message.secret_key))
+            if why_not:
+                words = f"signing refused: {why_not}"
+                client.tell(words, MavSeverity.ERROR, vehicle.server_address, now=now)
+
     def show_interval(self, asked: CommandRequest) -> None:
         """GET_MESSAGE_INTERVAL: send the interval at which this client gets a message."""
         message_id = translate.message_id_of(asked.command)
@@ -90,8 +118,9 @@ class MessageRequests:
             case m.ProtocolVersion.id:
                 client.outlet.send(PROTOCOL_VERSION, asked.answering)
             case _:
-                place, heard_at = (vehicle.tasks, vehicle.server_address), vehicle.heard_at
-                return self._show(client, packet, command, *place, heard_at=heard_at, now=now)
+                place = vehicle.tasks, vehicle.server_address
+                to = _Reader(client, packet.source, *place, now)
+                return self._show(to, command, heard_at=vehicle.heard_at)
         return True
 
     def show_unheard(
@@ -106,13 +135,14 @@ class MessageRequests:
     ) -> bool:
         """REQUEST_MESSAGE about a rover not heard in this run. Return False if it is not for us."""
         message_id, task_id = translate.message_id_of(command), translate.task_id_of(command)
+        to = _Reader(client, packet.source, tasks, address, now)
         client.uses_dialect = True
         if message_id == m.TaskTiming.id:  # needs the rover's setpoint rate
             raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
         if message_id == m.TaskStatus.id and task_id:
-            self._send(client, [self._task(task_id)], tasks, address, packet.source, now=now)
+            self._send(to, [self._task(task_id)])
             return True
-        return self._show(client, packet, command, tasks, address, heard_at=None, now=now)
+        return self._show(to, command, heard_at=None)
 
     def show_task(self, client: GcsClient, packet: Packet, task_id: int, *, now: float) -> None:
         """Send a task's TASK_STATUS, and each later change; raise Rejection if there is no task."""
@@ -121,7 +151,7 @@ class MessageRequests:
         client.follow(task_id)
         if owner := self._vehicles.look_at(task.vehicle):
             place = owner.tasks, owner.server_address
-            self._send(client, [task], *place, packet.source, now=now)
+            self._send(_Reader(client, packet.source, *place, now), [task])
 
     def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
         """Send a task's TASK_STATUS without its queue position, which takes time to compute."""
@@ -130,8 +160,8 @@ class MessageRequests:
         if task is not None and vehicle is not None:
             to = task.submitter.system_id, task.submitter.component_id
             reader = address_of(*to) if client.submitted(task) else EVERYBODY
-            tasks, address = vehicle.tasks, vehicle.server_address
-            self._send_one(client, task, tasks, address, reader, forecast=None, now=now)
+            place = vehicle.tasks, vehicle.server_address
+            self._send_one(_Reader(client, reader, *place, now), task, None)
 
     def _task(self, task_id: int) -> Task:
         task = self._registry.get(task_id)
@@ -139,75 +169,43 @@ class MessageRequests:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
         return task
 
-    def _show(
-        self,
-        client: GcsClient,
-        packet: Packet,
-        command: Command,
-        tasks: VehicleTasks,
-        address: Address,
-        *,
-        heard_at: float | None,
-        now: float,
-    ) -> bool:
-        """Send a rover's queue, or the first of its tasks. Return False if neither is asked for."""
+    def _show(self, to: _Reader, command: Command, *, heard_at: float | None) -> bool:
+        """Send a rover's queue, or a page of its tasks. Return False if neither is asked for."""
+        registry, tasks = self._registry, to.tasks
         match translate.message_id_of(command):
             case m.TaskQueueStatus.id:
                 status = translate.queue_status(
                     tasks,
-                    self._registry.counts(tasks.vehicle),
+                    registry.counts(tasks.vehicle),
                     heard_at=heard_at,
                     gateway=self._gateway.encode(),
-                    version=self._registry.recorded,
-                    now=now,
+                    version=registry.recorded,
+                    now=to.now,
                 )
-                client.outlet.send(status, address)
-            case m.TaskStatus.id:  # waiting or finished ones
+                to.client.outlet.send(status, to.source)
+            case m.TaskStatus.id:
                 first = max(0, translate.first_index_of(command))
-                is_of_finished = translate.is_of_finished(command)
-                ids = (
-                    self._registry.finished(tasks.vehicle, first, PAGE)
-                    if is_of_finished
-                    else tasks.page(first, PAGE)
-                )
-                shown = [self._registry[each] for each in ids]
-                self._send(client, shown, tasks, address, packet.source, now=now)
+                ids = tasks.page(first, PAGE)
+                if translate.is_of_finished(command):
+                    ids = registry.finished(tasks.vehicle, first, PAGE)
+                self._send(to, [registry[each] for each in ids])
             case _:
                 return False
-        client.uses_dialect = True
+        to.client.uses_dialect = True
         return True
 
-    def _send(
-        self,
-        client: GcsClient,
-        shown: Iterable[Task],
-        tasks: VehicleTasks,
-        address: Address,
-        reader: Address,
-        *,
-        now: float,
-    ) -> None:
+    def _send(self, to: _Reader, shown: Iterable[Task]) -> None:
         """Send the TASK_STATUS of tasks, with their queue positions and estimated times."""
-        forecast = Forecast(tasks, self._registry, now=now)
+        forecast = Forecast(to.tasks, self._registry, now=to.now)
         for task in shown:
-            self._send_one(client, task, tasks, address, reader, forecast=forecast, now=now)
+            self._send_one(to, task, forecast)
 
-    def _send_one(
-        self,
-        client: GcsClient,
-        task: Task,
-        tasks: VehicleTasks,
-        address: Address,
-        reader: Address,
-        *,
-        forecast: Forecast | None,
-        now: float,
-    ) -> None:
+    def _send_one(self, to: _Reader, task: Task, forecast: Forecast | None) -> None:
         number = self._gcs.link_numbers.get(task.submitter.link, 0)
         status = translate.task_status(
-            task, tasks, reader=reader, link_number=number, forecast=forecast, now=now
+            task, to.tasks, reader=to.address, link_number=number, forecast=forecast, now=to.now
         )
-        client.outlet.send(status, address)
+        to.client.outlet.send(status, to.source)
 
     def _show_timing(self, asked: CommandRequest, *, now: float) -> None:
         task_id = translate.task_id_of(asked.command)
@@ -218,11 +216,7 @@ class MessageRequests:
         vehicle = self._vehicles.look_at(task.vehicle)
         if vehicle is None:  # its rover is of an earlier run, not heard yet: as for TASK_STATUS
             return
-        message = translate.task_timing(
-            task,
-            vehicle.tasks.timing_of(task),
-            period=vehicle.parts.settings.watch.setpoint_period,
-            reader=asked.packet.source,
-            now=now,
-        )
+        period, reader = vehicle.parts.settings.watch.setpoint_period, asked.packet.source
+        timing = vehicle.tasks.timing_of(task)
+        message = translate.task_timing(task, timing, period=period, reader=reader, now=now)
         asked.client.outlet.send(message, vehicle.server_address)

@@ -1,9 +1,10 @@
 """The server's settings as parameters of its component in each vehicle's system.
 
 They are the same for all vehicles, survive a restart, and take effect once they are durable.
-Messages about the vehicle's own parameters are forwarded to it. MAVLink guide, "Parameter Protocol":
-all parameters are REAL32, and what is not there is answered by PARAM_ERROR, which clients that do
-not know it pass over.
+Messages about the vehicle's own parameters are forwarded to it.
+
+MAVLink guide, "Parameter Protocol". All parameters are REAL32, and what is not there is answered by
+PARAM_ERROR, which clients that do not know it pass over.
 """
 
 from collections.abc import Mapping

@@ -14,29 +14,28 @@ from dataclasses import dataclass
 from math import exp, inf, log
 from typing import NamedTuple
 
-from mav_tasks.mavlink import messages as m
 from mav_tasks.services.interval_requester import WANTED
 
-#: What REQUEST_DATA_STREAM names at once, by MAV_DATA_STREAM: as ArduPilot's rovers have it. These
-#: are the messages that vehicles send as streams, by id: only they are thinned. Everything else is
-#: an answer or an event, of which none may be lost.
+#: What REQUEST_DATA_STREAM names at once, by MAV_DATA_STREAM: message ids, as ArduPilot's rovers
+#: have them. ALL are the messages that vehicles send as streams, and only these are thinned:
+#: everything else is an answer or an event, of which none may be lost.
 GROUPS: dict[int, frozenset[int]] = {
-    # RAW_SENSORS: RAW_IMU, SCALED_IMU, SCALED_PRESSURE, HIGHRES_IMU, SCALED_IMU2, SCALED_IMU3
-    1: frozenset({27, 26, 29, 105, 116, 129}),
-    2: frozenset(  # EXTENDED_STATUS, with NAV_CONTROLLER_OUTPUT
-        {m.SysStatus.id, m.MissionCurrent.id, m.GpsRawInt.id, 62, m.PositionTargetGlobalInt.id}
-    ),
-    3: frozenset({35, 36, 65}),  # RC_CHANNELS: those, RC_CHANNELS_RAW, SERVO_OUTPUT_RAW
-    6: frozenset({m.GlobalPositionInt.id, m.LocalPositionNed.id}),  # POSITION
-    10: frozenset({m.Attitude.id, 31}),  # EXTRA1, with ATTITUDE_QUATERNION
-    11: frozenset({m.VfrHud.id}),  # EXTRA2
-    # EXTRA3, with DISTANCE_SENSOR, ESTIMATOR_STATUS, VIBRATION
-    12: frozenset({m.SystemTime.id, m.BatteryStatus.id, 132, 230, 241}),
+    int(group): frozenset(map(int, ids))
+    for group, _, *ids in map(
+        str.split,
+        """
+0  ALL  1 2 24 26 27 29 30 31 32 33 35 36 42 62 65 74 85 87 105 116 129 132 141 147 230 241 331
+1  RAW_SENSORS      26 27 29 105 116 129
+2  EXTENDED_STATUS  1 24 42 62 87
+3  RC_CHANNELS      35 36 65
+6  POSITION         32 33
+10 EXTRA1           30 31
+11 EXTRA2           74
+12 EXTRA3           2 132 147 230 241
+""".strip().splitlines(),
+    )
 }
-#: with ALTITUDE and ODOMETRY, which are in no group
-STREAMED = frozenset({m.PositionTargetLocalNed.id, 141, 331}).union(*GROUPS.values())
-GROUPS[0] = STREAMED  # ALL
-
+STREAMED = GROUPS[0]
 STOPPED = -1  # SET_MESSAGE_INTERVAL param2, and MESSAGE_INTERVAL: the message is not sent
 DEFAULT = 0  # SET_MESSAGE_INTERVAL param2: back to the default rate
 LONGEST_US = 2**31 - 1  # what MESSAGE_INTERVAL can say
