@@ -56,14 +56,6 @@ class _Stop:
     target: int | None  # system id
     owed: set[int]
 
-    def is_for(self, vehicle: int, *, now: float) -> bool:
-        """Return whether a gateway that gets a vehicle now must obey it."""
-        is_recent = now - self.at <= IN_TRANSIT and self.target in (EVERYBODY, vehicle)
-        return is_recent or vehicle in self.owed
-
-    def is_over(self, *, now: float) -> bool:
-        return now - self.at > (UNANSWERED if self.owed else IN_TRANSIT)
-
 
 class Elsewhere:
     """Which gateway has which vehicle, besides this one."""
@@ -96,8 +88,15 @@ class Elsewhere:
 
     def stops_of(self, vehicle: int, *, now: float) -> list[Received]:
         """Return the STOPs for a vehicle that nobody may have heard who has had it."""
-        self._stops = [each for each in self._stops if not each.is_over(now=now)]
-        return [each.received for each in self._stops if each.is_for(vehicle, now=now)]
+        recent = now - IN_TRANSIT
+        self._stops = [
+            each for each in self._stops if each.at >= (now - UNANSWERED if each.owed else recent)
+        ]
+        return [
+            each.received
+            for each in self._stops
+            if vehicle in each.owed or (each.at >= recent and each.target in (EVERYBODY, vehicle))
+        ]
 
     def stops_for(self, vehicle: int, *, now: float) -> list[Received]:
         """Return the same STOPs as for this vehicle alone: others may have been continued since."""

@@ -1,7 +1,6 @@
 """One client: an endpoint on a client link, what it was sent and what it requested."""
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from math import inf
 
 from mav_tasks.engine.clients.rights import NOTHING, SUBMITTER, Rights
@@ -31,7 +30,6 @@ REFUSAL_EACH = 5.0
 MAX_REFUSALS_TOLD = 64
 BACK_AFTER = 3.5  # s of silence, after which a ground station may have been restarted
 OLD = 0.5  # s; a packet that lay here longer may be older than packets that came since
-MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 ELSEWHERE = 0.5  # s between messages of one type to a client at another gateway
 MAX_SENDERS = 32  # addresses at one endpoint whose commands are remembered: there may be a router
@@ -45,14 +43,6 @@ NO_STANDING = (0, False)  # of a client that has said nothing yet
 def changes_of(rate: float) -> float:
     """Return how many changes a second go with a rate of requests."""
     return max(rate * CHANGES, min(rate, LEAST_CHANGES))
-
-
-@dataclass(slots=True)
-class _Stream:
-    """TASK_STATUS of a vehicle's active task, at the interval that the client asked for."""
-
-    interval: float  # s
-    next_at: float
 
 
 class GcsClient:
@@ -91,17 +81,20 @@ class GcsClient:
         self.source: Address | None = None
         #: its submitter
         self.who = Submitter(link, self.endpoint, 0, 0)
-        self._addresses: dict[Address, None] = {}  # addresses seen here, the latest last
+        #: addresses seen here, the latest last
+        self.addresses: dict[Address, None] = {}
         #: whether it has used our dialect: it gets TASK_STATUS then
         self.uses_dialect = False
-        self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
+        #: tasks that it has asked about, and is told each change of; the latest last
+        self.followed: dict[int, None] = {}
         #: its telemetry
         self.pace = Pace(settings.stream_interval, ELSEWHERE if link == FLEET_LINK else 0.0)
         #: by system id; made when the client is sent the vehicle's telemetry, or asks for it
         self.views: dict[int, VehicleView] = {}
         #: tasks to be told of, in this order; the state is that at the time of sending
         self._changed: dict[int, None] = {}
-        self._status_streams: dict[int, _Stream] = {}  # by vehicle
+        #: interval and next time of TASK_STATUS of an active task, s, by vehicle
+        self.status_streams: dict[int, tuple[float, float]] = {}
         self._statuses_from = 0.0  # s, until when the rate lets no TASK_STATUS leave
         self._wake = wake
         self._text_id = 0
@@ -124,7 +117,7 @@ class GcsClient:
         self.apply(settings)
 
     def __repr__(self) -> str:
-        names = " ".join(map(str, self._addresses)) or "unheard"
+        names = " ".join(map(str, self.addresses)) or "unheard"
         return f"GcsClient({names} at {self.endpoint})"
 
     def apply(self, settings: Clients) -> None:
@@ -172,14 +165,6 @@ class GcsClient:
         submitter = task.submitter
         return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
 
-    def follow(self, task_id: int) -> None:
-        """Send the client each change of this task from now on."""
-        keep_latest(self._followed, task_id, None, most=MAX_FOLLOWED)
-
-    def follows(self, task_id: int) -> bool:
-        """Whether the client has asked about this task."""
-        return task_id in self._followed
-
     def sender(self, source: Address) -> Sender:
         """Return the ``Sender`` of the address of the packet in hand; one for all observers.
 
@@ -205,8 +190,8 @@ class GcsClient:
         self.is_one_of_many = self.is_one_of_many and self.is_passing
         self.heard_at = now
         self.is_heard = True
-        if source not in self._addresses:
-            keep_latest(self._addresses, source, None, most=MAX_ADDRESSES)
+        if source not in self.addresses:
+            keep_latest(self.addresses, source, None, most=MAX_ADDRESSES)
 
     def view(self, system_id: int) -> VehicleView:
         """Return what the client gets of a vehicle."""
@@ -222,8 +207,8 @@ class GcsClient:
         """
         self.introduced.discard(system_id)
         self.views.pop(system_id, None)
-        self._status_streams.pop(system_id, None)
-        self._followed = {each: None for each in self._followed if each not in tasks}
+        self.status_streams.pop(system_id, None)
+        self.followed = {each: None for each in self.followed if each not in tasks}
         self._changed = {each: None for each in self._changed if each not in tasks}
         for source in [each for each in self.left_out if each.system_id == system_id]:
             del self.left_out[source]
@@ -239,23 +224,15 @@ class GcsClient:
 
     def stream_statuses(self, vehicle: int, interval: float | None, *, now: float) -> None:
         """Stream a vehicle's active task every ``interval`` seconds; None: not at all."""
-        if interval is None:
-            self._status_streams.pop(vehicle, None)
-        else:
-            self._status_streams[vehicle] = _Stream(min(max(interval, SHORTEST), LONGEST), now)
+        self.status_streams.pop(vehicle, None)
+        if interval is not None:
+            self.status_streams[vehicle] = min(max(interval, SHORTEST), LONGEST), now
         self._wake(now)
-
-    def status_interval(self, vehicle: int) -> float | None:
-        """Return the interval of a vehicle's stream of statuses, seconds; None: there is none."""
-        stream = self._status_streams.get(vehicle)
-        return None if stream is None else stream.interval
 
     def statuses_due_at(self) -> float:
         """Return when ``due_statuses`` has something to give; inf: never, as things are."""
         first = self._statuses_from if self._changed else inf
-        if not self._status_streams:  # as with nearly all clients
-            return first
-        return min([first, *(stream.next_at for stream in self._status_streams.values())])
+        return min([first, *(next_at for _, next_at in self.status_streams.values())])
 
     def due_statuses(self, active: Mapping[int, int], *, now: float) -> list[int]:
         """Return the tasks to report now; ``active`` are those that streams report, by vehicle."""
@@ -267,28 +244,16 @@ class GcsClient:
             task_id = next(iter(self._changed))
             del self._changed[task_id]
             due[task_id] = None
-        for vehicle, stream in self._status_streams.items():
-            if now >= stream.next_at:
-                stream.next_at = max(stream.next_at + stream.interval, now)
+        for vehicle, (interval, next_at) in self.status_streams.items():
+            if now >= next_at:
+                self.status_streams[vehicle] = interval, max(next_at + interval, now)
                 if vehicle in active:
                     due[active[vehicle]] = None
         return list(due)
 
-    def is_reached_by(self, target: Address) -> bool:
-        """Whether a message for this target reaches an address at this endpoint."""
-        return any(target.reaches(address) for address in self._addresses)
-
     def answer(self, answer: Answer, to: Address) -> None:
         """Send a COMMAND_ACK to the address ``to`` at this endpoint."""
         self.outlet.send(answer.ack(to), answer.source)
-
-    def introduce(self, heartbeat: Packet, *, last_seq: int) -> None:
-        """Send a vehicle's latest heartbeat, before anything else of its system.
-
-        ``last_seq`` is the number of the autopilot's last packet, so that the next one follows on.
-        """
-        self.introduced.add(heartbeat.system_id)
-        self.outlet.forward(heartbeat._replace(seq=last_seq))
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Forward a vehicle's packet, unless its stream is above this client's rate."""
@@ -297,8 +262,7 @@ class GcsClient:
             if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
                 return
             self.introduced.add(system_id)
-        number = packet.message_id
-        is_silent = not self.is_heard or self.is_one_of_many
+        number, is_silent = packet.message_id, not self.is_heard or self.is_one_of_many
         if number == m.Heartbeat.id or not (
             is_silent
             or (

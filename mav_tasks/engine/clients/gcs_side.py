@@ -219,7 +219,7 @@ class GcsSide:
             return
         target = target_of(message)
         for client in self.clients:
-            if client.is_reached_by(target):
+            if any(target.reaches(address) for address in client.addresses):
                 client.forward(packet, now=now)
             else:
                 client.outlet.withhold(packet.source)
@@ -240,10 +240,11 @@ class GcsSide:
         for client in self.clients:
             client.tell(text, severity, source, now=now)
 
-    def forget_silent(self, *, awaits: Callable[[GcsClient], bool], now: float) -> None:
+    def forget_silent(self, *, awaits: Callable[[str, str], bool], now: float) -> None:
         """Drop clients that have been silent for long; configured ones become unheard again.
 
-        ``awaits``: whether a client waits for the end of a task; it is kept, however long it takes.
+        ``awaits``: whether a client at this link and endpoint waits for the end of a task; it is
+        kept, however long that takes.
         """
         limits, is_crowd = self._settings.clients, self._is_crowd
         for key, client in list(self._clients.items()):
@@ -253,7 +254,7 @@ class GcsSide:
                 most = limits.push_lost
             elif is_crowd and client.is_passing and not is_connected:
                 most = SILENT
-            if now - client.heard_at > most and (is_pushed or not awaits(client)):
+            if now - client.heard_at > most and (is_pushed or not awaits(key[0], client.endpoint)):
                 self._drop(key)
 
     def _drop(self, key: Place) -> None:

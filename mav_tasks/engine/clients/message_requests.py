@@ -18,6 +18,7 @@ from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, address_of
 from mav_tasks.mavlink.enums import MavSeverity
@@ -34,6 +35,7 @@ R = TaskReason
 PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
 EVERYBODY = Address(0, 0)
 PAGE = 16  # waiting or finished tasks that one request returns
+MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_INTERVAL_ID = 0xFFFF  # of MESSAGE_INTERVAL.message_id
 
 
@@ -100,8 +102,8 @@ class MessageRequests:
             raise Rejection(R.BAD_PARAMETER, words)
         system_id = asked.vehicle.system_id
         if message_id == m.TaskStatus.id:
-            seconds = asked.client.status_interval(system_id)
-            interval = STOPPED if seconds is None else round(seconds * 1e6)
+            seconds, _ = asked.client.status_streams.get(system_id, (STOPPED / 1e6, 0.0))
+            interval = round(seconds * 1e6)
         else:
             interval = asked.client.view(system_id).interval_us(message_id)
         asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
@@ -148,7 +150,7 @@ class MessageRequests:
         """Send a task's TASK_STATUS, and each later change; raise Rejection if there is no task."""
         client.uses_dialect = True
         task = self._task(task_id)
-        client.follow(task_id)
+        keep_latest(client.followed, task_id, None, most=MAX_FOLLOWED)
         if owner := self._vehicles.look_at(task.vehicle):
             place = owner.tasks, owner.server_address
             self._send(_Reader(client, packet.source, *place, now), [task])

@@ -98,7 +98,9 @@ class Publisher:
                 heartbeat = vehicle.shown.applied(
                     vehicle.last_heartbeat, is_stopped=vehicle.tasks.is_stopped, now=now
                 )
-                client.introduce(heartbeat, last_seq=vehicle.last_seq)
+                # before anything else of its system; the autopilot's next packet follows on
+                client.introduced.add(vehicle.system_id)
+                client.outlet.forward(heartbeat._replace(seq=vehicle.last_seq))
 
     def withhold(self, packet: Packet) -> None:
         """Note for every client that a vehicle's packet is not forwarded: no gap shows."""
@@ -149,15 +151,12 @@ class Publisher:
         for client in self._gcs.clients:
             # a nonce proves it for good; after a restart or a long silence the client is a new one
             reads = client.uses_dialect or task.marks.nonce
-            if (reads and client.submitted(task)) or client.follows(task.id):
+            if (reads and client.submitted(task)) or task.id in client.followed:
                 client.note_change(task.id)
-
-    def _awaits(self, client: GcsClient) -> bool:
-        return self._registry.is_awaited_at(client.outlet.link, client.endpoint)
 
     def _beat(self, *, now: float) -> None:
         """Each second: heartbeats, message rates, dropped texts; forget silent clients."""
-        self._gcs.forget_silent(awaits=self._awaits, now=now)
+        self._gcs.forget_silent(awaits=self._registry.is_awaited_at, now=now)
         self._ask_for_telemetry(now=now)
         self._send_heartbeats(now=now)
         for client in self._gcs.clients:

@@ -158,19 +158,15 @@ class Signatures:
             gone = {key.name for key in change.keys if not key.secret}
         self._has_ring = True
         for way, signer in list(self._signers.items()):
-            if not self.knows(signer.key) and not self._is_last_of_vehicles(way[0]):
+            # Vehicles of a link that has lost its key without a new one take no other signature.
+            # Their packets are refused, so they are not driven; but commands to stand are still
+            # signed with the old key
+            there = self._links[way[0]]
+            is_last = there.is_of_vehicles and there.key not in self._keys
+            if not self.knows(signer.key) and not is_last:
                 del self._signers[way]  # also if only its role changed
         self.may_sign = bool(self._keys or self._signers)
         return gone
-
-    def _is_last_of_vehicles(self, link: str) -> bool:
-        """Whether a vehicle link has lost its key without a new one under that name.
-
-        Its vehicles take no other signature. Their packets are refused, so they are not driven;
-        but commands to stand are still signed with the old key.
-        """
-        there = self._links[link]
-        return there.is_of_vehicles and there.key not in self._keys
 
     def change_link(self, change: LinkChanged) -> None:
         """Add a link with its key and rules when it comes up, remove it when it goes down."""
