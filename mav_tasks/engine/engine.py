@@ -357,8 +357,8 @@ class Engine:
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
-        for refused in signatures.take_refused() if signatures.refused else ():
-            self._registry.record(refused)
+        while signatures.refused:
+            self._registry.record(signatures.refused.pop(0))
         times = signatures.take_times()
         if times is not None:
             self._registry.record(times)

@@ -13,7 +13,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
-from mav_tasks.engine.clients.rights import RightsBook
+from mav_tasks.engine.clients.rights import rights_of
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
 from mav_tasks.engine.clients.stop_packets import stops_in
 from mav_tasks.engine.inputs import (
@@ -124,12 +124,11 @@ class GcsSide:
 
     def apply(self, settings: Settings) -> None:
         self._settings = settings
-        self._rights = RightsBook(settings.roles)
         most = float(settings.clients.max_clients)
         self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most, now=0.0)
         for client in self.clients:
             client.apply(settings.clients)
-            client.take_rights(self._rights.of(client.signed_by, client.who))
+            client.take_rights(rights_of(client.signed_by, client.who, settings.roles))
 
     def forget_unknown(self) -> list[Place]:
         """Forget clients whose key is no longer valid; configured ones become unheard.
@@ -202,7 +201,7 @@ class GcsSide:
     def _know(self, client: GcsClient, source: Address, key: Key) -> None:
         client.source, client.signed_by = source, key
         client.who = client.submitter(source)
-        client.take_rights(self._rights.of(key, client.who))
+        client.take_rights(rights_of(key, client.who, self._settings.roles))
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Forward a vehicle's packet to every client that is to have it.

@@ -120,7 +120,7 @@ class Signatures:
         self._from = signed_until  # least own timestamp, until the clock is known
         self._known_until = signed_until  # latest time that an earlier run knew
         self._told: dict[str, float] = {}  # by key, when its wrong clock was reported
-        #: reports of wrong clocks, until ``take_refused``
+        #: reports of wrong clocks, for the journal and the log, which take them out
         self.refused: list[SignatureRefused] = []
         #: monotonic seconds; set before anything is signed or checked
         self.now = 0.0
@@ -271,11 +271,6 @@ class Signatures:
         self._told[key.fingerprint] = self.now
         actor = f"{packet.source}@{peer} signed {key.name}"
         self.refused.append(SignatureRefused(actor, (self._clock() - timestamp) / UNITS, self.now))
-
-    def take_refused(self) -> list[SignatureRefused]:
-        """Return the wrong clocks found since the last call, for the journal and the log."""
-        refused, self.refused = self.refused, []
-        return refused
 
     def _signed_with(self, there: _Link, link: str, peer: Peer, packet: Packet) -> Key | None:
         if there.is_of_vehicles:
