@@ -2,9 +2,9 @@
 
 
 class TokenBucket:
-    """``rate`` a second in the long run, ``burst`` at once; full at first."""
+    """``rate`` a second in the long run, ``burst`` at once; full at ``now``, or any time later."""
 
-    def __init__(self, *, rate: float, burst: float, now: float) -> None:
+    def __init__(self, *, rate: float, burst: float, now: float = 0.0) -> None:
         self.rate = rate  #: what may pass in a second in the long run
         self._burst = self._tokens = burst
         self._at = now

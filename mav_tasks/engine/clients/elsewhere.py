@@ -143,9 +143,26 @@ class Elsewhere:
         counts = Counter(self._holders.values())
         return max(sorted(counts), key=lambda name: counts[name], default="")
 
-    def pass_to(self, gateway: str, client: GcsClient, packet: Packet) -> None:
-        """Pass a client's packet in hand on to a gateway, which answers it."""
-        self._send_on(gateway, client, packet, arrived=client.arrived)
+    def pass_to(
+        self,
+        gateway: str,
+        client: GcsClient,
+        packet: Packet,
+        *,
+        arrived: float | None = None,
+        is_first: bool = False,
+    ) -> None:
+        """Pass a client's packet on to a gateway, which answers it; None: it is the one in hand."""
+        number = self._numbers.get(client.key)
+        if number is None:
+            if len(self._clients) >= MOST:
+                oldest = next(iter(self._clients))
+                del self._numbers[self._clients.pop(oldest)]
+            number = self._last = self._last + 1
+            self._numbers[client.key], self._clients[number] = number, client.key
+        there = TOWARDS, gateway, number
+        data = ARRIVED.pack(client.arrived if arrived is None else arrived) + packet.raw
+        self._queue.append(Outgoing(FLEET_LINK, there, data, is_first))
 
     def _target_of(self, received: Received) -> int | None:
         """Return whom a packet is for; a STOP to the server's own system is for all."""
@@ -204,25 +221,5 @@ class Elsewhere:
                         each.owed.difference_update(theirs if is_for_all else {packet.system_id})
 
     def _pass_on(self, gateway: str, received: Received) -> None:
-        client, packet, is_first = received.client, received.packet, is_stop(received.message)
-        self._send_on(gateway, client, packet, arrived=received.arrived, is_first=is_first)
-
-    def _send_on(
-        self,
-        gateway: str,
-        client: GcsClient,
-        packet: Packet,
-        *,
-        arrived: float,
-        is_first: bool = False,
-    ) -> None:
-        number = self._numbers.get(client.key)
-        if number is None:
-            if len(self._clients) >= MOST:
-                oldest = next(iter(self._clients))
-                del self._numbers[self._clients.pop(oldest)]
-            number = self._last = self._last + 1
-            self._numbers[client.key], self._clients[number] = number, client.key
-        there = TOWARDS, gateway, number
-        data = ARRIVED.pack(arrived) + packet.raw
-        self._queue.append(Outgoing(FLEET_LINK, there, data, is_first))
+        client, arrived, is_first = received.client, received.arrived, is_stop(received.message)
+        self.pass_to(gateway, client, received.packet, arrived=arrived, is_first=is_first)

@@ -28,6 +28,7 @@ REFUSALS, REFUSALS_AT_ONCE = 2.0, 20.0  # told and recorded: a second, and in on
 #: and sends one "go to" in two messages
 REFUSAL_EACH = 5.0
 MAX_REFUSALS_TOLD = 64
+MAX_LIMITS = 64  # roles, limited keys and rates of one client
 BACK_AFTER = 3.5  # s of silence, after which a ground station may have been restarted
 OLD = 0.5  # s; a packet that lay here longer may be older than packets that came since
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
@@ -105,11 +106,11 @@ class GcsClient:
         self.introduced: set[int] = set()
         #: until when it gets no MISSION_CURRENT, s: it was refused an item
         self.gives_up_at = -inf
-        #: by role and limited key, which may change: the limits of its requests, and of changes
-        self._limits_of: dict[tuple[str, str], tuple[TokenBucket, TokenBucket]] = {}
-        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE, now=now)
-        self._statuses = TokenBucket(rate=settings.status_rate, burst=STATUSES_AT_ONCE, now=now)
-        self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
+        #: by role, limited key and rate, which may change: the limits of requests, and of changes
+        self._limits_of: dict[tuple[str, str, float], tuple[TokenBucket, TokenBucket]] = {}
+        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE)
+        self._statuses = TokenBucket(rate=settings.status_rate, burst=STATUSES_AT_ONCE)
+        self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST)
         self._memory = Memory()
         self._senders: dict[Address, Sender] = {}
         self._observers: Sender | None = None
@@ -123,9 +124,9 @@ class GcsClient:
     def apply(self, settings: Clients) -> None:
         self.pace.default_interval = settings.stream_interval
         self._statuses.rate, self._texts.rate = settings.status_rate, settings.text_rate
-        #: the limit of its datagrams; ``TokenBucket`` is full if its time is long ago
         rate = settings.packet_rate
-        self.datagrams = TokenBucket(rate=rate, burst=rate * WITHIN, now=0.0)
+        #: the limit of its datagrams
+        self.datagrams = TokenBucket(rate=rate, burst=rate * WITHIN)
 
     @property
     def standing(self) -> tuple[int, bool]:
@@ -146,14 +147,13 @@ class GcsClient:
     def take_rights(self, rights: Rights) -> None:
         """Set what the submitter may do, and the limits of its key or role."""
         self.rights, rate = rights, rights.limits.rate
-        place = rights.role, rights.key
+        place = rights.role, rights.key, rate
         limits = self._limits_of.get(place)
-        if limits is None or limits[0].rate != rate:
+        if limits is None:
             burst = rate * AT_ONCE
-            limits = self._limits_of[place] = (
-                TokenBucket(rate=rate, burst=burst, now=0.0),
-                TokenBucket(rate=changes_of(rate), burst=burst, now=0.0),
-            )
+            requests = TokenBucket(rate=rate, burst=burst)
+            limits = requests, TokenBucket(rate=changes_of(rate), burst=burst)
+            keep_latest(self._limits_of, place, limits, most=MAX_LIMITS)
         self.requests, self.changes = limits
 
     def may_be_refused(self, *, now: float) -> bool:
@@ -295,9 +295,7 @@ class GcsClient:
         said_at = self._refusals_told.get((source, text), -inf)
         if now - said_at < REFUSAL_EACH:
             return
-        if len(self._refusals_told) >= MAX_REFUSALS_TOLD:
-            self._refusals_told.clear()
-        self._refusals_told[source, text] = now
+        keep_latest(self._refusals_told, (source, text), now, most=MAX_REFUSALS_TOLD)
         self.tell(text, MavSeverity.ERROR, source, now=now)
 
     def answer_in_words(self, text: str, source: Address, *, now: float) -> None:

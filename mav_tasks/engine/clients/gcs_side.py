@@ -104,7 +104,7 @@ class GcsSide:
             for key in [key for key in self._clients if key[0] == change.link]:
                 self._remove(key)
             return
-        strangers = TokenBucket(rate=STRANGERS, burst=STRANGERS, now=now)
+        strangers = TokenBucket(rate=STRANGERS, burst=STRANGERS)
         self.links[change.link] = None if change.is_stream else strangers
         self.link_numbers.setdefault(change.link, min(len(self.link_numbers) + 1, MAX_LINK_NUMBER))
         for peer in change.peers:
@@ -125,7 +125,7 @@ class GcsSide:
     def apply(self, settings: Settings) -> None:
         self._settings = settings
         most = float(settings.clients.max_clients)
-        self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most, now=0.0)
+        self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most)
         for client in self.clients:
             client.apply(settings.clients)
             client.take_rights(rights_of(client.signed_by, client.who, settings.roles))
