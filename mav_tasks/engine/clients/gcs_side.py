@@ -289,10 +289,12 @@ class GcsSide:
         telemetry sent to all its endpoints. Who may do more comes first, and of those who may do
         the same the signed ones: anybody can pose as many unsigned ones.
         """
-        client = self._new(link, peer, now=now)
-        self._know(client, packet.source, key)
         is_signed = key is not UNSIGNED
         may_come = is_signed or self._newcomers.take(now=now)
+        if not (may_come or is_stop(message)):
+            return None
+        client = self._new(link, peer, now=now)
+        self._know(client, packet.source, key)
         if may_come and self._has_room(client.standing, now=now):
             client.is_one_of_many = self._is_crowd and not is_signed
             self._clients[link, peer] = client
