@@ -102,7 +102,7 @@ class GcsSide:
         if not change.up:
             self.links.pop(change.link, None)
             for key in [key for key in self._clients if key[0] == change.link]:
-                self._remove(key)
+                del self._clients[key]
             return
         strangers = TokenBucket(rate=STRANGERS, burst=STRANGERS)
         self.links[change.link] = None if change.is_stream else strangers
@@ -112,7 +112,7 @@ class GcsSide:
 
     def change_peer(self, change: PeerChanged, *, now: float) -> None:
         """Add a connection of a stream link, or remove it when it is closed."""
-        self._remove((change.link, change.peer))
+        self._clients.pop((change.link, change.peer), None)
         self._signatures.forget(change.link, change.peer)
         if change.up and change.link in self.links:
             self._add(change.link, change.peer, is_connected=True, now=now)
@@ -179,12 +179,10 @@ class GcsSide:
         if key is None:
             return None
         client = self._clients.get((link, peer))
-        if client is None:
-            if message is None:  # bytes without a checked CRC make no client
-                return None
+        if client is None and message is not None:  # bytes without a checked CRC make no client
             client = self._admit(link, peer, packet, message, key=key, now=now)
-            if client is None:
-                return None
+        if client is None:
+            return None
         received = Received(client, packet, message, key, arrived)
         self.hear_out(received, now=now)
         if message is not None:
@@ -232,7 +230,6 @@ class GcsSide:
         """Forget a vehicle with its ``tasks``, for every client."""
         for client in self.clients:
             client.forget(system_id, tasks)
-        self.plan_statuses()
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT to every client."""
@@ -261,13 +258,8 @@ class GcsSide:
         if client.is_configured:
             client.is_heard = False
         else:
-            self._remove(key)
+            del self._clients[key]
             self._signatures.forget(*key)
-
-    def _remove(self, key: Place) -> None:
-        client = self._clients.pop(key, None)
-        if client is not None and client.statuses_due_at() < inf:
-            self.plan_statuses()
 
     def _add(self, link: str, peer: Peer, *, now: float, is_connected: bool = False) -> None:
         """Add a configured or connected client, even if there is no room for it."""

@@ -100,40 +100,32 @@ class ParameterServer:
         self, client: GcsClient, packet: Packet, message: ParamMessage, *, now: float
     ) -> None:
         """Answer a message that addresses the task server of one or more vehicles."""
+        component, asker = message.target_component, packet.source
         for vehicle in self._vehicles.all:
-            if message.target_system in (BROADCAST, vehicle.system_id):
-                self._answer(client, vehicle, packet.source, message, now=now)
-
-    def _answer(
-        self,
-        client: GcsClient,
-        vehicle: Vehicle,
-        asker: Address,
-        message: ParamMessage,
-        *,
-        now: float,
-    ) -> None:
-        component, source = message.target_component, vehicle.server_address
-        if component not in (BROADCAST, source.component_id):
-            if component == AUTOPILOT and _begins(message):
-                self._list(client, vehicle, now=now)
-                # where there is no such file, it asks for a list at once
-                client.view(vehicle.system_id).listed_at = -inf
-            return
-        is_meant = component != BROADCAST
-        match message:
-            case m.ParamRequestRead() if not _begins(message):
-                name, index = message.param_id, message.param_index
-                if is_meant or name in PARAMETERS:
-                    if index != BY_NAME:
-                        name = dict(enumerate(PARAMETERS)).get(index, "")
-                    error = _error(message, MavParamError.DOES_NOT_EXIST, to=asker)
-                    answer = self._value(name) if name in PARAMETERS else error
-                    client.outlet.send(answer, source)
-            case m.ParamRequestList() | m.ParamRequestRead():
-                self._list(client, vehicle, now=now)
-            case m.ParamSet() if is_meant or message.param_id in PARAMETERS:
-                self._set(client, asker, message, source, now=now)
+            source = vehicle.server_address
+            if message.target_system not in (BROADCAST, vehicle.system_id):
+                continue
+            is_meant = component == source.component_id
+            match message:
+                case _ if component == AUTOPILOT:
+                    if _begins(message):
+                        self._list(client, vehicle, now=now)
+                        # where there is no such file, it asks for a list at once
+                        client.view(vehicle.system_id).listed_at = -inf
+                case _ if component != BROADCAST and not is_meant:
+                    pass
+                case m.ParamRequestRead() if not _begins(message):
+                    name, index = message.param_id, message.param_index
+                    if is_meant or name in PARAMETERS:
+                        if index != BY_NAME:
+                            name = dict(enumerate(PARAMETERS)).get(index, "")
+                        error = _error(message, MavParamError.DOES_NOT_EXIST, to=asker)
+                        answer = self._value(name) if name in PARAMETERS else error
+                        client.outlet.send(answer, source)
+                case m.ParamRequestList() | m.ParamRequestRead():
+                    self._list(client, vehicle, now=now)
+                case m.ParamSet() if is_meant or message.param_id in PARAMETERS:
+                    self._set(client, asker, message, source, now=now)
 
     def _value(self, name: str) -> m.ParamValue:
         """Return the message that tells a parameter's value."""
