@@ -11,18 +11,13 @@ from typing import assert_never
 
 from mav_tasks.engine import inputs
 from mav_tasks.engine.clients.broadcasts import Broadcasts
-from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.elsewhere import Elsewhere
-from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
-from mav_tasks.engine.clients.operator_watch import OperatorWatch
 from mav_tasks.engine.clients.parameters import ParameterServer
 from mav_tasks.engine.clients.publisher import Publisher
 from mav_tasks.engine.clients.refusals import Refusals
-from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.clients.signatures import Signatures
-from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands.any_rover import AnyRover
 from mav_tasks.engine.commands.assignments import Assignments
 from mav_tasks.engine.commands.dependency_questions import DependencyQuestions
@@ -42,8 +37,6 @@ from mav_tasks.engine.packet_reader import PacketReader
 from mav_tasks.engine.reception import Reception
 from mav_tasks.engine.snapshot import Reach, Snapshot, VehicleSnapshot
 from mav_tasks.engine.timers import Timers, Turn
-from mav_tasks.engine.vehicles.control import Event as ControlEvent
-from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink.codec import Packer
 from mav_tasks.services.parameter_table import with_all
@@ -53,8 +46,6 @@ from mav_tasks.tasks.events import Event, ServerStopped
 from mav_tasks.tasks.fleet import Fleet
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.restored import Restored
-
-UNHEARD = Word(text="is paused: no ground station is heard")
 
 
 class Engine:
@@ -93,7 +84,6 @@ class Engine:
             statuses=self._telling,
             settings=settings,
         )
-        self._gates = FloodGates(is_client=gcs.has, settings=settings.clients)
         vehicles = self._vehicles = VehicleSide(
             queue=self._packets,
             packer=packer,
@@ -114,10 +104,10 @@ class Engine:
             gcs, vehicles, registry, submissions, settings=configured, kept=earlier.parameters
         )
         plans = self._plans = Plans(registry, self._fleet, restored=earlier.plans)
-        displays = MessageRequests(gcs, vehicles, registry, earlier.gateway)
-        refusals = Refusals(registry, vehicles)
+        displays = MessageRequests(gcs, vehicles, self.signatures, registry, earlier.gateway)
+        refusals = self._refusals = Refusals(registry, vehicles)
         modes = self._modes = ModeRequests(gcs, submissions, plans, refusals)
-        control, rates = TaskControl(registry), TelemetryRates(gcs, vehicles)
+        control = TaskControl(registry)
         assignments = self._assignments = Assignments(
             vehicles, self._fleet, registry, timers, settings, is_open=lambda: submissions.is_open
         )
@@ -132,33 +122,28 @@ class Engine:
         )
         self._desks, self._reports = MissionServers(parts), MissionReports(parts, now=now)
         self._publisher = Publisher(
-            gcs, vehicles, registry, displays, submissions, rates, timers, now=now
+            gcs, vehicles, registry, displays, submissions, timers, settings, now=now
         )
         self._passing = Forwarder(vehicles, refusals)
-        self._door = Door(vehicles, refusals)
-        self._operator = OperatorWatch(timers, self._note_unheard, settings)
         self._reception = Reception(
             gcs=gcs,
             vehicles=vehicles,
-            gates=self._gates,
             intake=self._intake,
-            door=self._door,
+            refusals=refusals,
             elsewhere=self._elsewhere,
             broadcasts=Broadcasts(vehicles, packer),
             commands=Commands(vehicles, submissions, plans, modes, control, displays, self._any),
             control=control,
             modes=modes,
             displays=displays,
-            setup=SetupSigning(self.signatures, vehicles),
             desks=self._desks,
-            operator=self._operator,
             parameters=self._parameters,
             passing=self._passing,
             publisher=self._publisher,
             reports=self._reports,
         )
         #: figures for metrics
-        self.figures = Figures(vehicles, gcs, self._gates, self._fleet, registry)
+        self.figures = Figures(vehicles, gcs, self._fleet, registry)
         self._stop_by: float | None = None
         self._stopped = False
         #: zero and HOLD for every driven vehicle, as of the last ``take_packets``; the runner sends
@@ -190,7 +175,6 @@ class Engine:
                 self._reception.receive(several, now=now)
             case inputs.LinkChanged(side=side):
                 self._intake.change_link(item)
-                self._gates.change_link(item)
                 self.signatures.change_link(item)
                 clients = side is LinkSide.CLIENTS
                 (self._gcs if clients else self._vehicles.links).change_link(item, now=now)
@@ -300,8 +284,8 @@ class Engine:
             tasks=self._registry.all(),
             decoded=(
                 f"vehicles {self._vehicles.counts}, clients {self._gcs.counts},"
-                f" {self.signatures.counts}, dropped {self._gates.left_out} datagrams,"
-                f" {self._door.left_out} requests"
+                f" {self.signatures.counts}, dropped {self._gcs.left_out} datagrams,"
+                f" {self._refusals.left_out} requests"
             ),
         )
 
@@ -355,12 +339,6 @@ class Engine:
     def _tell_statuses(self, *, now: float) -> None:
         self._publisher.send_statuses(now=now)
 
-    def _note_unheard(self, *, now: float) -> None:
-        """Pause all vehicles, if configured so: no ground station is heard any more."""
-        if self._settings.operator_lost == "pause":
-            for vehicle in self._vehicles.addressed_by(0):
-                vehicle.joint.on(ControlEvent.OPERATOR_LOST, UNHEARD, now=now)
-
     def _settle(self, *, now: float) -> None:
         """Pass the vehicles' answers to clients, and new events to clients and the journal."""
         room, signatures = self._fleet.room, self.signatures
@@ -378,8 +356,8 @@ class Engine:
             self._reports.tell_unperformed(vehicle, now=now)
         if self._stop_by is not None:
             self._note_stopped(now=now)
-        for refused in signatures.take_refused() if signatures.refused else ():
-            self._registry.record(refused)
+        while signatures.refused:
+            self._registry.record(signatures.refused.pop(0))
         times = signatures.take_times()
         if times is not None:
             self._registry.record(times)
@@ -405,7 +383,6 @@ class Engine:
     def _apply(self, settings: Settings) -> None:
         self._settings = settings
         self.signatures.apply(settings.signing.window)
-        self._gates.apply(settings.clients)
         self._fleet.apply(settings)
         self._gcs.apply(settings)
         self._vehicles.apply(settings)
@@ -414,7 +391,7 @@ class Engine:
         self._any.apply(settings)
         self._desks.apply(settings)
         self._reports.apply(settings)
-        self._operator.apply(settings)
+        self._publisher.apply(settings)
 
     def _shut_down(self, *, now: float) -> None:
         self._submissions.close()

@@ -6,7 +6,6 @@ Reading changes nothing. A vehicle's figures cost the same however many tasks it
 from dataclasses import dataclass
 from math import inf
 
-from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.histogram import Distribution
@@ -55,13 +54,11 @@ class Figures:
         self,
         vehicles: VehicleSide,
         gcs: GcsSide,
-        gates: FloodGates,
         fleet: Fleet,
         registry: TaskRegistry,
     ) -> None:
         self._vehicles = vehicles
         self._gcs = gcs
-        self._gates = gates
         self._fleet = fleet
         self._registry = registry
 
@@ -75,7 +72,7 @@ class Figures:
             vehicles=tuple(sorted(tasks.vehicle for tasks in self._fleet)),
             clients=len(self._gcs.clients),
             corrupt=tuple((side, counts.corrupt) for side, counts in sides),
-            flooded=self._gates.left_out,
+            flooded=self._gcs.left_out,
         )
 
     def of(self, system_id: int, *, now: float) -> VehicleFigures | None:

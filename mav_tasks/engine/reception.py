@@ -5,17 +5,14 @@ from dataclasses import dataclass, field
 from operator import attrgetter
 
 from mav_tasks.engine.clients.broadcasts import EVERYBODY, Broadcasts
-from mav_tasks.engine.clients.door import Door
 from mav_tasks.engine.clients.elsewhere import Elsewhere
-from mav_tasks.engine.clients.flood_gate import FloodGates
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
 from mav_tasks.engine.clients.message_requests import MessageRequests
-from mav_tasks.engine.clients.operator_watch import OperatorWatch
 from mav_tasks.engine.clients.parameters import ParameterServer, ParamMessage
 from mav_tasks.engine.clients.publisher import Publisher
+from mav_tasks.engine.clients.refusals import Refusals
 from mav_tasks.engine.clients.restart_watch import RestartWatch
 from mav_tasks.engine.clients.rights import OPERATOR
-from mav_tasks.engine.clients.setup_signing import SetupSigning
 from mav_tasks.engine.commands.command_request import MessageRequest
 from mav_tasks.engine.commands.dispatch import Commands
 from mav_tasks.engine.commands.forwarder import Forwarder
@@ -38,18 +35,15 @@ class Reception:
 
     gcs: GcsSide
     vehicles: VehicleSide
-    gates: FloodGates
     intake: PacketReader
-    door: Door
+    refusals: Refusals
     elsewhere: Elsewhere
     broadcasts: Broadcasts
     commands: Commands
     control: TaskControl
     modes: ModeRequests
     displays: MessageRequests
-    setup: SetupSigning
     desks: MissionServers
-    operator: OperatorWatch
     parameters: ParameterServer
     passing: Forwarder
     publisher: Publisher
@@ -83,7 +77,7 @@ class Reception:
                 self._receive_from_vehicles(item, now=now)
 
     def _received(self, item: Packets, *, now: float) -> list[Received]:
-        taken = self.intake.packets(self.gates.let_in(item, now=now), self.gcs.counts, now=now)
+        taken = self.intake.packets(self.gcs.let_in(item, now=now), self.gcs.counts, now=now)
         received: list[Received] = []
         for peer, packet, arrived in taken:
             if each := self.gcs.receive(item.link, peer, packet, arrived=arrived, now=now):
@@ -142,7 +136,7 @@ class Reception:
         self.restarts.forget(vehicle)
 
     def _receive_from_client(self, received: Received, *, now: float) -> None:
-        if not self.door.may_pass(received, now=now) or self.elsewhere.takes(received, now=now):
+        if not self.refusals.may_pass(received, now=now) or self.elsewhere.takes(received, now=now):
             return
         if len(received.client.introduced) < len(self.vehicles.by_id):
             self.publisher.welcome(received.client, now=now)
@@ -170,7 +164,7 @@ class Reception:
         elif isinstance(message, m.RequestDataStream):
             self.displays.set_streams(client, message)
         elif isinstance(message, m.SetupSigning):
-            self.setup.receive(client, message, now=now)
+            self.displays.set_up_signing(client, message, now=now)
         elif isinstance(message, MissionMessage) and self.desks.receive(
             client, packet, message, now=now
         ):
@@ -179,7 +173,7 @@ class Reception:
             if isinstance(message, m.Heartbeat) and packet.system_id in self.vehicles.by_id:
                 return  # of a rover's component: back by another link, it would be on its side
             if isinstance(message, m.Heartbeat) and client.rights.reach(OPERATOR):
-                self.operator.receive(message, now=now)
+                self.publisher.hear_operator(message, now=now)
             elif isinstance(message, ParamMessage):
                 self.parameters.receive(client, packet, message, now=now)
             self.passing.forward(client, packet, message, now=now)

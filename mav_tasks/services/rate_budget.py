@@ -5,8 +5,6 @@ that may command, one tenth for observers: so an operator's wish is never cut fo
 an observer's has something. Where wishes cost more than that, all of them become slower alike.
 """
 
-from collections.abc import Mapping
-
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.packet import CRC, HEADER_V2
 from mav_tasks.services.interval_requester import SHORTEST, WANTED
@@ -43,26 +41,23 @@ def spare_of(budget: float, capacity: float | None, *, vehicles: int) -> float:
 
 def granted(commanding: Intervals, observing: Intervals, *, spare: float) -> Intervals:
     """Return what a vehicle is asked for beyond the server's own needs."""
-    rates = {number: 1 / interval for number, interval in WANTED.items()}
-    _raise(rates, commanding, shortest=SHORTEST, most=(1 - OBSERVERS_SHARE) * spare)
-    _raise(rates, observing, shortest=OBSERVERS_SHORTEST, most=OBSERVERS_SHARE * spare)
     own = {number: 1 / interval for number, interval in WANTED.items()}
+    rates = dict(own)
+    for wishes, shortest, share in (
+        (commanding, SHORTEST, 1 - OBSERVERS_SHARE),
+        (observing, OBSERVERS_SHORTEST, OBSERVERS_SHARE),
+    ):
+        extra = {
+            number: 1 / max(interval, shortest) - rates.get(number, 0.0)
+            for number, interval in wishes.items()
+        }
+        extra = {number: rate for number, rate in extra.items() if rate > 0}
+        cost = sum(rate * size_of(number) for number, rate in extra.items())
+        part = min(1.0, share * spare / cost) if cost else 0.0
+        for number, rate in extra.items():
+            raised = rates.get(number, 0.0) + part * rate
+            if raised >= 1 / SLOWEST or number in rates:
+                rates[number] = raised
     return {
         number: round(1 / rate, 3) for number, rate in rates.items() if rate > own.get(number, 0.0)
     }
-
-
-def _raise(
-    rates: dict[int, float], wishes: Mapping[int, float], *, shortest: float, most: float
-) -> None:
-    extra = {
-        number: 1 / max(interval, shortest) - rates.get(number, 0.0)
-        for number, interval in wishes.items()
-    }
-    extra = {number: rate for number, rate in extra.items() if rate > 0}
-    cost = sum(rate * size_of(number) for number, rate in extra.items())
-    part = min(1.0, most / cost) if cost else 0.0
-    for number, rate in extra.items():
-        raised = rates.get(number, 0.0) + part * rate
-        if raised >= 1 / SLOWEST or number in rates:
-            rates[number] = raised

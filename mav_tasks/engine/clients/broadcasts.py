@@ -7,6 +7,7 @@ one rover.
 """
 
 from copy import copy
+from dataclasses import dataclass
 from typing import Any
 
 from mav_tasks.engine.clients.gcs_side import Received
@@ -20,12 +21,12 @@ from mav_tasks.mavlink.codec import Packer
 EVERYBODY = 0  # target_system and target_component
 
 
+@dataclass(repr=False, eq=False)
 class Broadcasts:
     """The copier of messages to all rovers."""
 
-    def __init__(self, vehicles: VehicleSide, packer: Packer) -> None:
-        self._vehicles = vehicles
-        self._packer = packer
+    _vehicles: VehicleSide
+    _packer: Packer
 
     def addressed(self, received: Received) -> list[Received]:
         """Return a copy of a client's packet for each rover; only the packet if none answers it."""

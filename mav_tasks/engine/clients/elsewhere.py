@@ -14,11 +14,10 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
 from struct import Struct
-from typing import TypeGuard
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide, Received
-from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets, Peer, Place
+from mav_tasks.engine.inputs import FLEET_LINK, FleetChanged, Outgoing, Packets, Place
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address
@@ -44,7 +43,6 @@ NOT_PASSED_ON = "STOP waits for the fleet's database. Use the rover's own gatewa
 TOWARDS, BACK = "to", "from"
 #: before each packet towards a gateway: when it arrived here, s, by which it counts as old there
 ARRIVED = Struct(">d")
-LENGTH = 3
 #: result and reason of a STOP that the other gateway could not store
 NOT_KEPT = (MavResult.FAILED, TaskReason.STORE_UNAVAILABLE)
 
@@ -57,14 +55,6 @@ class _Stop:
     received: Received
     target: int | None  # system id
     owed: set[int]
-
-    def is_for(self, vehicle: int, *, now: float) -> bool:
-        """Return whether a gateway that gets a vehicle now must obey it."""
-        is_recent = now - self.at <= IN_TRANSIT and self.target in (EVERYBODY, vehicle)
-        return is_recent or vehicle in self.owed
-
-    def is_over(self, *, now: float) -> bool:
-        return now - self.at > (UNANSWERED if self.owed else IN_TRANSIT)
 
 
 class Elsewhere:
@@ -98,8 +88,15 @@ class Elsewhere:
 
     def stops_of(self, vehicle: int, *, now: float) -> list[Received]:
         """Return the STOPs for a vehicle that nobody may have heard who has had it."""
-        self._stops = [each for each in self._stops if not each.is_over(now=now)]
-        return [each.received for each in self._stops if each.is_for(vehicle, now=now)]
+        recent = now - IN_TRANSIT
+        self._stops = [
+            each for each in self._stops if each.at >= (now - UNANSWERED if each.owed else recent)
+        ]
+        return [
+            each.received
+            for each in self._stops
+            if vehicle in each.owed or (each.at >= recent and each.target in (EVERYBODY, vehicle))
+        ]
 
     def stops_for(self, vehicle: int, *, now: float) -> list[Received]:
         """Return the same STOPs as for this vehicle alone: others may have been continued since."""
@@ -146,9 +143,26 @@ class Elsewhere:
         counts = Counter(self._holders.values())
         return max(sorted(counts), key=lambda name: counts[name], default="")
 
-    def pass_to(self, gateway: str, client: GcsClient, packet: Packet) -> None:
-        """Pass a client's packet on to a gateway, which answers it."""
-        self._send_on(gateway, client.key, packet.raw, arrived=client.arrived, is_first=False)
+    def pass_to(
+        self,
+        gateway: str,
+        client: GcsClient,
+        packet: Packet,
+        *,
+        arrived: float | None = None,
+        is_first: bool = False,
+    ) -> None:
+        """Pass a client's packet on to a gateway, which answers it; None: it is the one in hand."""
+        number = self._numbers.get(client.key)
+        if number is None:
+            if len(self._clients) >= MOST:
+                oldest = next(iter(self._clients))
+                del self._numbers[self._clients.pop(oldest)]
+            number = self._last = self._last + 1
+            self._numbers[client.key], self._clients[number] = number, client.key
+        there = TOWARDS, gateway, number
+        data = ARRIVED.pack(client.arrived if arrived is None else arrived) + packet.raw
+        self._queue.append(Outgoing(FLEET_LINK, there, data, is_first))
 
     def _target_of(self, received: Received) -> int | None:
         """Return whom a packet is for; a STOP to the server's own system is for all."""
@@ -158,13 +172,16 @@ class Elsewhere:
 
     def bring_back(self, item: Packets) -> Packets:
         """Send our clients what other gateways have for them; return the rest: their clients'."""
-        places = [place for place, (peer, _) in enumerate(item.datagrams) if not _is_back(peer)]
-        for peer, data in item.datagrams:
-            if _is_back(peer):
-                client = self._clients.get(peer[-1])
-                if client is not None and self._gcs.has(*client):
-                    self._note_answer(client, data, by=peer[1])
-                    self._queue.append(Outgoing(*client, data))
+        places: list[int] = []
+        for place, (peer, data) in enumerate(item.datagrams):
+            match peer:
+                case (word, str(gateway), int(number)) if word == BACK:
+                    client = self._clients.get(number)
+                    if client is not None and self._gcs.client(client):
+                        self._note_answer(client, data, by=gateway)
+                        self._queue.append(Outgoing(*client, data))
+                case _:
+                    places.append(place)
         return Packets(
             item.link,
             [item.datagrams[place] for place in places],
@@ -173,13 +190,12 @@ class Elsewhere:
 
     def _note_stop(self, received: Received, *, now: float) -> None:
         client, target = received.client, self._target_of(received)
-        owed: set[int] = set()
-        if client.key[0] != FLEET_LINK:  # its own gateway passes it on
-            owed = {
-                each
-                for each in self._had
-                if target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
-            }
+        is_of_ours = client.key[0] != FLEET_LINK  # of others, their own gateway passes it on
+        owed = {
+            each
+            for each in self._had
+            if is_of_ours and target in (EVERYBODY, each) and self._vehicles.look_at(each) is None
+        }
         said = client.key, target
         kept = [each for each in self._stops if (each.received.client.key, each.target) != said]
         if len(kept) >= MOST_STOPS:  # those that nobody has to hear any more go first
@@ -205,22 +221,5 @@ class Elsewhere:
                         each.owed.difference_update(theirs if is_for_all else {packet.system_id})
 
     def _pass_on(self, gateway: str, received: Received) -> None:
-        key, raw, is_first = received.client.key, received.packet.raw, is_stop(received.message)
-        self._send_on(gateway, key, raw, arrived=received.arrived, is_first=is_first)
-
-    def _send_on(
-        self, gateway: str, key: Place, raw: bytes, *, arrived: float, is_first: bool
-    ) -> None:
-        number = self._numbers.get(key)
-        if number is None:
-            if len(self._clients) >= MOST:
-                oldest = next(iter(self._clients))
-                del self._numbers[self._clients.pop(oldest)]
-            number = self._last = self._last + 1
-            self._numbers[key], self._clients[number] = number, key
-        there = TOWARDS, gateway, number
-        self._queue.append(Outgoing(FLEET_LINK, there, ARRIVED.pack(arrived) + raw, is_first))
-
-
-def _is_back(peer: Peer) -> TypeGuard[tuple[str, str, int]]:
-    return isinstance(peer, tuple) and len(peer) == LENGTH and peer[0] == BACK
+        client, arrived, is_first = received.client, received.arrived, is_stop(received.message)
+        self.pass_to(gateway, client, received.packet, arrived=arrived, is_first=is_first)

@@ -1,22 +1,21 @@
 """One client: an endpoint on a client link, what it was sent and what it requested."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from math import inf
 
 from mav_tasks.engine.clients.rights import NOTHING, SUBMITTER, Rights
 from mav_tasks.engine.clients.sender import OBSERVED, Memory, Sender
 from mav_tasks.engine.clients.signatures import UNSIGNED
+from mav_tasks.engine.clients.vehicle_view import LONGEST_US, STREAMED, Pace, VehicleView
 from mav_tasks.engine.inputs import FLEET_LINK
 from mav_tasks.engine.packet_sender import PacketSender
-from mav_tasks.latest import keep_latest
+from mav_tasks.latest import keep_latest, shorten
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import AUTOPILOT, Address
 from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services import statustext
 from mav_tasks.services.command_receiver import Answer
-from mav_tasks.services.message_interval import StreamRateLimiter
-from mav_tasks.services.task_status import TaskStatusSender
 from mav_tasks.services.token_bucket import TokenBucket
 from mav_tasks.settings import Clients
 from mav_tasks.tasks.task import Submitter, Task
@@ -29,12 +28,16 @@ REFUSALS, REFUSALS_AT_ONCE = 2.0, 20.0  # told and recorded: a second, and in on
 #: and sends one "go to" in two messages
 REFUSAL_EACH = 5.0
 MAX_REFUSALS_TOLD = 64
+MAX_LIMITS = 64  # roles, limited keys and rates of one client
 BACK_AFTER = 3.5  # s of silence, after which a ground station may have been restarted
 OLD = 0.5  # s; a packet that lay here longer may be older than packets that came since
-MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_ADDRESSES = 8  # MAVLink addresses remembered of one endpoint
 ELSEWHERE = 0.5  # s between messages of one type to a client at another gateway
 MAX_SENDERS = 32  # addresses at one endpoint whose commands are remembered: there may be a router
+WITHIN = 1.0  # s, whose datagrams may come in one burst
+STATUSES_AT_ONCE = 20  # TASK_STATUS, before the rate counts
+MAX_CHANGED = 1000  # tasks whose news waits to be told to one client
+SHORTEST, LONGEST = 0.05, LONGEST_US / 1e6  # s between reports of one task to one client
 NO_STANDING = (0, False)  # of a client that has said nothing yet
 
 
@@ -52,8 +55,6 @@ class GcsClient:
         *,
         settings: Clients,
         wake: Callable[[float], None],
-        is_configured: bool,
-        is_connected: bool,
         now: float,
     ) -> None:
         """``wake`` is called with the time at which the next TASK_STATUS is due."""
@@ -65,9 +66,9 @@ class GcsClient:
         self.endpoint = ":".join(map(str, peer)) if isinstance(peer, tuple) else str(peer)
         self.heard_at = now
         #: configured or connected: gets heartbeats before it has sent anything
-        self.is_configured = is_configured
+        self.is_configured = False
         #: on a stream link, which reports when it is gone: may be silent for any time
-        self.is_connected = is_connected
+        self.is_connected = False
         self.is_heard = False
         #: heard at most once so far
         self.is_passing = True
@@ -79,48 +80,53 @@ class GcsClient:
         self.arrived, self.waited = now, 0.0
         #: source address of the packet in hand
         self.source: Address | None = None
-        #: its submitter, and what that submitter may do
+        #: its submitter
         self.who = Submitter(link, self.endpoint, 0, 0)
-        self.rights = NOTHING
-        self._addresses: dict[Address, None] = {}  # addresses seen here, the latest last
+        #: addresses seen here, the latest last
+        self.addresses: dict[Address, None] = {}
         #: whether it has used our dialect: it gets TASK_STATUS then
         self.uses_dialect = False
-        self._followed: dict[int, None] = {}  # tasks that it has asked about, the latest last
-        self.thinner = StreamRateLimiter(
-            default_interval=settings.stream_interval, least=ELSEWHERE if link == FLEET_LINK else 0
-        )
-        self.statuses = TaskStatusSender(rate=settings.status_rate, wake=wake, now=now)
-        self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST, now=now)
+        #: tasks that it has asked about, and is told each change of; the latest last
+        self.followed: dict[int, None] = {}
+        #: its telemetry
+        self.pace = Pace(settings.stream_interval, ELSEWHERE if link == FLEET_LINK else 0.0)
+        #: by system id; made when the client is sent the vehicle's telemetry, or asks for it
+        self.views: dict[int, VehicleView] = {}
+        #: tasks to be told of, in this order; the state is that at the time of sending
+        self._changed: dict[int, None] = {}
+        #: interval and next time of TASK_STATUS of an active task, s, by vehicle
+        self.status_streams: dict[int, tuple[float, float]] = {}
+        self._statuses_from = 0.0  # s, until when the rate lets no TASK_STATUS leave
+        self._wake = wake
         self._text_id = 0
         self._refusals_told: dict[tuple[Address, str], float] = {}  # when, by source and text
         #: counts of texts above the rate limit, by source
         self.left_out: dict[Address, int] = {}
         #: vehicles whose autopilot's heartbeat it was sent
         self.introduced: set[int] = set()
-        self._informed: set[int] = set()  # vehicles whose summary it was sent since it came
         #: until when it gets no MISSION_CURRENT, s: it was refused an item
         self.gives_up_at = -inf
-        self.listed_at: dict[int, float] = {}  # by system id, when it was last sent all parameters
-        self._submitters: dict[
-            tuple[Address, str], Submitter
-        ] = {}  # cached: each command needs one
-        #: limits of its requests, and of changes; ``_refusals`` limits the refusals that are told
-        self.requests = self.changes = TokenBucket(rate=0.0, burst=0.0, now=now)
-        #: by role and limited key: the key may change
-        self._limits_of: dict[tuple[str, str], list[TokenBucket]] = {}
-        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE, now=now)
+        #: by role, limited key and rate, which may change: the limits of requests, and of changes
+        self._limits_of: dict[tuple[str, str, float], tuple[TokenBucket, TokenBucket]] = {}
+        self._refusals = TokenBucket(rate=REFUSALS, burst=REFUSALS_AT_ONCE)
+        self._statuses = TokenBucket(rate=settings.status_rate, burst=STATUSES_AT_ONCE)
+        self._texts = TokenBucket(rate=settings.text_rate, burst=statustext.BURST)
         self._memory = Memory()
         self._senders: dict[Address, Sender] = {}
         self._observers: Sender | None = None
+        self.take_rights(NOTHING)
+        self.apply(settings)
 
     def __repr__(self) -> str:
-        names = " ".join(map(str, self._addresses)) or "unheard"
+        names = " ".join(map(str, self.addresses)) or "unheard"
         return f"GcsClient({names} at {self.endpoint})"
 
     def apply(self, settings: Clients) -> None:
-        self.thinner.default_interval = settings.stream_interval
-        self.statuses.apply(rate=settings.status_rate)
-        self._texts.apply(rate=settings.text_rate)
+        self.pace.default_interval = settings.stream_interval
+        self._statuses.rate, self._texts.rate = settings.status_rate, settings.text_rate
+        rate = settings.packet_rate
+        #: the limit of its datagrams
+        self.datagrams = TokenBucket(rate=rate, burst=rate * WITHIN)
 
     @property
     def standing(self) -> tuple[int, bool]:
@@ -135,25 +141,19 @@ class GcsClient:
     def submitter(self, source: Address) -> Submitter:
         """Return the submitter for packets of ``source`` from this endpoint."""
         key = self.signed_by
-        submitter = self._submitters.get((source, key.fingerprint))
-        if submitter is None:
-            if len(self._submitters) >= MAX_ADDRESSES:
-                self._submitters.clear()
-            who = key.name, key.name and key.fingerprint
-            submitter = Submitter(self.outlet.link, self.endpoint, *source, *who)
-            self._submitters[source, key.fingerprint] = submitter
-        return submitter
+        who = key.name, key.name and key.fingerprint
+        return Submitter(self.outlet.link, self.endpoint, *source, *who)
 
-    def take_rights(self, rights: Rights, *, now: float) -> None:
-        """Set the client's rights, and the rate limit of its key or role."""
+    def take_rights(self, rights: Rights) -> None:
+        """Set what the submitter may do, and the limits of its key or role."""
         self.rights, rate = rights, rights.limits.rate
-        place = rights.role, rights.key
+        place = rights.role, rights.key, rate
         limits = self._limits_of.get(place)
-        if limits is None or limits[0].rate != rate:
-            limits = self._limits_of[place] = [
-                TokenBucket(rate=each, burst=rate * AT_ONCE, now=now)
-                for each in (rate, changes_of(rate))
-            ]
+        if limits is None:
+            burst = rate * AT_ONCE
+            requests = TokenBucket(rate=rate, burst=burst)
+            limits = requests, TokenBucket(rate=changes_of(rate), burst=burst)
+            keep_latest(self._limits_of, place, limits, most=MAX_LIMITS)
         self.requests, self.changes = limits
 
     def may_be_refused(self, *, now: float) -> bool:
@@ -164,14 +164,6 @@ class GcsClient:
         """Whether a task was submitted from this endpoint."""
         submitter = task.submitter
         return (submitter.link, submitter.endpoint) == (self.outlet.link, self.endpoint)
-
-    def follow(self, task_id: int) -> None:
-        """Send the client each change of this task from now on."""
-        keep_latest(self._followed, task_id, None, most=MAX_FOLLOWED)
-
-    def follows(self, task_id: int) -> bool:
-        """Whether the client has asked about this task."""
-        return task_id in self._followed
 
     def sender(self, source: Address) -> Sender:
         """Return the ``Sender`` of the address of the packet in hand; one for all observers.
@@ -193,12 +185,20 @@ class GcsClient:
             self.sender(source).line.place(packet.seq, now=self.arrived)
         self.is_passing = not self.is_heard
         if now - self.heard_at > BACK_AFTER:
-            self._informed.clear()
+            for view in self.views.values():
+                view.is_informed = False
         self.is_one_of_many = self.is_one_of_many and self.is_passing
         self.heard_at = now
         self.is_heard = True
-        if source not in self._addresses:
-            keep_latest(self._addresses, source, None, most=MAX_ADDRESSES)
+        if source not in self.addresses:
+            keep_latest(self.addresses, source, None, most=MAX_ADDRESSES)
+
+    def view(self, system_id: int) -> VehicleView:
+        """Return what the client gets of a vehicle."""
+        view = self.views.get(system_id)
+        if view is None:
+            view = self.views[system_id] = VehicleView(self.pace)
+        return view
 
     def forget(self, system_id: int, tasks: Collection[int]) -> None:
         """Forget a vehicle with its ``tasks``; what the client itself said stays known.
@@ -206,39 +206,54 @@ class GcsClient:
         It is introduced again if it comes back.
         """
         self.introduced.discard(system_id)
-        self._informed.discard(system_id)
-        self.listed_at.pop(system_id, None)
-        self._followed = {each: None for each in self._followed if each not in tasks}
+        self.views.pop(system_id, None)
+        self.status_streams.pop(system_id, None)
+        self.followed = {each: None for each in self.followed if each not in tasks}
+        self._changed = {each: None for each in self._changed if each not in tasks}
         for source in [each for each in self.left_out if each.system_id == system_id]:
             del self.left_out[source]
-        told = self._refusals_told.items()
-        self._refusals_told = {key: at for key, at in told if key[0].system_id != system_id}
-        self.thinner.forget(system_id)
-        self.statuses.forget(system_id, tasks)
         self.outlet.forget(system_id)
 
-    def is_reached_by(self, target: Address) -> bool:
-        """Whether a message for this target reaches an address at this endpoint."""
-        return any(target.reaches(address) for address in self._addresses)
+    # TASK_STATUS: on each change of state, and for active tasks at the interval that it asked for
+
+    def note_change(self, task_id: int) -> None:
+        """Note that a task's state changed; telling it twice before it is sent counts once."""
+        self._changed[task_id] = None
+        shorten(self._changed, MAX_CHANGED)  # a request still shows those tasks
+        self._wake(self._statuses_from)
+
+    def stream_statuses(self, vehicle: int, interval: float | None, *, now: float) -> None:
+        """Stream a vehicle's active task every ``interval`` seconds; None: not at all."""
+        self.status_streams.pop(vehicle, None)
+        if interval is not None:
+            self.status_streams[vehicle] = min(max(interval, SHORTEST), LONGEST), now
+        self._wake(now)
+
+    def statuses_due_at(self) -> float:
+        """Return when ``due_statuses`` has something to give; inf: never, as things are."""
+        first = self._statuses_from if self._changed else inf
+        return min([first, *(next_at for _, next_at in self.status_streams.values())])
+
+    def due_statuses(self, active: Mapping[int, int], *, now: float) -> list[int]:
+        """Return the tasks to report now; ``active`` are those that streams report, by vehicle."""
+        due: dict[int, None] = {}
+        while self._changed and now >= self._statuses_from:
+            if not self._statuses.take(now=now):
+                self._statuses_from = now + 1.0 / self._statuses.rate
+                break
+            task_id = next(iter(self._changed))
+            del self._changed[task_id]
+            due[task_id] = None
+        for vehicle, (interval, next_at) in self.status_streams.items():
+            if now >= next_at:
+                self.status_streams[vehicle] = interval, max(next_at + interval, now)
+                if vehicle in active:
+                    due[active[vehicle]] = None
+        return list(due)
 
     def answer(self, answer: Answer, to: Address) -> None:
         """Send a COMMAND_ACK to the address ``to`` at this endpoint."""
         self.outlet.send(answer.ack(to), answer.source)
-
-    def is_to_be_informed(self, system_id: int) -> bool:
-        """Whether the client has missed this vehicle's summary. Counts as sent after this call."""
-        if system_id in self._informed:
-            return False
-        self._informed.add(system_id)
-        return True
-
-    def introduce(self, heartbeat: Packet, *, last_seq: int) -> None:
-        """Send a vehicle's latest heartbeat, before anything else of its system.
-
-        ``last_seq`` is the number of the autopilot's last packet, so that the next one follows on.
-        """
-        self.introduced.add(heartbeat.system_id)
-        self.outlet.forward(heartbeat._replace(seq=last_seq))
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Forward a vehicle's packet, unless its stream is above this client's rate."""
@@ -247,10 +262,14 @@ class GcsClient:
             if packet.message_id != m.Heartbeat.id or packet.component_id != AUTOPILOT:
                 return
             self.introduced.add(system_id)
-        is_silent = not self.is_heard or self.is_one_of_many
-        if is_silent and packet.message_id != m.Heartbeat.id:
-            self.outlet.withhold(packet.source)
-        elif self.thinner.passes(system_id, packet.component_id, packet.message_id, now=now):
+        number, is_silent = packet.message_id, not self.is_heard or self.is_one_of_many
+        if number == m.Heartbeat.id or not (
+            is_silent
+            or (
+                number in STREAMED
+                and not self.view(system_id).passes(packet.component_id, number, now=now)
+            )
+        ):
             self.outlet.forward(packet)
         else:
             self.outlet.withhold(packet.source)
@@ -276,9 +295,7 @@ class GcsClient:
         said_at = self._refusals_told.get((source, text), -inf)
         if now - said_at < REFUSAL_EACH:
             return
-        if len(self._refusals_told) >= MAX_REFUSALS_TOLD:
-            self._refusals_told.clear()
-        self._refusals_told[source, text] = now
+        keep_latest(self._refusals_told, (source, text), now, most=MAX_REFUSALS_TOLD)
         self.tell(text, MavSeverity.ERROR, source, now=now)
 
     def answer_in_words(self, text: str, source: Address, *, now: float) -> None:

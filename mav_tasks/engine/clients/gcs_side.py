@@ -1,17 +1,30 @@
 """The client links and the clients on them, by link and endpoint.
 
-Any bytes may come in here; only a packet with a good CRC makes its sender a client. ``receive``
-returns a client's packet as a value; the engine acts on it.
+Any bytes may come in here; only a packet with a good CRC makes its sender a client. ``let_in``
+limits the datagrams that are parsed: a rate for each client, one for all strangers together. It
+decides by sender and size alone, before parsing, which costs more. ``receive`` returns a client's
+packet as a value; the engine acts on it.
 """
 
 from collections.abc import Callable, Collection
+from itertools import repeat
 from math import inf
+from operator import itemgetter
 from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import NO_STANDING, GcsClient
-from mav_tasks.engine.clients.rights import RightsBook
+from mav_tasks.engine.clients.rights import rights_of
 from mav_tasks.engine.clients.signatures import UNSIGNED, Signatures
-from mav_tasks.engine.inputs import Congestion, LinkChanged, Outgoing, Peer, PeerChanged, Place
+from mav_tasks.engine.clients.stop_packets import stops_in
+from mav_tasks.engine.inputs import (
+    Congestion,
+    LinkChanged,
+    Outgoing,
+    Packets,
+    Peer,
+    PeerChanged,
+    Place,
+)
 from mav_tasks.engine.packet_sender import PacketSender
 from mav_tasks.engine.timers import Timer
 from mav_tasks.mavlink import messages as m
@@ -29,6 +42,8 @@ NEWCOMERS = 2.0  # new unsigned clients a second, on average; the burst is ``max
 CROWDED = 2  # beyond ``max_clients`` / CROWDED, clients heard only once are forgotten after SILENT
 GONE = 10.0  # s of silence, after which a client of any standing may replace this one
 SILENT = 3.0  # s, after which a new client may replace this one; heartbeats come each second
+STRANGERS = 500.0  # datagrams a second, of all senders on a link together that are no clients
+SIZE = 64  # each so many bytes count as one more datagram, as many packets may be in one
 
 
 class Received(NamedTuple):
@@ -60,12 +75,12 @@ class GcsSide:
         self._queue = queue
         self._packer = packer
         self._signatures = signatures
-        self._settings = settings
-        self._rights = RightsBook(settings.roles)
         self._decoder = Decoder()
-        #: the client links, by name
-        self.links: set[str] = set()
-        self._newcomers: TokenBucket | None = None
+        #: the client links by name, with the limit of strangers' datagrams. Stream links need none:
+        #: they have backpressure
+        self.links: dict[str, TokenBucket | None] = {}
+        #: count of datagrams dropped because they were too many
+        self.left_out = 0
         #: number of each client link of this run, from 1
         self.link_numbers: dict[str, int] = {}
         self._clients: dict[Place, GcsClient] = {}
@@ -76,27 +91,28 @@ class GcsSide:
         #: counts of what came in on these links
         self.counts = self._decoder.counts
         self._statuses = statuses
+        self.apply(settings)
 
     def plan_statuses(self) -> None:
         """Set the timer to the next TASK_STATUS that is due."""
-        due = [client.statuses.next_deadline() for client in self.clients]
-        self._statuses.set(min(due, default=inf))
+        self._statuses.set(min([client.statuses_due_at() for client in self.clients], default=inf))
 
     def change_link(self, change: LinkChanged, *, now: float) -> None:
         """Add a link that came up, remove one that went down."""
         if not change.up:
-            self.links.discard(change.link)
+            self.links.pop(change.link, None)
             for key in [key for key in self._clients if key[0] == change.link]:
-                self._remove(key)
+                del self._clients[key]
             return
-        self.links.add(change.link)
+        strangers = TokenBucket(rate=STRANGERS, burst=STRANGERS)
+        self.links[change.link] = None if change.is_stream else strangers
         self.link_numbers.setdefault(change.link, min(len(self.link_numbers) + 1, MAX_LINK_NUMBER))
         for peer in change.peers:
             self._add(change.link, peer, now=now)
 
     def change_peer(self, change: PeerChanged, *, now: float) -> None:
         """Add a connection of a stream link, or remove it when it is closed."""
-        self._remove((change.link, change.peer))
+        self._clients.pop((change.link, change.peer), None)
         self._signatures.forget(change.link, change.peer)
         if change.up and change.link in self.links:
             self._add(change.link, change.peer, is_connected=True, now=now)
@@ -104,33 +120,49 @@ class GcsSide:
     def note_congestion(self, change: Congestion, *, now: float) -> None:
         """Hold back telemetry to an endpoint that is congested."""
         if client := self._clients.get((change.link, change.peer)):
-            client.thinner.backoff.note(change.is_congested, now=now)
+            client.pace.note_congestion(change.is_congested, now=now)
 
     def apply(self, settings: Settings) -> None:
         self._settings = settings
-        self._rights = RightsBook(settings.roles)
-        self._newcomers = None
+        most = float(settings.clients.max_clients)
+        self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most)
         for client in self.clients:
             client.apply(settings.clients)
-            client.take_rights(self._rights.of(client.signed_by, client.who), now=client.heard_at)
+            client.take_rights(rights_of(client.signed_by, client.who, settings.roles))
 
     def forget_unknown(self) -> list[Place]:
         """Forget clients whose key is no longer valid; configured ones become unheard.
 
         Return their links and endpoints.
         """
-        unknown = [
-            (key, client)
-            for key, client in self._clients.items()
-            if not self._signatures.knows(client.signed_by)
-        ]
-        for key, client in unknown:
-            self._drop(key, client)
-        return [key for key, _ in unknown]
+        clients = list(self._clients.items())
+        unknown = [key for key, each in clients if not self._signatures.knows(each.signed_by)]
+        for key in unknown:
+            self._drop(key)
+        return unknown
 
-    def has(self, link: str, peer: Peer) -> bool:
-        """Whether a client is at this endpoint."""
-        return (link, peer) in self._clients
+    def let_in(self, item: Packets, *, now: float) -> Packets:
+        """Return the datagrams within the limits, and the STOPs of the others."""
+        link = item.link
+        strangers = self.links[link]
+        if strangers is None:
+            return item
+        let_in: list[tuple[Peer, bytes]] = []
+        times: list[float] = []
+        is_whole = True
+        for each, arrived in zip(item.datagrams, item.arrived or repeat(now), strict=False):
+            peer, data = each
+            client = self._clients.get((link, peer))
+            limit = strangers if client is None else client.datagrams
+            if not limit.take(tokens=1 + len(data) // SIZE, now=now):
+                is_whole = False
+                if not (stops := stops_in(data)):
+                    continue
+                each = peer, stops
+            let_in.append(each)
+            times.append(arrived)
+        self.left_out += len(item.datagrams) - len(let_in)
+        return item if is_whole else Packets(link, let_in, times)
 
     def receive(
         self, link: str, peer: Peer, packet: Packet, *, arrived: float, now: float
@@ -147,30 +179,27 @@ class GcsSide:
         if key is None:
             return None
         client = self._clients.get((link, peer))
-        if client is None:
-            if message is None:  # bytes without a checked CRC make no client
-                return None
+        if client is None and message is not None:  # bytes without a checked CRC make no client
             client = self._admit(link, peer, packet, message, key=key, now=now)
-            if client is None:
-                return None
-        client.arrived, client.waited = arrived, now - arrived
-        if packet.source != client.source or key is not client.signed_by:
-            self._know(client, packet.source, key, now=now)
+        if client is None:
+            return None
+        received = Received(client, packet, message, key, arrived)
+        self.hear_out(received, now=now)
         if message is not None:
             client.heard(packet, now=now)
-        return Received(client, packet, message, key, arrived)
+        return received
 
     def hear_out(self, received: Received, *, now: float) -> None:
-        """Restore a client's address, key and rights of this packet, one of several in a batch."""
-        client = received.client
+        """Set a client's address, key and rights to those of this packet, which is in hand."""
+        client, source, key = received.client, received.packet.source, received.key
         client.arrived, client.waited = received.arrived, now - received.arrived
-        self._know(client, received.packet.source, received.key, now=now)
+        if source != client.source or key is not client.signed_by:
+            self._know(client, source, key)
 
-    def _know(self, client: GcsClient, source: Address, key: Key, *, now: float) -> None:
-        """Set the address and key of a client's packet in hand, and the rights that follow."""
+    def _know(self, client: GcsClient, source: Address, key: Key) -> None:
         client.source, client.signed_by = source, key
         client.who = client.submitter(source)
-        client.take_rights(self._rights.of(key, client.who), now=now)
+        client.take_rights(rights_of(key, client.who, self._settings.roles))
 
     def forward(self, packet: Packet, *, now: float) -> None:
         """Forward a vehicle's packet to every client that is to have it.
@@ -187,7 +216,7 @@ class GcsSide:
             return
         target = target_of(message)
         for client in self.clients:
-            if client.is_reached_by(target):
+            if any(target.reaches(address) for address in client.addresses):
                 client.forward(packet, now=now)
             else:
                 client.outlet.withhold(packet.source)
@@ -201,61 +230,47 @@ class GcsSide:
         """Forget a vehicle with its ``tasks``, for every client."""
         for client in self.clients:
             client.forget(system_id, tasks)
-        self.plan_statuses()
 
     def tell(self, text: str, severity: MavSeverity, source: Address, *, now: float) -> None:
         """Send a STATUSTEXT to every client."""
         for client in self.clients:
             client.tell(text, severity, source, now=now)
 
-    def forget_silent(self, *, awaits: Callable[[GcsClient], bool], now: float) -> None:
+    def forget_silent(self, *, awaits: Callable[[str, str], bool], now: float) -> None:
         """Drop clients that have been silent for long; configured ones become unheard again.
 
-        ``awaits``: whether a client waits for the end of a task; it is kept, however long it takes.
+        ``awaits``: whether a client at this link and endpoint waits for the end of a task; it is
+        kept, however long that takes.
         """
-        limits = self._settings.clients
-        clients = list(self._clients.items())
-        for key, client in clients:
-            silence = now - client.heard_at
-            if client.is_configured and not client.is_connected:
-                if silence > limits.push_lost:
-                    client.is_heard = False
-                continue
-            is_passing = client.is_passing and not client.is_connected
-            passes = is_passing and self._is_crowd(len(clients))
-            if silence > (SILENT if passes else limits.forget_after) and not awaits(client):
-                self._drop(key, client)
+        limits, is_crowd = self._settings.clients, self._is_crowd
+        for key, client in list(self._clients.items()):
+            most, is_connected = limits.forget_after, client.is_connected
+            is_pushed = client.is_configured and not is_connected
+            if is_pushed:
+                most = limits.push_lost
+            elif is_crowd and client.is_passing and not is_connected:
+                most = SILENT
+            if now - client.heard_at > most and (is_pushed or not awaits(key[0], client.endpoint)):
+                self._drop(key)
 
-    def _drop(self, key: Place, client: GcsClient) -> None:
+    def _drop(self, key: Place) -> None:
+        client = self._clients[key]
         if client.is_configured:
             client.is_heard = False
         else:
-            self._remove(key)
+            del self._clients[key]
             self._signatures.forget(*key)
-
-    def _remove(self, key: Place) -> None:
-        client = self._clients.pop(key, None)
-        if client is not None and client.statuses.next_deadline() < inf:
-            self.plan_statuses()
 
     def _add(self, link: str, peer: Peer, *, now: float, is_connected: bool = False) -> None:
         """Add a configured or connected client, even if there is no room for it."""
         self._has_room(NO_STANDING, now=now)
-        self._clients[link, peer] = self._new(
-            link, peer, is_configured=True, is_connected=is_connected, now=now
-        )
+        client = self._clients[link, peer] = self._new(link, peer, now=now)
+        client.is_configured, client.is_connected = True, is_connected
 
-    def _new(
-        self, link: str, peer: Peer, *, is_configured: bool, is_connected: bool, now: float
-    ) -> GcsClient:
-        return GcsClient(
-            PacketSender(link, peer, self._queue, self._packer, self._signatures),
-            settings=self._settings.clients,
-            wake=self._statuses.bring_forward,
-            is_configured=is_configured,
-            is_connected=is_connected,
-            now=now,
-        )
+    def _new(self, link: str, peer: Peer, *, now: float) -> GcsClient:
+        outlet = PacketSender(link, peer, self._queue, self._packer, self._signatures)
+        wake = self._statuses.bring_forward
+        return GcsClient(outlet, settings=self._settings.clients, wake=wake, now=now)
 
     def _admit(
         self, link: str, peer: Peer, packet: Packet, message: m.Message, *, key: Key, now: float
@@ -266,21 +281,21 @@ class GcsSide:
         telemetry sent to all its endpoints. Who may do more comes first, and of those who may do
         the same the signed ones: anybody can pose as many unsigned ones.
         """
-        if self._newcomers is None:
-            most = float(self._settings.clients.max_clients)
-            self._newcomers = TokenBucket(rate=NEWCOMERS, burst=most, now=now)
-        client = self._new(link, peer, is_configured=False, is_connected=False, now=now)
-        self._know(client, packet.source, key, now=now)
         is_signed = key is not UNSIGNED
         may_come = is_signed or self._newcomers.take(now=now)
+        if not (may_come or is_stop(message)):
+            return None
+        client = self._new(link, peer, now=now)
+        self._know(client, packet.source, key)
         if may_come and self._has_room(client.standing, now=now):
-            client.is_one_of_many = self._is_crowd(len(self._clients)) and not is_signed
+            client.is_one_of_many = self._is_crowd and not is_signed
             self._clients[link, peer] = client
             return client
         return client if is_stop(message) else None
 
-    def _is_crowd(self, clients: int) -> bool:
-        return clients > self._settings.clients.max_clients // CROWDED
+    @property
+    def _is_crowd(self) -> bool:
+        return len(self._clients) > self._settings.clients.max_clients // CROWDED
 
     def _has_room(self, standing: tuple[int, bool], *, now: float) -> bool:
         """Whether there is room for a client of this standing; perhaps forget one in its place.
@@ -291,20 +306,15 @@ class GcsSide:
         if len(self._clients) < self._settings.clients.max_clients:
             return True
         others = [
-            client
+            (is_present, client.standing, client.heard_at, client.key)
             for client in self.clients
             if not client.is_configured
             and (
-                (client.standing, now - client.heard_at < SILENT) < (standing, True)
+                (client.standing, is_present := now - client.heard_at < SILENT) < (standing, True)
                 or now - client.heard_at >= GONE
             )
         ]
-        last = min(
-            others,
-            key=lambda each: (now - each.heard_at < SILENT, each.standing, each.heard_at),
-            default=None,
-        )
-        if last is None:
+        if not others:
             return False
-        self._drop(last.key, last)
+        self._drop(min(others, key=itemgetter(0, 1, 2))[3])
         return True

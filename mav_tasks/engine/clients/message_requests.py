@@ -1,45 +1,64 @@
-"""Serves REQUEST_MESSAGE and the requests about message intervals."""
+"""Serves REQUEST_MESSAGE, the requests about message intervals, and SETUP_SIGNING.
+
+SETUP_SIGNING makes the server sign its packets to a client, if the key is in the ring. It is never
+forwarded: a rover whose key changed without the server would accept no STOP from it any more.
+"""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.rights import SUBMITTER
+from mav_tasks.engine.clients.signatures import Signatures
+from mav_tasks.engine.clients.vehicle_view import STOPPED
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.command_request import CommandRequest
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection
+from mav_tasks.latest import keep_latest
 from mav_tasks.mavlink import messages as m
 from mav_tasks.mavlink.address import Address, address_of
+from mav_tasks.mavlink.enums import MavSeverity
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.command_receiver import Command
 from mav_tasks.tasks.forecast import Forecast
 from mav_tasks.tasks.lifecycle import TaskReason
 from mav_tasks.tasks.registry import TaskRegistry
-from mav_tasks.tasks.task import Task, TaskId
+from mav_tasks.tasks.task import Task
 from mav_tasks.tasks.vehicle_tasks import VehicleTasks
 
 R = TaskReason
 
 PROTOCOL_VERSION = m.ProtocolVersion(200, 100, 200, [0] * 8, [0] * 8)
 EVERYBODY = Address(0, 0)
-NO_INTERVAL = -1  # of MESSAGE_INTERVAL: the message is not sent
 PAGE = 16  # waiting or finished tasks that one request returns
+MAX_FOLLOWED = 1000  # tasks that one client asked about and is told of
 MAX_INTERVAL_ID = 0xFFFF  # of MESSAGE_INTERVAL.message_id
 
 
+class _Reader(NamedTuple):
+    """Who is sent messages about the tasks of one rover, and in whose name."""
+
+    client: GcsClient
+    address: Address
+    tasks: VehicleTasks
+    source: Address
+    now: float
+
+
+@dataclass(repr=False, eq=False)
 class MessageRequests:
     """The handler of REQUEST_MESSAGE and of message intervals."""
 
-    def __init__(
-        self, gcs: GcsSide, vehicles: VehicleSide, registry: TaskRegistry, gateway: str
-    ) -> None:
-        """``gateway``: the name of this server in its fleet, "" if it is in none."""
-        self._gateway = gateway.encode()
-        self._gcs = gcs
-        self._vehicles = vehicles
-        self._registry = registry
+    _gcs: GcsSide
+    _vehicles: VehicleSide
+    _signatures: Signatures
+    _registry: TaskRegistry
+    #: the name of this server in its fleet, "" if it is in none
+    _gateway: str
 
     def set_interval(self, asked: CommandRequest, *, now: float) -> None:
         """SET_MESSAGE_INTERVAL: set this client's rate; ``TelemetryRates`` asks the rover."""
@@ -52,19 +71,28 @@ class MessageRequests:
         if message_id == m.TaskStatus.id:
             client.uses_dialect = True
             interval = interval_us / 1e6 if interval_us > 0 else None
-            client.statuses.set_interval(vehicle.system_id, interval, now=now)
+            client.stream_statuses(vehicle.system_id, interval, now=now)
             return
         commands = asked.rights.reach(SUBMITTER)
-        client.thinner.set_interval(vehicle.system_id, message_id, interval_us, commands=commands)
+        client.view(vehicle.system_id).wish(message_id, interval_us, commands=commands)
 
     def set_streams(self, client: GcsClient, message: m.RequestDataStream) -> None:
         """REQUEST_DATA_STREAM: set the interval of each message of the group."""
         rate = message.req_message_rate if message.start_stop else 0
         commands = client.rights.reach(SUBMITTER)
         for vehicle in self._vehicles.addressed_by(message.target_system):
-            client.thinner.set_group(
-                vehicle.system_id, message.req_stream_id, rate, commands=commands
-            )
+            view = client.view(vehicle.system_id)
+            view.wish_group(message.req_stream_id, rate, commands=commands)
+
+    def set_up_signing(self, client: GcsClient, message: m.SetupSigning, *, now: float) -> None:
+        """SETUP_SIGNING: a text says why not; QGroundControl looks for it, or signed packets."""
+        for vehicle in self._vehicles.addressed_by(message.target_system)[:1]:
+            why_not = "disabled by signing.setup"
+            if vehicle.parts.settings.signing.setup == "known":
+                why_not = self._signatures.set_up(*client.key, bytes(message.secret_key))
+            if why_not:
+                words = f"signing refused: {why_not}"
+                client.tell(words, MavSeverity.ERROR, vehicle.server_address, now=now)
 
     def show_interval(self, asked: CommandRequest) -> None:
         """GET_MESSAGE_INTERVAL: send the interval at which this client gets a message."""
@@ -74,31 +102,27 @@ class MessageRequests:
             raise Rejection(R.BAD_PARAMETER, words)
         system_id = asked.vehicle.system_id
         if message_id == m.TaskStatus.id:
-            seconds = asked.client.statuses.interval(system_id)
-            interval = NO_INTERVAL if seconds is None else round(seconds * 1e6)
+            seconds, _ = asked.client.status_streams.get(system_id, (STOPPED / 1e6, 0.0))
+            interval = round(seconds * 1e6)
         else:
-            interval = asked.client.thinner.interval_us(system_id, message_id)
+            interval = asked.client.view(system_id).interval_us(message_id)
         asked.client.outlet.send(m.MessageInterval(message_id, interval), asked.answering)
 
     def show(self, asked: CommandRequest, *, now: float) -> bool:
         """REQUEST_MESSAGE: send a message of the server itself. Return False if it is not one."""
-        client, vehicle = asked.client, asked.vehicle
-        match translate.message_id_of(asked.command):
-            case m.TaskStatus.id:
-                client.uses_dialect = True
-                self._show_tasks(asked, now=now)
+        client, packet, command, vehicle = asked.client, asked.packet, asked.command, asked.vehicle
+        match translate.message_id_of(command):
+            case m.TaskStatus.id if task_id := translate.task_id_of(command):
+                self.show_task(client, packet, task_id, now=now)
             case m.TaskTiming.id:
                 client.uses_dialect = True
                 self._show_timing(asked, now=now)
-            case m.TaskQueueStatus.id:
-                heard_at = vehicle.heard_at
-                self._show_queue(
-                    client, vehicle.tasks, vehicle.server_address, heard_at=heard_at, now=now
-                )
             case m.ProtocolVersion.id:
                 client.outlet.send(PROTOCOL_VERSION, asked.answering)
             case _:
-                return False
+                place = vehicle.tasks, vehicle.server_address
+                to = _Reader(client, packet.source, *place, now)
+                return self._show(to, command, heard_at=vehicle.heard_at)
         return True
 
     def show_unheard(
@@ -112,21 +136,24 @@ class MessageRequests:
         now: float,
     ) -> bool:
         """REQUEST_MESSAGE about a rover not heard in this run. Return False if it is not for us."""
+        message_id, task_id = translate.message_id_of(command), translate.task_id_of(command)
+        to = _Reader(client, packet.source, tasks, address, now)
         client.uses_dialect = True
-        match translate.message_id_of(command):
-            case m.TaskQueueStatus.id:
-                self._show_queue(client, tasks, address, heard_at=None, now=now)
-            case m.TaskStatus.id:
-                task_id = translate.task_id_of(command)
-                if task_id and self._registry.get(task_id) is None:
-                    raise Rejection(R.NOT_FOUND, f"no task {task_id}")
-                ids = [TaskId(task_id)] if task_id else self._page(tasks, command)
-                self._show_statuses(client, ids, tasks, address, reader=packet.source, now=now)
-            case m.TaskTiming.id:  # needs the rover's setpoint rate
-                raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
-            case _:
-                return False
-        return True
+        if message_id == m.TaskTiming.id:  # needs the rover's setpoint rate
+            raise Rejection(R.VEHICLE_SILENT, f"no heartbeat from rover {tasks.vehicle} yet")
+        if message_id == m.TaskStatus.id and task_id:
+            self._send(to, [self._task(task_id)])
+            return True
+        return self._show(to, command, heard_at=None)
+
+    def show_task(self, client: GcsClient, packet: Packet, task_id: int, *, now: float) -> None:
+        """Send a task's TASK_STATUS, and each later change; raise Rejection if there is no task."""
+        client.uses_dialect = True
+        task = self._task(task_id)
+        keep_latest(client.followed, task_id, None, most=MAX_FOLLOWED)
+        if owner := self._vehicles.look_at(task.vehicle):
+            place = owner.tasks, owner.server_address
+            self._send(_Reader(client, packet.source, *place, now), [task])
 
     def push_status(self, client: GcsClient, task_id: int, *, now: float) -> None:
         """Send a task's TASK_STATUS without its queue position, which takes time to compute."""
@@ -135,89 +162,52 @@ class MessageRequests:
         if task is not None and vehicle is not None:
             to = task.submitter.system_id, task.submitter.component_id
             reader = address_of(*to) if client.submitted(task) else EVERYBODY
-            tasks, address = vehicle.tasks, vehicle.server_address
-            self._send(client, task, tasks, address, reader=reader, forecast=None, now=now)
+            place = vehicle.tasks, vehicle.server_address
+            self._send_one(_Reader(client, reader, *place, now), task, None)
 
-    def _show_statuses(
-        self,
-        client: GcsClient,
-        ids: Iterable[TaskId],
-        tasks: VehicleTasks,
-        address: Address,
-        *,
-        reader: Address,
-        now: float,
-    ) -> None:
-        """Send the TASK_STATUS of tasks, with their queue positions and estimated times."""
-        forecast = Forecast(tasks, self._registry, now=now)
-        for each in ids:
-            task = self._registry[each]
-            self._send(client, task, tasks, address, reader=reader, forecast=forecast, now=now)
-
-    def _send(
-        self,
-        client: GcsClient,
-        task: Task,
-        tasks: VehicleTasks,
-        address: Address,
-        *,
-        reader: Address,
-        forecast: Forecast | None,
-        now: float,
-    ) -> None:
-        status = translate.task_status(
-            task,
-            tasks,
-            reader=reader,
-            link_number=self._gcs.link_numbers.get(task.submitter.link, 0),
-            forecast=forecast,
-            now=now,
-        )
-        client.outlet.send(status, address)
-
-    def _show_queue(
-        self,
-        client: GcsClient,
-        tasks: VehicleTasks,
-        address: Address,
-        *,
-        heard_at: float | None,
-        now: float,
-    ) -> None:
-        client.uses_dialect = True
-        counts = self._registry.counts(tasks.vehicle)
-        version = self._registry.recorded
-        status = translate.queue_status(
-            tasks, counts, heard_at=heard_at, gateway=self._gateway, version=version, now=now
-        )
-        client.outlet.send(status, address)
-
-    def _show_tasks(self, asked: CommandRequest, *, now: float) -> None:
-        client, vehicle, reader = asked.client, asked.vehicle, asked.packet.source
-        task_id = translate.task_id_of(asked.command)
-        if task_id:
-            self.show_task(client, asked.packet, task_id, now=now)
-            return
-        ids, address = self._page(vehicle.tasks, asked.command), vehicle.server_address
-        self._show_statuses(client, ids, vehicle.tasks, address, reader=reader, now=now)
-
-    def show_task(self, client: GcsClient, packet: Packet, task_id: int, *, now: float) -> None:
-        """Send a task's TASK_STATUS, and each later change; raise Rejection if there is no task."""
-        client.uses_dialect = True
+    def _task(self, task_id: int) -> Task:
         task = self._registry.get(task_id)
         if task is None:
             raise Rejection(R.NOT_FOUND, f"no task {task_id}")
-        client.follow(task_id)
-        if owner := self._vehicles.look_at(task.vehicle):
-            tasks, address = owner.tasks, owner.server_address
-            self._show_statuses(client, [task.id], tasks, address, reader=packet.source, now=now)
+        return task
 
-    def _page(self, tasks: VehicleTasks, command: Command) -> list[TaskId]:
-        """Return the waiting or finished tasks for a request without a task id."""
-        first = max(0, translate.first_index_of(command))
-        if translate.is_of_finished(command):
-            return self._registry.finished(tasks.vehicle, first, PAGE)
-        return tasks.page(first, PAGE)
+    def _show(self, to: _Reader, command: Command, *, heard_at: float | None) -> bool:
+        """Send a rover's queue, or a page of its tasks. Return False if neither is asked for."""
+        registry, tasks = self._registry, to.tasks
+        match translate.message_id_of(command):
+            case m.TaskQueueStatus.id:
+                status = translate.queue_status(
+                    tasks,
+                    registry.counts(tasks.vehicle),
+                    heard_at=heard_at,
+                    gateway=self._gateway.encode(),
+                    version=registry.recorded,
+                    now=to.now,
+                )
+                to.client.outlet.send(status, to.source)
+            case m.TaskStatus.id:
+                first = max(0, translate.first_index_of(command))
+                ids = tasks.page(first, PAGE)
+                if translate.is_of_finished(command):
+                    ids = registry.finished(tasks.vehicle, first, PAGE)
+                self._send(to, [registry[each] for each in ids])
+            case _:
+                return False
+        to.client.uses_dialect = True
+        return True
+
+    def _send(self, to: _Reader, shown: Iterable[Task]) -> None:
+        """Send the TASK_STATUS of tasks, with their queue positions and estimated times."""
+        forecast = Forecast(to.tasks, self._registry, now=to.now)
+        for task in shown:
+            self._send_one(to, task, forecast)
+
+    def _send_one(self, to: _Reader, task: Task, forecast: Forecast | None) -> None:
+        number = self._gcs.link_numbers.get(task.submitter.link, 0)
+        status = translate.task_status(
+            task, to.tasks, reader=to.address, link_number=number, forecast=forecast, now=to.now
+        )
+        to.client.outlet.send(status, to.source)
 
     def _show_timing(self, asked: CommandRequest, *, now: float) -> None:
         task_id = translate.task_id_of(asked.command)
@@ -228,11 +218,7 @@ class MessageRequests:
         vehicle = self._vehicles.look_at(task.vehicle)
         if vehicle is None:  # its rover is of an earlier run, not heard yet: as for TASK_STATUS
             return
-        message = translate.task_timing(
-            task,
-            vehicle.tasks.timing_of(task),
-            period=vehicle.parts.settings.watch.setpoint_period,
-            reader=asked.packet.source,
-            now=now,
-        )
+        period, reader = vehicle.parts.settings.watch.setpoint_period, asked.packet.source
+        timing = vehicle.tasks.timing_of(task)
+        message = translate.task_timing(task, timing, period=period, reader=reader, now=now)
         asked.client.outlet.send(message, vehicle.server_address)

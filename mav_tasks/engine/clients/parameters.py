@@ -2,9 +2,14 @@
 
 They are the same for all vehicles, survive a restart, and take effect once they are durable.
 Messages about the vehicle's own parameters are forwarded to it.
+
+MAVLink guide, "Parameter Protocol". All parameters are REAL32, and what is not there is answered by
+PARAM_ERROR, which clients that do not know it pass over.
 """
 
 from collections.abc import Mapping
+from functools import partial
+from math import inf
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
@@ -14,16 +19,17 @@ from mav_tasks.engine.vehicles.vehicle import Vehicle
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
 from mav_tasks.errors import Rejection, SettingError
 from mav_tasks.mavlink import messages as m
-from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST
+from mav_tasks.mavlink.address import AUTOPILOT, BROADCAST, Address
 from mav_tasks.mavlink.enums import MavParamError, MavParamType, MavSeverity
 from mav_tasks.mavlink.packet import Packet
-from mav_tasks.services import file_transfer, param_receiver
-from mav_tasks.services.param_receiver import HASH_CHECK
+from mav_tasks.services import file_transfer
 from mav_tasks.services.parameter_table import PARAMETERS, as_sent, changed, with_all
 from mav_tasks.settings import Settings
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.server_events import ParameterSet
 
+BY_NAME = -1  # param_index of a request
+HASH_CHECK = "_HASH_CHECK"  # by which a client with a cache begins: whatever it asks, it wants all
 LIST_EACH = 0.2  # s between lists: one packet asks for many, no client asks again so soon
 ParamMessage = m.ParamRequestList | m.ParamRequestRead | m.ParamSet | m.FileTransferProtocol
 
@@ -65,11 +71,10 @@ class ParameterServer:
 
     def configured(self, settings: Settings) -> Settings:
         """Take reloaded settings, and return them with the parameters applied."""
-        before = self._values()
-        self._configured = settings
+        before, self._configured = self._settings, settings
         self._settings, self._why_not = with_all(settings, self._kept)
-        for name, value in self._values().items():
-            if value != before[name]:
+        for name, each in PARAMETERS.items():
+            if each.value(self._settings) != each.value(before):
                 self._tell(name)
         return self._settings
 
@@ -95,90 +100,85 @@ class ParameterServer:
         self, client: GcsClient, packet: Packet, message: ParamMessage, *, now: float
     ) -> None:
         """Answer a message that addresses the task server of one or more vehicles."""
-        vehicles = [
-            v for v in self._vehicles.all if message.target_system in (BROADCAST, v.system_id)
-        ]
-        for vehicle in vehicles:
-            component = message.target_component
-            if component in (BROADCAST, vehicle.server_component):
-                self._answer(client, vehicle, packet, message, now=now)
-            elif component == AUTOPILOT and _begins(message):
-                self._list(client, vehicle, now=now)
-                client.listed_at.clear()  # where there is no such file, it asks for a list at once
+        component, asker = message.target_component, packet.source
+        for vehicle in self._vehicles.all:
+            source = vehicle.server_address
+            if message.target_system not in (BROADCAST, vehicle.system_id):
+                continue
+            is_meant = component == source.component_id
+            match message:
+                case _ if component == AUTOPILOT:
+                    if _begins(message):
+                        self._list(client, vehicle, now=now)
+                        # where there is no such file, it asks for a list at once
+                        client.view(vehicle.system_id).listed_at = -inf
+                case _ if component != BROADCAST and not is_meant:
+                    pass
+                case m.ParamRequestRead() if not _begins(message):
+                    name, index = message.param_id, message.param_index
+                    if is_meant or name in PARAMETERS:
+                        if index != BY_NAME:
+                            name = dict(enumerate(PARAMETERS)).get(index, "")
+                        error = _error(message, MavParamError.DOES_NOT_EXIST, to=asker)
+                        answer = self._value(name) if name in PARAMETERS else error
+                        client.outlet.send(answer, source)
+                case m.ParamRequestList() | m.ParamRequestRead():
+                    self._list(client, vehicle, now=now)
+                case m.ParamSet() if is_meant or message.param_id in PARAMETERS:
+                    self._set(client, asker, message, source, now=now)
 
-    def _answer(
-        self,
-        client: GcsClient,
-        vehicle: Vehicle,
-        packet: Packet,
-        message: ParamMessage,
-        *,
-        now: float,
-    ) -> None:
-        is_meant = message.target_component != BROADCAST
-        match message:
-            case m.ParamRequestList():
-                self._list(client, vehicle, now=now)
-            case m.ParamRequestRead() if _begins(message):
-                self._list(client, vehicle, now=now)
-            case m.ParamRequestRead() if is_meant or message.param_id in PARAMETERS:
-                answer = param_receiver.read(self._values(), message, to=packet.source)
-                client.outlet.send(answer, vehicle.server_address)
-            case m.ParamSet() if is_meant or message.param_id in PARAMETERS:
-                self._set(client, vehicle, packet, message, now=now)
-
-    def _values(self) -> dict[str, float]:
-        return {name: each.value(self._settings) for name, each in PARAMETERS.items()}
+    def _value(self, name: str) -> m.ParamValue:
+        """Return the message that tells a parameter's value."""
+        names, value = list(PARAMETERS), PARAMETERS[name].value(self._settings)
+        index = names.index(name)
+        return m.ParamValue(name.encode(), value, MavParamType.REAL32, len(names), index)
 
     def _list(self, client: GcsClient, vehicle: Vehicle, *, now: float) -> None:
-        listed_at = client.listed_at.get(vehicle.system_id)
-        if listed_at is not None and now - listed_at < LIST_EACH:
-            return
-        client.listed_at[vehicle.system_id] = now
-        for value in param_receiver.all_values(self._values()):
-            client.outlet.send(value, vehicle.server_address)
+        view = client.view(vehicle.system_id)
+        if now - view.listed_at >= LIST_EACH:
+            view.listed_at = now
+            for name in PARAMETERS:
+                client.outlet.send(self._value(name), vehicle.server_address)
 
     def _set(
         self,
         client: GcsClient,
-        vehicle: Vehicle,
-        packet: Packet,
+        asker: Address,
         message: m.ParamSet,
+        source: Address,
         *,
         now: float,
     ) -> None:
         """Check a PARAM_SET and record it; it takes effect, and is announced, once durable."""
         name, value, who = message.param_id, as_sent(message.param_value), str(client.who)
-        asker = packet.source
 
         def refuse(text: str, why: int, *, now: float) -> None:
-            source = vehicle.server_address
-            client.outlet.send(param_receiver.error(message, why, to=asker), source)
+            client.outlet.send(_error(message, why, to=asker), source)
             if name in PARAMETERS:  # for clients that do not know PARAM_ERROR
-                client.outlet.send(param_receiver.value_of(self._values(), name), source)
+                client.outlet.send(self._value(name), source)
             client.tell(text, MavSeverity.WARNING, source, now=now)
 
-        def settle(*, was_stored: bool, now: float) -> None:
-            """Forget it, and record the value in force unless a later one is on its way."""
+        def settle(words: str, why: int, *, now: float) -> None:
+            """Take it, or refuse it for ``words`` and record the value in force again.
+
+            That only if no later one is on its way.
+            """
             if self._pending.get(name) is message:
                 del self._pending[name]
-                if not was_stored:
+                if words:
                     self._registry.record(ParameterSet(name, self._kept.get(name), who, now))
+            if words:
+                refuse(words, why, now=now)
+            else:
+                self._take(name, value)
 
         def accept(*, now: float) -> None:
+            words = ""
             try:
                 changed(self._settings, name, value)
             except SettingError as error:  # the values that it was checked against were not stored
-                settle(was_stored=False, now=now)
-                refuse(str(error), MavParamError.VALUE_OUT_OF_RANGE, now=now)
-            else:
-                settle(was_stored=True, now=now)
-                self._take(name, value)
-
-        def give_up(*, now: float) -> None:
-            settle(was_stored=False, now=now)
-            words = f"{name} was not stored in time: not set"
-            refuse(words, MavParamError.PERMISSION_DENIED, now=now)
+                words = str(error)
+            settle(words, MavParamError.VALUE_OUT_OF_RANGE, now=now)
 
         if name not in PARAMETERS:
             refuse(f"{name}: no such parameter", MavParamError.DOES_NOT_EXIST, now=now)
@@ -200,6 +200,8 @@ class ParameterServer:
         if name in self._pending or value != self._kept.get(name):
             self._registry.record(ParameterSet(name, value, who, now))
         self._pending[name] = message
+        words = f"{name} was not stored in time: not set"
+        give_up = partial(settle, words, MavParamError.PERMISSION_DENIED)
         self._submissions.gate.hold(accept, give_up, now=now)
 
     def _take(self, name: str, value: float) -> None:
@@ -210,11 +212,17 @@ class ParameterServer:
 
     def _tell(self, name: str) -> None:
         """Send a parameter's value to every client."""
-        told = param_receiver.value_of(self._values(), name)
+        told = self._value(name)
         for vehicle in self._vehicles.all:
             for client in self._gcs.clients:
                 if client.is_heard and vehicle.system_id in client.introduced:
                     client.outlet.send(told, vehicle.server_address)
+
+
+def _error(message: m.ParamRequestRead | m.ParamSet, why: int, *, to: Address) -> m.ParamError:
+    """Return the PARAM_ERROR that answers a message; ``why`` is a MAV_PARAM_ERROR."""
+    index = message.param_index if isinstance(message, m.ParamRequestRead) else BY_NAME
+    return m.ParamError(*to, message.param_id.encode()[:16], index, why)
 
 
 def _begins(message: ParamMessage) -> bool:

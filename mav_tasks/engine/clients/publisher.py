@@ -2,23 +2,32 @@
 
 A TASK_STATUS with a final state is sent once that state is durable, so that it is never taken back,
 or after the time limit of the commit gate. A state that a client requests is sent at once.
+
+Each second it also asks the vehicles for the message intervals that clients want and a link
+carries. It computes them from the present clients only: the requests of a client end when it is
+gone, or so silent that it gets no telemetry any more. And it watches whether a ground station is
+heard: the heartbeats of all of them count.
 """
 
 from functools import partial
+from math import inf
 
 from mav_tasks.engine.clients.gcs_client import GcsClient
 from mav_tasks.engine.clients.gcs_side import GcsSide
 from mav_tasks.engine.clients.message_requests import MessageRequests
 from mav_tasks.engine.clients.summary import next_words, summary_of
-from mav_tasks.engine.clients.telemetry_rates import TelemetryRates
 from mav_tasks.engine.commands import translate
 from mav_tasks.engine.commands.submissions import Submissions
 from mav_tasks.engine.timers import Timers, Turn
-from mav_tasks.engine.vehicles.vehicle import Vehicle
+from mav_tasks.engine.vehicles.control import Event as ControlEvent
+from mav_tasks.engine.vehicles.hands import Word
 from mav_tasks.engine.vehicles.vehicle_side import VehicleSide
-from mav_tasks.mavlink.enums import MavSeverity, MavState
+from mav_tasks.mavlink import messages as m
+from mav_tasks.mavlink.enums import MavSeverity, MavState, MavType
 from mav_tasks.mavlink.packet import Packet
 from mav_tasks.services.heartbeat import INTERVAL, component_heartbeat
+from mav_tasks.services.rate_budget import granted
+from mav_tasks.settings import Settings
 from mav_tasks.tasks.events import (
     Event,
     QueueContinued,
@@ -33,6 +42,8 @@ from mav_tasks.tasks.lifecycle import TERMINAL
 from mav_tasks.tasks.registry import TaskRegistry
 from mav_tasks.tasks.task import TaskId
 
+UNHEARD = Word(text="is paused: no ground station is heard")
+
 
 class Publisher:
     """The sender of heartbeats, TASK_STATUS and texts to clients."""
@@ -44,8 +55,8 @@ class Publisher:
         registry: TaskRegistry,
         displays: MessageRequests,
         submissions: Submissions,
-        rates: TelemetryRates,
         timers: Timers,
+        settings: Settings,
         *,
         now: float,
     ) -> None:
@@ -54,9 +65,29 @@ class Publisher:
         self._registry = registry
         self._displays = displays
         self._submissions = submissions
-        self._rates = rates
+        self._had_wishes = False
+        self._operator_heard_at = inf  # s; inf: none was heard, or its loss was noted
+        self._operator = timers.timer(Turn.OPERATOR, self._lose_operator)
         self._ended: set[int] = set()  # tasks whose end is not durable yet
         timers.rhythm(Turn.HEARTBEATS, self._beat, period=INTERVAL, now=now)
+        self.apply(settings)
+
+    def apply(self, settings: Settings) -> None:
+        self._settings = settings
+        self._operator.set(self._operator_heard_at + settings.watch.operator_lost)
+
+    def hear_operator(self, heartbeat: m.Heartbeat, *, now: float) -> None:
+        """Note the heartbeat of a ground station, if it is one's."""
+        if heartbeat.type == MavType.GCS:
+            self._operator_heard_at = now
+            self.apply(self._settings)
+
+    def _lose_operator(self, *, now: float) -> None:
+        """Pause all vehicles, if configured so: no ground station is heard any more."""
+        self._operator_heard_at = inf
+        if self._settings.operator_lost == "pause":
+            for vehicle in self._vehicles.addressed_by(0):
+                vehicle.joint.on(ControlEvent.OPERATOR_LOST, UNHEARD, now=now)
 
     def welcome(self, client: GcsClient, *, now: float) -> None:
         """Send a client the latest heartbeat of each vehicle that it has not seen yet."""
@@ -67,7 +98,9 @@ class Publisher:
                 heartbeat = vehicle.shown.applied(
                     vehicle.last_heartbeat, is_stopped=vehicle.tasks.is_stopped, now=now
                 )
-                client.introduce(heartbeat, last_seq=vehicle.last_seq)
+                # before anything else of its system; the autopilot's next packet follows on
+                client.introduced.add(vehicle.system_id)
+                client.outlet.forward(heartbeat._replace(seq=vehicle.last_seq))
 
     def withhold(self, packet: Packet) -> None:
         """Note for every client that a vehicle's packet is not forwarded: no gap shows."""
@@ -118,16 +151,13 @@ class Publisher:
         for client in self._gcs.clients:
             # a nonce proves it for good; after a restart or a long silence the client is a new one
             reads = client.uses_dialect or task.marks.nonce
-            if (reads and client.submitted(task)) or client.follows(task.id):
-                client.statuses.changed(task.id)
-
-    def _awaits(self, client: GcsClient) -> bool:
-        return self._registry.is_awaited_at(client.outlet.link, client.endpoint)
+            if (reads and client.submitted(task)) or task.id in client.followed:
+                client.note_change(task.id)
 
     def _beat(self, *, now: float) -> None:
         """Each second: heartbeats, message rates, dropped texts; forget silent clients."""
-        self._gcs.forget_silent(awaits=self._awaits, now=now)
-        self._rates.update(now=now)
+        self._gcs.forget_silent(awaits=self._registry.is_awaited_at, now=now)
+        self._ask_for_telemetry(now=now)
         self._send_heartbeats(now=now)
         for client in self._gcs.clients:
             if client.left_out:
@@ -136,14 +166,14 @@ class Publisher:
     def send_statuses(self, *, now: float) -> None:
         """Send each client the statuses that are due."""
         for client in self._gcs.clients:
-            if now < client.statuses.next_deadline():
+            if now < client.statuses_due_at():
                 continue
             active: dict[int, int] = {
                 vehicle.system_id: active_id
                 for vehicle in self._vehicles.all
                 if (active_id := vehicle.tasks.executor.task_id) is not None
             }
-            for task_id in client.statuses.due(active, now=now):
+            for task_id in client.due_statuses(active, now=now):
                 if task_id not in self._ended:
                     self._displays.push_status(client, task_id, now=now)
         self._gcs.plan_statuses()
@@ -166,16 +196,27 @@ class Publisher:
             for client in self._gcs.clients:
                 if client.is_heard and vehicle.system_id in client.introduced:
                     client.outlet.send(heartbeat, source)
-                    if client.is_to_be_informed(vehicle.system_id):
+                    view = client.view(vehicle.system_id)
+                    if not view.is_informed:
+                        view.is_informed = True
                         new.append(client)
-            if new:
-                self._inform(vehicle, new, now=now)
+            # who is new, or back, has missed what is held or paused. It is told with the next
+            # heartbeat: a ground station ignores texts of a vehicle that it has only just heard of
+            words = summary_of(vehicle.tasks) if new else ""
+            for client in new if words else ():
+                client.tell(words, MavSeverity.WARNING, source, now=now)
 
-    def _inform(self, vehicle: Vehicle, new: list[GcsClient], *, now: float) -> None:
-        """Tell clients that are new, or back, what is held or paused: with the next heartbeat.
-
-        A ground station ignores texts of a vehicle that it has only just heard of.
-        """
-        words = summary_of(vehicle.tasks)
-        for client in new if words else ():
-            client.tell(words, MavSeverity.WARNING, vehicle.server_address, now=now)
+    def _ask_for_telemetry(self, *, now: float) -> None:
+        clients = [each for each in self._gcs.clients if each.is_heard and each.pace.has_wishes]
+        if not clients and not self._had_wishes:
+            return
+        self._had_wishes = bool(clients)
+        for vehicle in self._vehicles.all:
+            least: dict[bool, dict[int, float]] = {True: {}, False: {}}
+            for client in clients:
+                for number, wish in client.view(vehicle.system_id).wishes.items():
+                    if wish.commands is not None and wish.interval is not None:
+                        intervals = least[wish.commands]
+                        intervals[number] = min(wish.interval, intervals.get(number, inf))
+            spare = self._vehicles.links.link_budget(vehicle, now=now).spare
+            vehicle.requests.intervals.set_wishes(granted(least[True], least[False], spare=spare))

@@ -26,12 +26,9 @@ class RestartWatch:
 
     def begins_anew(self, packet: Packet, *, now: float) -> bool:
         """Return whether the sender of a packet has restarted just before it."""
-        last = self._last.pop(packet.source, None)
-        if last is None and len(self._last) >= MOST:
+        number, at = self._last.pop(packet.source, (packet.seq, now))
+        if len(self._last) >= MOST:
             del self._last[next(iter(self._last))]
         self._last[packet.source] = packet.seq, now
-        if last is None:
-            return False
-        number, at = last
         is_next = packet.seq == (number + 1) & 0xFF
         return not is_next and packet.seq < FIRST_NUMBERS and now - at >= SILENCE

@@ -125,30 +125,20 @@ class Rights(NamedTuple):
 NOTHING = Rights(OBSERVER, NO_LIMIT)
 
 
-class RightsBook:
-    """The rights of all clients, by key and address; a key may have limits of its own."""
+def rights_of(key: Key, submitter: Submitter, roles: Roles) -> Rights:
+    """Return the rights of a submitter whose packet was signed with this key.
 
-    def __init__(self, roles: Roles) -> None:
-        self._roles = roles
-        self._by_role = {role: Rights(role, getattr(roles, role)) for role in ROLES}
-
-    def __repr__(self) -> str:
-        return f"RightsBook(unsigned: {self._roles.unsigned})"
-
-    def of(self, key: Key, submitter: Submitter) -> Rights:
-        """Return the rights of a submitter whose packet was signed with this key."""
-        if key is not UNSIGNED:
-            of_role, own = self._by_role[key.role], key.limits
-            if not isinstance(own, Limits):
-                return of_role
-            is_bound = own.max_speed < NO_LIMIT.max_speed
-            is_bound |= own.max_distance < NO_LIMIT.max_distance
-            return Rights(key.role, of_role.limits.within(own), f"key {key.name}", is_bound)
-        addresses = self._roles.addresses
-        if not addresses:
-            return self._by_role[self._roles.unsigned]
-        by_address = addresses.get(submitter.address, self._roles.unsigned)
-        return self._by_role[addresses.get(submitter.place, by_address)]
+    A key may have limits of its own.
+    """
+    role = key.role
+    if key is UNSIGNED:
+        by_address = roles.addresses.get(submitter.address, roles.unsigned)
+        role = roles.addresses.get(submitter.place, by_address)
+    limits, own = getattr(roles, role), key.limits
+    if not isinstance(own, Limits):
+        return Rights(role, limits)
+    is_slow, is_near = own.max_speed < NO_LIMIT.max_speed, own.max_distance < NO_LIMIT.max_distance
+    return Rights(role, limits.within(own), f"key {key.name}", is_slow or is_near)
 
 
 def _kinds_of(goal: Goal) -> list[str]:

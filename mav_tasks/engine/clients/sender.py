@@ -57,11 +57,9 @@ class Memory:
             self._forget(self.packets.pop(said.raw))
         self.packets[said.raw] = said
         self.contents.setdefault(said.content, []).append(said)
-        while len(self.packets) > self._most or self._is_over(now=said.at):
+        oldest = said.at - DOUBLED
+        while len(self.packets) > self._most or next(iter(self.packets.values())).at < oldest:
             self._forget(self.packets.popitem(last=False)[1])
-
-    def _is_over(self, *, now: float) -> bool:
-        return now - next(iter(self.packets.values())).at > DOUBLED
 
     def _forget(self, said: Said) -> None:
         equal = self.contents[said.content]

@@ -78,7 +78,10 @@ class _Link(NamedTuple):
     number: int
     is_of_vehicles: bool
     takes_unsigned: bool
-    key: str
+    key: str  # its name
+
+
+NO_LINK = _Link(0, is_of_vehicles=True, takes_unsigned=True, key="")
 
 
 class Signatures:
@@ -92,11 +95,10 @@ class Signatures:
         signed_until: int = 0,
     ) -> None:
         """``window`` is in seconds; ``times`` and ``signed_until`` come from the store."""
-        self._window = int(window * UNITS)
+        self.apply(window)
         self._keys: dict[str, Key] = {}  # with a secret, by name
         self._has_ring = False
         self._links: dict[str, _Link] = {}
-        self._numbers: dict[str, int] = {}
         self._times: dict[str, StreamTimes] = {}  # by fingerprint
         self._signers: dict[Place, Signer] = {}
         self._fenced: dict[Place, Signer] = {}  # to vehicles of a fleet that are ours
@@ -109,8 +111,8 @@ class Signatures:
         self._highest_offset = -inf  # in this run: a clock that is set back locks no sender out
         #: timestamps of packets that we signed, by side, key, link id and source
         self._own: dict[tuple[bool, str, int, int, int], int] = {}
-        self._heard: dict[tuple[str, Stream], int] = {}  # timestamps not given to the store yet
-        self._gone: set[tuple[str, Stream]] = set()
+        #: timestamps not given to the store yet; 0: the stream is forgotten
+        self._heard: dict[tuple[str, Stream], int] = {}
         #: when timestamps are to be given to the store
         self.keep_at = inf
         self._signed_until = signed_until  # as the store has it
@@ -118,14 +120,15 @@ class Signatures:
         self._from = signed_until  # least own timestamp, until the clock is known
         self._known_until = signed_until  # latest time that an earlier run knew
         self._told: dict[str, float] = {}  # by key, when its wrong clock was reported
-        #: reports of wrong clocks, until ``take_refused``
+        #: reports of wrong clocks, for the journal and the log, which take them out
         self.refused: list[SignatureRefused] = []
         #: monotonic seconds; set before anything is signed or checked
         self.now = 0.0
         self.counts = SignatureCounts()
         for time in times:
             stream = Stream(time.link_id, Address(time.system_id, time.component_id))
-            self._times_of(time.key).restore(stream, time.timestamp)
+            times_of = self._times.setdefault(time.key, StreamTimes())
+            times_of.restore(stream, time.timestamp)
 
     def __repr__(self) -> str:
         return f"Signatures({sorted(self._keys)}, {self.counts})"
@@ -149,43 +152,34 @@ class Signatures:
         Return the names of keys that are no longer valid; at the first call, of revoked ones.
         """
         before, self._keys = self._keys, {key.name: key for key in change.keys if key.secret}
-        gone = {name for name, key in before.items() if not self._has_secret_of(key)}
+        now = {key.name: key.fingerprint for key in self._keys.values()}
+        gone = {name for name, key in before.items() if now.get(name) != key.fingerprint}
         if not self._has_ring:
             gone = {key.name for key in change.keys if not key.secret}
         self._has_ring = True
         for way, signer in list(self._signers.items()):
-            if not self.knows(signer.key) and not self._is_last_of_vehicles(way[0]):
+            # Vehicles of a link that has lost its key without a new one take no other signature.
+            # Their packets are refused, so they are not driven; but commands to stand are still
+            # signed with the old key
+            there = self._links[way[0]]
+            is_last = there.is_of_vehicles and there.key not in self._keys
+            if not self.knows(signer.key) and not is_last:
                 del self._signers[way]  # also if only its role changed
         self.may_sign = bool(self._keys or self._signers)
         return gone
 
-    def _has_secret_of(self, key: Key) -> bool:
-        there = self._keys.get(key.name)
-        return there is not None and there.fingerprint == key.fingerprint
-
-    def _is_last_of_vehicles(self, link: str) -> bool:
-        """Whether a vehicle link has lost its key without a new one under that name.
-
-        Its vehicles take no other signature. Their packets are refused, so they are not driven;
-        but commands to stand are still signed with the old key.
-        """
-        there = self._links[link]
-        return there.is_of_vehicles and there.key not in self._keys
-
     def change_link(self, change: LinkChanged) -> None:
         """Add a link with its key and rules when it comes up, remove it when it goes down."""
         if not change.up:
-            self._links.pop(change.link, None)
             for signers in (self._signers, self._fenced):
                 for way in [way for way in signers if way[0] == change.link]:
                     del signers[way]
-            return
-        number = self._numbers.setdefault(change.link, len(self._numbers) + 1)
+        number = self._links.get(change.link, NO_LINK).number or len(self._links) + 1
         self._links[change.link] = _Link(
             min(number, HIGHEST_LINK_ID),
             change.side is LinkSide.VEHICLES,
             change.takes_unsigned,
-            change.key,
+            change.key if change.up else "",
         )
 
     def forget(self, link: str, peer: Peer) -> None:
@@ -196,34 +190,31 @@ class Signatures:
         """Whether a key is still valid; UNSIGNED is."""
         return key is UNSIGNED or self._keys.get(key.name) == key
 
-    def key_of_secret(self, secret: bytes) -> Key | None:
-        """Return the key that has this secret, or None."""
-        return next((key for key in self._keys.values() if key.secret == secret), None)
+    def set_up(self, link: str, peer: Peer, secret: bytes) -> str:
+        """Sign packets to a client with the key that has this secret; with zeros not at all.
 
-    def sign_to(self, link: str, peer: Peer, key: Key | None) -> None:
-        """Sign packets to an endpoint with this key from now on; None: stop signing them."""
-        if key is None:
-            self._signers.pop((link, peer), None)
-        elif key is not UNSIGNED:
-            self._signer(link, peer, key)
+        Return why not, "" if so. It gives no rights, and adds no key to the ring.
+        """
+        if not any(secret):
+            if not self._links.get(link, NO_LINK).takes_unsigned:
+                return "this link requires signed packets"
+            self.forget(link, peer)
+            return ""
+        for key in self._keys.values():
+            if key.secret == secret and key.role:
+                self._signer(link, peer, key)
+                return ""
+        return "this server has no such key for clients"
 
     def has_key(self, link: str) -> bool:
         """Whether a link has a key of its own."""
-        there = self._links.get(link)
-        return there is not None and bool(there.key)
-
-    def takes_unsigned(self, link: str) -> bool:
-        """Whether the link accepts unsigned packets."""
-        there = self._links.get(link)
-        return there is not None and there.takes_unsigned
+        return bool(self._links.get(link, NO_LINK).key)
 
     # incoming packets
 
     def admit(self, link: str, peer: Peer, packet: Packet) -> Key | None:
         """Return the signing key of a packet of good CRC, or UNSIGNED; None to drop it."""
-        there = self._links.get(link)
-        if there is None:
-            return UNSIGNED
+        there = self._links.get(link, NO_LINK)
         # whether there is any key to check a signature with
         matters = there.key if there.is_of_vehicles else self._has_ring
         if not matters or not packet.is_signed:
@@ -238,7 +229,7 @@ class Signatures:
             self.counts.unverified += 1
             return None
         stream, timestamp = stream_of(packet), timestamp_of(packet)
-        times = self._times_of(key.fingerprint)
+        times = self._times.setdefault(key.fingerprint, StreamTimes())
         own = there.is_of_vehicles, key.fingerprint, stream.link_id, *stream.source
         if timestamp <= self._own.get(own, -1):
             self.counts.old += 1  # our own packet, sent back by an eavesdropper
@@ -249,8 +240,7 @@ class Signatures:
             return None
         gone = times.note(stream, timestamp, window)
         if gone is not None:
-            self._heard.pop((key.fingerprint, gone), None)
-            self._gone.add((key.fingerprint, gone))
+            self._heard[key.fingerprint, gone] = 0
         self._heard[key.fingerprint, stream] = timestamp
         self.keep_at = min(self.keep_at, self.now + _kept_within(there, packet))
         self._signer(link, peer, key).heard(timestamp)
@@ -282,29 +272,14 @@ class Signatures:
         actor = f"{packet.source}@{peer} signed {key.name}"
         self.refused.append(SignatureRefused(actor, (self._clock() - timestamp) / UNITS, self.now))
 
-    def take_refused(self) -> list[SignatureRefused]:
-        """Return the wrong clocks found since the last call, for the journal and the log."""
-        refused, self.refused = self.refused, []
-        return refused
-
     def _signed_with(self, there: _Link, link: str, peer: Peer, packet: Packet) -> Key | None:
         if there.is_of_vehicles:
-            key = self._keys.get(there.key)
-            return key if key is not None and is_signed_with(packet, key.secret) else None
-        signer = self._signers.get((link, peer))
-        is_client_s = signer is not None and bool(signer.key.role)
-        if signer is not None and is_client_s and is_signed_with(packet, signer.key.secret):
-            return signer.key
-        for key in self._keys.values():
-            if key.role and is_signed_with(packet, key.secret):
-                return key
-        return None
-
-    def _times_of(self, fingerprint: str) -> StreamTimes:
-        times = self._times.get(fingerprint)
-        if times is None:
-            times = self._times[fingerprint] = StreamTimes()
-        return times
+            keys = [self._keys[there.key]] if there.key in self._keys else []
+        else:
+            signer = self._signers.get((link, peer))
+            keys = [] if signer is None else [signer.key]
+            keys = [key for key in (*keys, *self._keys.values()) if key.role]
+        return next((key for key in keys if is_signed_with(packet, key.secret)), None)
 
     # outgoing packets
 
@@ -312,14 +287,12 @@ class Signatures:
         """Return a packet as it leaves: signed, if its endpoint or link has a key."""
         signer = self._signers.get((link, peer))
         if signer is None:
-            there = self._links.get(link)
-            key = self._keys.get(there.key) if there is not None and there.key else None
+            key = self._keys.get(self._links.get(link, NO_LINK).key)
             if key is None:
                 return raw
             signer = self._signer(link, peer, key)
         clock = self._own_clock()
-        sealed = signer.sign(raw, clock=clock)
-        self._note_own(link, signer, sealed)
+        sealed = self._signed(link, signer, raw, clock=clock)
         if signer.last <= clock + COUNTED:  # beyond, it is the other end's time, for it alone
             self._highest = max(self._highest, signer.last)
         return sealed
@@ -332,38 +305,38 @@ class Signatures:
         vehicle's time, which others hear, too, but where it would be refused for being old; and
         once, when it gets the vehicle: what the one before has signed is not later than that time.
         """
-        there = self._links.get(link)
-        key = self._keys.get(there.key) if there is not None and there.key else None
+        key = self._keys.get(self._links.get(link, NO_LINK).key)
         if key is None:
             return self.sealed(link, peer, raw)
         signer = self._fenced.get((link, peer))
         if signer is None or signer.key != key:
             signer = self._fenced[link, peer] = Signer(key, link_id=FENCE_LINK_ID)
         heard = self._signer(link, peer, key).last
-        lead, since = self._lead
-        ahead = int(max(0.0, lead - DECAY * (self.now - since)) * UNITS)
-        clock = self._own_clock() + ahead
+        clock = self._own_clock() + int(max(0.0, self._lead_left()) * UNITS)
         if self._began.get((link, peer)) != self._lead:
             self._began[link, peer] = self._lead
             if heard > clock:
                 signer.heard(heard + int(STEP * UNITS))
-        sealed = signer.sign(raw, clock=max(clock, heard - BEHIND))
-        self._note_own(link, signer, sealed)
-        return sealed
+        return self._signed(link, signer, raw, clock=max(clock, heard - BEHIND))
 
     def take_lead(self, lead: float) -> None:
         """Sign at least so many seconds ahead of our clock to vehicles that are ours."""
-        left = self._lead[0] - DECAY * (self.now - self._lead[1])
-        self._lead = max(lead, left), self.now
+        self._lead = max(lead, self._lead_left()), self.now
 
-    def _note_own(self, link: str, signer: Signer, raw: bytes) -> None:
-        if raw[0] != MAGIC_V2:
-            return
-        is_of_vehicles = self._links[link].is_of_vehicles
-        own = is_of_vehicles, signer.key.fingerprint, signer.link_id, raw[5], raw[6]
-        if own not in self._own and len(self._own) >= MOST_OWN:
-            del self._own[next(iter(self._own))]
-        self._own[own] = max(signer.last, self._own.get(own, 0))
+    def _lead_left(self) -> float:
+        lead, since = self._lead
+        return lead - DECAY * (self.now - since)
+
+    def _signed(self, link: str, signer: Signer, raw: bytes, *, clock: int) -> bytes:
+        """Return a packet with its signature, and note that this is ours."""
+        sealed = signer.sign(raw, clock=clock)
+        if raw[0] == MAGIC_V2:
+            is_of_vehicles = self._links[link].is_of_vehicles
+            own = is_of_vehicles, signer.key.fingerprint, signer.link_id, raw[5], raw[6]
+            if own not in self._own and len(self._own) >= MOST_OWN:
+                del self._own[next(iter(self._own))]
+            self._own[own] = max(signer.last, self._own.get(own, 0))
+        return sealed
 
     def sealed_late(self, outgoing: Outgoing) -> Outgoing:
         """Return a packet that was made long before, signed for sending now."""
@@ -397,16 +370,15 @@ class Signatures:
             return None
         if is_used_up:
             self._signed_until = self._highest + RESERVE
-        seen = SignaturesSeen(
-            tuple(_time(*each, timestamp) for each, timestamp in self._heard.items()),
-            tuple(_time(*each, 0) for each in sorted(self._gone)),
-            self._signed_until,
-            self.now,
-        )
+        times = [
+            SignatureTime(fingerprint, stream.link_id, *stream.source, timestamp)
+            for (fingerprint, stream), timestamp in self._heard.items()
+        ]
+        heard = tuple(time for time in times if time.timestamp)
+        gone = tuple(time for time in times if not time.timestamp)
         self._heard.clear()
-        self._gone.clear()
         self.keep_at = inf
-        return seen
+        return SignaturesSeen(heard, gone, self._signed_until, self.now)
 
 
 def _kept_within(link: _Link, packet: Packet) -> float:
@@ -414,7 +386,3 @@ def _kept_within(link: _Link, packet: Packet) -> float:
     if packet.message_id in HARMLESS or link.is_of_vehicles:
         return HARMLESS_WITHIN
     return STREAMED_WITHIN if packet.message_id in STREAMED else 0.0
-
-
-def _time(fingerprint: str, stream: Stream, timestamp: int) -> SignatureTime:
-    return SignatureTime(fingerprint, stream.link_id, *stream.source, timestamp)

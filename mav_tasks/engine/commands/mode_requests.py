@@ -89,7 +89,9 @@ class ModeRequests:
                 vehicle.requests.forward(asked.packet)
                 vehicle.requests.ask_to_show(now=now)
         except Rejection as refusal:
-            if self._refusals.message(asked.client, vehicle, asked.packet, refusal, now=now):
+            if self._refusals.message(
+                asked.client, vehicle.system_id, asked.packet, refusal, now=now
+            ):
                 asked.client.tell_refusal(refusal.text, vehicle.server_address, now=now)
         note_halt(asked, before=epoch)
 

@@ -433,4 +433,4 @@ def acknowledge(asked: CommandRequest, task_id: TaskId) -> None:
     """Acknowledge with the task's id; a client that reads TASK_STATUS gets that, with its nonce."""
     asked.answer(MavResult.ACCEPTED, task_id)
     if asked.client.uses_dialect:
-        asked.client.statuses.changed(task_id)
+        asked.client.note_change(task_id)
