@@ -14,7 +14,6 @@ from mav_tasks.engine.vehicles.setpoint_clock import SetpointClock
 from mav_tasks.services.offboard import REGAINED_UNSEEN
 from mav_tasks.services.orders import Posture, Speeds
 from mav_tasks.services.phase import Phase
-from mav_tasks.settings import Settings
 from mav_tasks.tasks.driving.guidance import ZERO
 from mav_tasks.tasks.goal import ends_at_home
 from mav_tasks.tasks.lifecycle import TaskReason, TaskState
@@ -46,16 +45,13 @@ class Pilot:
         #: when the next set-point is due
         self.clock = SetpointClock(parts.system_id, period=parts.settings.watch.setpoint_period)
         #: checks that it moves as it was told to
-        self.guard = MotionGuard(parts.where.motion, parts.settings.watch)
+        self.guard = MotionGuard(parts.where.motion)
         self._is_closing = False
         self._regained_at = -inf  # s, when it was met driving
         self._is_back_home = False  # its last task returned home: disarm it even if others wait
 
     def __repr__(self) -> str:
-        return f"Pilot({self.clock!r}, {self.guard.ladder!r})"
-
-    def apply(self, settings: Settings) -> None:
-        self.guard.apply(settings.watch)
+        return f"Pilot({self.clock!r}, {self.guard!r})"
 
     def close(self) -> None:
         """Only stop the vehicle from here on: the server ends."""
@@ -94,7 +90,7 @@ class Pilot:
     def plan_tick(self, *, now: float) -> None:
         """Plan the next tick if there is anything to drive or to watch."""
         is_engaged = self._parts.control.is_engaged
-        if is_engaged or self._parts.tasks.active is not None or self.guard.ladder.is_on:
+        if is_engaged or self._parts.tasks.active is not None or self.guard.is_on:
             self.clock.plan(now=now)
         else:
             self.clock.stop()
@@ -107,11 +103,11 @@ class Pilot:
         parts = self._parts
         self._face(now=now)
         is_better = parts.persona.brakes_by_setpoints or self._may_be_a_car(now=now)
-        is_seen = self.guard.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
+        is_seen = parts.where.motion.is_fresh(now=now) or now - self._regained_at <= REGAINED_UNSEEN
         brakes = brakes and is_better and is_seen
         longest = parts.settings.watch.shutdown - 1.0 if self._is_closing else BRAKES_FOR
         parts.control.begin_stop(now=now, brake_for=longest if brakes else 0.0)
-        self.guard.ladder.begin(now=now)
+        self.guard.begin(now=now)
         parts.requests.end_performing()
         self._send_at_once(now=now)
 
@@ -132,7 +128,7 @@ class Pilot:
 
     def watch(self, *, now: float) -> None:
         """Watch from here on that it comes to stand."""
-        self.guard.ladder.begin(now=now)
+        self.guard.begin(now=now)
         self._send_at_once(now=now)
 
     def regain(self, *, now: float) -> None:
@@ -156,7 +152,9 @@ class Pilot:
 
         HOLD stops every vehicle, but some roll on in it.
         """
-        is_known = bool(self._parts.sticks.throttle(now=now)) and self.guard.is_fresh(now=now)
+        is_known = bool(self._parts.sticks.throttle(now=now)) and self._parts.where.motion.is_fresh(
+            now=now
+        )
         return self._parts.persona.brakes_by_setpoints and is_known
 
     def _send_at_once(self, *, now: float) -> None:
@@ -191,17 +189,17 @@ class Pilot:
             case DemandKind.DRIVE:
                 wanted = demand.velocity
                 if not wanted.is_zero:
-                    parts.where.motion.standstill.may_move()
+                    parts.where.motion.may_move()
                 control.drive(Speeds(wanted.forward, wanted.yaw_rate, wanted.course))
             case DemandKind.HOLD:
                 is_deaf, disarm = self._is_deaf(now=now), self._is_back_home
                 still = seen.still and not is_deaf and not parts.hold_before.is_open(now=now)
-                slows = is_deaf or self.guard.ladder.is_slowing(now=now)
+                slows = is_deaf or self.guard.is_slowing(now=now)
                 control.release(
                     still=still, disarm=disarm, now=now, is_slowing=slows, is_deaf=is_deaf
                 )
             case DemandKind.HAND_BACK:
-                slows = self.guard.ladder.is_slowing(now=now)
+                slows = self.guard.is_slowing(now=now)
                 control.release(still=seen.still, disarm=True, now=now, is_slowing=slows)
             case DemandKind.HALT if control.phase is not Phase.STOPPING:
                 self.begin_stop(brakes=True, now=now)

@@ -281,9 +281,9 @@ class Takeovers:
         follows = (parts.persona.hold_mode, parts.persona.control_mode)
         is_driven = parts.is_driven_by_others(now=now)
         if parts.monitor.armed and (is_driven or parts.monitor.custom_mode not in follows):
-            parts.where.motion.standstill.may_move()
+            parts.where.motion.may_move()
         else:
-            parts.where.motion.standstill.told_to_stand(now=now)
+            parts.where.motion.told_to_stand(now=now)
 
     def _note_others(self, *, now: float) -> None:
         """Note that it moves without us: a HOLD after that means that somebody parked it."""

@@ -234,7 +234,7 @@ class Vehicle:
         elif isinstance(message, m.GpsGlobalOrigin | m.HomePosition):
             if isinstance(message, m.HomePosition):
                 self.requests.heard_home()
-            self.where.frame.receive(message)
+            self.where.receive_place(message)
             self._look_at_frame(now=now)
         elif isinstance(message, m.MissionRequest | m.MissionRequestInt | m.MissionAck):
             self.requests.receive_of_plan(message, now=now)
@@ -267,8 +267,8 @@ class Vehicle:
             self._receive_heartbeat(heartbeat, now=now)
 
     def _look_at_frame(self, *, now: float) -> None:
-        if self.where.frame.changed:
-            self.where.frame.changed = False
+        if self.where.has_moved_frame:
+            self.where.has_moved_frame = False
             self.parts.note("changed the origin of its local frame", now=now)
             self.tasks.hold(TaskReason.FRAME_RESET, now=now)
 
@@ -372,8 +372,7 @@ class Vehicle:
         """Apply new settings, except those that need a restart (see the table of keys)."""
         self.parts.settings = settings
         self._monitor.lost_after = settings.watch.heartbeat_lost
-        self.where.motion.apply(settings.watch)
-        self.pilot.apply(settings)
+        self.where.motion.watch = settings.watch
         self.requests.apply(settings.watch)
         self._says.apply(settings)
 

@@ -338,8 +338,8 @@ class VehicleSide:
             if answer is not None:
                 self._answer = packet
                 if answer.tc1 and from_autopilot:
-                    offset = vehicle.where.motion.clock.offset
-                    offset.exchange(answer.ts1 / NANO, answer.tc1 / NANO, now=now)
+                    clock = vehicle.where.motion.clock
+                    clock.exchange(answer.ts1 / NANO, answer.tc1 / NANO, now=now)
             if from_autopilot and vehicle.shows_another(message, now=now):
                 latest = vehicle.parts.monitor.latest
                 vehicle = self._succeed(beat or Beat(link, peer, packet, latest, now), now=now)
